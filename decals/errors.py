@@ -1,0 +1,39 @@
+"""What can go wrong with decals, as exceptions.
+
+::
+
+    DecalsError(Exception)                    everything this package raises on purpose
+    ├── InvalidDecals(ValueError)             arrays that are no decals: shapes, NaN, radius ≤ 0, ...
+    ├── InvalidMesh(ValueError)               a mesh that has no surface: empty, NaN, zero area, ...
+    ├── InvalidImage(ValueError)              a file or array that is no image
+    ├── InvalidScene(ValueError)              a scene or scene file that does not hold together
+    └── NoGraphics(RuntimeError)              no usable OpenGL here; the message says what to install
+
+A message says what was expected, what came, and what to do.
+"""
+
+# ruff: noqa: N818 -- the names say what is wrong; the root says that they are errors
+
+
+class DecalsError(Exception):
+    """Root of every error that this package raises on purpose."""
+
+
+class InvalidDecals(DecalsError, ValueError):
+    """Arrays that do not describe decals."""
+
+
+class InvalidMesh(DecalsError, ValueError):
+    """A mesh that has no surface to put decals on."""
+
+
+class InvalidImage(DecalsError, ValueError):
+    """A file or array that is no image."""
+
+
+class InvalidScene(DecalsError, ValueError):
+    """A scene, or a scene file, that does not hold together."""
+
+
+class NoGraphics(DecalsError, RuntimeError):
+    """No usable OpenGL on this machine; the message says what to install."""
