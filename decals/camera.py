@@ -1,0 +1,214 @@
+"""Where a picture is taken from: view and projection matrices, and the rays of the pixels.
+
+Matrices act on columns, ``M @ (x, y, z, 1)``, as in OpenGL; they are float64, and the renderer rounds the
+product, not the factors.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InvalidScene
+
+Vector = tuple[float, float, float]
+Bounds = tuple[ArrayLike, ArrayLike]
+Floats = NDArray[np.float64]
+
+NEAR_OVER_FAR = 1e-4
+"""The near plane comes no closer than this fraction of the far one, for the depth buffer's sake."""
+PARALLEL = 1e-9
+"""Sine below which two directions count as parallel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rays:
+    """The rays through an image's pixels: ``origin + t·(corner + x·right + y·up)``.
+
+    ``(x, y)`` is the place in pixels from the image's lower left corner, so a pixel's centre lies at half
+    integers, as in ``gl_FragCoord``. Directions are not unit: their component along the view is 1.
+    """
+
+    origin: Floats
+    corner: Floats
+    right: Floats
+    up: Floats
+
+    def directions(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Give the directions at places in pixels, shape ``[..., 3]``."""
+        px, py = np.asarray(x, np.float64)[..., None], np.asarray(y, np.float64)[..., None]
+        return np.asarray(self.corner + px * self.right + py * self.up)
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A perspective camera.
+
+    Parameters
+    ----------
+    position, target
+        The eye, and the point in the middle of the picture, in the scene's units.
+    up
+        Any direction that is not along the view; the picture's upward one.
+    fov
+        Vertical angle of view in degrees, between 0 and 180.
+
+    Raises
+    ------
+    InvalidScene
+        Something is not finite, position and target coincide, or ``up`` is zero or along the view.
+    """
+
+    position: Vector
+    target: Vector = (0.0, 0.0, 0.0)
+    up: Vector = (0.0, 1.0, 0.0)
+    fov: float = 30.0
+
+    def __post_init__(self) -> None:
+        for name in ("position", "target", "up"):
+            object.__setattr__(self, name, _vector(name, getattr(self, name)))
+        object.__setattr__(self, "fov", float(self.fov))
+        if not 0.0 < self.fov < 180.0:
+            raise InvalidScene(f"a camera's fov must lie between 0 and 180 degrees, got {self.fov}")
+        scale = max(abs(x) for x in (*self.position, *self.target))
+        if not self.distance > 1e-12 * scale:
+            raise InvalidScene(
+                f"a camera's position and target coincide at {self.position}; move one of them"
+            )
+        if math.hypot(*self.up) == 0.0 or _parallel(np.array(self.up), self._back):
+            raise InvalidScene(f"a camera's up must not be zero or along the view, got {self.up}")
+
+    @property
+    def distance(self) -> float:
+        """How far the target is from the eye."""
+        return math.dist(self.position, self.target)
+
+    @property
+    def _back(self) -> Floats:
+        return _unit(np.subtract(self.position, self.target))
+
+    @property
+    def axes(self) -> Floats:
+        """Unit vectors to the right, up, and toward the viewer, as rows."""
+        back = self._back
+        right = _unit(np.cross(_unit(np.array(self.up)), back))
+        return np.stack([right, np.cross(back, right), back])
+
+    def view(self) -> Floats:
+        """World to eye space, ``float64[4, 4]``; the eye looks along −z."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.axes
+        matrix[:3, 3] = -self.axes @ np.array(self.position)
+        return matrix
+
+    def projection(self, aspect: float, near: float, far: float) -> Floats:
+        """Eye to clip space, ``float64[4, 4]``, for an image of this width over height."""
+        focal = 1.0 / math.tan(math.radians(self.fov) / 2)
+        matrix = np.zeros((4, 4))
+        matrix[0, 0] = focal / aspect
+        matrix[1, 1] = focal
+        matrix[2, 2] = (far + near) / (near - far)
+        matrix[2, 3] = 2 * far * near / (near - far)
+        matrix[3, 2] = -1.0
+        return matrix
+
+    def clip_range(self, bounds: Bounds) -> tuple[float, float]:
+        """Give near and far distances, along the view, that hold everything in a box before the eye."""
+        depth = (np.array(self.position) - _corners(bounds)) @ self.axes[2]
+        far = float(depth.max()) * 1.01
+        if far <= 0.0:  # all of it lies behind: any range is right
+            far = self.distance
+        return max(float(depth.min()) * 0.99, far * NEAR_OVER_FAR), far
+
+    def rays(self, width: int, height: int) -> Rays:
+        """Give the rays through the pixels of an image of this size."""
+        right, up, back = self.axes
+        half = math.tan(math.radians(self.fov) / 2)
+        pixel = 2 * half / height
+        corner = -back - half * up - (pixel * width / 2) * right
+        return Rays(np.array(self.position), corner, pixel * right, pixel * up)
+
+    @classmethod
+    def framing(
+        cls,
+        bounds: Bounds,
+        *,
+        direction: Sequence[float] = (0.35, 0.25, 1.0),
+        up: Sequence[float] = (0.0, 1.0, 0.0),
+        fov: float = 30.0,
+        aspect: float = 4 / 3,
+        margin: float = 1.05,
+    ) -> "Camera":
+        """Look at a box from a direction, just far enough to see all of it.
+
+        Parameters
+        ----------
+        bounds
+            Lower and upper corner, each ``[3]``.
+        direction
+            From the box toward the eye; any length.
+        up
+            Upward direction; where it is along the view, another axis takes its place.
+        fov
+            Vertical angle of view, degrees.
+        aspect
+            Width over height of the picture.
+        margin
+            Room around the box, 1 for none.
+        """
+        corners = _corners(bounds)
+        centre = corners.mean(axis=0)
+        toward = np.array(_vector("direction", direction))
+        if not toward.any():
+            raise InvalidScene("a framing wants a direction that is not zero")
+        upward = np.array(_vector("up", up))
+        if not upward.any() or _parallel(upward, _unit(toward)):
+            upward = np.eye(3)[int(np.argmin(np.abs(toward)))]
+        target, above = _triple(centre), _triple(upward)
+        frame = cls(_triple(centre + _reach(corners) * _unit(toward)), target, above, fov)
+        half = math.tan(math.radians(frame.fov) / 2) / margin
+        x, y, z = ((corners - centre) @ frame.axes.T).T
+        distance = float(np.max(z + np.maximum(np.abs(x) / (half * aspect), np.abs(y) / half)))
+        return cls(_triple(centre + max(distance, _reach(corners)) * _unit(toward)), target, above, fov)
+
+
+def _reach(corners: Floats) -> float:
+    """Give half the box's diagonal, or something usable where the box is a point."""
+    reach = float(np.linalg.norm(corners[-1] - corners[0])) / 2
+    return (
+        reach
+        if reach > 1e-6 * float(np.abs(corners).max())
+        else max(1e-3 * float(np.abs(corners).max()), 1.0)
+    )
+
+
+def _corners(bounds: Bounds) -> Floats:
+    box = np.asarray([bounds[0], bounds[1]], np.float64)
+    if box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any():
+        raise InvalidScene(f"bounds must be two finite corners (lower, upper) of three numbers, got {bounds}")
+    choice = np.indices((2, 2, 2)).reshape(3, 8).T
+    return np.take_along_axis(box, choice, axis=0)
+
+
+def _vector(name: str, value: ArrayLike) -> Vector:
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidScene(f"a camera's {name} must be three numbers, got {value!r}") from error
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise InvalidScene(f"a camera's {name} must be three finite numbers, got {value!r}")
+    return _triple(array)
+
+
+def _triple(array: Floats) -> Vector:
+    return float(array[0]), float(array[1]), float(array[2])
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / math.hypot(*vector))
+
+
+def _parallel(a: Floats, unit: Floats) -> bool:
+    return math.hypot(*np.cross(_unit(a), unit)) < PARALLEL
