@@ -5,6 +5,8 @@
     DecalsError(Exception)                    everything this package raises on purpose
     ├── InvalidDecals(ValueError)             arrays that are no decals: shapes, NaN, radius ≤ 0, ...
     ├── InvalidMesh(ValueError)               a mesh that has no surface: empty, NaN, zero area, ...
+    ├── InvalidPoints(ValueError)             points or directions that are none: shapes, NaN, ...
+    ├── InvalidSeeding(ValueError)            an impossible wish for seeds: negative count, no surface, ...
     ├── InvalidImage(ValueError)              a file or array that is no image
     ├── InvalidScene(ValueError)              a scene or scene file that does not hold together
     └── NoGraphics(RuntimeError)              no usable OpenGL here; the message says what to install
@@ -25,6 +27,14 @@ class InvalidDecals(DecalsError, ValueError):
 
 class InvalidMesh(DecalsError, ValueError):
     """A mesh that has no surface to put decals on."""
+
+
+class InvalidPoints(DecalsError, ValueError):
+    """Points or directions that are none."""
+
+
+class InvalidSeeding(DecalsError, ValueError):
+    """A wish for seeds that cannot be met."""
 
 
 class InvalidImage(DecalsError, ValueError):

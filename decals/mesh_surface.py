@@ -1,0 +1,215 @@
+"""A triangle mesh as a surface for decals."""
+
+from functools import cached_property
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from decals.errors import InvalidMesh
+from decals.mesh_queries import closest_points, first_hits, inside_flags
+from decals.surface import Flags, Floats, as_points, as_rays, frozen
+
+Faces = NDArray[np.int32]
+
+SLIVER = 1e-6
+"""A face whose doubled area is below this share of its squared edges has no usable normal and is left out
+(Warp's own mesh queries skip the same faces)."""
+
+
+class MeshSurface:
+    """A triangle mesh: closest points, rays and containment through a bounding volume hierarchy.
+
+    Degenerate faces are tolerated; they carry no samples and nothing projects onto them. The mesh
+    contains points only where it is closed: every edge is used equally often in both directions,
+    vertices at the same place counting as one.
+
+    Parameters
+    ----------
+    vertices
+        ``float[n, 3]``, finite.
+    faces
+        ``int[m, 3]``, indices into the vertices, counter-clockwise seen from outside.
+
+    Raises
+    ------
+    InvalidMesh
+        For wrong shapes, NaN or infinite vertices, indices out of range, no faces, no area.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        self.vertices = _as_vertices(vertices)
+        self.faces = _as_faces(faces, len(self.vertices))
+        corners, normals, areas = _sound_faces(self.vertices, self.faces)
+        self._corners = corners
+        self._cumulative = np.cumsum(areas)
+        self._normals = normals
+        used = self.vertices[corners]
+        self._bounds = used.min(axis=(0, 1)), used.max(axis=(0, 1))
+        for array in (self.vertices, self.faces, *self._bounds):
+            frozen(array)
+        self._device_points: wp.array[wp.vec3] = wp.array(self.vertices, dtype=wp.vec3, device="cpu")
+        self._device_normals: wp.array[wp.vec3] = wp.array(normals, dtype=wp.vec3, device="cpu")
+        self._device_corners: wp.array[wp.int32] = wp.array(corners.reshape(-1), dtype=wp.int32, device="cpu")
+        self._mesh = wp.Mesh(points=self._device_points, indices=self._device_corners)
+
+    def __repr__(self) -> str:
+        return f"MeshSurface({len(self.vertices)} vertices, {len(self.faces)} faces)"
+
+    @property
+    def area(self) -> float:
+        """Sum of the areas of the faces."""
+        return float(self._cumulative[-1])
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Corners of the box around the faces."""
+        return self._bounds
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether the faces bound a volume."""
+        return _is_closed(self.vertices, self.faces)
+
+    def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
+        """Points uniform by area, one in each ``1/count`` of it along the order of the faces."""
+        rng = np.random.default_rng(seed)
+        levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
+        face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)
+        root, along = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+        a, b, c = np.moveaxis(self.vertices[self._corners[face]].astype(np.float64), 1, 0)
+        positions = (1 - root) * a + root * ((1 - along) * b + along * c)
+        return positions.astype(np.float32), self._normals[face]
+
+    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
+        """Closest points of the mesh and the normals of their faces."""
+        queries = as_points(points)
+        positions, normals = np.empty_like(queries), np.empty_like(queries)
+        wp.launch(
+            closest_points,
+            dim=len(queries),
+            inputs=[self._mesh.id, self._device_normals, _shared(queries), self._reach(queries)],
+            outputs=[_shared(positions), _shared(normals)],
+            device="cpu",
+        )
+        return positions, normals
+
+    def normal(self, points: ArrayLike) -> Floats:
+        """Return the normals of the faces closest to the points."""
+        return self.project(points)[1]
+
+    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Floats:
+        """Distance to the first face that each ray meets, from either side."""
+        starts, ways = as_rays(origins, directions)
+        distances = np.empty(len(starts), np.float32)
+        wp.launch(
+            first_hits,
+            dim=len(starts),
+            inputs=[self._mesh.id, _shared(starts), _shared(ways)],
+            outputs=[wp.array(distances, dtype=wp.float32, device="cpu", copy=False)],
+            device="cpu",
+        )
+        distances[~ways.any(axis=1)] = np.inf
+        return distances
+
+    def contains(self, points: ArrayLike) -> Flags:
+        """Whether the mesh winds around each point; an open mesh contains nothing."""
+        queries = as_points(points)
+        low, high = self.bounds
+        inside: Flags = np.all((queries >= low) & (queries <= high), axis=1)
+        if not inside.any() or not self.closed:
+            return np.zeros(len(queries), np.bool_)
+        near = np.ascontiguousarray(queries[inside])
+        flags = np.empty(len(near), np.int32)
+        wp.launch(
+            inside_flags,
+            dim=len(near),
+            inputs=[self._winding_mesh.id, _shared(near), self._reach(near)],
+            outputs=[wp.array(flags, dtype=wp.int32, device="cpu", copy=False)],
+            device="cpu",
+        )
+        inside[inside] = flags == 1
+        return inside
+
+    @cached_property
+    def _winding_mesh(self) -> wp.Mesh:
+        corners = self._device_corners
+        if _volume(self.vertices, self.faces) < 0:
+            turned = np.ascontiguousarray(self._corners[:, ::-1])
+            corners = wp.array(turned.reshape(-1), dtype=wp.int32, device="cpu")
+        return wp.Mesh(points=self._device_points, indices=corners, support_winding_number=True)
+
+    def _reach(self, points: Floats) -> float:
+        """Return a distance that is certainly larger than from any of the points to the mesh."""
+        low, high = (corner.astype(np.float64) for corner in self.bounds)
+        if len(points) == 0:
+            return 0.0
+        span = np.maximum(points.max(axis=0), high) - np.minimum(points.min(axis=0), low)
+        return float(2.0 * np.linalg.norm(span))
+
+
+def _shared(rows: Floats) -> wp.array[wp.vec3]:
+    """Show the rows to a kernel without a copy, so that it can also write them."""
+    return wp.array(rows, dtype=wp.vec3, device="cpu", copy=False)
+
+
+def _as_vertices(vertices: ArrayLike) -> Floats:
+    try:
+        array = np.array(vertices, dtype=np.float32, order="C")
+    except (TypeError, ValueError) as error:
+        raise InvalidMesh(
+            f"vertices: expected numbers of shape [n, 3], got {type(vertices).__name__}"
+        ) from error
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise InvalidMesh(f"vertices: expected shape [n, 3] with n > 0, got {list(array.shape)}")
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise InvalidMesh(
+            f"vertices: expected finite numbers, got {array[row]} in row {row}; repair the mesh"
+        )
+    return array
+
+
+def _as_faces(faces: ArrayLike, vertex_count: int) -> Faces:
+    given = np.asarray(faces)
+    if given.ndim != 2 or given.shape[1] != 3 or len(given) == 0:
+        raise InvalidMesh(
+            f"faces: expected shape [m, 3] with m > 0, got {list(given.shape)}; triangulate polygons first"
+        )
+    if not np.issubdtype(given.dtype, np.integer):
+        raise InvalidMesh(f"faces: expected integers, got {given.dtype}")
+    if given.min() < 0 or given.max() >= vertex_count:
+        bad = given.min() if given.min() < 0 else given.max()
+        raise InvalidMesh(f"faces: expected indices from 0 to {vertex_count - 1}, got {bad}")
+    return np.array(given, dtype=np.int32, order="C")
+
+
+def _sound_faces(vertices: Floats, faces: Faces) -> tuple[Faces, Floats, NDArray[np.float64]]:
+    """Select the faces that have a normal, with unit normals and areas."""
+    a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
+    crosses = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(crosses, axis=1)
+    edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
+    sound = doubled > SLIVER * edges
+    if not sound.any():
+        raise InvalidMesh(
+            f"expected a mesh with area, got {len(faces)} degenerate faces; check its units and its indices"
+        )
+    normals = (crosses[sound] / doubled[sound, None]).astype(np.float32)
+    return np.ascontiguousarray(faces[sound]), normals, 0.5 * doubled[sound]
+
+
+def _is_closed(vertices: Floats, faces: Faces) -> bool:
+    """Whether every edge is walked equally often in both directions, after welding equal vertices."""
+    welded = np.unique(vertices + np.float32(0), axis=0, return_inverse=True)[1].reshape(-1)
+    corners = welded[faces].astype(np.int64)
+    start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    _, edge = np.unique(np.minimum(start, end) * len(vertices) + np.maximum(start, end), return_inverse=True)
+    return not np.bincount(edge.reshape(-1), weights=np.sign(end - start)).any()
+
+
+def _volume(vertices: Floats, faces: Faces) -> float:
+    """Signed volume: positive where the faces wind counter-clockwise seen from outside."""
+    wide = vertices.astype(np.float64) - vertices.mean(axis=0, dtype=np.float64)
+    a, b, c = np.moveaxis(wide[faces], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
