@@ -1,0 +1,94 @@
+"""Build the wheel, look into it, and use it from an environment and a folder outside the checkout."""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import venv
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("blobtree", "decals", "implicit_decals.apps", "implicit_decals.shaders")
+IMPORT_ALL = """
+import importlib, pathlib, sys
+for name in sys.argv[2:]:
+    file = pathlib.Path(importlib.import_module(name).__file__).resolve()
+    assert file.is_relative_to(sys.argv[1]), f"{name} was imported from {file}, not from the wheel"
+"""
+
+
+def build(folder: Path) -> Path:
+    """Build the sdist, and the wheel from it: nothing left over in the checkout can slip in."""
+    command = [sys.executable, "-m", "build", "--outdir", folder, ROOT]
+    built = subprocess.run(command, check=False, capture_output=True, text=True)
+    if built.returncode:
+        sys.exit(f"{built.stdout}{built.stderr}the wheel could not be built")
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def expected_files() -> set[str]:
+    """Name every module, shader and marker of the four packages as the wheel should hold it."""
+    files = set()
+    for package in PACKAGES:
+        folder = ROOT / package.removeprefix("implicit_decals.")
+        inside = package.replace(".", "/")
+        found = [
+            p for pattern in ("*.py", "*.glsl", "*.vert", "*.frag", "*.comp") for p in folder.rglob(pattern)
+        ]
+        files.update(f"{inside}/{p.relative_to(folder).as_posix()}" for p in [*found, folder / "py.typed"])
+    return files
+
+
+def check_content(wheel: Path) -> None:
+    """Refuse a wheel that lacks one of our files, or that takes a name it should leave to others."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    missing = sorted(expected_files() - names)
+    if missing:
+        sys.exit(f"the wheel lacks {', '.join(missing)}: see packages and package-data in pyproject.toml")
+    tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
+    if tops != {"blobtree", "decals", "implicit_decals"}:
+        sys.exit(f"the wheel has {sorted(tops)} at its top level")
+
+
+def check_use(wheel: Path, folder: Path) -> None:
+    """Import every package from the installed wheel and ask the command for its help."""
+    home = folder / "venv"
+    venv.create(home, symlinks=os.name != "nt")
+    paths = sysconfig.get_paths(vars={"base": str(home), "platbase": str(home)})
+    site, scripts = Path(paths["purelib"]), Path(paths["scripts"])
+    # The dependencies come from this environment; its own editable copy of us does not, as a path
+    # that a .pth file names has its .pth files ignored.
+    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    python = scripts / "python"
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        python,
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+    ]
+    subprocess.run([*install, wheel], check=True)
+    subprocess.run([python, "-c", IMPORT_ALL, site.resolve(), *PACKAGES], check=True, cwd=folder)
+    subprocess.run([scripts / "implicit-decals", "--help"], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+
+
+def main() -> None:
+    """Build and check the wheel."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        wheel = build(folder / "dist")
+        check_content(wheel)
+        check_use(wheel, folder)
+    print(f"{wheel.name}: complete, and works outside the checkout")
+
+
+if __name__ == "__main__":
+    main()
