@@ -1,0 +1,180 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from decals.errors import InvalidImage
+from decals.images import BUILTIN_IMAGES, MAX_IMAGE_EDGE, generate_image, load_image, read_image
+
+FULL = ("rock", "scale", "tile")
+CUT_OUT = ("eye", "rivet")
+
+
+def _rho(size: int) -> NDArray[np.float64]:
+    ticks = (np.arange(size) + 0.5) * 2 / size - 1
+    return np.hypot(*np.meshgrid(ticks, ticks))
+
+
+def test_the_names_are_the_five() -> None:
+    assert BUILTIN_IMAGES == ("eye", "rivet", "rock", "scale", "tile")
+
+
+@pytest.mark.parametrize("name", BUILTIN_IMAGES)
+@pytest.mark.parametrize("size", [1, 33, 256])
+def test_any_size_is_rgba_and_repeats(name: str, size: int) -> None:
+    image = generate_image(name, size)
+    assert image.shape == (size, size, 4)
+    assert image.dtype == np.uint8
+    generate_image.cache_clear()
+    assert np.array_equal(image, generate_image(name, size))
+
+
+@pytest.mark.parametrize("name", FULL)
+def test_contact_ring_is_dark_opaque_and_reaches_the_corners(name: str) -> None:
+    image, rho = generate_image(name, 256), _rho(256)
+    assert (image[..., 3] == 255).all()
+    assert image[rho > 0.97, :3].max() < 24
+    assert image[rho < 0.85, :3].mean() > 70
+    # The ring is a few percent wide, no more: colour comes back soon behind it.
+    assert image[(rho > 0.90) & (rho < 0.91), :3].mean() > 40
+
+
+@pytest.mark.parametrize("name", CUT_OUT)
+def test_cut_outs_have_a_smooth_edge_inside_the_rim(name: str) -> None:
+    alpha, rho = generate_image(name, 256)[..., 3], _rho(256)
+    assert (alpha[rho < 0.8] == 255).all()
+    assert (alpha[rho > 0.97] == 0).all()
+    soft = (alpha > 0) & (alpha < 255)
+    assert soft.any()
+    assert np.ptp(rho[soft]) < 6 / 256
+
+
+@pytest.mark.parametrize("name", CUT_OUT)
+def test_transparent_pixels_carry_the_edge_colour(name: str) -> None:
+    """Straight alpha must hold no foreign colour behind the edge, or filters would show a fringe."""
+    image = generate_image(name, 128).astype(int)
+    edge = (image[..., 3] > 0) & (image[..., 3] < 128)
+    inner = (image[..., 3] == 255) & (_rho(128) > 0.84)
+    assert np.abs(image[edge, :3].mean(axis=0) - image[inner, :3].mean(axis=0)).max() < 60
+
+
+def test_the_scale_is_alike_on_both_sides_of_its_keel_and_points_along_u() -> None:
+    image = generate_image("scale", 200)[..., :3].astype(float)
+    assert np.abs(image - image[::-1]).mean() < 6
+    root, tip = image[60:140, 30:70], image[60:140, 130:170]
+    assert tip.mean() > 1.3 * root.mean()
+
+
+def test_the_ring_looks_the_same_from_every_side() -> None:
+    for name in FULL:
+        image = generate_image(name, 128).astype(int)
+        ring = (_rho(128) > 0.97)[..., None]
+        assert np.abs((image - np.rot90(image)) * ring).max() <= 8
+
+
+def test_small_image_is_the_large_one_averaged() -> None:
+    large = generate_image("tile", 512)[..., :3].astype(float)
+    small = generate_image("tile", 128)[..., :3].astype(float)
+    assert np.abs(large.reshape(128, 4, 128, 4, 3).mean(axis=(1, 3)) - small).mean() < 1.5
+
+
+def test_a_colour_tints() -> None:
+    red, blue = generate_image("scale#c03020", 64), generate_image("scale#2030c0", 64)
+    assert red[..., 0].mean() > 1.5 * red[..., 2].mean()
+    assert blue[..., 2].mean() > 1.5 * blue[..., 0].mean()
+
+
+@pytest.mark.parametrize("reference", ["", "scales", "scale#", "scale#12345", "SCALE", "scale#12345g"])
+def test_unknown_names_say_what_there_is(reference: str) -> None:
+    with pytest.raises(InvalidImage, match=r"eye, rivet, rock, scale, tile"):
+        generate_image(reference)
+
+
+@pytest.mark.parametrize("size", [0, -1, 5000])
+def test_absurd_sizes_are_refused(size: int) -> None:
+    with pytest.raises(InvalidImage, match="1 to 4096"):
+        generate_image("tile", size)
+
+
+def test_generated_pixels_are_read_only() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        generate_image("tile", 8)[0, 0, 0] = 1
+
+
+def _save(path: Path, array: NDArray[np.generic], mode: str | None = None) -> Path:
+    picture = Image.fromarray(array)
+    (picture.convert(mode) if mode else picture).save(path)
+    return path
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "RGB", "RGBA"])
+def test_every_mode_becomes_rgba(tmp_path: Path, mode: str) -> None:
+    grey = np.zeros((3, 5), np.uint8)
+    grey[1, 2] = 255
+    pixels = read_image(_save(tmp_path / "a.png", grey, mode))
+    assert pixels.shape == (3, 5, 4)
+    assert pixels.dtype == np.uint8
+    assert (pixels[..., 3] == 255).all()
+    assert pixels[1, 2, :3].tolist() == [255, 255, 255]
+    assert pixels[0, 0, :3].tolist() == [0, 0, 0]
+
+
+def test_alpha_survives(tmp_path: Path) -> None:
+    array = np.dstack([np.full((4, 4), level, np.uint8) for level in (10, 20, 30, 77)])
+    assert np.array_equal(read_image(_save(tmp_path / "a.png", array)), array)
+
+
+def test_palette_with_a_transparent_entry(tmp_path: Path) -> None:
+    picture = Image.fromarray(np.array([[0, 1]], np.uint8), mode=None).convert("P")
+    picture.save(tmp_path / "a.png", transparency=0)
+    assert read_image(tmp_path / "a.png")[0, :, 3].tolist() == [0, 255]
+
+
+def test_sixteen_bits_are_scaled_not_clipped(tmp_path: Path) -> None:
+    array = np.array([[0, 257, 32896, 65535]], np.uint16)
+    assert read_image(_save(tmp_path / "a.png", array))[0, :, 0].tolist() == [0, 1, 128, 255]
+
+
+def test_float_picture(tmp_path: Path) -> None:
+    array = np.array([[0.0, 0.5, np.nan, 1.0]], np.float32)
+    assert read_image(_save(tmp_path / "a.tiff", array))[0, :, 0].tolist() == [0, 128, 0, 255]
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(InvalidImage, match="found no file"):
+        load_image(str(tmp_path / "nowhere.png"))
+
+
+def test_relative_to_a_folder(tmp_path: Path) -> None:
+    _save(tmp_path / "a.png", np.zeros((2, 2), np.uint8))
+    assert load_image("a.png", folder=tmp_path).shape == (2, 2, 4)
+
+
+@pytest.mark.parametrize("content", [b"", b"not a picture at all", b"\x89PNG\r\n\x1a\n"])
+def test_no_picture(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "a.png"
+    path.write_bytes(content)
+    with pytest.raises(InvalidImage, match=r"a\.png"):
+        read_image(path)
+
+
+def test_truncated_picture(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)
+    path = _save(tmp_path / "a.png", noise)
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(InvalidImage, match="could not read"):
+        read_image(path)
+
+
+def test_too_large(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    Image.new("1", (MAX_IMAGE_EDGE + 1, 1)).save(path)
+    with pytest.raises(InvalidImage, match="scale it"):
+        read_image(path)
+
+
+def test_a_folder_is_no_image(tmp_path: Path) -> None:
+    with pytest.raises(InvalidImage, match="found no file"):
+        read_image(tmp_path)
