@@ -1,0 +1,155 @@
+"""Decals as data: what is kept, what is repaired, what is refused."""
+
+import hypothesis.extra.numpy as hnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blobtree.kernels import RIM
+from decals.errors import DecalsError, InvalidDecals
+from decals.model import FACING_LIMIT, LARGEST, SMALLEST_RADIUS, Decals
+
+
+def some(count=5, seed=0, **changes):
+    rng = np.random.default_rng(seed)
+    arrays = {
+        "positions": rng.normal(size=(count, 3)),
+        "normals": rng.normal(size=(count, 3)),
+        "tangents": rng.normal(size=(count, 3)),
+        "radii": rng.uniform(0.1, 1.0, count),
+        "images": rng.integers(0, 9, count),
+        "spill": rng.random(count) < 0.5,
+    }
+    return Decals(**{**arrays, **changes})
+
+
+def test_frames_are_orthonormal_and_right_handed():
+    decals = some(200)
+    frame = np.stack([decals.tangents, decals.bitangents, decals.normals], axis=1).astype(float)
+    assert np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max() < 5e-7
+    assert np.linalg.det(frame) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_tangent_is_projected_within_the_plane_of_itself_and_the_normal():
+    decals = Decals([[0, 0, 0]], [[0, 0, 2]], [[3, 0, 4]], [1.0])
+    assert decals.tangents.tolist() == [[1, 0, 0]]
+    assert decals.normals.tolist() == [[0, 0, 1]]
+
+
+def test_valid_frames_survive_bit_for_bit():
+    decals = some(500)
+    again = decals.replace()
+    for name in ("positions", "normals", "tangents", "radii", "images", "spill"):
+        assert np.array_equal(getattr(again, name), getattr(decals, name))
+
+
+def test_arrays_are_float32_copies_that_nobody_can_write():
+    mine = np.ones((1, 3), np.float32)
+    decals = Decals(mine, [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    mine[:] = 7
+    assert decals.positions.tolist() == [[1, 1, 1]]
+    assert decals.images.tolist() == [0]
+    assert decals.spill.tolist() == [False]
+    for name, dtype in (("positions", "f4"), ("radii", "f4"), ("images", "i4"), ("spill", "?")):
+        assert getattr(decals, name).dtype == np.dtype(dtype)
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(decals, name)[:] = 0
+
+
+def test_influence_puts_the_rim_at_the_radius():
+    decals = some(50)
+    assert decals.influence.dtype == np.float32
+    assert (1 - (decals.radii.astype(float) / decals.influence) ** 2) ** 3 == pytest.approx(0.5, abs=1e-6)
+    assert decals.influence == pytest.approx(decals.radii / RIM)
+
+
+def test_slices_masks_and_index_arrays():
+    decals = some(6)
+    assert np.array_equal(decals[2:4].positions, decals.positions[2:4])
+    assert np.array_equal(decals[decals.spill].images, decals.images[decals.spill])
+    assert np.array_equal(decals[[4, 0]].radii, decals.radii[[4, 0]])
+    assert len(decals[[]]) == 0
+    assert np.array_equal(decals[-1].normals, decals.normals[-1:])
+
+
+def test_concatenate_keeps_order_and_all_fields():
+    first, second = some(3, 1), some(4, 2)
+    both = Decals.concatenate([first, second])
+    assert len(both) == 7
+    assert np.array_equal(both[:3].tangents, first.tangents)
+    assert np.array_equal(both[3:].spill, second.spill)
+    assert len(Decals.concatenate([])) == len(Decals.empty()) == 0
+    assert Decals.empty().packed().shape == (0, 4)
+
+
+def test_packed_record():
+    decals = some(3, spill=np.array([False, True, False]))
+    record = decals.packed()
+    assert record.shape == (9, 4)
+    assert record.dtype == np.float32
+    assert np.array_equal(record[0::3], np.column_stack([decals.positions, decals.influence]))
+    assert np.array_equal(record[1::3, :3], decals.normals)
+    assert record[1::3, 3].tolist() == [FACING_LIMIT, -2.0, FACING_LIMIT]
+    assert np.array_equal(record[2::3], np.column_stack([decals.tangents, decals.images]))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("positions", np.zeros((2, 2)), r"shape \[n, 3\], got \[2, 2\]"),
+        ("positions", "nonsense", "expected numbers"),
+        ("positions", np.full((2, 3), np.nan), "finite"),
+        ("positions", np.full((2, 3), -np.inf), "finite"),
+        ("positions", np.full((2, 3), 1e20), "rescale"),
+        ("normals", np.zeros((3, 3)), r"shape \[2, 3\], got \[3, 3\]"),
+        ("normals", [[0, 0, 1], [0, 0, 0]], "zero vector in row 1"),
+        ("tangents", [[0, 0, 0], [1, 0, 0]], "zero vector in row 0"),
+        ("tangents", [[1, 0, 0], [0, 0, -5]], "along normal .* in row 1"),
+        ("radii", [1.0, 0.0], "in row 1"),
+        ("radii", [-1.0, 1.0], "in row 0"),
+        ("radii", [1.0, np.nan], "finite"),
+        ("radii", [1e-20, 1.0], "got 1e-20"),
+        ("radii", [1.0, 1e20], "got 1e[+]20"),
+        ("radii", 1.0, "shape"),
+        ("images", [0, -1], "got -1 in row 1"),
+        ("images", [0, 2**24], "row 1"),
+        ("images", [0.5, 1.0], "whole numbers"),
+        ("images", [0], "shape"),
+        ("spill", [0, 1], "True or False"),
+    ],
+)
+def test_refuses(name, value, says):
+    good = {
+        "positions": np.zeros((2, 3)),
+        "normals": [[0, 0, 1]] * 2,
+        "tangents": [[1, 0, 0]] * 2,
+        "radii": [1, 1],
+    }
+    with pytest.raises(InvalidDecals, match=says) as caught:
+        Decals(**{**good, name: value})
+    assert isinstance(caught.value, DecalsError)
+    assert isinstance(caught.value, ValueError)
+    assert str(caught.value).startswith(name)
+
+
+def test_limits_are_accepted():
+    radii = [SMALLEST_RADIUS, LARGEST]
+    decals = Decals([[LARGEST] * 3, [-LARGEST] * 3], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, radii)
+    assert decals.replace().radii.tolist() == radii
+
+
+vectors = hnp.arrays(np.float64, (4, 3), elements=st.floats(-1e300, 1e300))
+
+
+@settings(max_examples=100, deadline=None)
+@given(normals=vectors, tangents=vectors)
+def test_any_directions_make_an_orthonormal_frame_or_a_clear_error(normals, tangents):
+    try:
+        decals = Decals(np.zeros((4, 3)), normals, tangents, np.ones(4))
+    except InvalidDecals:
+        return
+    n, u = decals.normals.astype(float), decals.tangents.astype(float)
+    assert np.abs((n * n).sum(1) - 1).max() < 3e-6
+    assert np.abs((u * u).sum(1) - 1).max() < 3e-6
+    assert np.abs((n * u).sum(1)).max() < 3e-6
