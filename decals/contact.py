@@ -31,12 +31,11 @@ NOWHERE = 2.0
 SERIES_BELOW = 0.02
 SMALLEST_SPAN = 1.0e-7
 SMALLEST_COMPLEMENT = 1.0e-30
-SMALLEST_EXPONENT = -80.0
 
 
 @wp.func
 def field_complement(z: wp.float32) -> wp.float32:
-    """Complement e = 1 − g(d) of the squared relative distance z = d² = |q − p|²/s², exact to rounding near z = 0."""
+    """Complement e = 1 − g(d) of z = d² = |q − p|²/s², to full relative precision near z = 0 too."""
     t = wp.min(z, 1.0)
     return t * (3.0 - t * (3.0 - t))
 
@@ -55,7 +54,7 @@ def contact_push(e_i: wp.float32, e_k: wp.float32) -> wp.float32:
     w = (e_i - e_k) / wp.max(1.0 - 2.0 * e_k, SMALLEST_SPAN)
     if w >= 1.0:
         return 0.0
-    return wp.exp(wp.max(log_of_rest(w) / wp.max(e_k, SMALLEST_COMPLEMENT), SMALLEST_EXPONENT))
+    return wp.exp(log_of_rest(w) / wp.max(e_k, SMALLEST_COMPLEMENT))
 
 
 @wp.func

@@ -1,0 +1,55 @@
+"""The paper's equation 5, repaired, in float64 NumPy: once as written, once where 1 − f would cancel."""
+
+import numpy as np
+
+RIM = np.sqrt(1 - 0.5 ** (1 / 3))
+
+
+def falloff(distance):
+    """g(d), eq. 2."""
+    return np.where(distance <= 1, (1 - np.minimum(distance, 1) ** 2) ** 3, 0.0)
+
+
+def inverse_falloff(field):
+    """g⁻¹(F), eq. 3."""
+    return np.sqrt(1 - np.cbrt(field))
+
+
+def contact_field(fields):
+    """F of rows of field values, literally: owner = highest field; NaN where the owner's field is below ½."""
+    fields = np.asarray(fields, np.float64)
+    owner = fields.argmax(axis=1)
+    highest = fields[np.arange(len(fields)), owner][:, None]
+    with np.errstate(all="ignore"):
+        u = (fields + highest - 1) / (2 * highest - 1)
+        h = np.where(fields + highest <= 1, 1.0, 1 - np.abs(u) ** (1 / (1 - highest)))
+    h[fields == highest] = 0.0  # u = 1, also where 1/(1 - f) is infinite
+    h[np.arange(len(fields)), owner] = 1.0
+    deformed = 0.5 + (highest[:, 0] - 0.5) * h.prod(axis=1)
+    return np.where(highest[:, 0] >= 0.5, deformed, np.nan)
+
+
+def complements(squared):
+    """e = 1 − g of squared relative distances, without cancellation."""
+    t = np.minimum(squared, 1.0)
+    return t * (3 - 3 * t + t * t)
+
+
+def contact_complement(e):
+    """(owner, E = 1 − F) of rows of complements, to full relative precision; owner −1 outside all rims."""
+    e = np.asarray(e, np.float64)
+    rows, owner = np.arange(len(e)), e.argmin(axis=1)
+    least = e[rows, owner][:, None]
+    with np.errstate(all="ignore"):
+        w = (e - least) / (1 - 2 * least)
+        log_h = np.where(w < 1, np.log1p(-np.exp(np.log1p(-np.minimum(w, 1)) / least)), 0.0)
+    log_h[e == least] = -np.inf
+    log_h[rows, owner] = 0.0
+    result = least[:, 0] + (0.5 - least[:, 0]) * -np.expm1(log_h.sum(axis=1))
+    return np.where(least[:, 0] <= 0.5, owner, -1), result
+
+
+def rim_distance(complement):
+    """r / r_h = g⁻¹(1 − E) / r_h, without cancellation."""
+    c = np.cbrt(1 - complement)
+    return np.sqrt(complement / (1 + c + c * c)) / RIM
