@@ -1,6 +1,6 @@
 """Run the tests with exactly the oldest dependencies that pyproject.toml allows.
 
-Takes minutes and a download, so CI leaves it out: run it when a lower bound, or a use of a dependency, changes.
+It takes minutes and a download, so CI leaves it out: run it after changing a bound or the use of a dependency.
 """
 
 import os

@@ -1,0 +1,65 @@
+"""Make an OpenGL context and print what it is, as JSON.
+
+Run in a process of its own, as a bad driver can crash it.
+"""
+
+import json
+import sys
+from typing import Any
+
+import moderngl
+
+from decals.render.libraries import require_gl
+
+OLDEST_GL = 210
+GLSL_VERSIONS = (460, 450, 440, 430, 420, 410, 400, 330)
+SMALLEST_SHADER = "#version {} core\nvoid main() {{ gl_Position = vec4(0.0); }}"
+
+
+def newest_glsl(gl: moderngl.Context) -> int:
+    """Find the newest GLSL that compiles, 330 standing for 3.30; 0 if none from 3.30 on does."""
+    for version in GLSL_VERSIONS:
+        try:
+            gl.program(vertex_shader=SMALLEST_SHADER.format(version)).release()
+        except moderngl.Error:
+            continue
+        return version
+    return 0
+
+
+def describe() -> dict[str, str | int]:
+    """Describe the best OpenGL context to be had here.
+
+    Returns
+    -------
+    dict
+        ``code`` (330 for OpenGL 3.3), ``glsl`` (330 for GLSL 3.30), ``vendor``, ``renderer`` and ``version``.
+
+    Raises
+    ------
+    decals.errors.NoGraphics
+        The system libraries are missing.
+    Exception
+        What moderngl raises where no context can be made.
+    """
+    require_gl()
+    settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
+    try:
+        gl = moderngl.create_context(require=330, standalone=True, **settings)
+    except Exception:  # glcontext raises nothing more precise
+        gl = moderngl.create_context(require=OLDEST_GL, standalone=True, **settings)
+    with gl:
+        return {
+            "code": gl.version_code,
+            "glsl": newest_glsl(gl),
+            "vendor": gl.info["GL_VENDOR"],
+            "renderer": gl.info["GL_RENDERER"],
+            "version": gl.info["GL_VERSION"],
+        }
+
+
+if __name__ == "__main__":
+    try:
+        print(json.dumps(describe()))
+    except Exception as error:
+        sys.exit(str(error))

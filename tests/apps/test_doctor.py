@@ -1,0 +1,162 @@
+import io
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from decals.render.libraries import missing_gl_libraries
+from implicit_decals.apps import doctor
+from implicit_decals.apps.doctor import Finding, Status
+
+CONTEXT: dict[str, str | int] = {
+    "code": 330,
+    "glsl": 330,
+    "vendor": "Mesa",
+    "renderer": "llvmpipe",
+    "version": "3.3 (Core Profile) Mesa",
+}
+
+
+def shown(findings: list[Finding]) -> tuple[int, str]:
+    text = io.StringIO()
+    code = doctor.report(findings, Console(file=text, width=200))
+    return code, text.getvalue()
+
+
+def test_an_old_python_is_missing() -> None:
+    assert doctor.python_finding((3, 11, 0)).status is Status.GOOD
+    old = doctor.python_finding((3, 10, 12))
+    assert old.status is Status.MISSING
+    assert old.value == "3.10.12"
+    assert "3.11" in old.advice
+
+
+def test_every_package_is_looked_for_and_an_absent_one_comes_with_its_command() -> None:
+    def version(name: str) -> str:
+        if name == "vtk":
+            raise metadata.PackageNotFoundError(name)
+        return "1.2"
+
+    found = {finding.name: finding for finding in doctor.package_findings(version)}
+    assert set(found) == set(doctor.PACKAGES)
+    assert found["vtk"].status is Status.MISSING
+    assert found["vtk"].advice.endswith("-m pip install vtk")
+    assert found["numpy"] == Finding("numpy", "1.2")
+
+
+def test_warp_that_does_not_start_is_a_finding() -> None:
+    def broken() -> list[str]:
+        raise RuntimeError("first\nno such library")
+
+    finding = doctor.warp_finding(broken)
+    assert finding.status is Status.MISSING
+    assert finding.value == "none: no such library"
+    assert doctor.warp_finding(lambda: ["cpu (CPU)"]) == Finding("Warp devices", "cpu (CPU)")
+
+
+def test_missing_libraries_come_with_their_command() -> None:
+    assert doctor.library_finding([]).status is Status.GOOD
+    finding = doctor.library_finding(["libEGL.so.1"])
+    assert finding.status is Status.MISSING
+    assert "apt-get install --no-install-recommends libegl1" in finding.advice
+
+
+@pytest.mark.parametrize(
+    ("code", "glsl", "status", "value"),
+    [
+        (330, 330, Status.GOOD, "OpenGL 3.3, GLSL 3.30"),
+        (460, 460, Status.GOOD, "OpenGL 4.6, GLSL 4.60"),
+        (320, 330, Status.MISSING, "OpenGL 3.2, GLSL 3.30"),
+        (330, 0, Status.MISSING, "OpenGL 3.3, GLSL older than 3.30"),
+    ],
+)
+def test_the_base_line_is_3_3(code: int, glsl: int, status: Status, value: str) -> None:
+    driver, verdict = doctor.describe_context({**CONTEXT, "code": code, "glsl": glsl})
+    assert driver.status is Status.GOOD
+    assert "llvmpipe" in driver.value
+    assert (verdict.status, verdict.value) == (status, value)
+    assert bool(verdict.advice) == (status is Status.MISSING)
+
+
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "crashed (signal 9)"),
+        ("import sys; sys.exit('cannot create context')", "cannot create context"),
+        ("import sys; sys.exit(3)", "it says nothing"),
+        ("print('not JSON')", "unreadable answer 'not JSON'"),
+        ("print('[1, 2]')", "unreadable answer '[1, 2]'"),
+        ("", "unreadable answer"),
+    ],
+)
+def test_whatever_becomes_of_the_probe_the_doctor_lives(program: str, said: str) -> None:
+    (finding,) = doctor.context_findings([sys.executable, "-I", "-S", "-c", program])
+    assert finding.status is Status.MISSING
+    assert said in finding.value
+    assert finding.advice
+
+
+def test_a_probe_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "PROBE_SECONDS", 0.2)
+    (finding,) = doctor.context_findings([sys.executable, "-S", "-c", "import time; time.sleep(30)"])
+    assert finding.status is Status.MISSING
+    assert "timed out" in finding.value
+
+
+@pytest.mark.skipif(bool(missing_gl_libraries()), reason="OpenGL libraries are not installed")
+def test_the_probe_finds_what_draws_here() -> None:
+    driver, verdict = doctor.context_findings()
+    assert driver.name == "OpenGL driver"
+    assert verdict.status is Status.GOOD
+
+
+def test_samples_in_the_folder_that_pyvista_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "_download_folder", lambda: [tmp_path / "downloads"])
+    data = tmp_path / "Data"
+    data.mkdir()
+    (data / "dragon.ply").touch()
+    lacking = doctor.sample_finding({"PYVISTA_DATA": str(tmp_path)})
+    assert lacking.status is Status.NOTE
+    assert lacking.value.endswith("lacks horse.vtp")
+    assert lacking.advice
+    (data / "horse.vtp").touch()
+    for folder in (tmp_path, data):
+        assert doctor.sample_finding({"PYVISTA_DATA": str(folder)}).status is Status.GOOD
+    unset = doctor.sample_finding({})
+    assert unset.status is Status.NOTE
+    assert unset.value.startswith("not here yet")
+
+
+def test_samples_that_were_downloaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "_download_folder", lambda: [tmp_path])
+    for name in doctor.SAMPLES:
+        (tmp_path / name).touch()
+    assert doctor.sample_finding({}) == Finding("Sample meshes", "dragon.ply, horse.vtp")
+
+
+def test_a_note_is_no_failure() -> None:
+    code, text = shown([Finding("a", "1"), Finding("b", "2", Status.NOTE, "look here")])
+    assert code == 0
+    assert "b: look here" in text
+    assert "Everything that drawing needs is here." in text
+
+
+def test_what_is_missing_fails_and_is_named_last() -> None:
+    code, text = shown([Finding("a", "1"), Finding("b", "[2]", Status.MISSING, "do [this]")])
+    assert code == 1
+    assert "[2]" in text
+    assert "b: do [this]" in text
+    assert text.endswith("Missing: b.\n")
+
+
+def test_without_libraries_no_context_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden() -> list[Finding]:
+        raise AssertionError("the probe was run")
+
+    monkeypatch.setattr(doctor, "missing_gl_libraries", lambda: ["libGL.so.1"])
+    monkeypatch.setattr(doctor, "context_findings", forbidden)
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert findings["OpenGL libraries"].status is Status.MISSING
+    assert {"Python", "Platform", "Warp devices", "Sample meshes", *doctor.PACKAGES} <= set(findings)
