@@ -1,6 +1,6 @@
 """Run the tests with exactly the oldest dependencies that pyproject.toml allows.
 
-It takes minutes and a download, so CI leaves it out: run it after changing a bound or the use of a dependency.
+It takes minutes and a download, so CI leaves it out: run it after changing a bound, or how something is used.
 """
 
 import os

@@ -199,8 +199,8 @@ def sample_finding(environment: Mapping[str, str] = os.environ) -> Finding:
         advice = "Name a folder that has them in its folder Data, or unset PYVISTA_DATA to download them."
         return Finding("Sample meshes", value, Status.NOTE, advice)
     advice = (
-        "pyvista downloads them when they are first asked for. Without a network, set PYVISTA_DATA to a folder "
-        "that has them in its folder Data."
+        "pyvista downloads them when they are first asked for. Without a network, set PYVISTA_DATA to a "
+        "folder that has them in its folder Data."
     )
     return Finding("Sample meshes", f"not here yet: {', '.join(absent)}", Status.NOTE, advice)
 
