@@ -1,0 +1,125 @@
+"""From surfaces to decals in one call."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blobtree.progress import Progress
+from decals.errors import InvalidSeeding
+from decals.model import Decals
+from decals.orientation import Direction, tangents
+from decals.population import Sites, World
+from decals.relaxation import Relaxation
+from decals.sizing import covering_radii
+from decals.surface import Surface
+
+SAMPLES = 48
+"""Samples for each decal from which its size is measured."""
+
+SPREADING = 0.8
+"""Part of the whole work that the relaxation takes, for progress bars."""
+
+_SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
+
+
+def seed(
+    surfaces: Surface | Sequence[Surface],
+    *,
+    count: int,
+    seed: int = 0,
+    direction: Direction = None,
+    images: int = 1,
+    weights: ArrayLike | None = None,
+    progress: Progress | None = None,
+) -> Decals:
+    """Cover surfaces with decals that lie evenly and leave no gap.
+
+    One call over `Relaxation`, `covering_radii` and `tangents`.
+
+    Parameters
+    ----------
+    surfaces
+        One surface, or several that are covered by one coat.
+    count
+        How many decals, exactly.
+    seed
+        From 0 upward; the same one gives the same decals.
+    direction
+        Of the images' u axes: None (random), a vector, or a function of ``points[n, 3]`` to vectors.
+    images
+        How many images there are to choose from.
+    weights
+        How often each image is chosen, ``float[images]``; equally often by default.
+    progress
+        Called with a stage in plain words and the fraction done.
+
+    Raises
+    ------
+    InvalidSeeding
+        For a count, seed, direction, number of images or weights that make no sense, or nothing to lie on.
+    """
+    given = [surfaces] if isinstance(surfaces, Surface) else list(surfaces)
+    odds = _odds(images, weights)
+    tell = progress or (lambda stage, fraction: None)
+    relaxation = Relaxation(given, count=count, seed=seed)
+    relaxation.run(lambda stage, fraction: tell(stage, SPREADING * fraction))
+    if count == 0:
+        return Decals.empty()
+    tell("Measuring sizes", SPREADING)
+    radii = sizes(relaxation, seed=seed)
+    tell("Measuring sizes", 1.0)
+    return Decals(
+        positions=relaxation.positions,
+        normals=relaxation.normals,
+        tangents=tangents(relaxation.positions, relaxation.normals, direction, _stream(seed, _ANGLE_STREAM)),
+        radii=radii.astype(np.float32),
+        images=_choose(odds, count, _stream(seed, _IMAGE_STREAM)),
+    )
+
+
+def sizes(relaxation: Relaxation, *, seed: int = 0) -> NDArray[np.float64]:
+    """Radii at which decals on the relaxed particles leave no gap, ``float64[n]``."""
+    world, counts = (
+        relaxation.world,
+        np.bincount(relaxation.surface_ids, minlength=len(relaxation.world.surfaces)),
+    )
+    least = np.where(world.areas > 0, SAMPLES, 0)
+    samples = world.sample(np.maximum(counts * SAMPLES, least), stream=_SAMPLE_STREAM)
+    return covering_radii(
+        relaxation.sites, samples, lambda sites: visible(world, sites), _stream(seed, _TRIAL_STREAM)
+    )
+
+
+def visible(world: World, sites: Sites) -> Sites:
+    """Put points back onto their own surfaces and drop those that are hidden there."""
+    positions, normals = np.empty_like(sites.positions), np.empty_like(sites.normals)
+    shown = np.ones(len(sites), np.bool_)
+    for number, surface in enumerate(world.surfaces):
+        own = np.flatnonzero(sites.surface_ids == number)
+        positions[own], normals[own] = surface.project(sites.positions[own])
+        shown[own] = ~world.hidden(number, positions[own], normals[own])
+    return Sites(positions[shown], normals[shown], sites.surface_ids[shown])
+
+
+def _odds(images: int, weights: ArrayLike | None) -> NDArray[np.float64]:
+    """Chance of each image."""
+    if isinstance(images, bool) or not isinstance(images, int | np.integer) or images < 1:
+        raise InvalidSeeding(f"images: expected a whole number of at least 1, got {images!r}")
+    if weights is None:
+        return np.full(images, 1.0 / images)
+    odds = np.asarray(weights, dtype=np.float64)
+    if odds.shape != (images,):
+        raise InvalidSeeding(f"weights: expected shape [{images}], got {list(odds.shape)}")
+    if not (np.isfinite(odds).all() and (odds >= 0).all() and odds.sum() > 0):
+        raise InvalidSeeding("weights: expected finite numbers from 0 upward, one of them above 0")
+    return odds / odds.sum()
+
+
+def _choose(odds: NDArray[np.float64], count: int, stream: int) -> NDArray[np.int32]:
+    return np.random.default_rng(stream).choice(len(odds), size=count, p=odds).astype(np.int32)
+
+
+def _stream(seed: int, purpose: int) -> int:
+    """A seed of its own for each purpose, so that a new wish for one leaves the others as they were."""
+    return int(np.random.SeedSequence([seed, purpose]).generate_state(1, np.uint64)[0])
