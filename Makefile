@@ -55,6 +55,7 @@ $(BIN)/python:
 	@.ci/make-venv $(VENV)
 
 # An editable install: only a changed pyproject.toml asks for another one.
+# setuptools warns at each that a folder may hide the package; here the folder is the package.
 $(INSTALLED): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	PYTHONWARNINGS="ignore:Editable installation" $(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@
