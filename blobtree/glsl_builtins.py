@@ -1,0 +1,108 @@
+"""Warp's maths in GLSL's words: types, casts, and the functions whose meaning differs between the two."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import warp as wp
+
+
+class Expression(NamedTuple):
+    """A piece of GLSL and its type."""
+
+    code: str
+    type: str
+
+
+_TYPES: dict[object, str] = {
+    float: "float",
+    int: "int",
+    bool: "bool",
+    wp.float32: "float",
+    wp.int32: "int",
+    wp.uint32: "uint",
+    wp.bool: "bool",
+    wp.vec2: "vec2",
+    wp.vec3: "vec3",
+    wp.vec4: "vec4",
+    wp.vec2i: "ivec2",
+    wp.vec3i: "ivec3",
+    wp.vec4i: "ivec4",
+}
+_ARRAYS: dict[object, str] = {wp.vec4: "sampler2D", wp.int32: "isampler2D"}
+
+CASTS = {"float": "float", "int": "int", "bool": "bool"}
+
+RESERVED_WORDS = frozenset(
+    """
+    active attribute buffer centroid common discard filter fixed flat half highp image input inout invariant
+    layout lowp mediump noise out output partition patch precision resource sample shared smooth subroutine
+    superp texture uniform unsigned using varying volatile void
+    """.split()  # noqa: SIM905  (a list of words reads best as words)
+)
+
+HELPERS = """\
+vec2 wp_normalize(vec2 v) { float l = length(v); return l > 0.0 ? v / l : vec2(0.0); }
+vec3 wp_normalize(vec3 v) { float l = length(v); return l > 0.0 ? v / l : vec3(0.0); }
+vec4 wp_normalize(vec4 v) { float l = length(v); return l > 0.0 ? v / l : vec4(0.0); }
+
+"""
+"""Warp normalises the zero vector to zero; GLSL leaves it undefined."""
+
+
+def type_name(hint: object) -> str | None:
+    """The GLSL type of a Warp annotation, None where there is none."""
+    if isinstance(hint, wp.array):
+        return _ARRAYS.get(hint.dtype)
+    try:
+        return _TYPES.get(hint)
+    except TypeError:  # unhashable: certainly no type of ours
+        return None
+
+
+def _same(name: str) -> Callable[..., Expression]:
+    """A function of the same name and meaning whose result has its first argument's type."""
+
+    def emit(*arguments: Expression) -> Expression:
+        return Expression(f"{name}({', '.join(a.code for a in arguments)})", arguments[0].type)
+
+    return emit
+
+
+def _scalar(name: str) -> Callable[..., Expression]:
+    """A function of the same meaning whose result is a float."""
+
+    def emit(*arguments: Expression) -> Expression:
+        return Expression(f"{name}({', '.join(a.code for a in arguments)})", "float")
+
+    return emit
+
+
+def _template(pattern: str, result: str | None = None) -> Callable[..., Expression]:
+    """A function that GLSL spells in another way."""
+
+    def emit(*arguments: Expression) -> Expression:
+        code = pattern.format(*(argument.code for argument in arguments))
+        return Expression(code, result or arguments[0].type)
+
+    return emit
+
+
+BUILTINS: dict[str, Callable[..., Expression]] = {
+    **{name: _same(name) for name in ("abs", "ceil", "clamp", "cross", "exp", "floor", "log", "max", "min")},
+    **{name: _same(name) for name in ("acos", "asin", "cos", "pow", "sin", "sqrt", "tan", "trunc")},
+    **{name: _scalar(name) for name in ("dot", "length")},
+    "atan": _same("atan"),
+    "atan2": _same("atan"),
+    "lerp": _same("mix"),
+    "normalize": _same("wp_normalize"),
+    "length_sq": _template("dot({0}, {0})", "float"),
+    "cw_mul": _template("({0} * {1})"),
+    "cw_div": _template("({0} / {1})"),
+    "sign": _template("({0} < 0.0 ? -1.0 : 1.0)"),
+    "where": lambda condition, chosen, other: Expression(
+        f"({condition.code} ? {chosen.code} : {other.code})", chosen.type
+    ),
+    "float32": _template("float({0})", "float"),
+    "int32": _template("int({0})", "int"),
+    "uint32": _template("uint({0})", "uint"),
+}

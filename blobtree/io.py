@@ -1,0 +1,222 @@
+"""BlobTree ↔ JSON: a flat, versioned list of nodes, each naming its operands by their place in the list.
+
+    {"format": "blobtree", "version": 1, "nodes": [
+        {"type": "point", "center": [0, 0, 0], "radius": 1, "color": [0.8, 0.8, 0.8]},
+        {"type": "point", "center": [1, 0, 0], "radius": 1, "color": [0.8, 0.8, 0.8]},
+        {"type": "sum", "operands": [0, 1]}]}
+
+The last node is the root. Operands stand before the node that uses them, so a file can hold no cycle, a
+shared subtree is written once, and depth costs no recursion.
+"""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import msgspec
+
+from .errors import BlobTreeError, InvalidFile
+from .traversal import postorder
+from .tree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Transform, Union
+from .validation import Matrix, Vector
+
+VERSION: Literal[1] = 1
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """One node in a file; fields that hold other nodes hold their places instead."""
+
+    node_type: ClassVar[type[Node]]
+    references: ClassVar[tuple[str, ...]] = ()
+
+
+class PointRecord(Record, frozen=True, tag="point"):
+    """A ball."""
+
+    node_type = Point
+    center: Vector
+    radius: float
+    color: Vector
+
+
+class SegmentRecord(Record, frozen=True, tag="segment"):
+    """A capsule."""
+
+    node_type = Segment
+    start: Vector
+    end: Vector
+    radius: float
+    color: Vector
+
+
+class SumRecord(Record, frozen=True, tag="sum"):
+    """A smooth blend."""
+
+    node_type = Sum
+    references = ("operands",)
+    operands: tuple[int, ...]
+
+
+class RicciRecord(Record, frozen=True, tag="ricci"):
+    """A Ricci blend."""
+
+    node_type = Ricci
+    references = ("operands",)
+    operands: tuple[int, ...]
+    exponent: float
+
+
+class UnionRecord(Record, frozen=True, tag="union"):
+    """A union."""
+
+    node_type = Union
+    references = ("operands",)
+    operands: tuple[int, ...]
+
+
+class IntersectionRecord(Record, frozen=True, tag="intersection"):
+    """An intersection."""
+
+    node_type = Intersection
+    references = ("operands",)
+    operands: tuple[int, ...]
+
+
+class DifferenceRecord(Record, frozen=True, tag="difference"):
+    """A solid without a tool."""
+
+    node_type = Difference
+    references = ("solid", "tool")
+    solid: int
+    tool: int
+
+
+class TransformRecord(Record, frozen=True, tag="transform"):
+    """A node under an affine map."""
+
+    node_type = Transform
+    references = ("child",)
+    child: int
+    matrix: Matrix
+
+
+_AnyRecord = (
+    PointRecord
+    | SegmentRecord
+    | SumRecord
+    | RicciRecord
+    | UnionRecord
+    | IntersectionRecord
+    | DifferenceRecord
+    | TransformRecord
+)
+_RECORD_OF: dict[type[Node], type[_AnyRecord]] = {record.node_type: record for record in _AnyRecord.__args__}
+
+
+class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A whole file, or the part of another file that holds a tree."""
+
+    format: Literal["blobtree"]
+    version: Literal[1]
+    nodes: tuple[_AnyRecord, ...]
+
+
+def to_document(root: Node) -> Document:
+    """The tree as records."""
+    order = postorder(root)
+    place = {id(node): index for index, node in enumerate(order)}
+    return Document("blobtree", VERSION, tuple(_record(node, place) for node in order))
+
+
+def from_document(document: Document) -> Node:
+    """The tree that `document` holds.
+
+    Raises
+    ------
+    InvalidFile
+        A node is wrong or refers to one that does not stand before it (a cycle); the message says which.
+    """
+    if not document.nodes:
+        raise InvalidFile("nodes: expected at least one node, got none")
+    nodes: list[Node] = []
+    for index, record in enumerate(document.nodes):
+        try:
+            nodes.append(_node(record, nodes))
+        except BlobTreeError as error:
+            raise InvalidFile(f"nodes[{index}] ({record.__struct_config__.tag}): {error}") from None
+    return nodes[-1]
+
+
+def to_json(root: Node) -> bytes:
+    """The tree as UTF-8 JSON."""
+    return msgspec.json.format(msgspec.json.encode(to_document(root)), indent=1)
+
+
+def from_json(text: bytes | str) -> Node:
+    """The tree that a JSON text holds; InvalidFile where it holds none."""
+    try:
+        document = msgspec.json.decode(text, type=Document)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InvalidFile(f"not a BlobTree of version {VERSION}: {error}") from None
+    except RecursionError:
+        raise InvalidFile("not a BlobTree: nested too deeply") from None
+    return from_document(document)
+
+
+def save(root: Node, path: str | os.PathLike[str]) -> None:
+    """Write the tree to `path`, whole or not at all."""
+    write_atomically(Path(path), to_json(root))
+
+
+def load(path: str | os.PathLike[str]) -> Node:
+    """Read the tree in the file `path`; InvalidFile where it holds none, OSError where it cannot be read."""
+    try:
+        return from_json(Path(path).read_bytes())
+    except InvalidFile as error:
+        raise InvalidFile(f"{path}: {error}") from None
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Put `content` into `path` so that a crash leaves either the old file or the new one."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _record(node: Node, place: dict[int, int]) -> _AnyRecord:
+    """`node` with its operands replaced by their places."""
+    record_type = _RECORD_OF[type(node)]
+    values = {name: getattr(node, name) for name in record_type.__struct_fields__}
+    for name in record_type.references:
+        operand = values[name]
+        values[name] = (
+            place[id(operand)] if isinstance(operand, Node) else tuple(place[id(node)] for node in operand)
+        )
+    return record_type(**values)
+
+
+def _node(record: Record, earlier: list[Node]) -> Node:
+    """The node of `record`, its places replaced by the nodes that stand there."""
+    values = {name: getattr(record, name) for name in record.__struct_fields__}
+    for name in record.references:
+        places = values[name]
+        values[name] = (
+            _at(places, earlier)
+            if isinstance(places, int)
+            else tuple(_at(place, earlier) for place in places)
+        )
+    return record.node_type(**values)
+
+
+def _at(place: int, earlier: list[Node]) -> Node:
+    if not 0 <= place < len(earlier):
+        raise InvalidFile(f"operand {place} does not stand before this node, which is node {len(earlier)}")
+    return earlier[place]

@@ -1,0 +1,61 @@
+"""The falloff that turns normalised distance into field: g(d) = (1 − d²)³ on [0, 1], 0 beyond.
+
+Source: Wyvill's field function, eq. 2 of the Implicit Decals paper. Compact support is why the modeller
+is fast: a skeleton that does not reach a place contributes exactly nothing there.
+"""
+
+import math
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+ISO = 0.5
+"""The surface lies where the field equals this; inside it is larger."""
+
+RIM = math.sqrt(1.0 - 2.0 ** (-1.0 / 3.0))
+"""Normalised distance at which an isolated falloff equals ISO: visible radius / radius of influence."""
+
+STEEPEST_DISTANCE = 1.0 / math.sqrt(5.0)
+"""Normalised distance at which |g'| is largest."""
+
+STEEPEST_SLOPE = 6.0 * STEEPEST_DISTANCE * (1.0 - STEEPEST_DISTANCE**2) ** 2
+"""max |g'| = 1.7173, the Lipschitz constant of g."""
+
+
+def inverse_falloff(field: float) -> float:
+    """Normalised distance d at which g(d) = `field`, for 0 ≤ field ≤ 1 (eq. 3): √(1 − F^⅓)."""
+    return math.sqrt(max(0.0, 1.0 - field ** (1.0 / 3.0)))
+
+
+@wp.func
+def falloff(squared_distance: wp.float32) -> wp.float32:
+    """G as a function of d², so that no square root is needed."""
+    t = wp.max(1.0 - squared_distance, 0.0)
+    return t * t * t
+
+
+@wp.func
+def falloff_derivative(squared_distance: wp.float32) -> wp.float32:
+    """∂g/∂(d²) = −3 (1 − d²)²."""
+    t = wp.max(1.0 - squared_distance, 0.0)
+    return -3.0 * t * t
+
+
+@wp.func
+def falloff_steepness(distance: wp.float32) -> wp.float32:
+    """|g'(d)| = 6 d (1 − d²)², 0 beyond the support."""
+    t = wp.max(1.0 - distance * distance, 0.0)
+    return 6.0 * distance * t * t
+
+
+@wp.func
+def falloff_slope_bound(distance: wp.float32, reach: wp.float32) -> wp.float32:
+    """Largest |g'| over [distance − reach, distance + reach].
+
+    |g'| rises up to STEEPEST_DISTANCE and falls after it, so its maximum over an interval lies at the
+    point of the interval that is nearest to STEEPEST_DISTANCE.
+    """
+    nearest = wp.max(distance - reach, 0.0)
+    farthest = distance + reach
+    return falloff_steepness(wp.clamp(STEEPEST_DISTANCE, nearest, farthest))

@@ -1,0 +1,135 @@
+"""Operators: how two fields become one, as value and partial derivatives.
+
+Each operator is two typed functions:
+
+* `partials(a, b, parameter) -> vec3(F, ∂F/∂a, ∂F/∂b)`;
+* `slope(slope_a, slope_b, max_a, max_b, parameter)`: a bound on |∇F| wherever the operands' gradients are
+  bounded by slope_a, slope_b and their values by max_a, max_b. The tracer's proof rests on it.
+
+Whatever rides along with the field (colour) is averaged with the weights |∂F/∂a|·a and |∂F/∂b|·b: a sum mixes
+by strength, a union takes the winner, a difference paints the cut with the tool that cut it.
+Every operator here gives its first operand back where the second is exactly 0, save intersection, which is 0.
+"""
+
+from dataclasses import dataclass
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def sum_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
+    """F = a + b, the blend of Blinn and Wyvill."""
+    return wp.vec3(a + b, 1.0, 1.0)
+
+
+@wp.func
+def sum_slope(
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
+) -> wp.float32:
+    """|∇a + ∇b| ≤ |∇a| + |∇b|."""
+    return slope_a + slope_b
+
+
+@wp.func
+def ricci_norm(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.float32:
+    """(aⁿ + bⁿ)^(1/n) for a, b ≥ 0, scaled by the larger so that no power overflows or vanishes."""
+    larger = wp.max(a, b)
+    if larger <= 0.0:
+        return 0.0
+    return larger * wp.pow(1.0 + wp.pow(wp.min(a, b) / larger, exponent), 1.0 / exponent)
+
+
+@wp.func
+def ricci_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
+    """F = (aⁿ + bⁿ)^(1/n) (Ricci 1973): n = 1 is the sum, n → ∞ the union; ∂F/∂a = (a/F)^(n−1)."""
+    value = ricci_norm(a, b, exponent)
+    if value <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    return wp.vec3(value, wp.pow(a / value, exponent - 1.0), wp.pow(b / value, exponent - 1.0))
+
+
+@wp.func
+def ricci_slope(
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
+) -> wp.float32:
+    """Hölder: the partials lie on the dual norm's unit sphere, so slopes combine by the norm itself."""
+    return ricci_norm(slope_a, slope_b, exponent)
+
+
+@wp.func
+def union_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
+    """F = max(a, b)."""
+    if a >= b:
+        return wp.vec3(a, 1.0, 0.0)
+    return wp.vec3(b, 0.0, 1.0)
+
+
+@wp.func
+def intersection_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
+    """F = min(a, b)."""
+    if a <= b:
+        return wp.vec3(a, 1.0, 0.0)
+    return wp.vec3(b, 0.0, 1.0)
+
+
+@wp.func
+def extremum_slope(
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
+) -> wp.float32:
+    """Max and min have the gradient of one operand or of the other."""
+    return wp.max(slope_a, slope_b)
+
+
+@wp.func
+def difference_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
+    """F = min(a, c) with the complement c = m − b(2m − 1), m = max(a, 1), never below 0.
+
+    For a ≤ 1 this is min(a, 1 − b) of the literature (Wyvill 1999). Where fields add up to more than 1 the
+    complement starts from a itself, so that a tool which does not reach a place changes nothing there.
+    """
+    top = wp.max(a, 1.0)
+    complement = top - b * (2.0 * top - 1.0)
+    if a < complement or b <= 0.0:
+        return wp.vec3(a, 1.0, 0.0)
+    if complement <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    if a > 1.0:
+        return wp.vec3(complement, 1.0 - 2.0 * b, 1.0 - 2.0 * a)
+    return wp.vec3(complement, 0.0, -1.0)
+
+
+@wp.func
+def difference_slope(
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
+) -> wp.float32:
+    """Where a ≤ 1 either gradient; above, |1 − 2b| ≤ 1 as long as F > 0, and |1 − 2a| ≤ 2 max_a − 1."""
+    if max_a <= 1.0:
+        return wp.max(slope_a, slope_b)
+    return slope_a + (2.0 * max_a - 1.0) * slope_b
+
+
+@dataclass(frozen=True)
+class Operator:
+    """One row of the table: an operator's name, its functions and its algebra."""
+
+    name: str
+    partials: wp.Function
+    slope: wp.Function
+    commutes: bool = True
+    """Operands may change places and nest in any way."""
+    starts_from_zero: bool = True
+    """F(0, b) = b, so that a fold may start from the empty field."""
+
+
+SUM = Operator("sum", sum_partials, sum_slope)
+RICCI = Operator("ricci", ricci_partials, ricci_slope)
+UNION = Operator("union", union_partials, extremum_slope)
+INTERSECTION = Operator("intersection", intersection_partials, extremum_slope, starts_from_zero=False)
+DIFFERENCE = Operator(
+    "difference", difference_partials, difference_slope, commutes=False, starts_from_zero=False
+)
+
+OPERATORS = (SUM, RICCI, UNION, INTERSECTION, DIFFERENCE)
+"""Every operator; its place here is its code on the tape."""

@@ -1,0 +1,65 @@
+"""Points taken onto the surface along the exact gradient of the field."""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from .evaluate import field_gradient
+from .kernels import ISO
+from .tape import Tape
+from .validation import point_array
+
+wp.set_module_options({"enable_backward": False})
+
+NEWTON_STEPS = 8
+CONVERGED = 1e-6
+"""Field error, in units of ISO, at which a point is on the surface as far as float32 can tell."""
+
+
+@wp.func
+def project_to_surface(p: wp.vec3, longest_step: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec3:
+    """Newton's method for f = ISO from p, no step longer than `longest_step`.
+
+    Where the field is flat (its gradient 0) the point stays where it is.
+    """
+    for _step in range(NEWTON_STEPS):
+        f = field_gradient(p, tape)
+        gap = ISO - f[0]
+        g = wp.vec3(f[1], f[2], f[3])
+        steepness = wp.length(g)
+        if wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
+            return p
+        p += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
+    return p
+
+
+@wp.kernel
+def _project(
+    points: wp.array(dtype=wp.vec3),
+    longest_step: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+) -> None:
+    i = wp.tid()
+    p = project_to_surface(points[i], longest_step, tape)
+    f = field_gradient(p, tape)
+    positions[i] = p
+    normals[i] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+
+
+def project(
+    tape: Tape, points: ArrayLike, longest_step: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Surface points (n, 3) near `points` (n, 3) and the outward unit normals (n, 3) there.
+
+    Points where the field is flat stay where they are, with the normal 0.
+    """
+    start: wp.array[Any] = wp.array(point_array(points), dtype=wp.vec3)
+    positions, normals = wp.empty_like(start), wp.empty_like(start)
+    wp.launch(
+        _project, dim=len(start), inputs=[start, longest_step, tape.on().data], outputs=[positions, normals]
+    )
+    return positions.numpy(), normals.numpy()

@@ -1,0 +1,345 @@
+"""BlobTree nodes: immutable values that combine with Python's operators (Wyvill, Guy & Galin 1999).
+
+    body = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0, 0), radius=0.4)
+    model = (body | Point((2, 1, 0), radius=0.5)) - Point((0, 0, 1), radius=0.5)
+
+`radius` is what an isolated primitive shows; the radius of influence that the field needs is radius / RIM.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .bounds import influence_bounds
+from .errors import InvalidNode
+from .evaluate import colors_at, gradients_at, values_at
+from .kernels import RIM
+from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
+from .skeletons import POINT, SEGMENT, Skeleton
+from .tape import Tape, compile_tape
+from .validation import (
+    Matrix,
+    Vector,
+    affine_matrix,
+    color_triple,
+    finite_number,
+    finite_vector,
+    positive_number,
+)
+
+DEFAULT_COLOR: Vector = (0.8, 0.8, 0.8)
+
+LARGEST_EXPONENT = 100.0
+"""Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
+
+
+class Node:
+    """Part of a BlobTree: a field that is 0 far away and larger than ISO inside.
+
+    Every node is a value: it never changes, and equal nodes compare equal.
+    """
+
+    @property
+    def children(self) -> tuple["Node", ...]:
+        """The nodes that this one combines, none for a primitive."""
+        return ()
+
+    # -- combining ----------------------------------------------------------------------------------
+
+    def __add__(self, other: "Node") -> "Node":
+        return (
+            Sum((*_operands(Sum, self), *_operands(Sum, other)))
+            if isinstance(other, Node)
+            else NotImplemented
+        )
+
+    def __or__(self, other: "Node") -> "Node":
+        return (
+            Union((*_operands(Union, self), *_operands(Union, other)))
+            if isinstance(other, Node)
+            else NotImplemented
+        )
+
+    def __and__(self, other: "Node") -> "Node":
+        if not isinstance(other, Node):
+            return NotImplemented
+        return Intersection((*_operands(Intersection, self), *_operands(Intersection, other)))
+
+    def __sub__(self, other: "Node") -> "Node":
+        return Difference(self, other) if isinstance(other, Node) else NotImplemented
+
+    # -- placing ------------------------------------------------------------------------------------
+
+    def transform(self, matrix: ArrayLike) -> "Transform":
+        """This node under an affine map, 3×4 or 4×4, that takes its points (columns) to the world."""
+        return Transform(self, affine_matrix(matrix))
+
+    def translate(self, offset: ArrayLike) -> "Transform":
+        """This node moved by `offset` (3,)."""
+        return self.transform(np.column_stack([np.eye(3), finite_vector("offset", offset)]))
+
+    def rotate(self, axis: ArrayLike, degrees: float) -> "Transform":
+        """This node turned about `axis` (3,) through the origin, counter-clockwise as seen from its tip."""
+        direction = np.array(finite_vector("axis", axis))
+        length = np.linalg.norm(direction)
+        if length == 0.0:
+            raise InvalidNode("axis: expected a direction, got the zero vector")
+        x, y, z = direction / length
+        angle = math.radians(finite_number("degrees", degrees))
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        linear = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+        return self.transform(np.column_stack([linear, np.zeros(3)]))
+
+    def scale(self, factor: float | ArrayLike) -> "Transform":
+        """This node scaled about the origin by one factor, or by one per axis."""
+        factors = finite_vector("factor", np.broadcast_to(np.asarray(factor, dtype=np.float64), 3))
+        if 0.0 in factors:
+            raise InvalidNode(f"factor: expected a scale other than 0, got {factor!r}")
+        return self.transform(np.column_stack([np.diag(factors), np.zeros(3)]))
+
+    # -- asking -------------------------------------------------------------------------------------
+
+    @cached_property
+    def tape(self) -> Tape:
+        """The flat form of this tree that every backend reads."""
+        return compile_tape(self)
+
+    @cached_property
+    def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Corners (3,), (3,) of a box outside of which the field is exactly 0."""
+        return influence_bounds(self)
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float32]:
+        """Field values (n,) at `points` (n, 3)."""
+        return values_at(self.tape, points)
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float32]:
+        """Exact field gradients (n, 3) at `points` (n, 3)."""
+        return gradients_at(self.tape, points)[:, 1:]
+
+    def colors(self, points: ArrayLike) -> NDArray[np.float32]:
+        """Blended colours (n, 3) at `points` (n, 3), black where no primitive reaches."""
+        return colors_at(self.tape, points)
+
+
+class Primitive(Node):
+    """A skeleton with a radius and a colour: a leaf of the tree."""
+
+    skeleton: ClassVar[Skeleton]
+    radius: float
+    color: Vector
+
+    @property
+    def influence(self) -> float:
+        """Distance from the skeleton at which the field fades to 0."""
+        return self.radius / RIM
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        """Points (k, 3) whose convex hull holds the skeleton."""
+        raise NotImplementedError
+
+    def texels(self, control_points: NDArray[np.float64], influence: float) -> NDArray[np.float64]:
+        """The skeleton's parameters (stride, 4) on the tape, its control points and influence being these."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Point(Primitive):
+    """A ball of `radius` around `center`."""
+
+    skeleton = POINT
+
+    center: Vector
+    _: KW_ONLY
+    radius: float
+    color: Vector = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        _settle(
+            self,
+            center=finite_vector("center", self.center),
+            radius=positive_number("radius", self.radius),
+            color=color_triple(self.color),
+        )
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        """Points (k, 3) whose convex hull is the skeleton."""
+        return np.array([self.center])
+
+    def texels(self, control_points: NDArray[np.float64], influence: float) -> NDArray[np.float64]:
+        """Parameters (stride, 4) as `skeletons` describes them."""
+        return np.array([[*control_points[0], influence]])
+
+
+@dataclass(frozen=True)
+class Segment(Primitive):
+    """A capsule of `radius` around the straight line from `start` to `end`; equal ends make a ball."""
+
+    skeleton = SEGMENT
+
+    start: Vector
+    end: Vector
+    _: KW_ONLY
+    radius: float
+    color: Vector = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        _settle(
+            self,
+            start=finite_vector("start", self.start),
+            end=finite_vector("end", self.end),
+            radius=positive_number("radius", self.radius),
+            color=color_triple(self.color),
+        )
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        """Points (k, 3) whose convex hull is the skeleton."""
+        return np.array([self.start, self.end])
+
+    def texels(self, control_points: NDArray[np.float64], influence: float) -> NDArray[np.float64]:
+        """Parameters (stride, 4) as `skeletons` describes them."""
+        start, end = control_points
+        axis = end - start
+        length_squared = float(axis @ axis)
+        shortest = 1e-12 * influence**2
+        return np.array(
+            [[*start, influence], [*axis, 1.0 / length_squared if length_squared > shortest else 0.0]]
+        )
+
+
+class Combination(Node):
+    """An operator folded over its operands from left to right."""
+
+    operator: ClassVar[Operator]
+
+    @property
+    def parameter(self) -> float:
+        """What the operator needs besides its operands."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class AssociativeCombination(Combination):
+    """A combination of any number of `operands`, nested alike or not."""
+
+    operands: tuple[Node, ...]
+
+    def __post_init__(self) -> None:
+        _settle(self, operands=_nodes(self.operands))
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """What this node combines."""
+        return self.operands
+
+
+@dataclass(frozen=True)
+class Sum(AssociativeCombination):
+    """Smooth blend F = Σ fᵢ."""
+
+    operator = SUM
+
+
+@dataclass(frozen=True)
+class Union(AssociativeCombination):
+    """Sharp union F = max fᵢ."""
+
+    operator = UNION
+
+
+@dataclass(frozen=True)
+class Intersection(AssociativeCombination):
+    """Sharp intersection F = min fᵢ."""
+
+    operator = INTERSECTION
+
+
+@dataclass(frozen=True)
+class Ricci(AssociativeCombination):
+    """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): `exponent` 1 is the sum, a large one nears the union."""
+
+    operator = RICCI
+
+    exponent: float = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        exponent = finite_number("exponent", self.exponent)
+        if not 1.0 <= exponent <= LARGEST_EXPONENT:
+            raise InvalidNode(
+                f"exponent: expected 1 to {LARGEST_EXPONENT:g}, got {exponent!r}; for more use a union"
+            )
+        _settle(self, exponent=exponent)
+
+    @property
+    def parameter(self) -> float:
+        """The exponent n."""
+        return self.exponent
+
+
+@dataclass(frozen=True)
+class Difference(Combination):
+    """`solid` without `tool`: F = min(f, 1 − g) while f ≤ 1, see `operators.difference_partials`."""
+
+    operator = DIFFERENCE
+
+    solid: Node
+    tool: Node
+
+    def __post_init__(self) -> None:
+        _nodes((self.solid, self.tool))
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """What this node combines."""
+        return (self.solid, self.tool)
+
+
+@dataclass(frozen=True)
+class Transform(Node):
+    """`child` under an affine map whose 3×4 `matrix` takes the child's points (columns) to this node's space.
+
+    The map folds into the primitives below it when the tape is made, so it costs nothing afterwards.
+    """
+
+    child: Node
+    matrix: Matrix
+
+    def __post_init__(self) -> None:
+        _nodes((self.child,))
+        _settle(self, matrix=affine_matrix(self.matrix))
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """What this node combines."""
+        return (self.child,)
+
+
+def _settle(node: Node, **fields: object) -> None:
+    """Put checked values into a frozen node while it is being made."""
+    for name, value in fields.items():
+        object.__setattr__(node, name, value)
+
+
+def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
+    """`operands` as a tuple of nodes, at least one."""
+    nodes = tuple(operands)
+    if not nodes:
+        raise InvalidNode("operands: expected at least one node, got none")
+    for node in nodes:
+        if not isinstance(node, Node):
+            raise InvalidNode(f"operands: expected BlobTree nodes, got {node!r}")
+    return nodes
+
+
+def _operands(kind: type[Sum] | type[Union] | type[Intersection], node: Node) -> tuple[Node, ...]:
+    """What `node` brings to an operator of `kind`: a + b + c is one sum of three."""
+    return node.operands if isinstance(node, kind) else (node,)

@@ -1,0 +1,94 @@
+"""Checks that turn what people type into plain tuples of finite numbers, or say what is wrong with it."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InvalidNode, InvalidPoints
+
+Vector = tuple[float, float, float]
+Matrix = tuple[tuple[float, ...], ...]
+"""Three rows of a row-major affine map: the linear part beside its translation."""
+
+LARGEST_NUMBER = 1e18
+"""Beyond it float32 squares overflow."""
+
+
+def finite_vector(name: str, value: object) -> Vector:
+    """`value` as three floats.
+
+    Raises
+    ------
+    InvalidNode
+        It is not three finite numbers.
+    """
+    try:
+        numbers = tuple(float(component) for component in cast(Iterable[Any], value))
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) != 3 or not all(abs(number) <= LARGEST_NUMBER for number in numbers):
+        raise InvalidNode(f"{name}: expected three finite numbers (x, y, z), got {value!r}")
+    return numbers
+
+
+def positive_number(name: str, value: object) -> float:
+    """`value` as a finite float above zero; InvalidNode otherwise."""
+    number = finite_number(name, value)
+    if number <= 0.0:
+        raise InvalidNode(f"{name}: expected a number above 0, got {value!r}")
+    return number
+
+
+def finite_number(name: str, value: object) -> float:
+    """`value` as a finite float; InvalidNode otherwise."""
+    try:
+        number = float(cast(Any, value))
+    except (TypeError, ValueError):
+        number = math.nan
+    if not abs(number) <= LARGEST_NUMBER:
+        raise InvalidNode(f"{name}: expected a finite number, got {value!r}")
+    return number
+
+
+def color_triple(value: object) -> Vector:
+    """`value` as red, green, blue in [0, 1]; InvalidNode otherwise."""
+    color = finite_vector("color", value)
+    if min(color) < 0.0 or max(color) > 1.0:
+        raise InvalidNode(f"color: expected red, green, blue in [0, 1], got {value!r}")
+    return color
+
+
+def affine_matrix(value: ArrayLike) -> Matrix:
+    """`value` (3×4 or 4×4) as an invertible affine map; InvalidNode otherwise."""
+    try:
+        matrix = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        matrix = np.empty(0)
+    if matrix.shape == (4, 4) and np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0)):
+        matrix = matrix[:3]
+    if matrix.shape != (3, 4) or not np.all(np.abs(matrix) <= LARGEST_NUMBER):
+        raise InvalidNode(f"matrix: expected a finite 3×4 or affine 4×4 matrix, got {value!r}")
+    singular_values = np.linalg.svd(matrix[:, :3], compute_uv=False)
+    if singular_values[-1] <= 1e-6 * singular_values[0]:
+        raise InvalidNode(f"matrix: expected an invertible map, got one that flattens space: {value!r}")
+    return tuple(tuple(float(number) for number in row) for row in matrix)
+
+
+def point_array(points: ArrayLike) -> NDArray[np.float32]:
+    """`points` as float32[n, 3] without NaN or infinity; InvalidPoints otherwise."""
+    try:
+        array = np.asarray(points, dtype=np.float32)
+    except (TypeError, ValueError):
+        array = np.empty(0, np.float32)
+    if array.size == 0 and array.ndim <= 1 and np.ndim(points) >= 1 and np.size(points) == 0:
+        array = array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InvalidPoints(f"points: expected an array of shape (n, 3), got shape {np.shape(points)}")
+    if not np.isfinite(array).all():
+        raise InvalidPoints(
+            "points: expected finite coordinates, got NaN or infinity; drop those points first"
+        )
+    return np.ascontiguousarray(array)
