@@ -1,0 +1,55 @@
+"""How each kind of object gets into the G-buffer: one small class per kind, found by the object's type."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from decals.camera import Bounds
+from decals.errors import InvalidScene
+from decals.render.context import Context
+from decals.render.tile import Tile
+
+
+class Drawable(Protocol):
+    """One object of the scene on the graphics card; it owns its handles."""
+
+    @property
+    def bounds(self) -> Bounds:
+        """Box around everything that `draw` can draw."""
+        ...
+
+    def draw(self, object_id: int, tile: Tile) -> None:
+        """Write the object through ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth.
+
+        The tile's camera is bound already (`decals.render.tile.attach_camera`), depth test and targets are
+        set. Other state that is changed here is put back.
+        """
+        ...
+
+    def release(self) -> None:
+        """Give the memory back."""
+        ...
+
+
+Factory = Callable[[Context, Any], Drawable]
+
+_FACTORIES: dict[type, Factory] = {}
+
+
+def register(kind: type, factory: Factory) -> None:
+    """Let objects of a type (and of its subtypes) be drawn by what ``factory(context, object)`` makes."""
+    _FACTORIES[kind] = factory
+
+
+def drawable_for(context: Context, thing: object) -> Drawable:
+    """Make the drawable of a scene's object.
+
+    Raises
+    ------
+    InvalidScene
+        No factory was registered for its type.
+    """
+    for kind in type(thing).__mro__:
+        if kind in _FACTORIES:
+            return _FACTORIES[kind](context, thing)
+    known = ", ".join(sorted(kind.__name__ for kind in _FACTORIES))
+    raise InvalidScene(f"cannot draw a {type(thing).__name__}; expected one of: {known}")

@@ -1,0 +1,55 @@
+"""What the visible surface is at every pixel: the targets that all kinds of objects write."""
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from decals.render.context import Context
+from decals.render.tile import Tile, read_floats
+
+
+class GBuffer:
+    """Position and object, normal, base colour, depth: see ``shaders/gbuffer.glsl``.
+
+    Parameters
+    ----------
+    context
+        Where the textures live.
+    size
+        Width and height in samples.
+    """
+
+    def __init__(self, context: Context, size: tuple[int, int]) -> None:
+        self.size = size
+        self.position = context.gl.texture(size, 4, dtype="f4")
+        self.normal = context.gl.texture(size, 4, dtype="f4")
+        self.color = context.gl.texture(size, 4, dtype="f2")
+        self.depth = context.gl.depth_texture(size)
+        for texture in (self.position, self.normal, self.color):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._framebuffer = context.gl.framebuffer([self.position, self.normal, self.color], self.depth)
+        self._gl = context.gl
+
+    def begin(self, width: int, height: int) -> None:
+        """Clear the lower left part of this size, and let the next draws fall there."""
+        self._framebuffer.use()
+        self._framebuffer.viewport = (0, 0, width, height)
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "<"
+        self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+
+    def read_position(self, tile: Tile) -> NDArray[np.float32]:
+        """Read position and object id + 1, ``float32[h, w, 4]``, the lowest row first."""
+        return self._read(0, tile)
+
+    def read_normal(self, tile: Tile) -> NDArray[np.float32]:
+        """Read the normals, ``float32[h, w, 4]``, the lowest row first."""
+        return self._read(1, tile)
+
+    def _read(self, attachment: int, tile: Tile) -> NDArray[np.float32]:
+        return read_floats(self._framebuffer, attachment, tile)
+
+    def release(self) -> None:
+        """Give the memory back."""
+        for resource in (self._framebuffer, self.position, self.normal, self.color, self.depth):
+            resource.release()

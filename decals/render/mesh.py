@@ -1,0 +1,71 @@
+"""Triangle meshes in the G-buffer: rasterised, with smooth normals."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from decals.camera import Bounds
+from decals.render.context import Context
+from decals.render.tile import Tile, attach_camera, set_uniform
+from implicit_decals.shaders import compose
+
+
+class MeshLike(Protocol):
+    """What is read of a mesh object: ``float[n, 3]``, ``int[m, 3]``, one sRGB colour or one per vertex."""
+
+    @property
+    def vertices(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def faces(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def color(self) -> ArrayLike: ...  # noqa: D102
+
+
+class MeshDrawable:
+    """A mesh's vertices and faces on the graphics card."""
+
+    def __init__(self, context: Context, mesh: MeshLike) -> None:
+        vertices = np.asarray(mesh.vertices, np.float32)
+        faces = np.ascontiguousarray(mesh.faces, np.int32)
+        rows = np.empty((len(vertices), 9), np.float32)
+        rows[:, :3] = vertices
+        rows[:, 3:6] = vertex_normals(vertices, faces)
+        rows[:, 6:] = np.asarray(mesh.color, np.float32)
+        self._bounds = vertices.min(axis=0), vertices.max(axis=0)
+        self._program = attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
+        self._vertices = context.gl.buffer(rows.tobytes())
+        self._indices = context.gl.buffer(faces.tobytes())
+        layout = [(self._vertices, "3f 3f 3f", "vertex_position", "vertex_normal", "vertex_color")]
+        self._array = context.gl.vertex_array(self._program, layout, self._indices)
+
+    @property
+    def bounds(self) -> Bounds:
+        """Box around the vertices."""
+        return self._bounds
+
+    def draw(self, object_id: int, tile: Tile) -> None:
+        """Rasterise the faces, both sides."""
+        set_uniform(self._program, "object_id", object_id)
+        self._array.render()
+
+    def release(self) -> None:
+        """Give the memory back."""
+        for resource in (self._array, self._vertices, self._indices):
+            resource.release()
+
+
+def vertex_normals(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Give unit normals at the vertices, each the sum of its faces' normals weighted by area.
+
+    A vertex without any face, or whose faces cancel, gets the z axis.
+    """
+    a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
+    crosses = np.cross(b - a, c - a)
+    corners = faces.reshape(-1)
+    sums = np.stack(
+        [np.bincount(corners, np.repeat(crosses[:, i], 3), len(vertices)) for i in range(3)], axis=1
+    )
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    units = np.where(lengths > 0, sums / np.where(lengths > 0, lengths, 1), [0.0, 0.0, 1.0])
+    return units.astype(np.float32)

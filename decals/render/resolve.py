@@ -1,0 +1,70 @@
+"""From samples to pixels: a box filter in linear light, the background, and sRGB."""
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from decals.render.context import Context
+from decals.render.tile import Tile, set_uniform
+from implicit_decals.shaders import compose
+
+Rgba = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Background:
+    """A vertical gradient behind everything: sRGB and alpha, each in [0, 1], not premultiplied."""
+
+    top: Rgba
+    bottom: Rgba
+
+
+STUDIO = Background((0.80, 0.82, 0.85, 1.0), (0.96, 0.96, 0.95, 1.0))
+"""Light grey paper, a little darker at the top."""
+TRANSPARENT = Background((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+"""Nothing: alpha is how much of a pixel the objects cover."""
+
+
+class ResolvePass:
+    """Filters a tile's samples down and reads the pixels.
+
+    Parameters
+    ----------
+    context
+        Where to draw.
+    size
+        The largest tile, in samples.
+    """
+
+    def __init__(self, context: Context, size: tuple[int, int]) -> None:
+        self._program = context.program(compose("screen.vert"), compose("resolve.frag"))
+        self._array = context.gl.vertex_array(self._program, [])
+        self._target = context.gl.texture(size, 4, dtype="f1")
+        self._framebuffer = context.gl.framebuffer([self._target])
+        self._gl = context.gl
+
+    def pixels(
+        self, light: moderngl.Texture, tile: Tile, samples: int, background: Background
+    ) -> NDArray[np.uint8]:
+        """Give the tile's pixels, ``uint8[h, w, 4]``, the lowest row first."""
+        width, height = tile.width // samples, tile.height // samples
+        self._framebuffer.use()
+        self._framebuffer.viewport = (0, 0, width, height)
+        self._gl.enable_only(moderngl.NOTHING)
+        light.use(0)
+        set_uniform(self._program, "light", 0)
+        set_uniform(self._program, "samples", samples)
+        set_uniform(self._program, "first_row", tile.y / samples)
+        set_uniform(self._program, "rows", tile.picture[1] / samples)
+        set_uniform(self._program, "background_top", background.top)
+        set_uniform(self._program, "background_bottom", background.bottom)
+        self._array.render(vertices=3)
+        data = self._framebuffer.read(viewport=(0, 0, width, height), components=4, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(height, width, 4)
+
+    def release(self) -> None:
+        """Give the memory back."""
+        for resource in (self._array, self._framebuffer, self._target):
+            resource.release()

@@ -1,0 +1,30 @@
+"""What is read of a scene; `decals.scene.Scene` is one."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from decals.camera import Camera
+from decals.model import Decals
+
+
+class ImageLike(Protocol):
+    """An image of a scene: straight RGBA, row 0 at the top."""
+
+    @property
+    def pixels(self) -> NDArray[np.uint8]: ...  # noqa: D102
+
+
+class SceneLike(Protocol):
+    """What is read of a scene (`decals.scene.Scene`)."""
+
+    @property
+    def objects(self) -> Sequence[object]: ...  # noqa: D102
+    @property
+    def decals(self) -> Decals: ...  # noqa: D102
+    @property
+    def images(self) -> Sequence[ImageLike]: ...  # noqa: D102
+    @property
+    def camera(self) -> Camera: ...  # noqa: D102

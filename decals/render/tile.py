@@ -1,0 +1,105 @@
+"""A picture is drawn in tiles, each of which sees its own part of the camera's view."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from decals.camera import Camera
+from decals.render.context import Context
+
+CAMERA_BINDING = 0
+"""Binding point of the uniform block in ``shaders/camera.glsl``."""
+MAX_TILE = 2048
+"""Tiles are at most this many samples wide and high, which bounds the memory of all targets."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A rectangle of a picture's samples, from its lower left corner."""
+
+    camera: Camera
+    picture: tuple[int, int]
+    x: int
+    y: int
+    width: int
+    height: int
+    near: float
+    far: float
+
+    def matrix(self) -> NDArray[np.float64]:
+        """World to this tile's clip space, acting on columns."""
+        width, height = self.picture
+        crop = np.eye(4)
+        crop[0, 0], crop[1, 1] = width / self.width, height / self.height
+        crop[0, 3] = (width - 2 * self.x) / self.width - 1
+        crop[1, 3] = (height - 2 * self.y) / self.height - 1
+        projection = self.camera.projection(width / height, self.near, self.far)
+        return np.asarray(crop @ projection @ self.camera.view())
+
+    def block(self) -> bytes:
+        """Give the contents of ``CameraBlock`` in ``shaders/camera.glsl`` (std140)."""
+        rays = self.camera.rays(*self.picture)
+        corner = rays.corner + self.x * rays.right + self.y * rays.up
+        rows = np.zeros((8, 4), np.float32)
+        rows[:4] = self.matrix().T
+        rows[4:, :3] = rays.origin, corner, rays.right, rays.up
+        return rows.tobytes()
+
+
+def tiles(
+    camera: Camera,
+    size: tuple[int, int],
+    samples: int,
+    clip_range: tuple[float, float],
+    limit: int = MAX_TILE,
+) -> Iterator[Tile]:
+    """Cut a picture of ``size`` pixels with ``samples`` per axis; no tile cuts through a pixel."""
+    width, height = size[0] * samples, size[1] * samples
+    step = max(limit // samples, 1) * samples
+    for y in range(0, height, step):
+        for x in range(0, width, step):
+            tile_size = min(step, width - x), min(step, height - y)
+            yield Tile(camera, (width, height), x, y, *tile_size, *clip_range)
+
+
+class CameraBuffer:
+    """The uniform block from which every program reads the tile's camera."""
+
+    def __init__(self, context: Context) -> None:
+        self._buffer = context.gl.buffer(reserve=128)
+
+    def use(self, tile: Tile) -> Self:
+        """Fill the block for a tile and bind it."""
+        self._buffer.write(tile.block())
+        self._buffer.bind_to_uniform_block(CAMERA_BINDING)
+        return self
+
+    def release(self) -> None:
+        """Give the memory back."""
+        self._buffer.release()
+
+
+def attach_camera(program: moderngl.Program) -> moderngl.Program:
+    """Let a program read its ``CameraBlock``, if it has one, from the bound buffer."""
+    block = program.get("CameraBlock", None)
+    if isinstance(block, moderngl.UniformBlock):
+        block.binding = CAMERA_BINDING
+    return program
+
+
+def set_uniform(program: moderngl.Program, name: str, value: object) -> None:
+    """Set a uniform; one that the driver found unused is passed over."""
+    uniform = program.get(name, None)
+    if isinstance(uniform, moderngl.Uniform):
+        uniform.value = value
+
+
+def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) -> NDArray[np.float32]:
+    """Read a tile's part of a target, ``float32[h, w, 4]``, the lowest row first."""
+    size = tile.width, tile.height
+    data = framebuffer.read((0, 0, *size), components=4, attachment=attachment, alignment=1, dtype="f4")
+    return np.frombuffer(data, np.float32).reshape(tile.height, tile.width, 4)

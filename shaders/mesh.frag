@@ -1,0 +1,8 @@
+//@ include gbuffer.glsl
+in vec3 position;
+in vec3 normal;
+in vec3 color;
+
+void main() {
+    write_surface(position, normal, color);
+}

@@ -1,0 +1,57 @@
+"""Small scenes for the renderer's tests."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from decals.camera import Camera
+from decals.model import Decals
+from decals.render.drawables import register
+from decals.render.mesh import MeshDrawable
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A mesh and its colour: all that the renderer asks of one."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    color: tuple[float, float, float] = (0.7, 0.6, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A decal image: all that the renderer asks of one."""
+
+    pixels: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A scene: all that the renderer asks of one."""
+
+    objects: tuple[object, ...]
+    camera: Camera
+    decals: Decals = field(default_factory=Decals.empty)
+    images: tuple[Picture, ...] = ()
+
+
+register(Shape, MeshDrawable)
+
+
+def grid(rows: int, columns: int) -> np.ndarray:
+    """Two triangles for each cell of a grid of points that closes in both directions."""
+    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    a, b = i * columns + j, (i + 1) % rows * columns + j
+    c, d = (i + 1) % rows * columns + (j + 1) % columns, i * columns + (j + 1) % columns
+    return np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], 2).reshape(-1, 3).astype(np.int32)
+
+
+def torus(
+    radius: float = 1.0, tube: float = 0.4, rows: int = 24, columns: int = 12, *, shift=(0, 0, 0)
+) -> Shape:
+    """A torus around the z axis, faces counter-clockwise from outside."""
+    u, v = np.meshgrid(*(np.arange(n) * 2 * np.pi / n for n in (rows, columns)), indexing="ij")
+    ring = radius + tube * np.cos(v)
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), tube * np.sin(v)], -1).reshape(-1, 3) + shift
+    return Shape(points.astype(np.float32), grid(rows, columns))
