@@ -16,7 +16,7 @@ VANISHING = 1e-3
 
 
 def tangents(positions: Floats, normals: Floats, direction: Direction, seed: int) -> Floats:
-    """Unit tangents, ``float32[n, 3]``: random from the seed, or along a direction as far as the surface allows.
+    """Choose unit tangents, ``float32[n, 3]``: random, or along a direction as far as the surface allows.
 
     Where the direction vanishes or stands upright on the surface, the tangent is a fixed function of
     the normal. `InvalidSeeding` for directions of a wrong shape or that are not finite.
@@ -35,7 +35,8 @@ def tangents(positions: Floats, normals: Floats, direction: Direction, seed: int
 def _stable_tangents(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Tangent closest to the x axis, or to the y axis where the normal is near x."""
     axes = np.where(np.abs(normals[:, :1]) > 0.8, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-    return axes - np.einsum("ni,ni->n", axes, normals)[:, None] * normals
+    tangents: NDArray[np.float64] = axes - np.einsum("ni,ni->n", axes, normals)[:, None] * normals
+    return tangents
 
 
 def _directions(
@@ -56,5 +57,5 @@ def _directions(
         )
     rows = np.broadcast_to(vectors, positions.shape)
     largest = np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
-    scaled = rows / np.where(largest > 0, largest, 1.0)
+    scaled: NDArray[np.float64] = rows / np.where(largest > 0, largest, 1.0)
     return scaled

@@ -7,7 +7,6 @@ so that the result does not depend on scheduling.
 """
 
 # mypy: ignore-errors
-# ruff: noqa: UP018, RUF046
 # (kernel code is Python to look at only: its annotations are Warp values, its names have Warp types;
 # float(0.0) is how a kernel declares a variable that it changes)
 

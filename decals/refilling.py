@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from decals.neighbours import FacingTree
 from decals.population import Sites
 
-GAIN = 1.1
+GAIN = 1.3
 """A particle moves if it will be this many times farther from its neighbours than it was."""
 
 APART = 0.8

@@ -29,14 +29,14 @@ DAMPING = 0.6
 LONGEST = 0.3
 """Longest move of a step, in spacings."""
 
-REFILLS = (0.2, 0.4, 0.6, 0.8)
+REFILLS = (0.3, 0.6, 0.9)
 """Parts of the schedule after which crowded particles move to bare places."""
 
 MEMORY = 0.7
-"""Share of the past in the normal that guides a particle. At a sharp tip the surface's normal jumps from one side
-to the other with every small move; its mean over some steps tells neighbours from far sides better."""
+"""Share of the past in the normal that guides a particle. At a sharp tip the surface's normal jumps from one
+side to the other with every small move; its mean over some steps tells neighbours from far sides better."""
 
-VOID_SAMPLES = 8
+VOID_SAMPLES = 32
 """Samples for each particle among which bare places are found."""
 
 GRID_CELLS = (16, 128)
@@ -109,7 +109,7 @@ class Relaxation:
         self._scouts = self.world.sample(counts * VOID_SAMPLES, stream=2) if count else _nobody()
         self._refills = {int(part * iterations) for part in REFILLS} - {0}
         side = int(np.clip(2 * np.sqrt(max(count, 1)) / CUTOFF, *GRID_CELLS))
-        self._grid: Any = wp.HashGrid(side, side, side, device="cpu")  # type: ignore[no-untyped-call]
+        self._grid: Any = wp.HashGrid(side, side, side, device="cpu")
         self._guides = self.normals.copy()
         self._moves = np.zeros((count, 3), np.float32)
         self._energies = wp.zeros(count, dtype=wp.float32, device="cpu")

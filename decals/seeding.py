@@ -113,7 +113,8 @@ def _odds(images: int, weights: ArrayLike | None) -> NDArray[np.float64]:
         raise InvalidSeeding(f"weights: expected shape [{images}], got {list(odds.shape)}")
     if not (np.isfinite(odds).all() and (odds >= 0).all() and odds.sum() > 0):
         raise InvalidSeeding("weights: expected finite numbers from 0 upward, one of them above 0")
-    return odds / odds.sum()
+    chances: NDArray[np.float64] = odds / odds.sum()
+    return chances
 
 
 def _choose(odds: NDArray[np.float64], count: int, stream: int) -> NDArray[np.int32]:
@@ -121,5 +122,5 @@ def _choose(odds: NDArray[np.float64], count: int, stream: int) -> NDArray[np.in
 
 
 def _stream(seed: int, purpose: int) -> int:
-    """A seed of its own for each purpose, so that a new wish for one leaves the others as they were."""
+    """Derive a seed for one purpose, so that a new wish for it leaves the others as they were."""
     return int(np.random.SeedSequence([seed, purpose]).generate_state(1, np.uint64)[0])

@@ -50,7 +50,8 @@ class Surface(Protocol):
         """Distance to the first hit of each ray, ``float32[n]``; infinity for a miss.
 
         Directions need not be unit vectors, distances are in model units all the same; a ray without
-        direction misses.
+        direction misses. Rays are meant to start outside: from within, a mesh is hit where the ray
+        leaves it, an implicit at once.
         """
         ...
 
