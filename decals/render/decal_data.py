@@ -6,34 +6,15 @@ import moderngl
 
 from blobtree.glsl import translate_library
 from blobtree.kernels import RIM
-from decals.contact import (
-    NOWHERE,
-    add_push,
-    contact_complement,
-    contact_push,
-    contact_uv,
-    field_complement,
-    rim_distance,
-)
 from decals.index import DecalIndex
-from decals.lookup import cell_range
-from decals.mapping import surface_offset, tangent_coordinates
+from decals.mapping import tangent_coordinates
 from decals.model import Decals
+from decals.ownership import complement_at, owner_at, uv_at
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.tile import set_uniform
 
-FUNCTIONS = (
-    cell_range,
-    field_complement,
-    contact_push,
-    add_push,
-    contact_complement,
-    rim_distance,
-    contact_uv,
-    surface_offset,
-    tangent_coordinates,
-)
+FUNCTIONS = (owner_at, complement_at, uv_at, tangent_coordinates)
 """What ``shaders/decals.glsl`` calls."""
 
 
@@ -67,5 +48,4 @@ class DecalData:
 @cache
 def library() -> str:
     """Give the GLSL of all decal formulas, for the slot ``functions``."""
-    constants = f"const float NOWHERE = {float(NOWHERE)!r};\nconst float RIM = {float(RIM)!r};\n"
-    return constants + translate_library(FUNCTIONS)  # type: ignore[arg-type]  # Warp's decorator hides its result's type
+    return f"const float RIM = {float(RIM)!r};\n" + translate_library(FUNCTIONS)  # type: ignore[arg-type]  # Warp's decorator hides its result's type

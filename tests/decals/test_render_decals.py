@@ -1,0 +1,156 @@
+"""The decal pass at every pixel: against float64 brute force, against Warp, and the colours that it makes."""
+
+import numpy as np
+import pytest
+
+from decals.camera import Camera
+from decals.evaluate import evaluate
+from decals.mapping import Mapping
+from decals.model import Decals
+from decals.render.renderer import Buffers, Renderer
+from tests.decals.shapes import Picture, Shape, View, torus
+from tests.oracles.decals import decals_at
+
+SIZE = (80, 60)
+TIE = 1e-4
+"""Owners may differ where a relative change of this size decides."""
+WHITE = Picture(np.full((4, 4, 4), 255, np.uint8))
+
+
+def scattered(shape: Shape, count: int, seed: int, *, radii: tuple[float, float], images: int = 1) -> Decals:
+    """Decals at random vertices of a shape, random in size and turn."""
+    rng = np.random.default_rng(seed)
+    corners = shape.vertices[shape.faces[rng.integers(0, len(shape.faces), count)]].astype(np.float64)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return Decals(
+        positions=np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], count), corners),
+        normals=normals,
+        tangents=np.cross(normals, rng.normal(size=(count, 3))),
+        radii=np.exp(rng.uniform(*np.log(radii), count)),
+        images=rng.integers(0, images, count),
+        spill=rng.random(count) < 0.2,
+    )
+
+
+def view_of(decals: Decals, *shapes: Shape, images: int = 1, direction=(0.5, -0.9, 0.8)) -> View:
+    points = np.concatenate([shape.vertices for shape in shapes])
+    camera = Camera.framing((points.min(0), points.max(0)), direction=direction, up=(0, 0, 1))
+    return View(shapes, camera, decals, (WHITE,) * images)
+
+
+def compare(view: View, buffers: Buffers, mapping: Mapping) -> np.ndarray:
+    """Owner, field and uv of all covered pixels against brute force; which of them have an owner."""
+    seen = buffers.object_id >= 0
+    points, normals = buffers.position[seen], buffers.normal[seen]
+    reference = decals_at(view.decals, points, normals, corrected=mapping is Mapping.CORRECTED)
+    owner, field, uv = buffers.owner[seen], buffers.field[seen], buffers.uv[seen]
+    sure = reference.doubt > TIE
+    assert sure.mean() > 0.95
+    np.testing.assert_array_equal(owner[sure], reference.owner[sure])
+    agree = owner == reference.owner
+    np.testing.assert_allclose(field[agree], reference.field[agree], atol=2e-3)
+    conditioned = agree & (reference.stretch < 20)
+    error = np.abs(uv - reference.uv).max(axis=1)
+    assert np.quantile(error[conditioned], 0.999) < 1e-3
+    return owner >= 0
+
+
+@pytest.mark.parametrize("mapping", list(Mapping))
+@pytest.mark.parametrize(("count", "radii"), [(1, (0.5, 0.6)), (40, (0.2, 0.6)), (800, (0.004, 0.4))])
+def test_every_pixel_is_the_oracles(renderer: Renderer, mapping: Mapping, count: int, radii) -> None:
+    shapes = torus(), torus(0.8, 0.3, shift=(0.7, 0, 0.5))
+    decals = Decals.concatenate([scattered(shape, count, 7, radii=radii) for shape in shapes])
+    view = view_of(decals, *shapes)
+    owned = compare(view, renderer.buffers(view, size=SIZE, mapping=mapping), mapping)
+    assert owned.any()
+    assert count > 1 or not owned.all()
+
+
+def test_many_decals_on_one_point(renderer: Renderer) -> None:
+    shape = torus()
+    decals = scattered(shape, 300, 3, radii=(0.1, 0.5)).replace(positions=np.full((300, 3), [0, -1.4, 0]))
+    view = view_of(decals, shape)
+    assert compare(view, renderer.buffers(view, size=SIZE), Mapping.CORRECTED).any()
+
+
+def test_graphics_and_warp_agree_bit_for_nearly_bit(renderer: Renderer) -> None:
+    shape = torus()
+    view = view_of(scattered(shape, 300, 5, radii=(0.05, 0.3)), shape)
+    buffers = renderer.buffers(view, size=SIZE)
+    seen = buffers.object_id == 0
+    samples = evaluate(view.decals, buffers.position[seen], buffers.normal[seen], device="cpu")
+    same = buffers.owner[seen] == samples.owner
+    assert same.mean() > 0.999
+    np.testing.assert_allclose(buffers.field[seen][same], samples.field[same], atol=1e-4)
+    assert np.quantile(np.abs(buffers.uv[seen] - samples.uv)[same], 0.999) < 1e-4
+
+
+def test_tiles_change_nothing(context, renderer: Renderer) -> None:
+    shape = torus()
+    view = view_of(scattered(shape, 100, 5, radii=(0.05, 0.3)), shape)
+    whole = renderer.render(view, size=SIZE, samples=3)
+    with Renderer(context, max_tile=50) as tiled:
+        parts = tiled.render(view, size=SIZE, samples=3)
+        raw = tiled.buffers(view, size=SIZE)
+    assert (np.abs(parts.astype(int) - whole).max(axis=-1) > 2).mean() < 0.01
+    assert (raw.owner != renderer.buffers(view, size=SIZE).owner).mean() < 0.01
+
+
+# -- colours --------------------------------------------------------------------------------------------
+
+
+def wall(picture: np.ndarray, *, pixels: int, radius: float = 1.0, color=(0.5, 0.5, 0.5)) -> View:
+    """One decal whose rim fills a wall seen face on, at this many pixels across."""
+    corners = np.array([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], np.float32)
+    square = Shape(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), color)
+    decals = Decals(positions=[[0, 0, 0]], normals=[[0, 0, 1]], tangents=[[1, 0, 0]], radii=[radius])
+    camera = Camera((0, 0, 10), fov=2 * np.degrees(np.arctan(radius / 10)))
+    return View((square,), camera, decals, (Picture(picture),))
+
+
+def quarters() -> np.ndarray:
+    """Red upper left, green upper right, blue lower left, transparent lower right."""
+    image = np.zeros((64, 64, 4), np.uint8)
+    image[:32, :32], image[:32, 32:], image[32:, :32] = (255, 0, 0, 255), (0, 255, 0, 255), (0, 0, 255, 255)
+    return image
+
+
+def test_an_image_stands_upright(renderer: Renderer) -> None:
+    picture = renderer.render(wall(quarters(), pixels=64, color=(1, 1, 1)), size=(64, 64), samples=1)
+    upper_left, upper_right, lower_left, lower_right = (
+        picture[y, x, :3].astype(int) for y, x in [(24, 24), (24, 40), (40, 24), (40, 40)]
+    )
+    assert upper_left[0] > 2 * max(upper_left[1:])
+    assert upper_right[1] > 2 * max(upper_right[[0, 2]])
+    assert lower_left[2] > 2 * max(lower_left[:2])
+    assert lower_right.min() > 150  # the white wall shows through
+    corner = picture[1, 1, :3].astype(int)
+    assert corner.min() > 150  # outside the rim too
+
+
+def test_uv_of_a_flat_decal_by_hand(renderer: Renderer) -> None:
+    buffers = renderer.buffers(wall(quarters(), pixels=64), size=(64, 64))
+    x, y = np.meshgrid((np.arange(64) + 0.5) / 64, 1 - (np.arange(64) + 0.5) / 64)
+    inside = np.hypot(x - 0.5, y - 0.5) < 0.499
+    np.testing.assert_array_equal(buffers.owner == 0, np.hypot(x - 0.5, y - 0.5) < 0.5)
+    np.testing.assert_allclose(buffers.uv[inside], np.stack([x, y], -1)[inside], atol=1e-5)
+
+
+@pytest.mark.parametrize("pixels", [16, 32])
+def test_a_fine_pattern_averages_to_grey(renderer: Renderer, pixels: int) -> None:
+    """Black and white squares far smaller than a pixel: linear light makes them 188, not 128."""
+    board = np.zeros((512, 512, 4), np.uint8)
+    board[..., 3] = 255
+    board[(np.indices((512, 512)).sum(axis=0) % 2).astype(bool), :3] = 255
+    grey = np.full((4, 4, 4), 255, np.uint8)
+    grey[..., :3] = 188
+    inside = np.s_[pixels // 4 : -pixels // 4, pixels // 4 : -pixels // 4, :3]
+    fine = renderer.render(wall(board, pixels=pixels), size=(pixels, pixels), samples=1)[inside]
+    flat = renderer.render(wall(grey, pixels=pixels), size=(pixels, pixels), samples=1)[inside]
+    np.testing.assert_allclose(fine.astype(int), flat, atol=3)
+
+
+def test_transparent_images_leave_the_object(renderer: Renderer) -> None:
+    view = wall(np.zeros((8, 8, 4), np.uint8), pixels=32)
+    bare = View(view.objects, view.camera)
+    np.testing.assert_array_equal(renderer.render(view, size=(32, 32)), renderer.render(bare, size=(32, 32)))
