@@ -14,8 +14,6 @@
 A message says what was expected, what came, and what to do.
 """
 
-# ruff: noqa: N818 -- the names say what is wrong; the root says that they are errors
-
 
 class DecalsError(Exception):
     """Root of every error that this package raises on purpose."""

@@ -35,15 +35,20 @@ def complements(squared):
     return t * (3 - 3 * t + t * t)
 
 
+def log_factor(e, least):
+    """log h_i of neighbours with complement e against owners with complement least; −∞ on a tie."""
+    with np.errstate(all="ignore"):
+        w = np.minimum((e - least) / (1 - 2 * least), 1)
+        log_h = np.log1p(-np.exp(np.log1p(-w) / least))
+    return np.where(e == least, -np.inf, np.where(w < 1, log_h, 0.0))
+
+
 def contact_complement(e):
     """(owner, E = 1 − F) of rows of complements, to full relative precision; owner −1 outside all rims."""
     e = np.asarray(e, np.float64)
     rows, owner = np.arange(len(e)), e.argmin(axis=1)
     least = e[rows, owner][:, None]
-    with np.errstate(all="ignore"):
-        w = (e - least) / (1 - 2 * least)
-        log_h = np.where(w < 1, np.log1p(-np.exp(np.log1p(-np.minimum(w, 1)) / least)), 0.0)
-    log_h[e == least] = -np.inf
+    log_h = log_factor(e, least)
     log_h[rows, owner] = 0.0
     result = least[:, 0] + (0.5 - least[:, 0]) * -np.expm1(log_h.sum(axis=1))
     return np.where(least[:, 0] <= 0.5, owner, -1), result

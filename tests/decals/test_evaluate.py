@@ -1,0 +1,223 @@
+"""Owner, field and image coordinates against brute force in float64, on kind and hostile sets."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from decals.contact import REACH
+from decals.errors import InvalidPoints
+from decals.evaluate import evaluate
+from decals.index import DecalIndex
+from decals.mapping import Mapping
+from decals.model import Decals
+from tests.oracles.decals import decals_at
+
+TIE = 1e-4
+"""Relative distance to a tie within which float32 may choose the other owner."""
+
+CUT_ERROR = 1e-4
+"""Of uv and field: what neighbours beyond REACH would have added."""
+
+ROUNDING_ERROR = 1e-5
+"""Of uv and field against the same equations without those neighbours."""
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def dress(rng, positions, normals, radii, **more):
+    return Decals(positions, normals, rng.normal(size=np.shape(positions)), radii, **more)
+
+
+def on_sphere(rng, count):
+    n = unit(rng.normal(size=(count, 3)))
+    return n, n
+
+
+def even_sphere(rng):
+    positions, normals = on_sphere(rng, 400)
+    return dress(rng, positions, normals, np.full(400, 0.12)), *on_sphere(rng, 4000)
+
+
+def unlike_sizes(rng):
+    positions, normals = on_sphere(rng, 2000)
+    radii = np.sort(10.0 ** rng.uniform(-3, -0.3, 2000))
+    points, directions = on_sphere(rng, 2000)
+    close = unit(positions + radii[:, None] * rng.normal(size=(2000, 3)) * 0.5)
+    return (
+        dress(rng, positions, normals, radii),
+        np.concatenate([points, close]),
+        np.concatenate([directions, close]),
+    )
+
+
+def thin_plate(rng):
+    side = rng.choice([-1.0, 1.0], (300, 1))
+    up = np.array([[0, 0, 1.0]])
+    positions = rng.random((300, 3)) * [1, 1, 0] + 1e-3 * side * up
+    decals = dress(rng, positions, side * up, np.full(300, 0.06), spill=rng.random(300) < 0.3)
+    side = rng.choice([-1.0, 1.0], (3000, 1))
+    return decals, rng.random((3000, 3)) * [1, 1, 0] + 1e-3 * side * up, side * np.repeat(up, 3000, axis=0)
+
+
+def far_away(rng):
+    decals, points, normals = even_sphere(rng)
+    shift = np.array([4096.0, -8192.0, 16384.0])
+    return decals.replace(positions=decals.positions + shift), points + shift, normals
+
+
+def stacked(rng):
+    """Five hundred on one point, of many sizes, and a hundred equal ones on another."""
+    n = np.repeat([[0, 0, 1.0]], 600, axis=0)
+    positions = np.repeat([[0, 0, 0], [0.5, 0, 0]], [500, 100], axis=0)
+    radii = np.concatenate([rng.uniform(0.1, 0.4, 500), np.full(100, 0.3)])
+    points = rng.uniform(-0.5, 1, (1500, 3)) * [1, 1, 0]
+    return dress(rng, positions, n, radii), points, n[:1].repeat(1500, axis=0)
+
+
+def scattered_in_space(rng):
+    decals = dress(rng, rng.random((300, 3)), rng.normal(size=(300, 3)), rng.uniform(0.05, 0.3, 300))
+    return decals, rng.random((3000, 3)), unit(rng.normal(size=(3000, 3)))
+
+
+def small_model(rng):
+    decals, points, normals = even_sphere(rng)
+    return (
+        decals.replace(positions=decals.positions * 1e-6, radii=decals.radii * 1e-6),
+        points * 1e-6,
+        normals,
+    )
+
+
+SETS = [even_sphere, unlike_sizes, thin_plate, far_away, stacked, scattered_in_space, small_model]
+
+
+def worst(got, want, rows):
+    """Larger of the errors of uv, relative to its conditioning, and of the field."""
+    uv = np.abs(got.uv - want.uv).max(axis=1) / want.stretch
+    return np.maximum(uv, np.abs(got.field - want.field))[rows]
+
+
+@pytest.mark.parametrize("mapping", Mapping)
+@pytest.mark.parametrize("make", SETS)
+def test_against_brute_force(make, mapping):
+    decals, points, normals = make(np.random.default_rng(SETS.index(make)))
+    points, normals = np.float32(points), np.float32(normals)
+    got = evaluate(decals, points, normals, mapping=mapping)
+    facing, corrected = unit(normals.astype(float)), mapping == Mapping.CORRECTED
+    want = decals_at(decals, points, facing, corrected=corrected)
+    clear = want.doubt > TIE
+    assert clear.mean() > 0.5
+    assert np.array_equal(got.owner[clear], want.owner[clear])
+    same = clear & (want.owner >= 0)
+    assert same.sum() > 100
+    cut = worst(got, want, same).max()
+    assert cut <= CUT_ERROR
+    errors = worst(got, decals_at(decals, points, facing, corrected=corrected, reach=REACH), same)
+    print(f"{make.__name__}, {mapping.name}: cut {cut:.1e}, rounding {errors.max():.1e}")
+    assert np.quantile(errors, 0.999) <= ROUNDING_ERROR  # a neighbour may lie on the very limit
+    nobody = got.owner < 0
+    assert not got.uv[nobody].any()
+    assert not got.field[nobody].any()
+
+
+def test_a_lone_decal_shows_its_image_undistorted():
+    decals = Decals([[1, 2, 3]], [[0, 0, 1]], [[0, 1, 0]], [2.0])
+    points = [[1, 2, 3], [1, 4, 3], [-1, 2, 3], [1, 1, 3], [1, 4.01, 3]]
+    samples = evaluate(decals, points, np.tile([0, 0, 1], (5, 1)))
+    assert samples.owner.tolist() == [0, 0, 0, 0, -1]
+    assert samples.uv[:4] == pytest.approx(np.array([[0.5, 0.5], [1, 0.5], [0.5, 1], [0.25, 0.5]]), abs=1e-6)
+    assert samples.field[:3] == pytest.approx(np.array([1, 0.5, 0.5]), abs=1e-6)
+
+
+def test_ties_go_to_the_lowest_number_and_show_the_rim():
+    flat = {"normals": [[0, 0, 1]] * 3, "tangents": [[1, 0, 0]] * 3}
+    decals = Decals([[1, 0, 0], [-1, 0, 0], [1, 0, 0]], radii=[2, 2, 2], **flat)
+    samples = evaluate(decals, [[0, 0.5, 0], [0.5, 0, 0]], [[0, 0, 1]] * 2)
+    assert samples.owner.tolist() == [0, 0]
+    assert samples.field == pytest.approx(0.5)
+
+
+def test_index_and_brute_force_agree_to_the_bit():
+    """One cell that holds everything gives what the index gives: culling changes nothing."""
+    rng = np.random.default_rng(11)
+    positions, normals = on_sphere(rng, 300)
+    decals = dress(rng, positions, normals, np.full(300, 0.15))
+    everything = DecalIndex.build(np.zeros((300, 3)), np.full(300, 100.0))
+    points, directions = on_sphere(rng, 3000)
+    culled = evaluate(decals, points, directions)
+    brute = evaluate(decals, points, directions, index=everything)
+    for name in ("owner", "uv", "field"):
+        assert np.array_equal(getattr(culled, name), getattr(brute, name))
+
+
+def test_the_far_side_is_coloured_only_by_decals_that_spill():
+    frame = {"normals": [[0, 0, 1]], "tangents": [[1, 0, 0]], "radii": [1.0]}
+    behind = [[0.1, 0, -0.01]], [[0, 0, -1]]
+    assert evaluate(Decals([[0, 0, 0]], **frame), *behind).owner.tolist() == [-1]
+    assert evaluate(Decals([[0, 0, 0]], **frame, spill=[True]), *behind).owner.tolist() == [0]
+    below, above = np.deg2rad([100, 109])
+    for angle, owner in ((below, 0), (above, -1)):
+        tilted = [[np.sin(angle), 0, np.cos(angle)]]
+        assert evaluate(Decals([[0, 0, 0]], **frame), [[0.1, 0, 0]], tilted).owner.tolist() == [owner]
+
+
+def test_normals_of_any_length():
+    rng = np.random.default_rng(12)
+    decals, points, normals = even_sphere(rng)
+    one = evaluate(decals, points, normals)
+    other = evaluate(decals, points, normals * 7)
+    assert np.array_equal(one.owner, other.owner)
+    assert one.uv == pytest.approx(other.uv, abs=1e-5)
+
+
+def test_nothing_and_nonsense():
+    decals = Decals.empty()
+    assert evaluate(decals, np.zeros((3, 3)), np.zeros((3, 3))).owner.tolist() == [-1] * 3
+    assert evaluate(decals, np.zeros((0, 3)), np.zeros((0, 3))).uv.shape == (0, 2)
+    one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    strange = [[np.nan, 0, 0], [np.inf, 0, 0], [3e38, -3e38, 0]]
+    samples = evaluate(one, strange, np.tile([0, 0, 1], (3, 1)))
+    assert samples.owner.tolist() == [-1] * 3
+    assert np.isfinite(evaluate(one, [[0.1, 0.2, 0]], [[0, 0, 0]]).uv).all()
+
+
+@pytest.mark.parametrize(
+    ("points", "normals", "says"),
+    [
+        (np.zeros((2, 2)), np.zeros((2, 3)), "points: expected shape"),
+        (np.zeros((2, 3)), np.zeros(3), "normals: expected shape"),
+        (np.zeros((2, 3)), np.zeros((1, 3)), "one for each of 2 points, got 1"),
+    ],
+)
+def test_refuses(points, normals, says):
+    with pytest.raises(InvalidPoints, match=says):
+        evaluate(Decals.empty(), points, normals)
+
+
+component = st.floats(-2, 2, width=32)
+triple = st.tuples(component, component, component)
+direction = triple.filter(lambda v: np.linalg.norm(v) > 0.01)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    centres=st.lists(triple, min_size=1, max_size=6),
+    normal=direction,
+    radius=st.floats(2.0**-6, 3, width=32),
+    points=st.lists(triple, min_size=1, max_size=6),
+    look=direction,
+)
+def test_any_small_set(centres, normal, radius, points, look):
+    tangent = np.cross(normal, [0.6, 0.8, 0] if abs(normal[2]) > 1e-3 else [0, 0, 1])
+    count = len(centres)
+    decals = Decals(centres, [normal] * count, [tangent] * count, [radius] * count)
+    normals = np.float32([look] * len(points))
+    got = evaluate(decals, points, normals)
+    want = decals_at(decals, np.float32(points), unit(normals.astype(float)))
+    assert np.isfinite(got.uv).all()
+    clear = (want.doubt > TIE) & (want.stretch < 10)
+    assert np.array_equal(got.owner[clear], want.owner[clear])
+    assert np.abs(got.uv - want.uv)[clear].max(initial=0) <= 1e-3
