@@ -34,27 +34,33 @@ _COMPONENTS = {
 _SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x")}
 
 
-def translate_library(functions: Iterable[wp.Function]) -> str:
+def translate_library(functions: Iterable[wp.Function], *, provided: Iterable[wp.Function] = ()) -> str:
     """GLSL source of `functions` and of everything they call, each once, callees first.
+
+    Parameters
+    ----------
+    provided
+        Functions that the shader defines by hand, under the same names; they are only declared.
 
     Raises
     ------
     UntranslatableFunction
         A function leaves the shared subset; the message names file and line.
     """
+    declarations = {function.key: _Translator(function).signature() + ";" for function in provided}
     translated: dict[str, str] = {}
     for function in functions:
-        _collect(function, translated)
-    return HELPERS + "\n".join(translated.values())
+        _collect(function, translated, frozenset(declarations))
+    return HELPERS + "\n".join([*declarations.values(), "", *translated.values()])
 
 
-def _collect(function: wp.Function, translated: dict[str, str]) -> None:
-    if function.key in translated:
+def _collect(function: wp.Function, translated: dict[str, str], provided: frozenset[str]) -> None:
+    if function.key in translated or function.key in provided:
         return
     translator = _Translator(function)
     source = translator.source()
     for callee in translator.callees:
-        _collect(callee, translated)
+        _collect(callee, translated, provided)
     translated[function.key] = source
 
 
@@ -80,7 +86,8 @@ class _Translator:
         assert isinstance(definition, ast.FunctionDef)
         self.definition = definition
 
-    def source(self) -> str:
+    def signature(self) -> str:
+        """What the function returns, its name, and its parameters."""
         annotations = {name: type_name(hint) for name, hint in self.hints.items()}
         returned = annotations.pop("return", "void")
         for name, glsl_type in annotations.items():
@@ -88,16 +95,21 @@ class _Translator:
                 raise self.refusal(self.definition, f"parameter {name!r} has no type that GLSL knows")
         if len(annotations) != len(self.definition.args.args):
             raise self.refusal(self.definition, "a parameter lacks its type")
-        parameters = dict(annotations)
-        self.types = {name: str(glsl_type) for name, glsl_type in parameters.items()}
+        self.types = {name: str(glsl_type) for name, glsl_type in annotations.items()}
+        parameters = ", ".join(f"{glsl_type} {spell(name)}" for name, glsl_type in self.types.items())
+        return f"{returned} {self.function.key}({parameters})"
+
+    def source(self) -> str:
+        """The whole function."""
+        signature = self.signature()
+        parameters = set(self.types)
         body = [line for statement in self.definition.body for line in self.statement(statement)]
-        locals_ = [
+        variables = [
             f"    {glsl_type} {spell(name)};"
             for name, glsl_type in self.types.items()
             if name not in parameters
         ]
-        signature = ", ".join(f"{glsl_type} {spell(name)}" for name, glsl_type in parameters.items())
-        return "\n".join([f"{returned} {self.function.key}({signature}) {{", *locals_, *body, "}", ""])
+        return "\n".join([signature + " {", *variables, *body, "}", ""])
 
     def refusal(self, node: ast.AST, reason: str) -> UntranslatableFunction:
         line = self.first_line + getattr(node, "lineno", 1) - 1

@@ -34,9 +34,11 @@ CASTS = {"float": "float", "int": "int", "bool": "bool"}
 
 RESERVED_WORDS = frozenset(
     """
-    active attribute buffer centroid common discard filter fixed flat half highp image input inout invariant
-    layout lowp mediump noise out output partition patch precision resource sample shared smooth subroutine
-    superp texture uniform unsigned using varying volatile void
+    active attribute buffer cast centroid class common const default discard do double enum extern external
+    filter fixed flat goto half highp image in inline inout input interface invariant layout long lowp mat2
+    mat3 mat4 mediump namespace noinline noise noperspective out output packed partition patch precision
+    public resource row_major sample sampler2D shared short sizeof smooth static struct subroutine superp
+    switch template texture this true typedef uniform union unsigned using varying void volatile
     """.split()  # noqa: SIM905  (a list of words reads best as words)
 )
 

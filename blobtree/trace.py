@@ -43,7 +43,7 @@ def first_hit(
     A ray that starts inside hits at t_min.
     """
     t = t_min
-    reach = (t_max - t_min) * 0.125
+    reach = wp.max((t_max - t_min) * 0.125, 4.0 * tolerance)
     for _step in range(MAX_STEPS):
         if t > t_max:
             return MISS
@@ -52,8 +52,8 @@ def first_hit(
         free = reach
         if bound[1] * reach > gap:
             free = gap / bound[1]
-        if free <= tolerance:
-            return refine_hit(origin, direction, t, tolerance, tape)
+            if free <= tolerance:
+                return refine_hit(origin, direction, t, tolerance, tape)
         t += free
         reach = 2.0 * free
     return MISS

@@ -1,0 +1,26 @@
+// The tape's interpreter, blobtree/interpreter.py in GLSL: one composition per reading. Defines:
+// INTERPRET, FIELD (its type), LEAF, UNSTRETCH, COMBINE, PRIMITIVE_COLOR.
+// Slots: the registers, and a case per instruction that occurs (decals/render/tape_shader.py).
+FIELD INTERPRET(vec3 q, float reach, sampler2D tape, sampler2D colors) {
+    FIELD accumulator = FIELD(0.0);
+    //@ slot registers optional
+    int at = 0;
+    int primitive = 0;
+    while (at < tape_length) {
+        vec4 header = tape_texel(tape, at);
+        int operator_ = int(header.y);
+        int count = int(header.z);
+        at += 1;
+        switch (int(header.x)) {
+        //@ slot runs
+        //@ slot stack optional
+        }
+    }
+    return accumulator;
+}
+#undef INTERPRET
+#undef FIELD
+#undef LEAF
+#undef UNSTRETCH
+#undef COMBINE
+#undef PRIMITIVE_COLOR
