@@ -1,1 +1,68 @@
-def main() -> None: print("hi")
+"""The command ``implicit-decals``: argument parsing, and errors as one line each."""
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+
+from cyclopts import App, CycloptsError
+from rich.console import Console
+
+from blobtree import BlobTreeError
+from decals.errors import DecalsError
+
+from .errors import UsageError
+from .help_texts import HELP
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+app = App(
+    name="implicit-decals",
+    help="Cover meshes and implicit models with decals that touch, push and deform each other.",
+    version=lambda: version("implicit-decals"),
+    help_format="plaintext",
+    suppress_keyboard_interrupt=False,
+)
+# Each command is imported when it is called, so that --help and --version answer at once.
+for _name, _help in HELP.items():
+    app.command(f"implicit_decals.apps.{_name}:{_name}", name=_name, help=_help)
+
+
+def run(tokens: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    tokens : sequence of str, optional
+        The arguments; those of the process if not given.
+
+    Returns
+    -------
+    int
+        0 if all went well, 2 for input that cannot be used, 130 if interrupted, else the command's own code.
+    """
+    try:
+        result = app(tokens, print_error=False, exit_on_error=False, result_action="return_value")
+    except (CycloptsError, UsageError, DecalsError, BlobTreeError) as error:
+        return _complain(str(error))
+    except OSError as error:
+        return _complain(f"{error.strerror or error}: {error.filename or 'the file'}")
+    except KeyboardInterrupt:
+        Console(stderr=True).print("interrupted")
+        return INTERRUPTED
+    return result if isinstance(result, int) else 0
+
+
+def _complain(message: str) -> int:
+    line = " ".join(message.split())
+    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_escaped(line)}", highlight=False)
+    return BAD_INPUT
+
+
+def _escaped(text: str) -> str:
+    return text.replace("[", r"\[")
+
+
+def main() -> None:
+    """Entry point of the command."""
+    sys.exit(run())

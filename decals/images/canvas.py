@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Field = NDArray[np.floating[Any]]
 Color = tuple[float, float, float]
 
-WORK_SIZE = 1024
+WORK_SIZE = 768
 """Edge of the grid that small images are drawn on before they are averaged down, in samples."""
 
 MAX_SUPERSAMPLING = 16

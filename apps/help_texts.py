@@ -1,0 +1,35 @@
+"""What ``--help`` says of each command: a line, then examples."""
+
+HELP = {
+    "demo": """Draw three pictures that show what this is about.
+
+For instance:
+
+implicit-decals demo
+
+implicit-decals demo --output pictures
+""",
+    "render": """Cover models with one coat of decals and draw a picture.
+
+Several models keep their own coordinates; where they touch, the decals run across.
+
+For instance:
+
+implicit-decals render knot --decals 800 -o knot.png
+
+implicit-decals render bunny.ply blob.json --image scale --image rock -o both.png
+
+implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json -o dragon.png
+
+implicit-decals render dragon.json --size 2400x1800 -o large.png
+""",
+    "polygonize": """Write an implicit model's surface as a triangle mesh.
+
+For instance:
+
+implicit-decals polygonize spheres -o spheres.ply
+
+implicit-decals polygonize blob.json --cell-size 0.02 -o blob.obj
+""",
+    "doctor": "Say what is here of what the project needs, and what to do about the rest.",
+}

@@ -1,0 +1,59 @@
+"""Where results go: checked before the long work, written in one step after it."""
+
+import io
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from blobtree.io import write_atomically
+
+from .errors import UsageError
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
+MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
+
+
+def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
+    """Make sure that a file of one of these kinds can be written there.
+
+    Raises
+    ------
+    UsageError
+        If the extension is unknown, the folder missing or read-only, or the path a folder.
+    """
+    if path.is_dir():
+        raise UsageError(f"expected a file to write, {str(path)!r} is a folder; add a file name")
+    if path.suffix.lower() not in suffixes:
+        known = ", ".join(suffixes)
+        raise UsageError(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
+    folder = path.parent
+    if not folder.is_dir():
+        raise UsageError(f"the output folder {str(folder)!r} does not exist; make it first")
+    if not os.access(folder, os.W_OK):
+        raise UsageError(f"the output folder {str(folder)!r} cannot be written; choose another")
+
+
+def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:
+    """Write uint8[h, w, 3 or 4] as the kind of picture that the extension names."""
+    kind = Image.registered_extensions()[path.suffix.lower()]
+    content = io.BytesIO()
+    picture = Image.fromarray(pixels)
+    (picture.convert("RGB") if kind == "JPEG" else picture).save(content, kind)
+    write_atomically(path, content.getvalue())
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary path of the same kind beside ``path``, and move it there if all went well."""
+    temporary = path.with_name(f".{uuid.uuid4().hex}{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

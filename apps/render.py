@@ -1,0 +1,138 @@
+"""``implicit-decals render``: cover models with decals and draw the picture."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from blobtree import Progress
+from decals.render.renderer import Renderer
+from decals.scene import DecalImage, Scene, SceneObject, bounds_of
+from decals.scene_file import save_scene
+from decals.seeding import seed as seed_decals
+
+from .errors import UsageError
+from .models import load_models
+from .options import (
+    CAMERAS,
+    MAX_DECALS,
+    MAX_SAMPLES,
+    MAX_SEED,
+    Direction,
+    Size,
+    check_count,
+    frame,
+    parse_direction,
+    parse_size,
+)
+from .output import PICTURE_SUFFIXES, check_output, write_picture
+from .progress_bars import progress_bars
+
+DEFAULT_COUNT = 500
+DEFAULT_IMAGES = ("scale",)
+
+
+def render(
+    model: Annotated[list[str], Parameter(negative=())],
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    decals: Annotated[int | None, Parameter(show_default=False)] = None,
+    image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
+    camera: str | None = None,
+    size: str = "1200x900",
+    samples: int = 2,
+    seed: Annotated[int | None, Parameter(show_default=False)] = None,
+    save: Path | None = None,
+) -> None:
+    """Cover models with one coat of decals and draw a picture.
+
+    Several models keep their own coordinates; where they touch, the decals run across.
+
+    Examples
+    --------
+        implicit-decals render knot --decals 800 -o knot.png
+
+        implicit-decals render bunny.ply blob.json --image scale --image rock -o both.png
+
+        implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json -o dragon.png
+
+        implicit-decals render dragon.json --size 2400x1800 -o large.png
+
+    Parameters
+    ----------
+    model
+        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, samples (creature, dragon, horse, knot,
+        spheres), or one saved scene.
+    output
+        The picture: png, jpg, webp or tif.
+    decals
+        How many decals. Default: 500.
+    image
+        What is on them: eye, rivet, rock, scale or tile, with a colour if you like (scale#b0413e), or a
+        picture file. May be given several times; decals choose at random. Default: scale.
+    camera
+        Where from: three-quarter, front, back, left, right, top, bottom, or a direction x,y,z.
+    size
+        Width and height of the picture in pixels.
+    samples
+        Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine.
+    seed
+        The same number gives the same decals. Default: 0.
+    save
+        Also write the scene to this JSON file, which can be rendered again.
+    """
+    pixels = parse_size(size)
+    direction = None if camera is None else parse_direction(camera)
+    check_count("--samples", samples, 1, MAX_SAMPLES)
+    check_output(output, PICTURE_SUFFIXES)
+    if save is not None:
+        check_output(save, (".json",))
+    loaded = load_models(model)
+    if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
+        raise UsageError("a saved scene brings its own decals; leave out --decals, --image and --seed")
+    coat = Coat.asked(decals, image, seed)
+    with Renderer() as renderer, progress_bars() as progress:  # no graphics: say so before the long work
+        scene = loaded if isinstance(loaded, Scene) else coat.scene(loaded, direction, pixels, progress)
+        if isinstance(loaded, Scene) and direction is not None:
+            scene = scene.replace(camera=frame(scene.bounds, direction, pixels))
+        if save is not None:
+            save_scene(scene, save)
+        progress("Drawing", 0.0)
+        write_picture(output, renderer.render(scene, size=pixels, samples=samples))
+
+
+@dataclass(frozen=True)
+class Coat:
+    """The decals that somebody asked for."""
+
+    count: int
+    images: tuple[DecalImage, ...]
+    seed: int
+
+    @classmethod
+    def asked(cls, count: int | None, images: Sequence[str] | None, seed: int | None) -> "Coat":
+        """Check what was asked, fill in the defaults and read the images."""
+        count, seed = DEFAULT_COUNT if count is None else count, seed or 0
+        check_count("--decals", count, 0, MAX_DECALS)
+        check_count("--seed", seed, 0, MAX_SEED)
+        return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
+
+    def scene(
+        self, objects: Sequence[SceneObject], direction: Direction | None, size: Size, progress: Progress
+    ) -> Scene:
+        """Cover objects with the decals and look at them from a direction."""
+        return Scene(
+            objects=tuple(objects),
+            camera=frame(bounds_of(objects), direction or CAMERAS["three-quarter"], size),
+            images=self.images,
+            decals=seed_decals(
+                [item.surface for item in objects],
+                count=self.count,
+                seed=self.seed,
+                images=len(self.images),
+                progress=progress,
+            ),
+        )

@@ -1,0 +1,69 @@
+"""Sample models by name: those of the paper (its figure 14), and the creature of the demo."""
+
+import logging
+import warnings
+from collections.abc import Callable
+from functools import partial
+
+import pyvista as pv
+from pyvista import examples
+
+from blobtree import Node
+from decals.mesh_file import MeshArrays, surface_triangles
+from decals.scene import MeshObject, SceneObject, TreeObject
+from decals.scene_file import SAMPLE
+
+from .creature import creature
+from .errors import UsageError
+from .knot import torus_knot
+from .spheres import spheres
+
+_DATA = "https://github.com/pyvista/vtk-data"
+
+
+def _download(name: str, download: Callable[[], pv.PolyData]) -> MeshArrays:
+    """Get a mesh through pyvista: from its cache, from ``PYVISTA_DATA``, or from the internet."""
+    logging.getLogger("pooch").setLevel(logging.WARNING)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about a PYVISTA_DATA that is no folder; what counts is the mesh
+            surface = download()
+    except Exception as error:  # no network, no permission, a broken cache: all end here
+        reason = type(error).__name__
+        raise UsageError(
+            f"the sample {name!r} is downloaded by pyvista on first use, and that failed ({reason}); "
+            f"connect to the internet, or set PYVISTA_DATA to a copy of {_DATA}"
+        ) from error
+    return surface_triangles(surface, name=name)
+
+
+_MESHES: dict[str, Callable[[], MeshArrays]] = {
+    "dragon": partial(_download, "dragon", lambda: examples.download_dragon()),
+    "horse": partial(_download, "horse", lambda: examples.download_horse()),
+    "knot": torus_knot,
+}
+_TREES: dict[str, Callable[[], Node]] = {"creature": creature, "spheres": spheres}
+
+SAMPLES: tuple[str, ...] = tuple(sorted([*_MESHES, *_TREES]))
+"""Names of the samples."""
+
+
+def sample_mesh(name: str) -> MeshArrays:
+    """Vertices and faces of a sample mesh; a `decals.scene_file.SampleLoader`."""
+    if name not in _MESHES:
+        raise UsageError(f"expected a sample mesh ({', '.join(sorted(_MESHES))}), got {name!r}")
+    return _MESHES[name]()
+
+
+def sample(name: str) -> SceneObject:
+    """Make or fetch a sample as an object of its own name.
+
+    Raises
+    ------
+    UsageError
+        If there is no such sample, or it had to be downloaded and could not.
+    """
+    if name in _TREES:
+        return TreeObject(name, _TREES[name]())
+    vertices, faces = sample_mesh(name)
+    return MeshObject(name, vertices, faces, source=SAMPLE + name)
