@@ -1,0 +1,216 @@
+"""The decal functions as GLSL: the same numbers as through Warp, on fragments."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import warp as wp
+
+from blobtree.glsl import translate_library
+from decals.contact import contact_complement, contact_push, contact_uv, field_complement, rim_distance
+from decals.index import DecalIndex
+from decals.lookup import cell_hash, cell_range
+from decals.mapping import Mapping, surface_offset, tangent_coordinates
+
+wp.set_module_options({"enable_backward": False})
+
+AGREEMENT = 1e-5
+WIDTH = 1024
+
+VERTEX = """#version 330
+void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
+"""
+FRAGMENT = """#version 330
+uniform sampler2D a; uniform sampler2D b; uniform sampler2D c;
+uniform sampler2D levels; uniform isampler2D table; uniform isampler2D ids; uniform int mask;
+out vec4 result;
+{functions}
+void main() {{
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 x = texelFetch(a, at, 0), y = texelFetch(b, at, 0), z = texelFetch(c, at, 0);
+    {body}
+}}
+"""
+
+
+@pytest.fixture
+def through_glsl(context) -> Callable[..., np.ndarray]:
+    """Run GLSL statements over rows x, y, z (float32[n, 4] each) that set `result`."""
+    gl = context.gl
+
+    def run(functions, body, *rows, index=None):
+        source = FRAGMENT.format(functions=translate_library(functions), body=body)
+        program = gl.program(vertex_shader=VERTEX, fragment_shader=source)
+        count = len(rows[0])
+        images = dict(zip("abc", rows, strict=False))
+        if index is not None:
+            images |= {"levels": index.levels, "table": index.table[:, None], "ids": index.ids[:, None]}
+            if "mask" in program:
+                program["mask"] = index.mask
+        made = [program, gl.texture((WIDTH, height(count)), 4, dtype="f4")]
+        for unit, (name, values) in enumerate(images.items()):
+            if name in program:
+                made.append(texture(gl, values))
+                made[-1].use(unit)
+                program[name] = unit
+        target = gl.framebuffer([made[1]])
+        target.use()
+        vertices = gl.vertex_array(program, [])
+        vertices.render(vertices=3)
+        seen = np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(-1, 4)[:count].copy()
+        for thing in (vertices, target, *made):
+            thing.release()
+        return seen
+
+    return run
+
+
+def height(count):
+    return max(1, -(-count // WIDTH))
+
+
+def texture(gl, values):
+    padded = np.zeros((height(len(values)) * WIDTH, values.shape[1]), values.dtype)
+    padded[: len(values)] = values
+    dtype = "i4" if values.dtype == np.int32 else "f4"
+    made = gl.texture((WIDTH, height(len(values))), values.shape[1], padded.tobytes(), dtype=dtype)
+    made.filter = (gl.NEAREST, gl.NEAREST)
+    return made
+
+
+def rows(*columns):
+    """float32[n, 4] of up to four columns."""
+    table = np.column_stack(columns).astype(np.float32)
+    return np.pad(table, ((0, 0), (0, 4 - table.shape[1])))
+
+
+@wp.kernel
+def contacts(x: wp.array(dtype=wp.vec4), result: wp.array(dtype=wp.vec4)):
+    i = wp.tid()
+    e_k = field_complement(x[i][0])
+    complement = contact_complement(e_k, contact_push(field_complement(x[i][1]), e_k))
+    uv = contact_uv(wp.vec2(x[i][2], x[i][3]), rim_distance(complement))
+    result[i] = wp.vec4(complement, rim_distance(complement), uv[0], uv[1])
+
+
+CONTACTS = """
+    float e_k = field_complement(x[0]);
+    float complement = contact_complement(e_k, contact_push(field_complement(x[1]), e_k));
+    vec2 uv = contact_uv(x.zw, rim_distance(complement));
+    result = vec4(complement, rim_distance(complement), uv);
+"""
+
+
+@wp.kernel
+def offsets(
+    x: wp.array(dtype=wp.vec4),
+    y: wp.array(dtype=wp.vec4),
+    z: wp.array(dtype=wp.vec4),
+    result: wp.array(dtype=wp.vec4),
+):
+    i = wp.tid()
+    n = wp.vec3(y[i][0], y[i][1], y[i][2])
+    w = wp.vec3(x[i][0], x[i][1], x[i][2])
+    m = surface_offset(w, n, wp.vec3(z[i][0], z[i][1], z[i][2]), int(y[i][3]))
+    xy = tangent_coordinates(m, n, w)
+    result[i] = wp.vec4(m[0], m[1], m[2], xy[1])
+
+
+OFFSETS = """
+    vec3 m = surface_offset(x.xyz, y.xyz, z.xyz, int(y.w));
+    result = vec4(m, tangent_coordinates(m, y.xyz, x.xyz)[1]);
+"""
+
+
+def through_warp(kernel, *inputs):
+    result = wp.zeros(len(inputs[0]), dtype=wp.vec4, device="cpu")
+    wp.launch(
+        kernel,
+        len(result),
+        [wp.array(i, dtype=wp.vec4, device="cpu") for i in inputs] + [result],
+        device="cpu",
+    )
+    return result.numpy()
+
+
+def adversarial_contacts(rng, n):
+    """Squared relative distances of an owner and a neighbour: anywhere, near centre, tie and rim."""
+    rim = 1 - 2 ** (-1 / 3)
+    least = np.concatenate(
+        [rng.uniform(0, rim, n), 10.0 ** rng.uniform(-20, -1, n), rim * (1 - 10.0 ** rng.uniform(-8, 0, n))]
+    )
+    ratio = np.where(rng.random(3 * n) < 0.5, 1 + 10.0 ** rng.uniform(-8, 1, 3 * n), rng.uniform(1, 9, 3 * n))
+    direction = rng.normal(size=(3 * n, 2)) * 10.0 ** rng.uniform(-9, 9, (3 * n, 1))
+    exact = [[0, 0, 1, 0], [0, 0.1, 0, 1], [rim, rim, 1, 1], [1e-20, 1e-20, 0, 0], [0, 1, -1, 0]]
+    return np.concatenate([rows(least, least * ratio, direction), np.float32(exact)])
+
+
+def test_contact(through_glsl):
+    x = adversarial_contacts(np.random.default_rng(0), 100_000)
+    functions = [field_complement, contact_complement, contact_push, contact_uv, rim_distance]
+    seen, expected = through_glsl(functions, CONTACTS, x), through_warp(contacts, x)
+    worst = np.abs(seen - expected).max(axis=0)
+    print("complement, rim, u, v:", worst)
+    assert worst.max() <= AGREEMENT
+
+
+@pytest.mark.parametrize("mapping", Mapping)
+def test_mapping(through_glsl, mapping):
+    rng = np.random.default_rng(1)
+    n = 100_000
+    n_p = rng.normal(size=(n, 3))
+    n_p /= np.linalg.norm(n_p, axis=1, keepdims=True)
+    n_q = n_p + 10.0 ** rng.uniform(-9, 1, (n, 1)) * rng.normal(size=(n, 3))
+    n_q /= np.linalg.norm(n_q, axis=1, keepdims=True)
+    keep = (n_p * n_q).sum(axis=1) > -0.9  # beyond, float32 hardly tells the axis
+    w = rng.uniform(-1, 1, (n, 3))
+    inputs = [a[keep] for a in (rows(w), rows(n_p, np.full(n, mapping)), rows(n_q))]
+    seen = through_glsl([surface_offset, tangent_coordinates], OFFSETS, *inputs)
+    worst = np.abs(seen - through_warp(offsets, *inputs)).max()
+    print(mapping.name, worst)
+    assert worst <= AGREEMENT
+
+
+LOOKUP = """
+    uint h = cell_hash(int(y.x), int(y.y), int(y.z)) & 65535u;
+    result = vec4(cell_range(x.xyz, int(x.w), levels, table, mask, ids), h, 0.0);
+"""
+
+
+def test_index(through_glsl):
+    """The same lists and the same hash, bit for bit, far from the origin and over six decades of size."""
+    rng = np.random.default_rng(2)
+    positions = np.float32(rng.normal(size=(400, 3)) * 10.0 ** rng.uniform(-3, 6, (400, 1)))
+    influence = np.float32(10.0 ** rng.uniform(-3, 3, 400))
+    index = DecalIndex.build(positions, influence)
+    where = positions + rng.normal(size=(400, 3)) * influence[:, None] * 0.2
+    cells = rng.integers(0, 2**24, (400, 3))
+    every_level = [rows(where, np.full(400, level)) for level in range(index.level_count)]
+    for x in every_level:
+        seen = through_glsl([cell_range, cell_hash], LOOKUP, x, rows(cells), index=index)
+        expected = through_warp_lookup(index, x, cells)
+        assert np.array_equal(seen[:, :3], expected)
+
+
+@wp.kernel
+def lookups(
+    x: wp.array(dtype=wp.vec4),
+    cells: wp.array(dtype=wp.vec3i),
+    level_count: wp.int32,
+    levels: wp.array(dtype=wp.vec4),
+    table: wp.array(dtype=wp.int32),
+    mask: wp.int32,
+    ids: wp.array(dtype=wp.int32),
+    result: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid()
+    span = cell_range(wp.vec3(x[i][0], x[i][1], x[i][2]), int(x[i][3]), levels, table, mask, ids)
+    h = cell_hash(cells[i][0], cells[i][1], cells[i][2]) & wp.uint32(65535)
+    result[i] = wp.vec3(float(span[0]), float(span[1]), float(h))
+
+
+def through_warp_lookup(index, x, cells):
+    result = wp.zeros(len(x), dtype=wp.vec3, device="cpu")
+    inputs = [wp.array(x, dtype=wp.vec4, device="cpu"), wp.array(cells, dtype=wp.vec3i, device="cpu")]
+    wp.launch(lookups, len(x), [*inputs, *index.on("cpu").arguments(), result], device="cpu")
+    return result.numpy()
