@@ -1,1 +1,33 @@
-"""Pictures of scenes through OpenGL."""
+"""Pictures of scenes through OpenGL.
+
+`render` makes one picture. `Renderer` is the thing to keep where many pictures of a scene are wanted.
+"""
+
+from decals.mapping import Mapping
+from decals.render.context import Context
+from decals.render.drawables import register
+from decals.render.mesh import MeshDrawable
+from decals.render.renderer import Buffers, Renderer, Size
+from decals.render.resolve import STUDIO, TRANSPARENT, Background
+from decals.render.scene_like import SceneLike
+from decals.render.shortcuts import render, render_buffers
+from decals.render.tree import TreeDrawable
+from decals.scene import MeshObject, TreeObject
+
+register(MeshObject, MeshDrawable)
+register(TreeObject, TreeDrawable)
+
+__all__ = [
+    "STUDIO",
+    "TRANSPARENT",
+    "Background",
+    "Buffers",
+    "Context",
+    "Mapping",
+    "Renderer",
+    "SceneLike",
+    "Size",
+    "register",
+    "render",
+    "render_buffers",
+]

@@ -121,6 +121,7 @@ class Renderer:
         InvalidScene
             The scene holds an object of unknown kind, or size or samples are none.
         """
+        _check_size(size, samples)
         picture = _Picture(size, 4, np.uint8)
         for tile, targets in self._tiles(scene, size, samples, mapping, buffers=False):
             light = targets.decal_pass.light
@@ -131,6 +132,7 @@ class Renderer:
         self, scene: SceneLike, *, size: Size = (800, 600), mapping: Mapping = Mapping.CORRECTED
     ) -> Buffers:
         """Give what lies behind every pixel's centre; arguments and errors as for `render`."""
+        _check_size(size, 1)
         color = _Picture(size, 4, np.uint8)
         position, normal, decal = (_Picture(size, 4, np.float32) for _ in range(3))
         for tile, targets in self._tiles(scene, size, 1, mapping, buffers=True):
@@ -152,7 +154,6 @@ class Renderer:
         self, scene: SceneLike, size: Size, samples: int, mapping: Mapping, *, buffers: bool
     ) -> Iterator[tuple[Tile, _Targets]]:
         """Draw tile after tile; the targets hold a tile until the next is asked for."""
-        _check_size(size, samples)
         with self.context.current():
             drawables = [self._drawable(thing) for thing in scene.objects]
             data, images = self._uploads(scene)

@@ -1,0 +1,146 @@
+"""Whole scenes: meshes and BlobTrees in one picture, under one coat of decals."""
+
+import numpy as np
+import pytest
+
+from blobtree import Point, Segment, polygonize
+from blobtree.trace import trace
+from decals.camera import Camera
+from decals.mapping import Mapping
+from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers
+from decals.scene import DecalImage, MeshObject, Scene, TreeObject
+from decals.seeding import seed
+from tests.decals.shapes import torus
+from tests.decals.test_render_decals import compare
+from tests.oracles.decals import decals_at
+from tests.oracles.raster import edges
+
+SIZE = (96, 72)
+TREE = Segment((-0.8, 0, 0), (0.5, 0, 0), radius=0.4, color=(0.8, 0.2, 0.1)) + Point(
+    (0.7, 0.3, 0.2), radius=0.45
+)
+WHITE = DecalImage("white", np.full((4, 4, 4), 255, np.uint8))
+
+
+def framed(*objects, decals=None) -> Scene:
+    scene = Scene(objects=objects, camera=Camera((0, 0, 1)), images=(WHITE,))
+    camera = Camera.framing(scene.bounds, direction=(0.4, -0.9, 0.7), up=(0, 0, 1))
+    return scene.replace(camera=camera, decals=decals)
+
+
+@pytest.fixture(scope="module")
+def both() -> Scene:
+    """A BlobTree and a mesh that touch."""
+    ring = torus(0.7, 0.3, shift=(0.2, -0.4, -0.4))
+    objects = TreeObject("blob", TREE), MeshObject("ring", ring.vertices, ring.faces)
+    return framed(*objects, decals=seed([item.surface for item in objects], count=120, seed=3))
+
+
+def test_a_tree_lies_where_its_rays_hit(renderer: Renderer) -> None:
+    scene = framed(TreeObject("blob", TREE))
+    buffers = renderer.buffers(scene, size=SIZE)
+    width, height = SIZE
+    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
+    rays = scene.camera.rays(width, height)
+    directions = rays.directions(x, y).reshape(-1, 3)
+    origins = np.broadcast_to(rays.origin, directions.shape)
+    distance = trace(TREE.tape, TREE.bounds, origins, directions).reshape(height, width)
+    hit = np.isfinite(distance)
+    sure = ~edges(hit)
+    np.testing.assert_array_equal((buffers.object_id == 0)[sure], hit[sure])
+    seen = hit & sure
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    expected = rays.origin + distance[..., None] * unit.reshape(height, width, 3)
+    np.testing.assert_allclose(buffers.position[seen], expected[seen], atol=2e-4)
+    assert np.abs(TREE(buffers.position[seen]) - 0.5).max() < 1e-3
+    gradient = TREE.gradient(buffers.position[seen])
+    normal = -gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+    np.testing.assert_allclose(buffers.normal[seen], normal, atol=1e-4)
+
+
+def test_one_coat_over_both_kinds_is_the_oracles(renderer: Renderer, both: Scene) -> None:
+    buffers = renderer.buffers(both, size=SIZE)
+    assert set(np.unique(buffers.object_id)) == {-1, 0, 1}
+    assert compare(both, buffers, Mapping.CORRECTED).mean() > 0.99
+    spans = [set(buffers.owner[buffers.object_id == number]) - {-1} for number in (0, 1)]
+    assert spans[0] & spans[1], "some decal lies on both objects"
+
+
+def test_nearer_objects_hide_farther_ones(renderer: Renderer, both: Scene) -> None:
+    """Alone or together, a pixel shows the object that is nearer."""
+    alone = [renderer.buffers(both.replace(objects=[item]), size=SIZE) for item in both.objects]
+    eye = np.array(both.camera.position)
+    depth = [np.where(b.object_id == 0, np.linalg.norm(b.position - eye, axis=-1), np.inf) for b in alone]
+    together = renderer.buffers(both, size=SIZE).object_id
+    expected = np.where(np.isinf(np.minimum(*depth)), -1, np.argmin(depth, axis=0))
+    finite = [np.nan_to_num(d, posinf=1e6) for d in depth]
+    clear = (expected == -1) | (np.abs(finite[0] - finite[1]) > 1e-3)
+    assert {0, 1} <= set(expected[clear])
+    np.testing.assert_array_equal(together[clear], expected[clear])
+
+
+def test_a_mesh_of_the_tree_shows_the_same_decals(renderer: Renderer, both: Scene) -> None:
+    mesh = polygonize(TREE, resolution=96)
+    traced = framed(TreeObject("blob", TREE), decals=both.decals)
+    meshed = traced.replace(objects=[MeshObject("blob", mesh.vertices, mesh.faces)])
+    first, second = (renderer.buffers(scene, size=SIZE) for scene in (traced, meshed))
+    inside = (first.object_id == 0) & (second.object_id == 0)
+    steady = decals_at(both.decals, first.position[inside], first.normal[inside]).doubt > 0.05
+    same = (first.owner == second.owner)[inside]
+    assert steady.mean() > 0.5
+    assert same[steady].mean() > 0.995
+    error = np.abs(first.uv - second.uv)[inside].max(axis=-1)
+    assert np.quantile(error[steady & same], 0.98) < 0.02
+
+
+def test_pictures(renderer: Renderer, both: Scene) -> None:
+    picture = renderer.render(both, size=SIZE)
+    assert picture.shape == (72, 96, 4)
+    assert picture.dtype == np.uint8
+    assert (picture[..., 3] == 255).all()
+    np.testing.assert_array_equal(picture, renderer.render(both, size=SIZE))
+    clear = renderer.render(both, size=SIZE, background=TRANSPARENT)
+    seen = renderer.buffers(both, size=SIZE).object_id >= 0
+    away = edges(seen)
+    assert (clear[..., 3][seen & ~away] == 255).all()
+    assert (clear[..., 3][~seen & ~away] == 0).all()
+    top = np.rint(np.array(STUDIO.top) * 255)
+    assert np.abs(picture[0, 0] - top).max() <= 3
+
+
+def test_colours_of_objects(renderer: Renderer) -> None:
+    ring = torus()
+    red = framed(MeshObject("ring", ring.vertices, ring.faces, (0.9, 0.1, 0.1)))
+    buffers = renderer.buffers(red, size=SIZE)
+    shown = buffers.color[buffers.object_id == 0, :3].astype(int)
+    assert (np.median(shown[:, 0]) > 2 * np.median(shown[:, 1:], axis=0)).all()
+    tree = renderer.buffers(
+        framed(TreeObject("blob", Point((0, 0, 0), radius=1, color=(0.1, 0.1, 0.9)))), size=SIZE
+    )
+    shown = tree.color[tree.object_id == 0, :3].astype(int)
+    assert np.median(shown[:, 2]) > 2 * np.median(shown[:, 0])
+
+
+def test_one_call_makes_its_own_context(renderer: Renderer, both: Scene) -> None:
+    picture = render(both, size=SIZE, samples=1)
+    np.testing.assert_array_equal(picture, renderer.render(both, size=SIZE, samples=1))
+    np.testing.assert_array_equal(
+        render_buffers(both, size=SIZE).owner, renderer.buffers(both, size=SIZE).owner
+    )
+
+
+def test_an_edited_scene_releases_what_it_no_longer_shows(context, both: Scene) -> None:
+    with Renderer(context) as own:
+        own.render(both, size=(16, 12))
+        drawable = own._drawables._things[(id(both.objects[0]),)][1]
+        own.render(both, size=(16, 12))
+        assert own._drawables._things[(id(both.objects[0]),)][1] is drawable
+        own.render(both.replace(objects=both.objects[1:]), size=(16, 12))
+        assert len(own._drawables._things) == 1
+    assert not own._drawables._things
+
+
+@pytest.mark.parametrize(("size", "samples"), [((0, 4), 1), ((4, -1), 1), ((4, 4), 0), ((4,), 1)])
+def test_impossible_sizes_are_refused(renderer: Renderer, both: Scene, size, samples) -> None:
+    with pytest.raises(ValueError, match="a picture needs a width"):
+        renderer.render(both, size=size, samples=samples)
