@@ -92,7 +92,7 @@ def test_exact_on(surface, inside_out):
 
 @pytest.mark.parametrize("angle", [0.0, 1e-7, 1e-5, 9.9e-5, 1.1e-4, 1e-3, 0.05, 0.2, 0.21])
 def test_every_small_angle_on_the_sphere(angle):
-    """No step at the seams of the series and of the flat case."""
+    """No step at the seam of the flat case."""
     rng = np.random.default_rng(1)
     n_p = unit(rng.normal(size=(2000, 3)))
     u = tangents(rng, n_p)
