@@ -12,10 +12,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("blobtree", "decals", "implicit_decals.apps", "implicit_decals.shaders")
 IMPORT_ALL = """
-import importlib, pathlib, sys
-for name in sys.argv[2:]:
-    file = pathlib.Path(importlib.import_module(name).__file__).resolve()
-    assert file.is_relative_to(sys.argv[1]), f"{name} was imported from {file}, not from the wheel"
+import importlib, pathlib, pkgutil, sys
+for package in map(importlib.import_module, sys.argv[2:]):
+    modules = pkgutil.walk_packages(package.__path__, package.__name__ + ".")
+    for module in [package, *(importlib.import_module(found.name) for found in modules)]:
+        file = pathlib.Path(module.__file__).resolve()
+        assert file.is_relative_to(sys.argv[1]), f"{module.__name__} comes from {file}, not from the wheel"
 """
 
 
@@ -55,7 +57,7 @@ def check_content(wheel: Path) -> None:
 
 
 def check_use(wheel: Path, folder: Path) -> None:
-    """Import every package from the installed wheel and ask the command for its help."""
+    """Import every module from the installed wheel and ask the command for its help."""
     home = folder / "venv"
     venv.create(home, symlinks=os.name != "nt")
     paths = sysconfig.get_paths(vars={"base": str(home), "platbase": str(home)})
