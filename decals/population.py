@@ -22,7 +22,7 @@ ROUNDS = 12
 
 @dataclass(frozen=True)
 class Sites:
-    """Oriented points on some of the surfaces, sorted by surface."""
+    """Oriented points, each on one of several surfaces."""
 
     positions: Floats
     normals: Floats
@@ -30,6 +30,18 @@ class Sites:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def __getitem__(self, rows: slice | NDArray[np.int64]) -> "Sites":
+        return Sites(self.positions[rows], self.normals[rows], self.surface_ids[rows])
+
+    @staticmethod
+    def joined(parts: "Sequence[Sites]") -> "Sites":
+        """All sites of all parts, in their order."""
+        return Sites(
+            np.concatenate([part.positions for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            np.concatenate([part.surface_ids for part in parts]),
+        )
 
 
 class World:

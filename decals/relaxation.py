@@ -149,7 +149,7 @@ class Relaxation:
         while not self.finished:
             self.step()
             if progress is not None:
-                progress("Spreading seeds", self.steps / self.iterations)
+                progress("spreading seeds", self.steps / self.iterations)
 
     def step(self) -> None:
         """Move every particle once against its neighbours, and now and then some to bare places."""

@@ -66,9 +66,9 @@ def seed(
     relaxation.run(lambda stage, fraction: tell(stage, SPREADING * fraction))
     if count == 0:
         return Decals.empty()
-    tell("Measuring sizes", SPREADING)
+    tell("measuring sizes", SPREADING)
     radii = sizes(relaxation, seed=seed)
-    tell("Measuring sizes", 1.0)
+    tell("measuring sizes", 1.0)
     return Decals(
         positions=relaxation.positions,
         normals=relaxation.normals,
@@ -79,13 +79,13 @@ def seed(
 
 
 def sizes(relaxation: Relaxation, *, seed: int = 0) -> NDArray[np.float64]:
-    """Radii at which decals on the relaxed particles leave no gap, ``float64[n]``."""
-    world, counts = (
-        relaxation.world,
-        np.bincount(relaxation.surface_ids, minlength=len(relaxation.world.surfaces)),
-    )
-    least = np.where(world.areas > 0, SAMPLES, 0)
-    samples = world.sample(np.maximum(counts * SAMPLES, least), stream=_SAMPLE_STREAM)
+    """Radii at which decals on the relaxed particles leave no gap, ``float64[n]``.
+
+    A surface too small for a share of the particles counts for nothing.
+    """
+    world = relaxation.world
+    counts = np.bincount(relaxation.surface_ids, minlength=len(world.surfaces))
+    samples = world.sample(counts * SAMPLES, stream=_SAMPLE_STREAM)
     return covering_radii(
         relaxation.sites, samples, lambda sites: visible(world, sites), _stream(seed, _TRIAL_STREAM)
     )

@@ -1,6 +1,7 @@
 """How large decals must be to leave no gap between them."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,11 +9,11 @@ from numpy.typing import NDArray
 from decals.neighbours import FacingTree
 from decals.population import Sites
 
-MARGIN = 0.02
+MARGIN = 0.03
 """Added to every radius, as a part of it: what the search for the farthest point may have missed."""
 
 RIM = 0.75
-"""Samples beyond this part of the radius found so far are where the search goes on."""
+"""Corners beyond this part of the radius found so far are where the search goes on."""
 
 SPECK = 0.02
 """Largest part of a decal's mean area that may stay bare, and only to spare it an outsized radius."""
@@ -20,10 +21,13 @@ SPECK = 0.02
 OUTSIZED = 1.5
 """A radius is outsized where this much of the one without specks, and the median, would not do."""
 
-TRIALS = 4
-"""Places tried around each such sample."""
+TIE = 1.02
+"""A point this little farther from a decal than from its owner is a corner of both."""
 
-SHRINK = (1.0, 0.5, 0.25)
+TRIALS = 8
+"""Places tried around each corner in each round."""
+
+SHRINK = (0.6, 0.3, 0.15)
 """Distance of the trials in each round, in mean distances of the samples."""
 
 Project = Callable[[Sites], Sites]
@@ -34,10 +38,10 @@ def covering_radii(decals: Sites, samples: Sites, project: Project, seed: int) -
     """Least radii, up to a small margin, at which decals cover the surfaces they lie on.
 
     A decal reaches to the farthest point of the surface that is nearer to it than to any other decal that
-    faces the point: the corner of its Voronoi cell. Dense samples find the neighbourhood of that point,
-    random trials around the outer samples climb to it. The paper's rule, radius of influence =
-    distance D of the farthest Delaunay neighbour, leaves gaps: already a perfect hexagonal tiling
-    needs s = D / (sqrt(3) 0.4542) = 1.271 D.
+    faces the point: a corner of its Voronoi cell. Dense samples find the neighbourhood of each corner,
+    the centre of the circle through its three decals and random trials climb to it. The paper's rule,
+    radius of influence = distance D of the farthest Delaunay neighbour, leaves gaps: already a perfect
+    hexagonal tiling needs s = D / (sqrt(3) 0.4542) = 1.271 D.
 
     Two things stay bare: points that face none of the nearest decals (`neighbours.WIDENING`), and specks,
     such as a lone folded face or a crumb far off, that would make a decal outsized (`SPECK`, `OUTSIZED`).
@@ -59,58 +63,95 @@ def covering_radii(decals: Sites, samples: Sites, project: Project, seed: int) -
     float64[n], above zero.
     """
     tree = FacingTree(decals.positions, decals.normals)
+    found = _measure(tree, samples)
+    limits = _limits(found, len(decals))
     radii = np.zeros(len(decals))
-    distances, owners = _measure(tree, samples)
-    limits = _limits(distances, owners, len(decals))
-    _grow(radii, distances, owners, limits)
+    _grow(radii, found, limits)
     rng = np.random.default_rng(seed)
     pitch = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
+    found = found.peaks(radii)
+    trials = _corners(found, decals)
     for shrink in SHRINK:
-        outer = np.flatnonzero((owners >= 0) & (distances > RIM * radii[owners]))
-        samples = project(_around(samples, outer, shrink * pitch, rng))
-        distances, owners = _measure(tree, samples)
-        _grow(radii, distances, owners, limits)
+        trials = Sites.joined([found.sites, trials, _around(found.sites, shrink * pitch, rng)])
+        found = _measure(tree, project(trials))
+        _grow(radii, found, limits)
+        found = found.peaks(radii)
+        trials = found.sites[:0]
     return (1.0 + MARGIN) * _without_zeros(radii, tree, decals)
 
 
-def _measure(tree: FacingTree, samples: Sites) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Distance of each sample to the nearest decal that faces it, and which that is."""
-    distances, owners = tree.nearest(samples.positions, samples.normals)
-    return distances[:, 0], owners[:, 0]
+@dataclass(frozen=True)
+class _Measured:
+    """Points, and the distances to the three nearest decals that face each, ``[n, 3]``; -1 for none."""
+
+    sites: Sites
+    distances: NDArray[np.float64]
+    decals: NDArray[np.int64]
+
+    def peaks(self, radii: NDArray[np.float64]) -> "_Measured":
+        """Keep the point farthest from any decal, of those with the same three decals nearest.
+
+        Such points share one corner of the Voronoi diagram. Those well within the radius drop out.
+        """
+        owners = self.decals[:, 0]
+        outer = np.flatnonzero((owners >= 0) & (self.distances[:, 0] > RIM * radii[owners]))
+        corners = np.sort(self.decals[outer], axis=1)
+        order = np.lexsort((-self.distances[outer, 0], *corners.T))
+        sorted_corners = corners[order]
+        first = np.ones(len(order), np.bool_)
+        first[1:] = (sorted_corners[1:] != sorted_corners[:-1]).any(axis=1)
+        rows = outer[order[first]]
+        return _Measured(self.sites[rows], self.distances[rows], self.decals[rows])
 
 
-def _limits(distances: NDArray[np.float64], owners: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+def _measure(tree: FacingTree, samples: Sites) -> _Measured:
+    return _Measured(samples, *tree.nearest(samples.positions, samples.normals, count=3))
+
+
+def _corners(peaks: _Measured, decals: Sites) -> Sites:
+    """Guess the corner near each peak: the centre of the circle through its three decals."""
+    whole = np.flatnonzero((peaks.decals >= 0).all(axis=1))
+    a, b, c = np.moveaxis(decals.positions[peaks.decals[whole]].astype(np.float64), 1, 0)
+    ab, ac = b - a, c - a
+    normal = np.cross(ab, ac)
+    square = np.einsum("ni,ni->n", normal, normal)
+    ab2, ac2 = np.einsum("ni,ni->n", ab, ab), np.einsum("ni,ni->n", ac, ac)
+    offset = ac2[:, None] * np.cross(normal, ab) + ab2[:, None] * np.cross(ac, normal)
+    offset /= np.where(square > 0, 2.0 * square, 1.0)[:, None]
+    sound = (square > 0) & (np.linalg.norm(offset, axis=1) < 2.0 * peaks.distances[whole, 0])
+    guesses = (a + offset)[sound].astype(np.float32)
+    return Sites(guesses, peaks.sites.normals[whole][sound], peaks.sites.surface_ids[whole][sound])
+
+
+def _limits(found: _Measured, count: int) -> NDArray[np.float64]:
     """Radius beyond which a decal is outsized."""
+    distances, owners = found.distances[:, 0], found.decals[:, 0]
     specks = max(1, round(SPECK * len(owners) / count))
     order = np.lexsort((-distances, owners))
     order = order[owners[order] >= 0]
+    if len(order) == 0:
+        return np.zeros(count)
     starts = np.searchsorted(owners[order], np.arange(count + 1))
-    without = np.minimum(starts[:-1] + specks, len(order) - 1)
-    enough = starts[:-1] + specks < starts[1:]
-    trimmed = np.where(enough, distances[order[without]], 0.0) if len(order) else np.zeros(count)
+    next_largest = starts[:-1] + specks
+    enough = next_largest < starts[1:]
+    trimmed = np.where(enough, distances[order[np.minimum(next_largest, len(order) - 1)]], 0.0)
     median = float(np.median(trimmed[enough])) if enough.any() else np.inf
     return OUTSIZED * np.maximum(trimmed, median)
 
 
-def _grow(
-    radii: NDArray[np.float64],
-    distances: NDArray[np.float64],
-    owners: NDArray[np.int64],
-    limits: NDArray[np.float64],
-) -> None:
-    """Let every decal reach to all points that it owns, specks aside."""
-    owned = np.flatnonzero(owners >= 0)
-    owned = owned[distances[owned] <= limits[owners[owned]]]
-    np.maximum.at(radii, owners[owned], distances[owned])
+def _grow(radii: NDArray[np.float64], found: _Measured, limits: NDArray[np.float64]) -> None:
+    """Let every decal reach to all points that it owns, or all but owns at a corner, specks aside."""
+    close = (found.decals >= 0) & (found.distances <= TIE * found.distances[:, :1])
+    distances, owners = found.distances[close], found.decals[close]
+    fair = distances <= limits[owners]
+    np.maximum.at(radii, owners[fair], distances[fair])
 
 
-def _around(samples: Sites, rows: NDArray[np.int64], distance: float, rng: np.random.Generator) -> Sites:
-    """Repeat the samples, with random points around each."""
-    positions = np.repeat(samples.positions[rows], TRIALS + 1, axis=0)
-    jitter = rng.normal(0.0, distance, positions.shape).astype(np.float32)
-    jitter[:: TRIALS + 1] = 0.0
-    normals = np.repeat(samples.normals[rows], TRIALS + 1, axis=0)
-    return Sites(positions + jitter, normals, np.repeat(samples.surface_ids[rows], TRIALS + 1))
+def _around(sites: Sites, distance: float, rng: np.random.Generator) -> Sites:
+    """Random points around each site."""
+    repeated = sites[np.repeat(np.arange(len(sites)), TRIALS)]
+    jitter = rng.normal(0.0, distance, repeated.positions.shape).astype(np.float32)
+    return Sites(repeated.positions + jitter, repeated.normals, repeated.surface_ids)
 
 
 def _without_zeros(radii: NDArray[np.float64], tree: FacingTree, decals: Sites) -> NDArray[np.float64]:
