@@ -14,37 +14,49 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def field_value(q: wp.vec3, tape: wp.array(dtype=wp.vec4)) -> wp.float32:
+def field_value(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.float32:
     """Field at q."""
-    return interpret_value(q, 0.0, tape, tape)
+    return interpret_value(q, 0.0, tape, span)
 
 
 @wp.func
-def field_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4)) -> wp.vec4:
+def field_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
     """(value, ∂x, ∂y, ∂z) of the field at q."""
-    return interpret_gradient(q, 0.0, tape, tape)
+    return interpret_gradient(q, 0.0, tape, span)
 
 
 @wp.func
-def field_bound(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec2:
+def field_bound(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec2:
     """(value at q, bound on |∇f| over the ball of radius `reach` about q)."""
-    return interpret_bound(q, reach, tape, tape)
+    return interpret_bound(q, reach, tape, span)
+
+
+@wp.func
+def field_color(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
+    """(value, red, green, blue) of the field at q."""
+    return interpret_color(q, 0.0, tape, span)
 
 
 @wp.kernel
 def _values(
-    points: wp.array(dtype=wp.vec3), tape: wp.array(dtype=wp.vec4), out: wp.array(dtype=wp.float32)
+    points: wp.array(dtype=wp.vec3),
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.float32),
 ) -> None:
     i = wp.tid()
-    out[i] = field_value(points[i], tape)
+    out[i] = field_value(points[i], tape, span)
 
 
 @wp.kernel
 def _gradients(
-    points: wp.array(dtype=wp.vec3), tape: wp.array(dtype=wp.vec4), out: wp.array(dtype=wp.vec4)
+    points: wp.array(dtype=wp.vec3),
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.vec4),
 ) -> None:
     i = wp.tid()
-    out[i] = field_gradient(points[i], tape)
+    out[i] = field_gradient(points[i], tape, span)
 
 
 @wp.kernel
@@ -52,53 +64,53 @@ def _bounds(
     points: wp.array(dtype=wp.vec3),
     reach: wp.array(dtype=wp.float32),
     tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
     out: wp.array(dtype=wp.vec2),
 ) -> None:
     i = wp.tid()
-    out[i] = field_bound(points[i], reach[i], tape)
+    out[i] = field_bound(points[i], reach[i], tape, span)
 
 
 @wp.kernel
 def _colors(
     points: wp.array(dtype=wp.vec3),
     tape: wp.array(dtype=wp.vec4),
-    colors: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
     out: wp.array(dtype=wp.vec4),
 ) -> None:
     i = wp.tid()
-    out[i] = interpret_color(points[i], 0.0, tape, colors)
+    out[i] = field_color(points[i], tape, span)
 
 
 def values_at(tape: Tape, points: ArrayLike) -> NDArray[np.float32]:
     """Field values (n,) at `points` (n, 3)."""
-    return _launch(_values, point_array(points), [tape.on().data], wp.float32)
+    return _launch(_values, tape, point_array(points), [], wp.float32)
 
 
 def gradients_at(tape: Tape, points: ArrayLike) -> NDArray[np.float32]:
     """Values and exact gradients (n, 4) at `points` (n, 3)."""
-    return _launch(_gradients, point_array(points), [tape.on().data], wp.vec4)
+    return _launch(_gradients, tape, point_array(points), [], wp.vec4)
 
 
 def bounds_at(tape: Tape, points: ArrayLike, reach: ArrayLike) -> NDArray[np.float32]:
     """Values and slope bounds (n, 2) over the balls of radius `reach` (n,) about `points` (n, 3)."""
     array = point_array(points)
-    reaches: wp.array[Any] = wp.array(
-        np.broadcast_to(np.asarray(reach, np.float32), len(array)), dtype=wp.float32
-    )
-    return _launch(_bounds, array, [reaches, tape.on().data], wp.vec2)
+    reaches = np.broadcast_to(np.asarray(reach, np.float32), len(array))
+    return _launch(_bounds, tape, array, [wp.array(reaches, dtype=wp.float32)], wp.vec2)
 
 
 def colors_at(tape: Tape, points: ArrayLike) -> NDArray[np.float32]:
     """Blended colours (n, 3) at `points` (n, 3)."""
-    uploaded = tape.on()
-    return _launch(_colors, point_array(points), [uploaded.data, uploaded.colors], wp.vec4)[:, 1:]
+    return _launch(_colors, tape, point_array(points), [], wp.vec4)[:, 1:]
 
 
 def _launch(
-    kernel: wp.Kernel, points: NDArray[np.float32], inputs: list[Any], dtype: Any
+    kernel: wp.Kernel, tape: Tape, points: NDArray[np.float32], extra: list[Any], dtype: Any
 ) -> NDArray[np.float32]:
     """`kernel` over `points`, its result as NumPy array."""
-    out = wp.empty(len(points), dtype=dtype)
-    wp.launch(kernel, dim=len(points), inputs=[wp.array(points, dtype=wp.vec3), *inputs], outputs=[out])
+    uploaded = tape.on()
+    out: wp.array[Any] = wp.empty(len(points), dtype=dtype)
+    inputs = [wp.array(points, dtype=wp.vec3), *extra, uploaded.data, uploaded.span]
+    wp.launch(kernel, dim=len(points), inputs=inputs, outputs=[out])
     result: NDArray[np.float32] = out.numpy()
     return result

@@ -28,11 +28,11 @@ def closest(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
 
 @wp.func
 def stride(kind: wp.int32) -> wp.int32:
-    """Texels of parameters of a skeleton of any kind."""
+    """Texels of a primitive of any kind: its parameters and its colour."""
     result = int(0)
     for code in range(wp.static(len(SKELETONS))):
         if kind == code:
-            result = wp.static(SKELETONS[code].stride)
+            result = wp.static(SKELETONS[code].parameters + 1)
     return result
 
 
@@ -218,19 +218,18 @@ COLOR = Reading(color_leaf, color_unstretch, color_combine, vector_empty, wp.vec
 
 
 def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
-    """The interpreter of one reading, called as (q, reach, tape, colors)."""
+    """The interpreter of one reading: (q, reach, tape, span), span being (first texel, one past the last)."""
     leaf, unstretch, combine, empty = reading.leaf, reading.unstretch, reading.combine, reading.empty
     contribution = reading.type
 
     @wp.func
     def interpret(
-        q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), colors: wp.array(dtype=wp.vec4)
+        q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
     ) -> contribution:
         accumulator = empty()
         registers = registers_type()
-        at = int(0)
-        primitive = int(0)
-        while at < tape.shape[0]:
+        at = span[0]
+        while at < span[1]:
             header = tape[at]
             code = int(header[0])
             operator = int(header[1])
@@ -242,16 +241,17 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
                 for _i in range(count):
                     local = to_local(q, tape, at)
                     c = closest(kind, local, tape, at + PREFIX)
-                    f = unstretch(leaf(local, c, reach * tape[at + 3][0], colors[primitive]), tape, at)
+                    next_at = at + PREFIX + stride(kind)
+                    f = unstretch(leaf(local, c, reach * tape[at + 3][0], tape[next_at - 1]), tape, at)
                     accumulator = combine(operator, accumulator, f, reach, parameter)
-                    at += PREFIX + stride(kind)
-                    primitive += 1
+                    at = next_at
             elif code >= 0:
                 for _i in range(count):
-                    f = leaf(q, closest(code, q, tape, at), reach, colors[primitive])
-                    accumulator = combine(operator, accumulator, f, reach, parameter)
+                    c = closest(code, q, tape, at)
                     at += stride(code)
-                    primitive += 1
+                    accumulator = combine(
+                        operator, accumulator, leaf(q, c, reach, tape[at - 1]), reach, parameter
+                    )
             elif code == PUSH:
                 registers[count] = accumulator
                 accumulator = empty()

@@ -19,13 +19,15 @@ CONVERGED = 1e-6
 
 
 @wp.func
-def project_to_surface(p: wp.vec3, longest_step: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec3:
+def project_to_surface(
+    p: wp.vec3, longest_step: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+) -> wp.vec3:
     """Newton's method for f = ISO from p, no step longer than `longest_step`.
 
     Where the field is flat (its gradient 0) the point stays where it is.
     """
     for _step in range(NEWTON_STEPS):
-        f = field_gradient(p, tape)
+        f = field_gradient(p, tape, span)
         gap = ISO - f[0]
         g = wp.vec3(f[1], f[2], f[3])
         steepness = wp.length(g)
@@ -40,12 +42,13 @@ def _project(
     points: wp.array(dtype=wp.vec3),
     longest_step: wp.float32,
     tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
 ) -> None:
     i = wp.tid()
-    p = project_to_surface(points[i], longest_step, tape)
-    f = field_gradient(p, tape)
+    p = project_to_surface(points[i], longest_step, tape, span)
+    f = field_gradient(p, tape, span)
     positions[i] = p
     normals[i] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
 
@@ -57,9 +60,13 @@ def project(
 
     Points where the field is flat stay where they are, with the normal 0.
     """
+    uploaded = tape.on()
     start: wp.array[Any] = wp.array(point_array(points), dtype=wp.vec3)
     positions, normals = wp.empty_like(start), wp.empty_like(start)
     wp.launch(
-        _project, dim=len(start), inputs=[start, longest_step, tape.on().data], outputs=[positions, normals]
+        _project,
+        dim=len(start),
+        inputs=[start, longest_step, uploaded.data, uploaded.span],
+        outputs=[positions, normals],
     )
     return positions.numpy(), normals.numpy()

@@ -37,12 +37,12 @@ class Skeleton:
 
     name: str
     closest: wp.Function
-    stride: int
-    """Texels (vec4) of parameters per primitive."""
+    parameters: int
+    """Texels (vec4) that the parameters take on the tape."""
 
 
-POINT = Skeleton("point", closest_on_point, stride=1)
-SEGMENT = Skeleton("segment", closest_on_segment, stride=2)
+POINT = Skeleton("point", closest_on_point, parameters=1)
+SEGMENT = Skeleton("segment", closest_on_segment, parameters=2)
 
 SKELETONS = (POINT, SEGMENT)
 """Every kind; its place here is its code on the tape."""

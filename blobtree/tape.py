@@ -3,14 +3,15 @@
 Layout, in texels (vec4 of float32):
 
     header     (code, operator, count, parameter)
-      code ≥ 0     a run of `count` primitives of SKELETONS[code], `stride` texels each, behind the header
+      code ≥ 0     a run of `count` primitives of SKELETONS[code], behind the header: parameters, then a
+                   texel of colour
       code ≥ STRETCHED  the same for SKELETONS[code − STRETCHED], each behind PREFIX texels: the rows of its
                    world → local map, then (largest stretch of that map, 0, 0, 0)
       PUSH         register[count] = accumulator; accumulator = 0
       POP          accumulator = operator(register[count], accumulator)
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
 
-Colours lie apart, one texel per primitive in the order of the tape: only hits and vertices read them.
+Everything of a primitive lies in one place, so a part of a tape is a tape.
 """
 
 from collections.abc import Iterator
@@ -42,18 +43,17 @@ REGISTERS = 24
 
 @dataclass(frozen=True)
 class DeviceTape:
-    """A tape in the memory of one Warp device."""
+    """A tape in the memory of one Warp device: its texels, and from where to where they are read."""
 
     data: "wp.array[wp.vec4]"
-    colors: "wp.array[wp.vec4]"
+    span: wp.vec2i
 
 
 @dataclass(frozen=True, eq=False)
 class Tape:
-    """Flat form of a tree: float32 `data` (m, 4), `colors` (k, 4), and what a shader is specialised to."""
+    """Flat form of a tree: float32 `data` (m, 4), and what a shader is specialised to."""
 
     data: NDArray[np.float32]
-    colors: NDArray[np.float32]
     registers: int
     skeletons: tuple[int, ...]
     """Codes of the skeleton kinds in use."""
@@ -69,9 +69,7 @@ class Tape:
 
 @lru_cache(maxsize=64)
 def _upload(tape: Tape, device: str) -> DeviceTape:
-    return DeviceTape(
-        wp.array(tape.data, dtype=wp.vec4, device=device), wp.array(tape.colors, dtype=wp.vec4, device=device)
-    )
+    return DeviceTape(wp.array(tape.data, dtype=wp.vec4, device=device), wp.vec2i(0, len(tape.data)))
 
 
 def compile_tape(root: "Node") -> Tape:
@@ -83,11 +81,9 @@ def compile_tape(root: "Node") -> Tape:
             f"tree: needs {registers} registers, at most {REGISTERS} exist; group its operands otherwise"
         )
     runs = [step for step in program if isinstance(step, Run)]
-    colors = [[*placed.primitive.color, 1.0] for run in runs for placed in run.primitives]
     operators = {OPERATORS.index(step.operator) for step in program if not isinstance(step, Push)}
     return Tape(
         data=np.concatenate([texels for step in program for texels in _texels(step)]).astype(np.float32),
-        colors=np.array(colors, dtype=np.float32),
         registers=registers,
         skeletons=tuple(sorted({SKELETONS.index(run.skeleton) for run in runs})),
         operators=tuple(sorted(operators)),
@@ -110,6 +106,7 @@ def _texels(step: Instruction) -> Iterator[NDArray[np.float64]]:
             pack = _pack_stretched if stretched else _pack_similar
             for placed in primitives:
                 yield from pack(placed)
+                yield np.array([[*placed.primitive.color, 1.0]])
 
 
 def _pack_similar(placed: PlacedPrimitive) -> Iterator[NDArray[np.float64]]:

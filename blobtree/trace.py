@@ -37,6 +37,7 @@ def first_hit(
     t_max: wp.float32,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
 ) -> wp.float32:
     """Distance along the unit `direction` to the first point inside within [t_min, t_max], else MISS.
 
@@ -47,13 +48,13 @@ def first_hit(
     for _step in range(MAX_STEPS):
         if t > t_max:
             return MISS
-        bound = field_bound(origin + direction * t, reach, tape)
+        bound = field_bound(origin + direction * t, reach, tape, span)
         gap = ISO - bound[0]
         free = reach
         if bound[1] * reach > gap:
             free = gap / bound[1]
             if free <= tolerance:
-                return refine_hit(origin, direction, t, tolerance, tape)
+                return refine_hit(origin, direction, t, tolerance, tape, span)
         t += free
         reach = 2.0 * free
     return MISS
@@ -61,10 +62,15 @@ def first_hit(
 
 @wp.func
 def refine_hit(
-    origin: wp.vec3, direction: wp.vec3, t: wp.float32, tolerance: wp.float32, tape: wp.array(dtype=wp.vec4)
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t: wp.float32,
+    tolerance: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
 ) -> wp.float32:
     """One Newton step along the ray from a point within tolerance of the surface, 2 tolerances at most."""
-    f = field_gradient(origin + direction * t, tape)
+    f = field_gradient(origin + direction * t, tape, span)
     rise = f[1] * direction[0] + f[2] * direction[1] + f[3] * direction[2]
     gap = ISO - f[0]
     if gap <= 0.0 or rise * tolerance * 2.0 <= gap:
@@ -97,12 +103,13 @@ def trace_ray(
     upper: wp.vec3,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
 ) -> wp.float32:
     """first_hit within the box of influence of a tree."""
-    span = box_interval(origin, direction, lower, upper)
-    if span[1] < span[0]:
+    inside = box_interval(origin, direction, lower, upper)
+    if inside[1] < inside[0]:
         return MISS
-    return first_hit(origin, direction, span[0], span[1], tolerance, tape)
+    return first_hit(origin, direction, inside[0], inside[1], tolerance, tape, span)
 
 
 @wp.kernel
@@ -113,10 +120,11 @@ def _trace(
     upper: wp.vec3,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
     out: wp.array(dtype=wp.float32),
 ) -> None:
     i = wp.tid()
-    t = trace_ray(origins[i], wp.normalize(directions[i]), lower, upper, tolerance, tape)
+    t = trace_ray(origins[i], wp.normalize(directions[i]), lower, upper, tolerance, tape, span)
     if t < 0.0:
         t = wp.inf
     out[i] = t
@@ -143,11 +151,15 @@ def trace(tape: Tape, bounds: Bounds, origins: ArrayLike, directions: ArrayLike)
         raise InvalidPoints(f"directions: expected one per origin, {len(starts)}, got {len(headings)}")
     if not (np.abs(headings).max(axis=1, initial=0.0) > 0.0).all():
         raise InvalidPoints("directions: expected vectors with a length, got a zero vector")
+    uploaded = tape.on()
     out = wp.empty(len(starts), dtype=wp.float32)
     inputs: list[Any] = [wp.array(array, dtype=wp.vec3) for array in (starts, headings)]
     inputs += [wp.vec3(*corner.tolist()) for corner in bounds]
     wp.launch(
-        _trace, dim=len(starts), inputs=[*inputs, trace_tolerance(bounds), tape.on().data], outputs=[out]
+        _trace,
+        dim=len(starts),
+        inputs=[*inputs, trace_tolerance(bounds), uploaded.data, uploaded.span],
+        outputs=[out],
     )
     distances: NDArray[np.float32] = out.numpy()
     return distances

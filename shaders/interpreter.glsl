@@ -1,12 +1,11 @@
 // The tape's interpreter, blobtree/interpreter.py in GLSL: one composition per reading. Defines:
-// INTERPRET, FIELD (its type), LEAF, UNSTRETCH, COMBINE, PRIMITIVE_COLOR.
+// INTERPRET, FIELD (its type), LEAF, UNSTRETCH, COMBINE, PRIMITIVE_COLOR (what LEAF gets for it).
 // Slots: the registers, and a case per instruction that occurs (decals/render/tape_shader.py).
-FIELD INTERPRET(vec3 q, float reach, sampler2D tape, sampler2D colors) {
+FIELD INTERPRET(vec3 q, float reach, sampler2D tape, ivec2 span) {
     FIELD accumulator = FIELD(0.0);
     //@ slot registers optional
-    int at = 0;
-    int primitive = 0;
-    while (at < tape_length) {
+    int at = span.x;
+    while (at < span.y) {
         vec4 header = tape_texel(tape, at);
         int operator_ = int(header.y);
         int count = int(header.z);

@@ -113,7 +113,7 @@ def _interpreter(name: str, reading: Reading, glsl_type: str, kinds: Kinds) -> S
             "LEAF": reading.leaf.key,
             "UNSTRETCH": reading.unstretch.key,
             "COMBINE": reading.combine.key,
-            "PRIMITIVE_COLOR": "tape_texel(colors, primitive)" if reading is COLOR else "vec4(0.0)",
+            "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)" if reading is COLOR else "vec4(0.0)",
         },
         slots={
             "registers": "".join(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
@@ -127,32 +127,35 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
     """A loop per kind of skeleton, so that the kind is not asked for inside it."""
     for code in kinds.skeletons:
         skeleton = SKELETONS[code]
-        yield _RUN.format(code=code, closest=skeleton.closest.key, stride=skeleton.stride)
+        yield _RUN.format(code=code, closest=skeleton.closest.key, stride=skeleton.parameters + 1)
         if kinds.stretched:
             yield _STRETCHED_RUN.format(
                 code=code + STRETCHED,
                 closest=skeleton.closest.key,
-                stride=skeleton.stride + PREFIX,
+                stride=skeleton.parameters + PREFIX + 1,
                 prefix=PREFIX,
             )
 
 
 _RUN = """\
 case {code}:
-    for (int i = 0; i < count; i++, at += {stride}, primitive++) {{
-        FIELD field = LEAF(q, {closest}(q, tape, at), reach, PRIMITIVE_COLOR);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w);
+    for (int i = 0; i < count; i++) {{
+        vec4 c = {closest}(q, tape, at);
+        at += {stride};
+        accumulator = COMBINE(operator_, accumulator, LEAF(q, c, reach, PRIMITIVE_COLOR), reach, header.w);
     }}
     break;
 """
 
 _STRETCHED_RUN = """\
 case {code}:
-    for (int i = 0; i < count; i++, at += {stride}, primitive++) {{
-        vec3 local = to_local(q, tape, at);
-        float local_reach = reach * tape_texel(tape, at + {prefix} - 1).x;
-        FIELD field = LEAF(local, {closest}(local, tape, at + {prefix}), local_reach, PRIMITIVE_COLOR);
-        accumulator = COMBINE(operator_, accumulator, UNSTRETCH(field, tape, at), reach, header.w);
+    for (int i = 0; i < count; i++) {{
+        int map = at;
+        vec3 local = to_local(q, tape, map);
+        vec4 c = {closest}(local, tape, map + {prefix});
+        at += {stride};
+        FIELD field = LEAF(local, c, reach * tape_texel(tape, map + {prefix} - 1).x, PRIMITIVE_COLOR);
+        accumulator = COMBINE(operator_, accumulator, UNSTRETCH(field, tape, map), reach, header.w);
     }}
     break;
 """

@@ -31,12 +31,10 @@ class TreeDrawable:
         tape = thing.tree.tape
         self._bounds = thing.tree.bounds
         self._gl = context.gl
-        self._textures = {
-            "tape": DataTexture(context, tape.data),
-            "tape_colors": DataTexture(context, tape.colors),
-        }
+        self._tape = DataTexture(context, tape.data)
         self._uniforms: dict[str, object] = {
-            "tape_length": len(tape.data),
+            "tape": 0,
+            "tape_span": (0, len(tape.data)),
             "box_lower": tuple(self._bounds[0].tolist()),
             "box_upper": tuple(self._bounds[1].tolist()),
             "tolerance": trace_tolerance(self._bounds),
@@ -51,9 +49,7 @@ class TreeDrawable:
 
     def draw(self, object_id: int, tile: Tile) -> None:
         """Trace the rays of all pixels on which the back of the box falls."""
-        for unit, (name, texture) in enumerate(self._textures.items()):
-            texture.use(unit)
-            set_uniform(self._program, name, unit)
+        self._tape.use(0)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
             set_uniform(self._program, name, value)
         self._gl.enable(moderngl.CULL_FACE)
@@ -64,5 +60,5 @@ class TreeDrawable:
 
     def release(self) -> None:
         """Give the memory back."""
-        for resource in (self._array, *self._textures.values()):
-            resource.release()
+        self._array.release()
+        self._tape.release()
