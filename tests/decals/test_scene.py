@@ -1,0 +1,246 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blobtree import BlobTreeError, Node, Point, Segment
+from decals.camera import Camera
+from decals.errors import DecalsError, InvalidImage, InvalidMesh, InvalidScene
+from decals.images import generate_image
+from decals.model import Decals
+from decals.scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
+from decals.scene_file import from_json, is_scene, load_scene, save_scene, to_json
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32) * np.float32(0.1)
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
+
+
+def _tree() -> Node:
+    blob = Point((0.1, 0.2, 0.3), radius=0.7, color=(0.1, 0.5, 1.0)) + Segment(
+        (0, 0, 0), (1, 0, 0), radius=1 / 3
+    )
+    return (blob | Point((2, 0, 0), radius=0.5)).rotate((0, 1, 0), 33.3).translate((0.1, 0, 0))
+
+
+def _decals(count: int = 50) -> Decals:
+    rng = np.random.default_rng(5)
+    return Decals(
+        positions=rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-6, 6, (count, 1)),
+        normals=rng.normal(size=(count, 3)),
+        tangents=rng.normal(size=(count, 3)),
+        radii=10.0 ** rng.uniform(-6, 6, count),
+        images=rng.integers(0, 2, count),
+        spill=rng.random(count) < 0.5,
+    )
+
+
+def _scene() -> Scene:
+    return Scene(
+        objects=[MeshObject("tetra", CORNERS, FACES, (0.1, 0.2, 0.3)), TreeObject("blob", _tree())],
+        camera=Camera((0.1, 2.0, 3.3), (0.0, 1 / 3, 0.0), (0.0, 1.0, 0.1), 31.4),
+        images=[DecalImage.load("scale"), DecalImage.load("tile#b0413e")],
+        decals=_decals(),
+    )
+
+
+def _bits(array: NDArray[np.generic]) -> bytes:
+    return array.tobytes()
+
+
+def test_what_is_saved_is_loaded_bit_for_bit(tmp_path: Path) -> None:
+    scene = _scene()
+    save_scene(scene, tmp_path / "scene.json")
+    again = load_scene(tmp_path / "scene.json")
+    for name in ("positions", "normals", "tangents", "radii", "images", "spill"):
+        assert _bits(getattr(again.decals, name)) == _bits(getattr(scene.decals, name)), name
+    assert again.camera == scene.camera
+    mesh, blob = again.objects
+    assert isinstance(mesh, MeshObject)
+    assert isinstance(blob, TreeObject)
+    assert blob.tree == _tree()
+    assert (mesh.name, mesh.color, mesh.source) == ("tetra", (0.1, 0.2, 0.3), None)
+    assert _bits(mesh.vertices) == _bits(CORNERS)
+    assert _bits(mesh.faces) == _bits(FACES)
+    assert [image.source for image in again.images] == ["scale", "tile#b0413e"]
+    assert np.array_equal(again.images[1].pixels, generate_image("tile#b0413e"))
+
+
+def test_saving_again_gives_the_same_bytes(tmp_path: Path) -> None:
+    save_scene(_scene(), tmp_path / "a.json")
+    save_scene(load_scene(tmp_path / "a.json"), tmp_path / "b.json")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_numbers_are_the_shortest_that_round_to_the_same_float32(tmp_path: Path) -> None:
+    third = Decals(
+        positions=np.float32([[1 / 3, 0.1, 2e-8]]), normals=[[0, 0, 1]], tangents=[[1, 0, 0]], radii=[0.7]
+    )
+    scene = _scene().replace(decals=third)
+    record = json.loads(to_json(scene, folder=tmp_path))["decals"][0]
+    assert record["position"] == [0.33333334, 0.1, 2e-8]
+    assert record["radius"] == 0.7
+
+
+def test_one_decal_a_line_for_people_and_diffs(tmp_path: Path) -> None:
+    lines = to_json(_scene(), folder=tmp_path).decode().splitlines()
+    assert sum('"tangent"' in line for line in lines) == 50
+    assert max(line.count('"tangent"') for line in lines) == 1
+
+
+def test_meshes_and_images_from_files_are_relative_to_the_scene(tmp_path: Path) -> None:
+    from PIL import Image
+
+    (tmp_path / "parts").mkdir()
+    mesh_path, image_path = tmp_path / "parts" / "tetra.obj", tmp_path / "parts" / "dot.png"
+    rows = [f"v {x} {y} {z}" for x, y, z in CORNERS.tolist()] + [
+        f"f {a} {b} {c}" for a, b, c in (FACES + 1).tolist()
+    ]
+    mesh_path.write_text("\n".join(rows) + "\n")
+    Image.new("RGB", (3, 2), (9, 8, 7)).save(image_path)
+    scene = Scene(
+        objects=[MeshObject("tetra", CORNERS, FACES, source=str(mesh_path))],
+        camera=Camera((1, 2, 3)),
+        images=[DecalImage.load(str(image_path))],
+    )
+    save_scene(scene, tmp_path / "scene.json")
+    written = json.loads((tmp_path / "scene.json").read_text())
+    assert written["objects"][0]["source"] == "parts/tetra.obj"
+    assert "data" not in written["objects"][0]
+    assert written["images"] == ["parts/dot.png"]
+    moved = tmp_path / "elsewhere"
+    moved.mkdir()
+    for name in ("parts", "scene.json"):
+        (tmp_path / name).rename(moved / name)
+    again = load_scene(moved / "scene.json")
+    assert isinstance(again.objects[0], MeshObject)
+    assert np.allclose(again.objects[0].vertices, CORNERS)
+    assert again.images[0].pixels.shape == (2, 3, 4)
+
+
+def test_samples_are_named_and_fetched_again(tmp_path: Path) -> None:
+    scene = Scene(objects=[MeshObject("t", CORNERS, FACES, source="sample:tetra")], camera=Camera((1, 2, 3)))
+    save_scene(scene, tmp_path / "scene.json")
+    asked = []
+    again = load_scene(tmp_path / "scene.json", samples=lambda name: asked.append(name) or (CORNERS, FACES))
+    assert asked == ["tetra"]
+    assert isinstance(again.objects[0], MeshObject)
+    assert again.objects[0].source == "sample:tetra"
+    with pytest.raises(InvalidScene, match="sample:tetra"):
+        load_scene(tmp_path / "scene.json")
+
+
+def test_a_failing_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "scene.json"
+    save_scene(_scene(), path)
+    before = path.read_bytes()
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(InvalidScene, match="No space left"):
+        save_scene(_scene().replace(decals=Decals.empty()), path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["scene.json"]
+
+
+def test_saving_into_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(InvalidScene, match="make it first"):
+        save_scene(_scene(), tmp_path / "nowhere" / "scene.json")
+
+
+def _broken(change: str, value: object) -> bytes:
+    """Give the JSON of a good scene with one field exchanged, which ``a.b.0.c`` names."""
+    document = json.loads(to_json(_scene(), folder=Path()))
+    *path, last = change.split(".")
+    place = document
+    for step in path:
+        place = place[int(step)] if step.isdigit() else place[step]
+    if value is KeyError:
+        del place[last]
+    else:
+        place[int(last) if last.isdigit() else last] = value
+    return json.dumps(document).encode()
+
+
+@pytest.mark.parametrize(
+    ("change", "value", "message"),
+    [
+        ("format", "something", "implicit-decals-scene"),
+        ("version", 2, "version 1"),
+        ("camera", KeyError, "camera"),
+        ("camera.fov", "wide", r"\$\.camera\.fov"),
+        ("camera.fov", 200.0, "fov"),
+        ("camera.position", [0.0, 0.0], r"\$\.camera\.position"),
+        ("decals.3.radius", "big", r"\$\.decals\[3\]\.radius"),
+        ("decals.3.radius", -1.0, "radii"),
+        ("decals.3.radius", None, r"\$\.decals\[3\]\.radius"),
+        ("decals.3.normal", [0.0, 0.0, 0.0], "normals"),
+        ("decals.3.image", -1, r"\$\.decals\[3\]\.image"),
+        ("decals.3.image", 2, "shows image 2"),
+        ("decals.3.colour", "red", "colour"),
+        ("objects.0.type", "cube", r"\$\.objects\[0\]"),
+        ("objects.0.data", KeyError, "either 'source' or 'data'"),
+        ("objects.0.data.vertices", "not base64!", r"\$\.objects\[0\]\.data\.vertices"),
+        ("objects.0.data.faces", "AAAA", "tetra"),
+        ("objects.0.color", [2.0, 0.0, 0.0], "colour"),
+        ("objects.0.name", "blob", "'blob' twice"),
+        ("objects.0.name", " ", "empty"),
+        ("objects.1.tree.nodes.0.radius", -1.0, "radius"),
+        ("objects.1.tree.nodes.2.operands", [0, 2], "nodes"),
+        ("images.0", "nowhere.png", "nowhere"),
+    ],
+)
+def test_each_wrong_field_is_named(change: str, value: object, message: str) -> None:
+    with pytest.raises((DecalsError, BlobTreeError), match=message):
+        from_json(_broken(change, value), folder=Path())
+
+
+@pytest.mark.parametrize("text", [b"", b"{", b"null", b"[]", b"\xff\xfe", b'{"format": 3}', b"{}"])
+def test_no_scene_at_all(tmp_path: Path, text: bytes) -> None:
+    path = tmp_path / "scene.json"
+    path.write_bytes(text)
+    with pytest.raises(InvalidScene, match=r"scene\.json"):
+        load_scene(path)
+    assert not is_scene(text)
+
+
+def test_truncated_at_every_place(tmp_path: Path) -> None:
+    text = to_json(_scene(), folder=tmp_path)
+    for end in range(0, len(text) - 2, 997):
+        with pytest.raises(InvalidScene):
+            from_json(text[:end], folder=tmp_path)
+
+
+def test_missing_scene(tmp_path: Path) -> None:
+    with pytest.raises(InvalidScene, match="check the path"):
+        load_scene(tmp_path / "nowhere.json")
+
+
+def test_scene_refuses_decals_without_their_image() -> None:
+    with pytest.raises(InvalidScene, match="has 1 images"):
+        _scene().replace(images=[DecalImage.load("scale")])
+
+
+def test_objects_are_checked() -> None:
+    with pytest.raises(InvalidMesh, match="finite"):
+        MeshObject("m", CORNERS * np.float32(np.nan), FACES)
+    with pytest.raises(InvalidMesh, match="area"):
+        MeshObject("m", CORNERS * 0, FACES)
+    with pytest.raises(InvalidScene, match="BlobTree"):
+        TreeObject("t", "no tree")  # type: ignore[arg-type]
+    with pytest.raises(InvalidScene, match="uint8"):
+        DecalImage("x", np.zeros((2, 2, 3), np.uint8))
+    with pytest.raises(InvalidImage):
+        DecalImage.load("nowhere")
+
+
+def test_bounds_are_those_of_the_surfaces() -> None:
+    ball = TreeObject("ball", Point((0, 0, 0), radius=0.5))
+    low, high = bounds_of([ball, MeshObject("m", CORNERS + np.float32([2, 0, 0]), FACES)])
+    assert np.allclose(low, -0.5, atol=0.02)
+    assert np.allclose(high, [2.1, 0.5, 0.5], atol=0.02)
+    with pytest.raises(InvalidScene, match="at least one"):
+        bounds_of([])
