@@ -45,8 +45,9 @@ def falloff_derivative(squared_distance: wp.float32) -> wp.float32:
 @wp.func
 def falloff_steepness(distance: wp.float32) -> wp.float32:
     """|g'(d)| = 6 d (1 − d²)², 0 beyond the support."""
-    t = wp.max(1.0 - distance * distance, 0.0)
-    return 6.0 * distance * t * t
+    d = wp.min(distance, 1.0)
+    t = 1.0 - d * d
+    return 6.0 * d * t * t
 
 
 @wp.func

@@ -1,6 +1,7 @@
 """Checks that turn what people type into plain tuples of finite numbers, or say what is wrong with it."""
 
 import math
+import reprlib
 from collections.abc import Iterable
 from typing import Any, cast
 
@@ -78,17 +79,21 @@ def affine_matrix(value: ArrayLike) -> Matrix:
 
 
 def point_array(points: ArrayLike) -> NDArray[np.float32]:
-    """`points` as float32[n, 3] without NaN or infinity; InvalidPoints otherwise."""
+    """`points` as float32[n, 3] of finite numbers up to LARGEST_NUMBER; InvalidPoints otherwise."""
     try:
-        array = np.asarray(points, dtype=np.float32)
+        with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused below
+            array = np.asarray(points, dtype=np.float32)
     except (TypeError, ValueError):
-        array = np.empty(0, np.float32)
-    if array.size == 0 and array.ndim <= 1 and np.ndim(points) >= 1 and np.size(points) == 0:
+        raise InvalidPoints(
+            f"points: expected an array of shape (n, 3), got {reprlib.repr(points)}"
+        ) from None
+    if array.shape == (0,):
         array = array.reshape(0, 3)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidPoints(f"points: expected an array of shape (n, 3), got shape {np.shape(points)}")
-    if not np.isfinite(array).all():
+        raise InvalidPoints(f"points: expected an array of shape (n, 3), got shape {array.shape}")
+    if not (np.abs(array) <= LARGEST_NUMBER).all():
         raise InvalidPoints(
-            "points: expected finite coordinates, got NaN or infinity; drop those points first"
+            f"points: expected finite coordinates within ±{LARGEST_NUMBER:g}, got NaN, infinity or more; "
+            "drop those points first"
         )
     return np.ascontiguousarray(array)
