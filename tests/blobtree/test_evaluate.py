@@ -1,0 +1,227 @@
+"""Values, gradients, colours and slope bounds of random trees against float64; what hostile points get."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blobtree import InvalidPoints, Node, Point, Segment
+from blobtree.evaluate import bounds_at, colors_at, gradients_at, values_at
+from blobtree.traversal import postorder
+from tests.blobtree.trees import KINDS, points_around, random_trees
+from tests.oracles import blobtree as oracle
+
+TREES = random_trees(seed=1, count=240)
+POINTS = 150
+Floats = NDArray[np.float64]
+
+AWAY = 1e-3
+"""Field values between a point and the nearest kink of min, max or difference."""
+
+NUMBER = pytest.mark.parametrize("start", range(0, len(TREES), 40))
+
+
+def cases(start: int, count: int = 40) -> list[tuple[Node, NDArray[np.float32]]]:
+    rng = np.random.default_rng(start)
+    return [(tree, points_around(rng, tree, POINTS)) for tree in TREES[start : start + count]]
+
+
+def test_the_random_trees_hold_every_kind_of_node_and_stretches_among_them() -> None:
+    kinds = {type(node) for tree in TREES for node in postorder(tree)}
+    assert kinds == set(KINDS)
+    assert sum(tree.tape.stretched for tree in TREES) > 50
+    assert max(tree.tape.registers for tree in TREES) >= 3
+    determinants = [np.linalg.det(np.array(node.matrix)[:, :3]) for tree in TREES
+                    for node in postorder(tree) if isinstance(node, KINDS[-1])]  # fmt: skip
+    assert min(determinants) < 0.0 < max(determinants)
+
+
+@NUMBER
+def test_values_are_those_of_float64(start: int) -> None:
+    inside = 0
+    for tree, points in cases(start):
+        expected = oracle.value(tree, points)
+        error = np.abs(tree(points) - expected) / np.maximum(1.0, expected)
+        assert error.max() <= 1e-5, tree
+        inside += int((expected > 0.5).sum())
+    assert inside > 100
+
+
+@NUMBER
+def test_gradients_are_those_of_float64_differences(start: int) -> None:
+    compared = 0
+    for tree, points in cases(start):
+        smooth = oracle.evaluate(tree, points).margin > AWAY
+        seen, expected = tree.gradient(points)[smooth], oracle.gradient(tree, points[smooth])
+        error = np.linalg.norm(seen - expected, axis=1)
+        assert (error <= 1e-4 * np.maximum(1.0, np.linalg.norm(expected, axis=1))).all(), tree
+        compared += int(smooth.sum())
+    assert compared > 0.75 * 40 * POINTS
+
+
+@NUMBER
+def test_colours_follow_the_field(start: int) -> None:
+    compared = 0
+    for tree, points in cases(start):
+        field = oracle.evaluate(tree, points)
+        sure = (field.margin > AWAY) & (field.value > 0.01)
+        np.testing.assert_allclose(tree.colors(points)[sure], field.color[sure], atol=2e-4)
+        compared += int(sure.sum())
+    assert compared > 0.4 * 40 * POINTS
+
+
+def test_colours_of_plain_blends() -> None:
+    red, blue = Point((-1, 0, 0), radius=1.0, color=(1, 0, 0)), Point((1, 0, 0), radius=1.0, color=(0, 0, 1))
+    middle, left = [[0, 0, 0]], [[-0.5, 0, 0]]
+    np.testing.assert_allclose((red + blue).colors(middle), [[0.5, 0, 0.5]], atol=1e-6)
+    np.testing.assert_allclose((red | blue).colors(left), [[1, 0, 0]])
+    np.testing.assert_allclose((red & blue).colors(left), [[0, 0, 1]])
+    np.testing.assert_allclose((red - blue).colors([[-1.5, 0, 0]]), [[1, 0, 0]])
+    np.testing.assert_allclose((red - blue).colors([[0.1, 0, 0]]), [[0, 0, 1]])  # the wall of the cut
+    np.testing.assert_array_equal((red + blue).colors([[9, 9, 9]]), [[0, 0, 0]])
+
+
+@pytest.mark.parametrize("tree", TREES[:60], ids=range(60))
+def test_outside_the_bounds_the_field_is_exactly_zero(tree: Node) -> None:
+    rng = np.random.default_rng(5)
+    lower, upper = tree.bounds
+    assert lower.dtype == upper.dtype == np.float32
+    points = rng.uniform(lower - 1.0, upper + 1.0, (800, 3)).astype(np.float32)
+    faces = rng.integers(0, 3, 200), rng.integers(0, 2, 200)
+    outside = np.where(faces[1], np.nextafter(upper[faces[0]], np.float32(np.inf)),
+                       np.nextafter(lower[faces[0]], np.float32(-np.inf)))  # fmt: skip
+    points[np.arange(200), faces[0]] = outside
+    beyond = ((points < lower) | (points > upper)).any(axis=1)
+    assert (tree(points[beyond]) == 0.0).all()
+    assert (tree.gradient(points[beyond]) == 0.0).all()
+
+
+def test_the_bounds_are_tight_around_a_stretched_capsule() -> None:
+    tree = Segment((0, 0, 0), (1, 0, 0), radius=0.5).scale((1.0, 2.0, 3.0)).translate((1.0, 0.0, 0.0))
+    reach = 0.5 / oracle.RIM
+    np.testing.assert_allclose(tree.bounds[0], [1.0 - reach, -2.0 * reach, -3.0 * reach], rtol=1e-6)
+    np.testing.assert_allclose(tree.bounds[1], [2.0 + reach, 2.0 * reach, 3.0 * reach], rtol=1e-6)
+
+
+def test_a_tree_that_is_empty_everywhere_still_has_a_box() -> None:
+    nothing = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
+    lower, upper = nothing.bounds
+    assert (lower < upper).all()
+    assert nothing([[0, 0, 0], [9, 9, 9]]).tolist() == [0.0, 0.0]
+
+
+def test_an_isolated_primitive_shows_its_radius() -> None:
+    for radius in (1e-6, 1.0, 1e6):
+        ball = Point((0, 0, 0), radius=radius)
+        np.testing.assert_allclose(ball([[radius, 0, 0], [0, 0, -radius]]), 0.5, atol=1e-6)
+        np.testing.assert_allclose(
+            ball.gradient([[radius, 0, 0]])[0] * radius, [-oracle_slope(), 0, 0], rtol=1e-5
+        )
+
+
+def oracle_slope() -> float:
+    """|r · ∂f/∂r| of a ball at its surface, by 6 d² (1 − d²)²."""
+    return float(6.0 * oracle.RIM**2 * (1.0 - oracle.RIM**2) ** 2)
+
+
+# -- bounds on the slope --------------------------------------------------------------------------------
+
+
+@NUMBER
+def test_no_field_rises_faster_than_its_bound(start: int) -> None:
+    """|f(x) − f(q)| ≤ L · |x − q| for all x in the ball: 192,000 pairs over all runs."""
+    rng = np.random.default_rng(start)
+    worst = 0.0
+    for tree, _ in cases(start):
+        centres = points_around(rng, tree, 40)
+        reach = (10.0 ** rng.uniform(-3.0, 0.5, 40)).astype(np.float32)
+        bounds = bounds_at(tree.tape, centres, reach)
+        np.testing.assert_array_equal(bounds[:, 0], values_at(tree.tape, centres))
+        direction = rng.normal(size=(20, 40, 3))
+        direction /= np.linalg.norm(direction, axis=2, keepdims=True)
+        distance = reach * rng.uniform(0.0, 1.0, (20, 40)) ** 0.5
+        centre_value = oracle.value(tree, centres)
+        other = centres.astype(np.float64) + direction * distance[..., None]
+        rise = np.abs(oracle.value(tree, other.reshape(-1, 3)).reshape(20, 40) - centre_value)
+        excess = rise - bounds[:, 1] * distance
+        assert excess.max() <= 1e-5, tree
+        worst = max(worst, float((rise / np.maximum(bounds[:, 1] * distance, 1e-4)).max()))
+    assert worst > 0.9, "the bounds are so loose that this shows nothing"
+
+
+@NUMBER
+def test_no_gradient_inside_a_ball_is_longer_than_its_bound(start: int) -> None:
+    rng = np.random.default_rng(start)
+    for tree, points in cases(start):
+        reach = (10.0 ** rng.uniform(-3.0, 0.5, POINTS)).astype(np.float32)
+        direction = rng.normal(size=(POINTS, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        other = (points + 0.999 * (reach * rng.uniform(0.0, 1.0, POINTS))[:, None] * direction).astype(
+            np.float32
+        )
+        length = np.linalg.norm(tree.gradient(other), axis=1)
+        assert (length <= bounds_at(tree.tape, points, reach)[:, 1] * (1.0 + 1e-5) + 1e-6).all(), tree
+
+
+def test_far_from_everything_the_bound_is_zero() -> None:
+    tree = Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=0.5)
+    assert bounds_at(tree.tape, [[50.0, 0.0, 0.0]], 10.0).tolist() == [[0.0, 0.0]]
+    assert bounds_at(tree.tape, [[50.0, 0.0, 0.0]], 60.0)[0, 1] > 0.0
+
+
+# -- hostile points -------------------------------------------------------------------------------------
+
+BALL = Point((0, 0, 0), radius=1.0)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 2e18, -3e38, 1e39])
+def test_what_is_not_finite_is_refused(bad: float) -> None:
+    with pytest.raises(
+        InvalidPoints, match=r"expected finite coordinates within ±1e\+18, got NaN, infinity or more"
+    ):
+        BALL([[0.0, 0.0, 0.0], [0.0, bad, 0.0]])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [1.0, [1.0, 2.0, 3.0], [[1.0, 2.0]], np.zeros((2, 4)), np.zeros((2, 3, 1)), np.zeros((0, 2)), "abc", None,
+     [[1, 2, 3], [1, 2]], [["a", "b", "c"]], {"x": 1}, np.zeros((3, 0))],
+)  # fmt: skip
+def test_what_is_no_row_of_points_is_refused(wrong: object) -> None:
+    with pytest.raises(InvalidPoints, match=r"points: expected an array of shape \(n, 3\), got "):
+        BALL(wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("none", [np.zeros((0, 3)), np.zeros((0, 3), np.float32), []])
+def test_no_points_give_no_results(none: list[float]) -> None:
+    assert BALL(none).shape == (0,)
+    assert BALL.gradient(none).shape == (0, 3)
+    assert BALL.colors(none).shape == (0, 3)
+    assert bounds_at(BALL.tape, none, []).shape == (0, 2)
+
+
+@pytest.mark.parametrize("size", [1e4, 1e9, 1e18])
+def test_huge_points_are_outside(size: float) -> None:
+    for tree in (BALL, TREES[0], TREES[1], Segment((0, 0, 0), (1, 0, 0), radius=0.1).scale((1, 2, 1)) + BALL):
+        points: Floats = size * np.array([[1, 0, 0], [0, -1, 0], [1, 1, 1], [-1, 1, -1]]) * 0.99
+        assert (tree(points) == 0.0).all()
+        assert (tree.gradient(points) == 0.0).all()
+        assert np.isfinite(bounds_at(tree.tape, points, 1.0)).all()
+        assert np.isfinite(tree.colors(points)).all()
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.float16, np.int64, np.uint8])
+def test_any_numbers_in_any_layout_will_do(kind: type) -> None:
+    points = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 2]], kind)
+    expected = BALL(points.tolist())
+    np.testing.assert_array_equal(BALL(points), expected)
+    np.testing.assert_array_equal(BALL(np.asfortranarray(points)), expected)
+    np.testing.assert_array_equal(BALL(np.repeat(points, 2, axis=0)[::2]), expected)
+    assert BALL(points).dtype == np.float32
+
+
+def test_the_points_are_left_alone() -> None:
+    points = np.zeros((3, 3), np.float32)
+    points.flags.writeable = False
+    assert BALL(points).tolist() == [1.0, 1.0, 1.0]
+    assert gradients_at(BALL.tape, points)[:, 0].tolist() == [1.0, 1.0, 1.0]
+    assert colors_at(BALL.tape, points).shape == (3, 3)

@@ -1,0 +1,103 @@
+"""Random trees: a seeded generator for numbers, a Hypothesis strategy for structure."""
+
+from functools import reduce
+from operator import add, and_, or_
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from blobtree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Transform, Union
+from blobtree.validation import Vector
+
+KINDS = (Point, Segment, Sum, Ricci, Union, Intersection, Difference, Transform)
+
+
+def triple(array: NDArray[np.floating]) -> Vector:
+    x, y, z = (float(component) for component in array)
+    return x, y, z
+
+
+def random_leaf(rng: np.random.Generator) -> Node:
+    color = triple(rng.uniform(0.0, 1.0, 3))
+    radius = float(rng.uniform(0.2, 0.7))
+    start = rng.uniform(-1.0, 1.0, 3)
+    if rng.random() < 0.5:
+        return Point(triple(start), radius=radius, color=color)
+    end = start + rng.uniform(-0.8, 0.8, 3) * (rng.random() < 0.95)  # now and then of no length
+    return Segment(triple(start), triple(end), radius=radius, color=color)
+
+
+def random_transform(rng: np.random.Generator, node: Node) -> Node:
+    """Moved, turned, and scaled by one factor or by three of any sign."""
+    turned = node.rotate(rng.normal(size=3), float(rng.uniform(-180.0, 180.0)))
+    factors = rng.uniform(0.7, 1.4, 3) * rng.choice([-1.0, 1.0], 3)
+    if rng.random() < 0.4:
+        factors = np.full(3, factors[0])
+    return turned.scale(factors).translate(rng.uniform(-0.3, 0.3, 3))
+
+
+def random_tree(rng: np.random.Generator, depth: int = 4) -> Node:
+    """A tree of all kinds of nodes, about two units wide, at most `depth` deep."""
+    kind = rng.integers(0, 8) if depth else 0
+    if kind <= 1:
+        return random_leaf(rng)
+    if kind == 2:
+        return random_transform(rng, random_tree(rng, depth - 1))
+    operands = [random_tree(rng, depth - 1) for _ in range(rng.integers(2, 5))]
+    if kind == 3:
+        return Ricci(tuple(operands), exponent=float(rng.choice([1.0, 1.5, 2.0, 4.0, 20.0])))
+    if kind == 4:
+        return operands[0] - operands[1]
+    combine = {5: add, 6: or_, 7: and_}[int(kind)]
+    return reduce(combine, operands)
+
+
+def random_trees(seed: int, count: int, depth: int = 4) -> list[Node]:
+    """Trees with at least one combination each; every kind of node occurs among two dozen of them."""
+    rng = np.random.default_rng(seed)
+    trees: list[Node] = []
+    while len(trees) < count:
+        tree = random_tree(rng, depth)
+        if len(tree.children) > 1:
+            trees.append(tree)
+    return trees
+
+
+def points_around(rng: np.random.Generator, tree: Node, count: int) -> NDArray[np.float32]:
+    """Points in the tree's box of influence widened by a tenth, most of them where there is a field."""
+    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    margin = 0.1 * (upper - lower)
+    pool = rng.uniform(lower - margin, upper + margin, (8 * count, 3)).astype(np.float32)
+    empty = tree(pool) == 0.0
+    empty[: count // 4] = False
+    return pool[np.argsort(empty, kind="stable")[:count]]
+
+
+_coordinate = st.floats(-10.0, 10.0)
+_vector = st.tuples(_coordinate, _coordinate, _coordinate)
+_radius = st.floats(1e-3, 10.0)
+_color = st.tuples(*[st.floats(0.0, 1.0)] * 3)
+_factor = st.floats(0.1, 10.0) | st.floats(-10.0, -0.1)
+
+
+def _extend(children: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
+    operands = st.lists(children, min_size=1, max_size=4).map(tuple)
+    return st.one_of(
+        st.builds(Sum, operands),
+        st.builds(Union, operands),
+        st.builds(Intersection, operands),
+        st.builds(Ricci, operands, exponent=st.floats(1.0, 100.0)),
+        st.builds(Difference, children, children),
+        st.builds(lambda node, offset: node.translate(offset), children, _vector),
+        st.builds(lambda node, factors: node.scale(factors), children, st.tuples(*[_factor] * 3)),
+        st.builds(lambda node, degrees: node.rotate((1, 2, 3), degrees), children, st.floats(-360.0, 360.0)),
+    )
+
+
+def trees(max_leaves: int = 12) -> st.SearchStrategy[Node]:
+    """Any tree of moderate numbers."""
+    leaves = st.builds(Point, _vector, radius=_radius, color=_color) | st.builds(
+        Segment, _vector, _vector, radius=_radius, color=_color
+    )
+    return st.recursive(leaves, _extend, max_leaves=max_leaves)
