@@ -2,6 +2,7 @@
 // DECALS: there are decals; the slot holds decals.glsl. BUFFERS: also write what was found, for tests and picking.
 //@ include camera.glsl
 //@ include light.glsl
+//@ include ambient.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
 uniform sampler2D g_color;
@@ -28,7 +29,8 @@ void main() {
         albedo = albedo * (1.0 - color.a) + color.rgb;
         decal = vec4(float(hit.owner), hit.field, hit.uv);
 #endif
-        light = vec4(clamp(shade(albedo, normal, -normalize(ray)), 0.0, 1.0), 1.0);
+        float open_ = openness(g_position, texel, position.xyz, facing(normal, ray), ray);
+        light = vec4(clamp(shade(albedo, normal, -normalize(ray), open_), 0.0, 1.0), 1.0);
     }
     out_light = light;
 #ifdef BUFFERS

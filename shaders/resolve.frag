@@ -2,6 +2,7 @@
 //@ include color.glsl
 uniform sampler2D light;    // linear, premultiplied alpha, samples × samples texels a pixel
 uniform int samples;
+uniform ivec2 first;        // sample of the tile with which the pixels begin
 uniform float first_row;    // of this tile in the picture, from below
 uniform float rows;         // of the whole picture
 uniform vec4 background_top;     // sRGB and alpha, not premultiplied
@@ -10,7 +11,7 @@ uniform vec4 background_bottom;
 out vec4 pixel;
 
 void main() {
-    ivec2 corner = ivec2(gl_FragCoord.xy) * samples;
+    ivec2 corner = first + ivec2(gl_FragCoord.xy) * samples;
     vec4 sum = vec4(0.0);
     for (int j = 0; j < samples; j++) {
         for (int i = 0; i < samples; i++) {

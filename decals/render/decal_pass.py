@@ -1,5 +1,7 @@
 """The decal pass: one full-screen triangle colours all pixels, however many decals and objects there are."""
 
+from dataclasses import dataclass
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +11,27 @@ from decals.render.context import Context
 from decals.render.decal_data import DecalData, library
 from decals.render.gbuffer import GBuffer
 from decals.render.textures import ImageArray
-from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
+from decals.render.tile import MARGIN, Tile, attach_camera, read_floats, set_uniform
 from implicit_decals.shaders import Source, compose
 
 FIRST_UNIT = 3
 """Texture units below hold the G-buffer, this one the images, those above the decals' data."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How decals lie and how light falls.
+
+    Parameters
+    ----------
+    mapping
+        How images are laid onto curved surface.
+    ambient_radius
+        How far away surroundings may be to keep light out, in the scene's units.
+    """
+
+    mapping: Mapping
+    ambient_radius: float
 
 
 class DecalPass:
@@ -43,7 +61,7 @@ class DecalPass:
         tile: Tile,
         decals: DecalData | None,
         images: ImageArray | None,
-        mapping: Mapping,
+        look: Look,
     ) -> None:
         """Shade a tile; without decals (or images for them) only the objects' own colours are seen."""
         array = self._array(with_decals=decals is not None)
@@ -52,13 +70,17 @@ class DecalPass:
         self._framebuffer.viewport = (0, 0, tile.width, tile.height)
         self._context.gl.enable_only(moderngl.NOTHING)
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
+        set_uniform(program, "tile_corner", (tile.x, tile.y))
+        set_uniform(program, "tile_size", (tile.width, tile.height))
+        set_uniform(program, "ambient_radius", look.ambient_radius)
+        set_uniform(program, "ambient_limit", MARGIN)
         for unit, (name, texture) in enumerate(textures.items()):
             texture.use(unit)
             set_uniform(program, name, unit)
         if decals is not None and images is not None:
             images.use(FIRST_UNIT)
             set_uniform(program, "decal_images", FIRST_UNIT)
-            set_uniform(program, "decal_mapping", int(mapping))
+            set_uniform(program, "decal_mapping", int(look.mapping))
             decals.use(program, FIRST_UNIT + 1)
         array.render(vertices=3)
 

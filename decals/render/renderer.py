@@ -15,17 +15,20 @@ from decals.errors import InvalidScene
 from decals.mapping import Mapping
 from decals.render.context import Context
 from decals.render.decal_data import DecalData
-from decals.render.decal_pass import DecalPass
+from decals.render.decal_pass import DecalPass, Look
 from decals.render.drawables import Drawable, drawable_for
 from decals.render.gbuffer import GBuffer
 from decals.render.kept import Kept
 from decals.render.resolve import STUDIO, Background, ResolvePass
 from decals.render.scene_like import SceneLike
 from decals.render.textures import ImageArray
-from decals.render.tile import MAX_TILE, CameraBuffer, Tile, tiles
+from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Tile, largest_tile, tiles
 
 Floats = NDArray[np.float32]
 Size = tuple[int, int]
+
+AMBIENT_RADIUS = 0.1
+"""How far away surroundings may be to keep light out, relative to the scene's diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +82,7 @@ class Renderer:
     def __init__(self, context: Context | None = None, *, max_tile: int = MAX_TILE) -> None:
         self._owned = context is None
         self.context = context or Context.standalone()
-        self._max_tile = min(max_tile, self.context.max_texture_size)
+        self._max_tile = min(max_tile, self.context.max_texture_size - 2 * MARGIN)
         self._drawables: Kept[Drawable] = Kept()
         self._decals: Kept[DecalData] = Kept()
         self._images: Kept[ImageArray] = Kept()
@@ -157,14 +160,16 @@ class Renderer:
         with self.context.current():
             drawables = [self._drawable(thing) for thing in scene.objects]
             data, images = self._uploads(scene)
-            clip_range = scene.camera.clip_range(_union([drawable.bounds for drawable in drawables]))
-            targets = self._targets_for(size, samples, buffers=buffers)
-            for tile in tiles(scene.camera, size, samples, clip_range, self._max_tile):
+            bounds = _union([drawable.bounds for drawable in drawables])
+            clip_range = scene.camera.clip_range(bounds)
+            look = Look(mapping=mapping, ambient_radius=AMBIENT_RADIUS * _diagonal(bounds))
+            targets = self._targets_for(largest_tile(size, samples, limit=self._max_tile), buffers=buffers)
+            for tile in tiles(scene.camera, size, samples, clip_range, limit=self._max_tile):
                 self._camera.use(tile)
                 targets.gbuffer.begin(tile.width, tile.height)
                 for object_id, drawable in enumerate(drawables):
                     drawable.draw(object_id, tile)
-                targets.decal_pass.draw(targets.gbuffer, tile, data, images, mapping)
+                targets.decal_pass.draw(targets.gbuffer, tile, data, images, look)
                 yield tile, targets
             for kept in (self._drawables, self._decals, self._images):
                 kept.sweep()
@@ -179,14 +184,12 @@ class Renderer:
         images = self._images.get(lambda: ImageArray(self.context, pixels), *pixels)
         return self._decals.get(lambda: DecalData(self.context, scene.decals), scene.decals), images
 
-    def _targets_for(self, size: Size, samples: int, *, buffers: bool) -> _Targets:
-        """Give targets that hold the largest tile; those of the last picture if they fit exactly."""
-        step = max(self._max_tile // samples, 1) * samples
-        wanted = min(size[0] * samples, step), min(size[1] * samples, step)
-        if self._targets is None or (self._targets.gbuffer.size, self._targets.buffers) != (wanted, buffers):
+    def _targets_for(self, size: Size, *, buffers: bool) -> _Targets:
+        """Give targets of a size; those of the last picture if they fit exactly."""
+        if self._targets is None or (self._targets.gbuffer.size, self._targets.buffers) != (size, buffers):
             if self._targets is not None:
                 self._targets.release()
-            self._targets = _Targets(self.context, wanted, buffers=buffers)
+            self._targets = _Targets(self.context, size, buffers=buffers)
         return self._targets
 
     def release(self) -> None:
@@ -232,7 +235,7 @@ class _Picture:
         self.pixels: NDArray[Any] = np.zeros((size[1], size[0], channels), dtype)
 
     def place(self, block: NDArray[Any], tile: Tile, samples: int = 1) -> None:
-        left, bottom = tile.x // samples, tile.y // samples
+        left, bottom = tile.inner.x // samples, tile.inner.y // samples
         height, width = block.shape[:2]
         self.pixels[::-1][bottom : bottom + height, left : left + width] = block
 
@@ -243,6 +246,10 @@ def _union(boxes: Sequence[Bounds]) -> Bounds:
         return np.zeros(3), np.zeros(3)
     lower, upper = zip(*boxes, strict=True)
     return np.min(lower, axis=0), np.max(upper, axis=0)
+
+
+def _diagonal(bounds: Bounds) -> float:
+    return float(np.linalg.norm(np.subtract(bounds[1], bounds[0])))
 
 
 def _check_size(size: Size, samples: int) -> None:

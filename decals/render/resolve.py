@@ -49,14 +49,16 @@ class ResolvePass:
         self, light: moderngl.Texture, tile: Tile, samples: int, background: Background
     ) -> NDArray[np.uint8]:
         """Give the tile's pixels, ``uint8[h, w, 4]``, the lowest row first."""
-        width, height = tile.width // samples, tile.height // samples
+        inner = tile.inner
+        width, height = inner.width // samples, inner.height // samples
         self._framebuffer.use()
         self._framebuffer.viewport = (0, 0, width, height)
         self._gl.enable_only(moderngl.NOTHING)
         light.use(0)
         set_uniform(self._program, "light", 0)
         set_uniform(self._program, "samples", samples)
-        set_uniform(self._program, "first_row", tile.y / samples)
+        set_uniform(self._program, "first", (inner.x - tile.x, inner.y - tile.y))
+        set_uniform(self._program, "first_row", inner.y / samples)
         set_uniform(self._program, "rows", tile.picture[1] / samples)
         set_uniform(self._program, "background_top", background.top)
         set_uniform(self._program, "background_bottom", background.bottom)

@@ -13,13 +13,28 @@ from decals.render.context import Context
 
 CAMERA_BINDING = 0
 """Binding point of the uniform block in ``shaders/camera.glsl``."""
-MAX_TILE = 2048
-"""Tiles are at most this many samples wide and high, which bounds the memory of all targets."""
+MAX_TILE = 2560
+"""Tiles, without their margins, are at most this many samples wide and high; it bounds the memory."""
+MARGIN = 320
+"""Samples around a tile that are drawn too, so that what looks at its neighbours never meets a seam."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """Lower left corner and size, in samples of the picture."""
+
+    x: int
+    y: int
+    width: int
+    height: int
 
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """A rectangle of a picture's samples, from its lower left corner."""
+    """A rectangle of a picture's samples, counted from the picture's lower left corner.
+
+    All of it is drawn; of that, the inner rectangle (in the same coordinates) becomes pixels.
+    """
 
     camera: Camera
     picture: tuple[int, int]
@@ -27,6 +42,7 @@ class Tile:
     y: int
     width: int
     height: int
+    inner: "Rectangle"
     near: float
     far: float
 
@@ -55,15 +71,28 @@ def tiles(
     size: tuple[int, int],
     samples: int,
     clip_range: tuple[float, float],
+    *,
     limit: int = MAX_TILE,
 ) -> Iterator[Tile]:
     """Cut a picture of ``size`` pixels with ``samples`` per axis; no tile cuts through a pixel."""
     width, height = size[0] * samples, size[1] * samples
-    step = max(limit // samples, 1) * samples
+    step = _step(samples, limit)
     for y in range(0, height, step):
         for x in range(0, width, step):
-            tile_size = min(step, width - x), min(step, height - y)
-            yield Tile(camera, (width, height), x, y, *tile_size, *clip_range)
+            inner = Rectangle(x, y, min(step, width - x), min(step, height - y))
+            left, right = max(x - MARGIN, 0), min(x + inner.width + MARGIN, width)
+            low, high = max(y - MARGIN, 0), min(y + inner.height + MARGIN, height)
+            yield Tile(camera, (width, height), left, low, right - left, high - low, inner, *clip_range)
+
+
+def largest_tile(size: tuple[int, int], samples: int, *, limit: int = MAX_TILE) -> tuple[int, int]:
+    """Give a size, in samples, that holds each of a picture's tiles."""
+    most = _step(samples, limit) + 2 * MARGIN
+    return min(size[0] * samples, most), min(size[1] * samples, most)
+
+
+def _step(samples: int, limit: int) -> int:
+    return max(limit // samples, 1) * samples
 
 
 class CameraBuffer:
@@ -99,7 +128,8 @@ def set_uniform(program: moderngl.Program, name: str, value: object) -> None:
 
 
 def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) -> NDArray[np.float32]:
-    """Read a tile's part of a target, ``float32[h, w, 4]``, the lowest row first."""
-    size = tile.width, tile.height
-    data = framebuffer.read((0, 0, *size), components=4, attachment=attachment, alignment=1, dtype="f4")
-    return np.frombuffer(data, np.float32).reshape(tile.height, tile.width, 4)
+    """Read the inner part of a tile from a target, ``float32[h, w, 4]``, the lowest row first."""
+    inner = tile.inner
+    part = inner.x - tile.x, inner.y - tile.y, inner.width, inner.height
+    data = framebuffer.read(part, components=4, attachment=attachment, alignment=1, dtype="f4")
+    return np.frombuffer(data, np.float32).reshape(inner.height, inner.width, 4)
