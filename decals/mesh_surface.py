@@ -68,8 +68,8 @@ class MeshSurface:
 
     @cached_property
     def closed(self) -> bool:
-        """Whether the faces bound a volume."""
-        return _is_closed(self.vertices, self.faces)
+        """Whether the faces bound a volume, with or without the degenerate ones."""
+        return any(_is_closed(self.vertices, faces) for faces in (self.faces, self._corners))
 
     def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
         """Points uniform by area, one in each ``1/count`` of it along the order of the faces."""

@@ -17,6 +17,9 @@ from decals.surface import Surface
 SAMPLES = 48
 """Samples for each decal from which its size is measured."""
 
+FEWEST_SAMPLES = 4096
+"""Samples at least, so that the few decals of a small population are measured as well."""
+
 SPREADING = 0.8
 """Part of the whole work that the relaxation takes, for progress bars."""
 
@@ -85,7 +88,8 @@ def sizes(relaxation: Relaxation, *, seed: int = 0) -> NDArray[np.float64]:
     """
     world = relaxation.world
     counts = np.bincount(relaxation.surface_ids, minlength=len(world.surfaces))
-    samples = world.sample(counts * SAMPLES, stream=_SAMPLE_STREAM)
+    each = max(SAMPLES, FEWEST_SAMPLES // max(relaxation.count, 1))
+    samples = world.sample(counts * each, stream=_SAMPLE_STREAM)
     return covering_radii(
         relaxation.sites, samples, lambda sites: visible(world, sites), _stream(seed, _TRIAL_STREAM)
     )

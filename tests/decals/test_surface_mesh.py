@@ -1,0 +1,183 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from decals.errors import InvalidMesh, InvalidPoints
+from decals.mesh_surface import MeshSurface
+from decals.surface import Surface
+from tests.decals.meshes import box, plane, sphere
+from tests.oracles.triangles import closest_points, first_hits
+
+
+def directions(count, seed=0):
+    vectors = np.random.default_rng(seed).normal(size=(count, 3))
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def triangle_soup(seed, count=30):
+    rng = np.random.default_rng(seed)
+    vertices = rng.uniform(-1, 1, (3 * count, 3)).astype(np.float32)
+    return vertices, np.arange(3 * count).reshape(-1, 3)
+
+
+def test_a_mesh_is_a_surface():
+    assert isinstance(plane(), Surface)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
+def test_sphere_area_bounds_and_samples(radius):
+    ball = sphere(radius)
+    assert ball.area == pytest.approx(4 * np.pi * radius**2, rel=5e-3)
+    assert np.allclose(ball.bounds, [[-radius] * 3, [radius] * 3], rtol=1e-2)
+    positions, normals = ball.sample(5000, seed=3)
+    assert positions.dtype == normals.dtype == np.float32
+    assert np.allclose(np.linalg.norm(positions, axis=1), radius, rtol=1e-2)
+    assert np.allclose(normals, positions / radius, atol=0.1)
+    assert np.abs(positions.mean(axis=0)).max() < 0.02 * radius
+
+
+def test_samples_are_uniform_by_area():
+    slab = box((4.0, 1.0, 1.0))
+    positions, normals = slab.sample(18_000, seed=0)
+    on_top = normals[:, 2] > 0.5
+    assert on_top.sum() == pytest.approx(4000, abs=2)
+    counts, _ = np.histogram(positions[on_top, 0], bins=8, range=(-2, 2))
+    assert np.abs(counts - 500).max() < 5 * np.sqrt(500)
+
+
+def test_samples_repeat_for_a_seed_and_differ_for_another():
+    ball = sphere()
+    first, again, other = (ball.sample(100, seed=seed)[0].tobytes() for seed in (5, 5, 6))
+    assert first == again != other
+    assert len(ball.sample(0, seed=1)[0]) == 0
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("seed", range(3))
+def test_projection_finds_the_closest_point(seed, scale):
+    vertices, faces = triangle_soup(seed)
+    soup = MeshSurface(vertices * scale, faces)
+    points = np.random.default_rng(seed + 100).uniform(-3, 3, (200, 3)) * scale
+    positions, normals = soup.project(points)
+    distances = np.linalg.norm(positions - points, axis=1)
+    assert np.allclose(distances, closest_points(points, soup.vertices, faces), atol=2e-6 * scale, rtol=1e-5)
+    assert np.allclose(closest_points(positions, soup.vertices, faces), 0, atol=1e-6 * scale)
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
+    assert np.array_equal(soup.normal(points), normals)
+
+
+def test_normals_follow_the_winding_of_the_faces():
+    assert np.allclose(plane().normal([[0.1, 0.2, 3.0], [0.1, 0.2, -3.0]]), [0, 0, 1])
+    turned = MeshSurface(plane().vertices, plane().faces[:, ::-1])
+    assert np.allclose(turned.normal([[0.1, 0.2, 3.0]]), [0, 0, -1])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rays_hit_the_first_triangle(seed):
+    vertices, faces = triangle_soup(seed)
+    soup = MeshSurface(vertices, faces)
+    origins, ways = directions(300, seed) * 3, directions(300, seed + 50)
+    expected = first_hits(origins.astype(np.float32), ways, vertices, faces)
+    found = soup.raycast(origins, 7.0 * ways)
+    assert (np.isfinite(found) == np.isfinite(expected)).mean() > 0.99
+    both = np.isfinite(found) & np.isfinite(expected)
+    assert both.any()
+    assert np.allclose(found[both], expected[both], rtol=1e-4)
+
+
+def test_rays_toward_a_sphere_know_its_size():
+    ways = directions(500)
+    distances = sphere(2.0, center=(5, 0, 0)).raycast(ways * 7 + [5, 0, 0], -ways)
+    assert np.allclose(distances, 5.0, atol=0.02)
+    assert np.isinf(sphere().raycast([[0, 0, 3], [0, 0, 3]], [[0, 0, 1], [0, 0, 0]])).all()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_closed_mesh_contains_its_inside_however_it_winds(turned):
+    ball = sphere(center=(3, 0, 0))
+    if turned:
+        ball = MeshSurface(ball.vertices, ball.faces[:, ::-1])
+    ways = directions(1000)
+    center = [3, 0, 0]
+    assert ball.closed
+    assert ball.contains(center + 0.98 * ways).all()
+    assert not ball.contains(center + 1.01 * ways).any()
+
+
+def test_unwelded_closed_mesh_is_closed_and_open_ones_contain_nothing():
+    cube = box()
+    split = MeshSurface(cube.vertices[cube.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    assert split.closed
+    assert split.contains([[0, 0, 0], [0.6, 0, 0]]).tolist() == [True, False]
+    lidless = MeshSurface(cube.vertices, cube.faces[1:])
+    one_flipped = MeshSurface(cube.vertices, np.vstack([cube.faces[:1, ::-1], cube.faces[1:]]))
+    for surface in (lidless, one_flipped, plane()):
+        assert not surface.closed
+        assert not surface.contains([[0, 0, 0]]).any()
+
+
+def test_degenerate_faces_are_tolerated():
+    good = sphere()
+    n = len(good.vertices)
+    extra = [[0, 0, 1], [2, 2, 2], [n, n + 1, n + 2]]
+    line = [[0, 0, 9], [0, 0, 10], [0, 0, 11]]
+    surface = MeshSurface(np.vstack([good.vertices, line]), np.vstack([good.faces, extra]))
+    assert surface.area == pytest.approx(good.area)
+    assert np.array_equal(surface.bounds, good.bounds)
+    assert np.array_equal(surface.sample(50, 1)[0], good.sample(50, 1)[0])
+    assert np.array_equal(surface.project([[0, 0, 8.0]])[0], good.project([[0, 0, 8.0]])[0])
+    assert surface.contains([[0, 0, 0]]).all()
+
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], float)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "says"),
+    [
+        (np.zeros((0, 3)), np.zeros((0, 3), int), "vertices: expected shape"),
+        (SQUARE, np.zeros((0, 3), int), "faces: expected shape"),
+        (SQUARE, [[0, 1, 2, 0]], "triangulate"),
+        (SQUARE[:, :2], [[0, 1, 2]], "vertices: expected shape"),
+        ("no mesh", [[0, 1, 2]], "vertices: expected numbers"),
+        (SQUARE * np.nan, [[0, 1, 2]], "finite"),
+        (SQUARE / [[1e-300, 1, 1]], [[0, 1, 2]], "finite"),
+        (SQUARE, [[0, 1, 3]], "indices from 0 to 2, got 3"),
+        (SQUARE, [[0, 1, -1]], "got -1"),
+        (SQUARE, [[0.0, 1.0, 2.0]], "integers"),
+        (SQUARE, [[0, 1, 1]], "mesh with area"),
+        (SQUARE * [1, 0, 1], [[0, 1, 2]], "mesh with area"),
+    ],
+)
+def test_what_is_no_mesh_is_refused(vertices, faces, says):
+    with np.errstate(all="ignore"), pytest.raises(InvalidMesh, match=says):
+        MeshSurface(vertices, faces)
+
+
+@pytest.mark.parametrize("points", [[[0, 0]], [0, 0, 0], [[np.nan, 0, 0]], [[np.inf, 0, 0]], "points"])
+def test_what_are_no_points_is_refused(points):
+    for ask in (plane().project, plane().normal, plane().contains):
+        with pytest.raises(InvalidPoints, match="points: expected"):
+            ask(points)
+
+
+def test_rays_need_as_many_origins_as_directions():
+    with pytest.raises(InvalidPoints, match="as many directions"):
+        plane().raycast([[0, 0, 1]], [[0, 0, 1], [0, 0, 1]])
+
+
+def test_no_points_give_no_answers():
+    none = np.zeros((0, 3))
+    assert plane().project(none)[0].shape == (0, 3)
+    assert plane().raycast(none, none).shape == plane().contains(none).shape == (0,)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.floats(1e-3, 1e3), st.floats(-100, 100))
+def test_samples_lie_on_the_surface_at_any_scale_and_place(seed, scale, shift):
+    vertices, faces = triangle_soup(seed, count=5)
+    soup = MeshSurface(vertices * scale + shift, faces)
+    positions, normals = soup.sample(20, seed)
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
+    assert closest_points(positions, soup.vertices, faces).max() <= 1e-6 * (scale + abs(shift))

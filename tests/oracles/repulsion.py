@@ -1,0 +1,51 @@
+"""One step of particle repulsion, pair by pair, in float64."""
+
+import numpy as np
+
+
+def facing_weight(cosine, limit):
+    t = np.clip(0.5 + 2.0 * (cosine - limit), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def pair_energy(x, exponent, cutoff):
+    """x^-p, less its tangent at the cutoff."""
+    return np.where(
+        x < cutoff,
+        x**-exponent - cutoff**-exponent + exponent * cutoff ** (-exponent - 1) * (x - cutoff),
+        0.0,
+    )
+
+
+def moves(
+    positions, normals, *, spacing, cutoff, exponent, facing_limit, damping, longest, isotropy, closest
+):
+    """Damped Newton move and energy of every particle, its neighbours at rest.
+
+    The slope is a central difference of `pair_energy`: only the energy is shared with the kernel.
+    """
+    positions, normals = np.asarray(positions, float), np.asarray(normals, float)
+    result, energies = np.zeros_like(positions), np.zeros(len(positions))
+    for i, (p, n) in enumerate(zip(positions, normals, strict=True)):
+        force, curvature = np.zeros(3), np.zeros((3, 3))
+        for j, q in enumerate(positions):
+            if j == i or np.linalg.norm(p - q) >= cutoff * spacing:
+                continue
+            weight = facing_weight(n @ normals[j], facing_limit)
+            x = max(np.linalg.norm(p - q) / spacing, closest)
+            step = 1e-5 * x
+            values = [pair_energy(x + k * step, exponent, cutoff) for k in (-1, 0, 1)]
+            slope = (values[2] - values[0]) / (2 * step)
+            bend = exponent * (exponent + 1) * x ** (-exponent - 2)
+            away = (p - q) / np.linalg.norm(p - q)
+            away -= (away @ n) * n
+            force -= weight * slope * away
+            curvature += weight * bend * np.outer(away, away)
+            energies[i] += weight * values[1]
+        tangent = np.eye(3) - np.outer(n, n)
+        curvature += isotropy * np.trace(curvature) * tangent
+        if curvature.any():
+            move = damping * spacing * np.linalg.pinv(curvature, hermitian=True) @ force
+            size = np.linalg.norm(move)
+            result[i] = move * min(1.0, longest * spacing / size) if size > 0 else move
+    return result, energies
