@@ -73,7 +73,7 @@ def test_every_common_format_gives_the_same_sphere(tmp_path: Path, suffix: str) 
 def test_ply_polygons_of_any_size(tmp_path: Path, polygons: list[list[int]], order: str) -> None:
     path = tmp_path / "a.ply"
     path.write_bytes(_binary_ply(SQUARE, polygons, order) if order else _ascii_ply(SQUARE, polygons))
-    assert np.array_equal(read_mesh(path)[0], np.float32(SQUARE))
+    assert np.array_equal(read_mesh(path)[0], np.array(SQUARE, np.float32))
     assert _area(path) == pytest.approx(1.0)
 
 
@@ -149,7 +149,7 @@ def test_points_without_faces(tmp_path: Path) -> None:
     with pytest.raises(InvalidMesh, match=r"no faces|cloud"):
         read_mesh(tmp_path / "cloud.vtp")
     (tmp_path / "a.ply").write_bytes(_ascii_ply(SQUARE, []))
-    with pytest.raises(InvalidMesh, match="5 points but no faces|4 points but no faces"):
+    with pytest.raises(InvalidMesh, match="4 points but no faces"):
         read_mesh(tmp_path / "a.ply")
 
 
@@ -171,7 +171,7 @@ def test_a_picture_is_no_mesh(tmp_path: Path) -> None:
 
 
 def test_strips_are_triangulated() -> None:
-    strip = pv.PolyData(np.float32(SQUARE), strips=[4, 0, 1, 3, 2])
+    strip = pv.PolyData(np.array(SQUARE, np.float32), strips=[4, 0, 1, 3, 2])
     vertices, faces = surface_triangles(strip, name="strip")
     assert faces.shape == (2, 3)
     assert len(vertices) == 4

@@ -1,5 +1,6 @@
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,9 +25,13 @@ def _tree() -> Node:
     return (blob | Point((2, 0, 0), radius=0.5)).rotate((0, 1, 0), 33.3).translate((0.1, 0, 0))
 
 
+def _make(**arrays: Any) -> Decals:
+    return Decals(**arrays)
+
+
 def _decals(count: int = 50) -> Decals:
     rng = np.random.default_rng(5)
-    return Decals(
+    return _make(
         positions=rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-6, 6, (count, 1)),
         normals=rng.normal(size=(count, 3)),
         tangents=rng.normal(size=(count, 3)),
@@ -38,9 +43,9 @@ def _decals(count: int = 50) -> Decals:
 
 def _scene() -> Scene:
     return Scene(
-        objects=[MeshObject("tetra", CORNERS, FACES, (0.1, 0.2, 0.3)), TreeObject("blob", _tree())],
+        objects=(MeshObject("tetra", CORNERS, FACES, (0.1, 0.2, 0.3)), TreeObject("blob", _tree())),
         camera=Camera((0.1, 2.0, 3.3), (0.0, 1 / 3, 0.0), (0.0, 1.0, 0.1), 31.4),
-        images=[DecalImage.load("scale"), DecalImage.load("tile#b0413e")],
+        images=(DecalImage.load("scale"), DecalImage.load("tile#b0413e")),
         decals=_decals(),
     )
 
@@ -74,8 +79,11 @@ def test_saving_again_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_numbers_are_the_shortest_that_round_to_the_same_float32(tmp_path: Path) -> None:
-    third = Decals(
-        positions=np.float32([[1 / 3, 0.1, 2e-8]]), normals=[[0, 0, 1]], tangents=[[1, 0, 0]], radii=[0.7]
+    third = _make(
+        positions=np.array([[1 / 3, 0.1, 2e-8]], np.float32),
+        normals=[[0, 0, 1]],
+        tangents=[[1, 0, 0]],
+        radii=[0.7],
     )
     scene = _scene().replace(decals=third)
     record = json.loads(to_json(scene, folder=tmp_path))["decals"][0]
@@ -100,9 +108,9 @@ def test_meshes_and_images_from_files_are_relative_to_the_scene(tmp_path: Path) 
     mesh_path.write_text("\n".join(rows) + "\n")
     Image.new("RGB", (3, 2), (9, 8, 7)).save(image_path)
     scene = Scene(
-        objects=[MeshObject("tetra", CORNERS, FACES, source=str(mesh_path))],
+        objects=(MeshObject("tetra", CORNERS, FACES, source=str(mesh_path)),),
         camera=Camera((1, 2, 3)),
-        images=[DecalImage.load(str(image_path))],
+        images=(DecalImage.load(str(image_path)),),
     )
     save_scene(scene, tmp_path / "scene.json")
     written = json.loads((tmp_path / "scene.json").read_text())
@@ -120,11 +128,10 @@ def test_meshes_and_images_from_files_are_relative_to_the_scene(tmp_path: Path) 
 
 
 def test_samples_are_named_and_fetched_again(tmp_path: Path) -> None:
-    scene = Scene(objects=[MeshObject("t", CORNERS, FACES, source="sample:tetra")], camera=Camera((1, 2, 3)))
+    tetra = MeshObject("t", CORNERS, FACES, source="sample:tetra")
+    scene = Scene(objects=(tetra,), camera=Camera((1, 2, 3)))
     save_scene(scene, tmp_path / "scene.json")
-    asked = []
-    again = load_scene(tmp_path / "scene.json", samples=lambda name: asked.append(name) or (CORNERS, FACES))
-    assert asked == ["tetra"]
+    again = load_scene(tmp_path / "scene.json", samples={"tetra": (CORNERS, FACES)}.__getitem__)
     assert isinstance(again.objects[0], MeshObject)
     assert again.objects[0].source == "sample:tetra"
     with pytest.raises(InvalidScene, match="sample:tetra"):
@@ -239,7 +246,7 @@ def test_objects_are_checked() -> None:
 
 def test_bounds_are_those_of_the_surfaces() -> None:
     ball = TreeObject("ball", Point((0, 0, 0), radius=0.5))
-    low, high = bounds_of([ball, MeshObject("m", CORNERS + np.float32([2, 0, 0]), FACES)])
+    low, high = bounds_of([ball, MeshObject("m", CORNERS + np.array([2, 0, 0], np.float32), FACES)])
     assert np.allclose(low, -0.5, atol=0.02)
     assert np.allclose(high, [2.1, 0.5, 0.5], atol=0.02)
     with pytest.raises(InvalidScene, match="at least one"):
