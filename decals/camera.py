@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 
 NEAR_OVER_FAR = 1e-4
 """The near plane comes no closer than this fraction of the far one, for the depth buffer's sake."""
+DIRECTION = (0.35, 0.25, 1.0)
+"""Where pictures are taken from, unless somebody says otherwise: from the model toward the eye."""
 PARALLEL = 1e-9
 """Sine below which two directions count as parallel."""
 
@@ -135,7 +137,7 @@ class Camera:
         cls,
         bounds: Bounds,
         *,
-        direction: Sequence[float] = (0.35, 0.25, 1.0),
+        direction: Sequence[float] = DIRECTION,
         up: Sequence[float] = (0.0, 1.0, 0.0),
         fov: float = 30.0,
         aspect: float = 4 / 3,
@@ -158,30 +160,69 @@ class Camera:
         margin
             Room around the box, 1 for none.
         """
-        corners = _corners(bounds)
-        centre = corners.mean(axis=0)
-        toward = np.array(_vector("direction", direction))
-        if not toward.any():
-            raise InvalidScene("a framing wants a direction that is not zero")
-        upward = np.array(_vector("up", up))
-        if not upward.any() or _parallel(upward, _unit(toward)):
-            upward = np.eye(3)[int(np.argmin(np.abs(toward)))]
-        target, above = _triple(centre), _triple(upward)
-        frame = cls(_triple(centre + _reach(corners) * _unit(toward)), target, above, fov)
+        return cls.fitting(
+            _corners(bounds), direction=direction, up=up, fov=fov, aspect=aspect, margin=margin
+        )
+
+    @classmethod
+    def fitting(
+        cls,
+        points: ArrayLike,
+        *,
+        direction: Sequence[float] = DIRECTION,
+        up: Sequence[float] = (0.0, 1.0, 0.0),
+        fov: float = 30.0,
+        aspect: float = 4 / 3,
+        margin: float = 1.05,
+    ) -> "Camera":
+        """Look at points, ``[n, 3]``, as `framing` does at a box: close, with all of them in the middle.
+
+        Tighter than the box around them, for shapes that do not fill it.
+        """
+        places = _points(points)
+        toward, upward = _orientation(direction, up)
+        frame = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
         half = math.tan(math.radians(frame.fov) / 2) / margin
-        x, y, z = ((corners - centre) @ frame.axes.T).T
-        distance = float(np.max(z + np.maximum(np.abs(x) / (half * aspect), np.abs(y) / half)))
-        return cls(_triple(centre + max(distance, _reach(corners)) * _unit(toward)), target, above, fov)
+        x, y, z = (places @ frame.axes.T).T
+        across, wide = _squeeze(x, z, half * aspect)
+        along, high = _squeeze(y, z, half)
+        middle = (z.max() + z.min()) / 2
+        eye = max(wide, high, float(z.max()) + 0.05 * _reach(places))
+        centre = np.array([across, along, middle]) @ frame.axes
+        return cls(_triple(centre + (eye - middle) * frame.axes[2]), _triple(centre), _triple(upward), fov)
 
 
-def _reach(corners: Floats) -> float:
-    """Give half the box's diagonal, or something usable where the box is a point."""
-    reach = float(np.linalg.norm(corners[-1] - corners[0])) / 2
-    return (
-        reach
-        if reach > 1e-6 * float(np.abs(corners).max())
-        else max(1e-3 * float(np.abs(corners).max()), 1.0)
-    )
+def _squeeze(x: Floats, z: Floats, slope: float) -> tuple[float, float]:
+    """Place an eye that looks along −z so that |x| ≤ slope · depth touches the points on both sides."""
+    right, left = float(np.max(x + slope * z)), float(np.max(slope * z - x))
+    return (right - left) / 2, (right + left) / (2 * slope)
+
+
+def _orientation(direction: Sequence[float], up: Sequence[float]) -> tuple[Floats, Floats]:
+    """Unit direction toward the eye, and an upward one that is not along it."""
+    toward, upward = np.array(_vector("direction", direction)), np.array(_vector("up", up))
+    if not toward.any():
+        raise InvalidScene("a camera's direction must not be zero")
+    toward = _unit(toward)
+    if not upward.any() or _parallel(upward, toward):
+        upward = np.eye(3)[int(np.argmin(np.abs(toward)))]
+    return toward, upward
+
+
+def _reach(points: Floats) -> float:
+    """Give half the diagonal of the points' box, or something usable where that is a point."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    reach, size = float(np.linalg.norm(high - low)) / 2, float(np.abs(points).max())
+    return reach if reach > 1e-6 * size else max(1e-3 * size, 1e-3)
+
+
+def _points(points: ArrayLike) -> Floats:
+    places = np.asarray(points, np.float64)
+    if places.ndim != 2 or places.shape[1] != 3 or not len(places) or not np.isfinite(places).all():
+        raise InvalidScene(
+            f"points must be finite, of shape [n, 3] with n > 0, got shape {list(places.shape)}"
+        )
+    return places
 
 
 def _corners(bounds: Bounds) -> Floats:

@@ -53,24 +53,47 @@ def test_a_pixels_ray_projects_to_that_pixel(camera: Camera, x: float, y: float,
     np.testing.assert_allclose(pixel, [x, y], atol=1e-6)
 
 
+def all_seen(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
+    """Normalised device coordinates of points, all of them in the picture."""
+    near, far = camera.clip_range((points.min(axis=0), points.max(axis=0)))
+    seen = project(camera.projection(aspect, near, far) @ camera.view(), points)
+    assert np.abs(seen).max() <= 1 + 1e-6
+    return seen
+
+
 @given(vector, vector, vector, st.floats(5, 120), st.floats(0.3, 3))
 def test_framing_sees_the_whole_box_and_little_more(a, b, direction, fov, aspect) -> None:
     lower, upper = np.minimum(a, b), np.maximum(a, b)
     assume(np.linalg.norm(upper - lower) > 1e-2)
     assume(np.linalg.norm(direction) > 1e-3)
     camera = Camera.framing((lower, upper), direction=direction, fov=fov, aspect=aspect, margin=1.0)
-    near, far = camera.clip_range((lower, upper))
     box = np.stack(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
-    seen = project(camera.projection(aspect, near, far) @ camera.view(), box)
-    assert np.abs(seen).max() <= 1 + 1e-6
-    toward = (np.array(camera.position) - (lower + upper) / 2) / np.linalg.norm(direction)
-    assert np.linalg.norm(np.cross(toward, direction)) < 1e-6 * (
-        1 + np.linalg.norm(toward) * np.linalg.norm(direction)
-    )
+    all_seen(camera, box, aspect)
+    toward = np.subtract(camera.position, camera.target)
+    cosine = toward @ direction / np.linalg.norm(toward) / np.linalg.norm(direction)
+    assert cosine == pytest.approx(1, abs=1e-9)
+
+
+@given(st.integers(0, 10**6), st.floats(5, 120), st.floats(0.3, 3))
+def test_fitting_touches_opposite_edges(seed: int, fov: float, aspect: float) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(20, 3)) * rng.uniform(0.1, 5, 3) + rng.uniform(-10, 10, 3)
+    camera = Camera.fitting(points, direction=rng.normal(size=3), fov=fov, aspect=aspect, margin=1.0)
+    seen = all_seen(camera, points, aspect)[:, :2]
+    touched = np.isclose(seen.max(axis=0), 1, atol=1e-6) & np.isclose(seen.min(axis=0), -1, atol=1e-6)
+    depth = (np.array(camera.position) - points) @ camera.axes[2]
+    assert touched.any() or depth.min() < 0.06 * np.linalg.norm(np.ptp(points, axis=0))
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.zeros(3), [[0, 0, np.nan]]])
+def test_bad_points_are_refused(points) -> None:
+    with pytest.raises(InvalidScene, match="points must be finite"):
+        Camera.fitting(points)
 
 
 def test_framing_fills_the_picture() -> None:
     camera = Camera.framing(([-1, -1, -1], [1, 1, 1]), direction=(0, 0, 1), fov=40, aspect=1, margin=1)
+    assert camera.position[:2] == pytest.approx((0, 0))
     seen = project(camera.projection(1, 0.1, 100) @ camera.view(), np.array([[1.0, 1, 1]]))
     np.testing.assert_allclose(seen[0, :2], [1, 1], atol=1e-9)
 
