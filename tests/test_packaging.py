@@ -87,7 +87,7 @@ def test_every_room_is_typed() -> None:
 
 
 def test_only_files_of_kernels_are_excused_from_types() -> None:
-    (excused,) = (o["module"] for o in project()["tool"]["mypy"]["overrides"] if "disable_error_code" in o)
+    excused = project()["tool"]["mypy"]["overrides"][0]["module"]
     assert excused == sorted(excused)
     for name in excused:
         source = (ROOT / name.replace(".", "/")).with_suffix(".py").read_text()
