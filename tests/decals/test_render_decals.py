@@ -7,6 +7,8 @@ from decals.camera import Camera
 from decals.evaluate import evaluate
 from decals.mapping import Mapping
 from decals.model import Decals
+from decals.render import tile
+from decals.render.context import Context
 from decals.render.renderer import Buffers, Renderer
 from tests.decals.shapes import Picture, Shape, View, torus
 from tests.oracles.decals import decals_at
@@ -85,15 +87,29 @@ def test_graphics_and_warp_agree_bit_for_nearly_bit(renderer: Renderer) -> None:
     assert np.quantile(np.abs(buffers.uv[seen] - samples.uv)[same], 0.999) < 1e-4
 
 
-def test_tiles_change_nothing(context, renderer: Renderer) -> None:
+def test_tiles_change_nothing(context: Context, renderer: Renderer) -> None:
     shape = torus()
     view = view_of(scattered(shape, 100, 5, radii=(0.05, 0.3)), shape)
     whole = renderer.render(view, size=SIZE, samples=3)
     with Renderer(context, max_tile=50) as tiled:
         parts = tiled.render(view, size=SIZE, samples=3)
-        raw = tiled.buffers(view, size=SIZE)
     assert (np.abs(parts.astype(int) - whole).max(axis=-1) > 2).mean() < 0.01
-    assert (raw.owner != renderer.buffers(view, size=SIZE).owner).mean() < 0.01
+
+
+@pytest.mark.parametrize("margin", [0, 7])
+def test_tiles_fit_together(
+    context: Context, renderer: Renderer, monkeypatch: pytest.MonkeyPatch, margin: int
+) -> None:
+    shape = torus()
+    view = view_of(scattered(shape, 100, 5, radii=(0.05, 0.3)), shape)
+    whole = renderer.buffers(view, size=SIZE)
+    monkeypatch.setattr(tile, "MARGIN", margin)
+    with Renderer(context, max_tile=17) as tiled:
+        parts = tiled.buffers(view, size=SIZE)
+    seen = (whole.object_id == 0) & (parts.object_id == 0)
+    assert seen.sum() > 0.98 * (whole.object_id == 0).sum()
+    assert (parts.owner == whole.owner).mean() > 0.99
+    assert np.quantile(np.abs(parts.position - whole.position)[seen], 0.99) < 1e-3
 
 
 # -- colours --------------------------------------------------------------------------------------------

@@ -7,7 +7,8 @@ from blobtree import Point, Segment, polygonize
 from blobtree.trace import trace
 from decals.camera import Camera
 from decals.mapping import Mapping
-from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers
+from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers, tile
+from decals.render.context import Context
 from decals.scene import DecalImage, MeshObject, Scene, TreeObject
 from decals.seeding import seed
 from tests.decals.shapes import torus
@@ -138,6 +139,18 @@ def test_an_edited_scene_releases_what_it_no_longer_shows(context, both: Scene) 
         own.render(both.replace(objects=both.objects[1:]), size=(16, 12))
         assert len(own._drawables._things) == 1
     assert not own._drawables._things
+
+
+def test_tiles_send_the_same_rays(
+    context: Context, renderer: Renderer, both: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = renderer.buffers(both, size=SIZE)
+    monkeypatch.setattr(tile, "MARGIN", 5)
+    with Renderer(context, max_tile=40) as tiled:
+        parts = tiled.buffers(both, size=SIZE)
+    seen = (whole.object_id == 0) & (parts.object_id == 0)
+    assert (whole.object_id != parts.object_id).mean() < 0.005
+    np.testing.assert_allclose(parts.position[seen], whole.position[seen], atol=1e-4)
 
 
 @pytest.mark.parametrize(("size", "samples"), [((0, 4), 1), ((4, -1), 1), ((4, 4), 0), ((4,), 1)])
