@@ -1,7 +1,7 @@
 """Warp kernels that ask a triangle mesh: closest point, first hit of a ray, inside or not."""
 
-# mypy: ignore-errors
-# (kernel code is Python to look at only: its annotations are Warp values, its names have Warp types)
+# mypy: disable-error-code="attr-defined"
+# (Warp does not declare the fields of its query results)
 
 import warp as wp
 
@@ -16,7 +16,7 @@ def closest_points(
     reach: wp.float32,
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
-):
+) -> None:
     """Closest point of the mesh to each point, and the normal of the face that it lies on."""
     i = wp.tid()
     query = wp.mesh_query_point_no_sign(mesh, points[i], reach)
@@ -31,7 +31,7 @@ def first_hits(
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     distances: wp.array(dtype=wp.float32),
-):
+) -> None:
     """Distance along each unit direction to the first face, of either side; infinity for a miss."""
     i = wp.tid()
     query = wp.mesh_query_ray(mesh, origins[i], directions[i], wp.inf)
@@ -47,7 +47,7 @@ def inside_flags(
     points: wp.array(dtype=wp.vec3),
     reach: wp.float32,
     flags: wp.array(dtype=wp.int32),
-):
+) -> None:
     """1 where the winding number of the mesh around the point is above one half."""
     i = wp.tid()
     query = wp.mesh_query_point_sign_winding_number(mesh, points[i], reach)

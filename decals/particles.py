@@ -6,9 +6,8 @@ here). Each kernel thread owns one particle and adds up its neighbours in the or
 so that the result does not depend on scheduling.
 """
 
-# mypy: ignore-errors
-# (kernel code is Python to look at only: its annotations are Warp values, its names have Warp types;
-# float(0.0) is how a kernel declares a variable that it changes)
+# mypy: disable-error-code="call-overload"
+# (Warp declares no arithmetic of vectors)
 
 import warp as wp
 
@@ -34,7 +33,7 @@ def some_tangent(normal: wp.vec3) -> wp.vec3:
     axis = wp.vec3(1.0, 0.0, 0.0)
     if wp.abs(normal[0]) > 0.6:
         axis = wp.vec3(0.0, 1.0, 0.0)
-    return wp.normalize(axis - wp.dot(axis, normal) * normal)
+    return wp.normalize(axis - normal * wp.dot(axis, normal))
 
 
 @wp.func
@@ -60,7 +59,7 @@ def repel(
     longest: wp.float32,
     moves: wp.array(dtype=wp.vec3),
     energies: wp.array(dtype=wp.float32),
-):
+) -> None:
     """One damped Newton step of each particle in its tangent plane, against its neighbours at rest.
 
     The energy of a pair at distance x, in spacings, is x^-p, shifted so that value and slope vanish

@@ -45,7 +45,7 @@ def moves(
         tangent = np.eye(3) - np.outer(n, n)
         curvature += isotropy * np.trace(curvature) * tangent
         if curvature.any():
-            move = damping * spacing * np.linalg.pinv(curvature, hermitian=True) @ force
+            move = damping * spacing * np.linalg.pinv(curvature, rcond=1e-6, hermitian=True) @ force
             size = np.linalg.norm(move)
             result[i] = move * min(1.0, longest * spacing / size) if size > 0 else move
     return result, energies

@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+import warp as wp
+
+from decals.particles import CLOSEST, ISOTROPY, repel
+from tests.oracles.repulsion import moves as expected_moves
+
+SPACING, CUTOFF, FACING_LIMIT, DAMPING, LONGEST = 0.3, 2.5, -0.25, 0.6, 0.3
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def sphere_points(count, seed, radius=1.0):
+    normals = unit(np.random.default_rng(seed).normal(size=(count, 3))).astype(np.float32)
+    return np.float32(radius) * normals, normals
+
+
+def step(positions, normals, *, exponent=12.0, spacing=SPACING):
+    arrays = [wp.array(rows, dtype=wp.vec3, device="cpu") for rows in (positions, normals)]
+    grid = wp.HashGrid(16, 16, 16, device="cpu")
+    grid.build(arrays[0], CUTOFF * spacing)
+    out = wp.zeros(len(positions), dtype=wp.vec3, device="cpu")
+    energies = wp.zeros(len(positions), dtype=wp.float32, device="cpu")
+    inputs = [grid.id, *arrays, spacing, CUTOFF, exponent, FACING_LIMIT, DAMPING, LONGEST]
+    wp.launch(repel, dim=len(positions), inputs=inputs, outputs=[out, energies], device="cpu")
+    return out.numpy(), energies.numpy()
+
+
+def oracle(positions, normals, *, exponent=12.0, spacing=SPACING):
+    return expected_moves(
+        positions,
+        normals,
+        spacing=spacing,
+        cutoff=CUTOFF,
+        exponent=exponent,
+        facing_limit=FACING_LIMIT,
+        damping=DAMPING,
+        longest=LONGEST,
+        isotropy=ISOTROPY,
+        closest=CLOSEST,
+    )
+
+
+@pytest.mark.parametrize("exponent", [4.0, 12.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_is_that_of_every_pair_by_itself(exponent, seed):
+    positions, normals = sphere_points(150, seed)
+    found, energies = step(positions, normals, exponent=exponent)
+    expected, expected_energies = oracle(positions, normals, exponent=exponent)
+    assert np.allclose(found, expected, atol=2e-4 * SPACING)
+    assert np.allclose(energies, expected_energies, rtol=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_step_grows_with_the_model(scale):
+    positions, normals = sphere_points(150, seed=4)
+    found, _ = step(positions * np.float32(scale), normals, spacing=SPACING * scale)
+    assert np.allclose(found / scale, step(positions, normals)[0], atol=2e-4 * SPACING)
+
+
+def test_moves_are_short_and_tangential():
+    positions, normals = sphere_points(400, seed=5)
+    found, _ = step(positions, normals)
+    assert np.linalg.norm(found, axis=1).max() <= LONGEST * SPACING * 1.0001
+    assert np.abs(np.einsum("ni,ni->n", found, normals)).max() < 1e-5
+
+
+def test_two_particles_part():
+    positions = np.array([[0, 0, 0], [0.5 * SPACING, 0, 0]], np.float32)
+    found, _ = step(positions, np.tile(np.float32([0, 0, 1]), (2, 1)))
+    assert found[0, 0] < 0 < found[1, 0]
+    assert np.allclose(found[0], -found[1])
+
+
+def test_particles_on_two_sides_of_a_wall_ignore_each_other():
+    positions = np.array([[0, 0, 0], [0.2 * SPACING, 0, -0.02]], np.float32)
+    found, energies = step(positions, np.array([[0, 0, 1], [0, 0, -1]], np.float32))
+    assert not found.any()
+    assert not energies.any()
+
+
+def test_coincident_particles_part_in_opposite_directions():
+    found, _ = step(np.ones((2, 3), np.float32), np.tile(np.float32([0, 1, 0]), (2, 1)))
+    assert np.isfinite(found).all()
+    assert np.linalg.norm(found[0]) > 0
+    assert np.allclose(found[0], -found[1])
+
+
+def test_a_lone_particle_rests():
+    found, energies = step(*sphere_points(1, seed=0))
+    assert not found.any()
+    assert not energies.any()
+
+
+def test_the_same_particles_move_by_the_same_bytes():
+    positions, normals = sphere_points(500, seed=6)
+    assert step(positions, normals)[0].tobytes() == step(positions, normals)[0].tobytes()

@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from blobtree import Point, Segment
+from decals.errors import InvalidMesh, InvalidPoints
+from decals.implicit_surface import ImplicitSurface
+from decals.surface import Surface
+
+
+def directions(count, seed=0):
+    vectors = np.random.default_rng(seed).normal(size=(count, 3))
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def ball(radius=1.0, center=(0.0, 0.0, 0.0)):
+    return ImplicitSurface(Point(center, radius=radius), resolution=32)
+
+
+def blob():
+    return Segment((-1, 0, 0), (1, 0, 0), radius=0.4) + Point((0, 0.6, 0), radius=0.5)
+
+
+def test_an_implicit_is_a_surface():
+    assert isinstance(ball(), Surface)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
+def test_sphere_area_bounds_samples_and_normals(radius):
+    surface = ball(radius)
+    assert surface.area == pytest.approx(4 * np.pi * radius**2, rel=1e-2)
+    assert np.allclose(surface.bounds, [[-radius] * 3, [radius] * 3], rtol=2e-2)
+    positions, normals = surface.sample(2000, seed=1)
+    assert np.allclose(np.linalg.norm(positions, axis=1), radius, rtol=1e-6)
+    assert np.allclose(normals, positions / radius, atol=1e-5)
+    assert np.abs(positions.mean(axis=0)).max() < 0.03 * radius
+
+
+@pytest.mark.parametrize("factor", [0.3, 0.5, 0.99, 1.01, 1.5, 2.1, 5.0, 40.0])
+def test_projection_reaches_the_sphere_from_near_and_far(factor):
+    ways = directions(300)
+    positions, normals = ball(center=(3, 0, 0)).project(factor * ways + [3, 0, 0])
+    assert np.allclose(np.linalg.norm(positions - [3, 0, 0], axis=1), 1, atol=1e-4)
+    assert np.allclose(normals, ways, atol=0.15)  # from afar, as near as a cell of the coarse mesh
+
+
+def test_a_point_without_gradient_gets_a_place_and_a_normal():
+    positions, normals = ball().project([[0, 0, 0]])
+    assert np.linalg.norm(positions) == pytest.approx(1, abs=1e-4)
+    assert np.linalg.norm(normals) == pytest.approx(1, abs=1e-4)
+
+
+def test_samples_of_a_blend_lie_on_it_with_the_normal_of_the_field():
+    tree = blob()
+    surface = ImplicitSurface(tree, resolution=32)
+    positions, normals = surface.sample(1000, seed=2)
+    assert np.abs(tree(positions) - 0.5).max() < 1e-5
+    gradients = tree.gradient(positions).astype(float)
+    expected = -gradients / np.linalg.norm(gradients, axis=1, keepdims=True)
+    assert np.allclose(normals, expected, atol=1e-5)
+    assert np.array_equal(surface.normal(positions), surface.project(positions)[1])
+    first, again, other = (surface.sample(100, seed=seed)[0].tobytes() for seed in (5, 5, 6))
+    assert first == again != other
+
+
+def test_rays_meet_the_sphere():
+    ways = directions(200)
+    assert np.allclose(ball(2.0).raycast(6 * ways, -5 * ways), 4.0, atol=1e-3)
+    assert np.isinf(ball().raycast([[0, 0, 3], [0, 0, 3]], [[0, 0, 1], [0, 0, 0]])).all()
+    assert ball().raycast(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+
+
+def test_it_contains_its_inside():
+    ways = directions(200)
+    surface = ball(center=(0, 5, 0))
+    assert surface.contains(0.99 * ways + [0, 5, 0]).all()
+    assert not surface.contains(1.01 * ways + [0, 5, 0]).any()
+    assert not surface.contains([[100, 0, 0]]).any()
+
+
+def test_a_tree_without_surface_is_refused():
+    nothing = Point((0, 0, 0), radius=1.0) - Point((0, 0, 0), radius=3.0)
+    with pytest.raises(InvalidMesh, match="tree with a surface"):
+        ImplicitSurface(nothing, resolution=16)
+
+
+def test_what_are_no_points_is_refused():
+    with pytest.raises(InvalidPoints):
+        ball().project([[np.nan, 0, 0]])
