@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from blobtree import Progress
-from decals.render.renderer import Renderer
+from decals.render import Renderer
 from decals.scene import DecalImage, Scene, SceneObject, bounds_of
 from decals.scene_file import save_scene
 from decals.seeding import seed as seed_decals

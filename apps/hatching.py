@@ -1,0 +1,107 @@
+"""The scene of the demo's first two pictures: the creature beside its egg, under one coat of scales.
+
+The creature is an implicit surface, the egg a mesh. Seeds spread over both at once, so scales push each other
+and run across wherever the two touch.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree import Progress
+from decals.camera import Camera
+from decals.model import Decals
+from decals.scene import DecalImage, MeshObject, Scene, TreeObject
+from decals.seeding import seed
+
+from .creature import creature
+from .shapes import egg
+
+Floats = NDArray[np.float32]
+
+COUNT = 1100
+EYE_RADIUS = 0.17
+_EYES = np.array([[1.06, 2.29, 0.45], [1.06, 2.29, -0.45]], np.float32)
+"""Where the creature's eyes look from, before they are put onto its surface."""
+
+_EGG_CENTER = np.array([1.33, 0.66, 0.0], np.float32)
+_EGG_RADIUS, _EGG_HEIGHT = 0.56, 0.70
+_SCALES = (
+    "scale#2f7f8c",
+    "scale#3a8a6a",
+    "scale#4f9448",
+    "scale#76a83a",
+    "scale#a8b437",
+    "scale#cf9f34",
+    "scale#cf7a30",
+    "scale#c4512f",
+    "scale#9c3542",
+)
+"""Scales from the tail's end to the egg."""
+
+_UP = np.array([0.0, 1.0, 0.0], np.float32)
+_BACKWARD = np.array([-1.0, -0.55, 0.0], np.float32)
+_SHELL = 1.08
+"""Points within this many radii of the egg lie on it: its thick end bulges out of the ellipsoid."""
+
+_GLAZES = ("tile#2f7f95", "tile#c9a227", "tile#b5533c", "tile#e4dcc8", "tile#3f6b4f")
+
+
+def hatching(*, progress: Progress) -> Scene:
+    """Make the scene: creature and egg covered with scales, each pointing toward the tail or down the egg."""
+    nest = TreeObject("creature", creature()), _egg()
+    scales = seed(
+        [item.surface for item in nest],
+        count=COUNT,
+        direction=_grain,
+        progress=progress,
+    )
+    scales = scales.replace(images=_palette(scales.positions))
+    return Scene(
+        objects=nest,
+        camera=Camera(position=(4.1, 2.7, 6.6), target=(0.10, 1.16, 0.10), fov=24.0),
+        images=tuple(DecalImage.load(name) for name in (*_SCALES, "eye")),
+        decals=_with_eyes(scales, nest[0]),
+    )
+
+
+def mosaic(scene: Scene) -> Scene:
+    """Make the close-up: the same seeds as glazed tiles, seen where a paw meets the egg."""
+    chosen = np.random.default_rng(3).integers(0, len(_GLAZES), len(scene.decals))
+    return scene.replace(
+        images=tuple(DecalImage.load(name) for name in _GLAZES),
+        decals=scene.decals.replace(images=chosen.astype(np.int32)),
+        camera=Camera(position=(2.3, 1.5, 3.6), target=(0.98, 0.82, 0.42), fov=20.0),
+    )
+
+
+def _egg() -> MeshObject:
+    vertices, faces = egg(_EGG_CENTER, radius=_EGG_RADIUS, height=_EGG_HEIGHT)
+    return MeshObject("egg", vertices, faces, color=(0.86, 0.80, 0.68))
+
+
+def _grain(points: Floats) -> Floats:
+    """Direction in which scales point: from head to tail on the creature, upward on the egg."""
+    sizes = np.array([_EGG_RADIUS, _EGG_HEIGHT, _EGG_RADIUS], np.float32)
+    on_egg = np.linalg.norm((points - _EGG_CENTER) / sizes, axis=1, keepdims=True) < _SHELL
+    return np.where(on_egg, _UP, _BACKWARD)
+
+
+def _palette(points: Floats) -> NDArray[np.int32]:
+    """Choose each scale's colour along the way from the tail to the egg, a little at random."""
+    way = np.clip((points[:, 0] - 0.25 * points[:, 1] + 2.1) / 3.6, 0.0, 1.0)
+    jitter = np.random.default_rng(7).uniform(-0.7, 0.7, len(points))
+    return np.clip(np.rint(way * (len(_SCALES) - 1) + jitter), 0, len(_SCALES) - 1).astype(np.int32)
+
+
+def _with_eyes(scales: Decals, body: TreeObject) -> Decals:
+    """Put two eyes in, in place of the scales that lie where they look out."""
+    positions, normals = body.surface.project(_EYES)
+    gaps = np.linalg.norm(scales.positions[:, None] - positions, axis=2).min(axis=1)
+    eyes = Decals(
+        positions=positions,
+        normals=normals,
+        tangents=np.cross(_UP, normals),
+        radii=np.full(len(positions), EYE_RADIUS, np.float32),
+        images=np.full(len(positions), len(_SCALES), np.int32),
+    )
+    return Decals.concatenate([scales[gaps > EYE_RADIUS], eyes])

@@ -1,0 +1,35 @@
+"""The scene of the demo's third picture: one large decal that a mesh and an implicit surface share."""
+
+import numpy as np
+
+from blobtree import Point, Ricci
+from decals.camera import Camera
+from decals.model import Decals
+from decals.scene import DecalImage, MeshObject, Scene, TreeObject
+
+from .shapes import rounded_box
+
+_RADIUS = 0.80
+_SAND, _BLUE = (0.80, 0.73, 0.62), (0.42, 0.58, 0.72)
+
+
+def spanning() -> Scene:
+    """Make the scene: a box of triangles, a blob of two points grown into it, and an eye across both.
+
+    The decal belongs to neither; each point of both surfaces asks the same field (the paper's figure 5).
+    """
+    vertices, faces = rounded_box((-0.85, 0.0, 0.0), half=(1.15, 1.05, 0.95), exponent=8.0)
+    box = MeshObject("box", vertices, faces, color=_SAND)
+    balls = (
+        Point((0.28, 0.0, -0.16), radius=1.12, color=_BLUE),
+        Point((1.45, 0.62, -0.25), radius=0.55, color=_BLUE),
+    )
+    blob = TreeObject("blob", Ricci(balls, exponent=2.0))
+    eye = Decals(
+        positions=np.array([[0.08, 0.0, 0.955]], np.float32),
+        normals=np.array([[0.0, 0.0, 1.0]], np.float32),
+        tangents=np.array([[1.0, 0.0, 0.0]], np.float32),
+        radii=np.array([_RADIUS], np.float32),
+    )
+    camera = Camera(position=(1.4, 1.5, 7.2), target=(0.05, 0.0, 0.1), fov=28.0)
+    return Scene(objects=(box, blob), camera=camera, decals=eye, images=(DecalImage.load("eye"),))
