@@ -1,5 +1,6 @@
 // Which decal owns a surface point, where in its image the point lies, and what colour that is. All formulas and
 // loops are those of decals/ownership.py; GLSL adds the image look-up.
+//@ include footprint.glsl
 uniform sampler2D decal_records;  // decal i: texels 3i (position, s), 3i + 1 (normal, facing limit), 3i + 2 (u, image)
 uniform sampler2D index_levels;
 uniform isampler2D index_table;
@@ -29,14 +30,6 @@ DecalHit decal_at(vec3 q, vec3 n) {
 
 vec4 decal_texel(int i) {
     return texelFetch(decal_records, ivec2(i & 1023, i >> 10), 0);
-}
-
-// What q moves by, on the surface's tangent plane, when its ray (through `ray`) moves by `step`.
-vec3 surface_step(vec3 q, vec3 n, vec3 ray, vec3 step_) {
-    float slope = dot(n, ray);
-    float least = 0.05 * length(ray);
-    slope = slope < 0.0 ? min(slope, -least) : max(slope, least);
-    return dot(q - eye.xyz, ray) / dot(ray, ray) * (step_ - ray * (dot(n, step_) / slope));
 }
 
 // Premultiplied linear colour of a hit. The derivatives are those of the undeformed image of the one decal that owns

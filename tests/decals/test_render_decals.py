@@ -152,7 +152,7 @@ def test_uv_of_a_flat_decal_by_hand(renderer: Renderer) -> None:
     np.testing.assert_allclose(buffers.uv[inside], np.stack([x, y], -1)[inside], atol=1e-5)
 
 
-@pytest.mark.parametrize("pixels", [16, 32])
+@pytest.mark.parametrize("pixels", [21, 37])
 def test_a_fine_pattern_averages_to_grey(renderer: Renderer, pixels: int) -> None:
     """Black and white squares far smaller than a pixel: linear light makes them 188, not 128."""
     board = np.zeros((512, 512, 4), np.uint8)
@@ -164,6 +164,41 @@ def test_a_fine_pattern_averages_to_grey(renderer: Renderer, pixels: int) -> Non
     fine = renderer.render(wall(board, pixels=pixels), size=(pixels, pixels), samples=1)[inside]
     flat = renderer.render(wall(grey, pixels=pixels), size=(pixels, pixels), samples=1)[inside]
     np.testing.assert_allclose(fine.astype(int), flat, atol=3)
+
+
+def test_an_opaque_decal_looks_like_an_object_of_its_colour(renderer: Renderer) -> None:
+    image = np.full((4, 4, 4), 255, np.uint8)
+    image[..., :3] = 200, 90, 40
+    covered = renderer.render(wall(image, pixels=32), size=(32, 32))
+    painted = wall(image, pixels=32, color=(200 / 255, 90 / 255, 40 / 255))
+    plain = renderer.render(View(painted.objects, painted.camera), size=(32, 32))
+    np.testing.assert_allclose(covered[12:20, 12:20].astype(int), plain[12:20, 12:20], atol=1)
+
+
+def test_light_is_kept_out_of_corners(renderer: Renderer) -> None:
+    """A wall is darker next to another that stands on it than far from it."""
+    corners = [
+        [-2, -2, 0],
+        [2, -2, 0],
+        [2, 2, 0],
+        [-2, 2, 0],
+        [0.5, -2, 0],
+        [0.5, 2, 0],
+        [0.5, 2, 2],
+        [0.5, -2, 2],
+    ]
+    faces = [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]]
+    floor = Shape(np.array(corners[:4], np.float32), np.array(faces[:2], np.int32))
+    step = Shape(np.array(corners, np.float32), np.array(faces[2:], np.int32))
+    camera = Camera((-3, 0, 9), (0, 0, 0), fov=20)
+    alone, beside = (
+        renderer.render(View(shapes, camera), size=(60, 40))[20, :, :3].astype(float).mean(axis=1)
+        for shapes in ((floor,), (floor, step))
+    )
+    foot = np.argmax(renderer.buffers(View((floor, step), camera), size=(60, 40)).object_id[20] == 1)
+    np.testing.assert_array_equal(beside[: foot - 6], alone[: foot - 6])
+    assert beside[foot - 1] < 0.96 * alone[foot - 1]
+    assert (np.diff(beside[foot - 5 : foot]) <= 0).all()
 
 
 def test_transparent_images_leave_the_object(renderer: Renderer) -> None:
