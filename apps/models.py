@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from blobtree import from_json
+from blobtree import BlobTreeError, from_json
+from decals.errors import DecalsError
 from decals.mesh_file import read_mesh
 from decals.scene import MeshObject, Scene, SceneObject, TreeObject
 from decals.scene_file import is_scene, load_scene
@@ -18,11 +19,18 @@ def load_model(model: str) -> SceneObject | Scene:
 
     Raises
     ------
-    UsageError
-        If it is neither a sample nor a file.
-    decals.DecalsError, blobtree.BlobTreeError
-        If the file cannot be used.
+    UsageError, decals.errors.DecalsError, blobtree.BlobTreeError
+        If it is neither a sample nor a file, or the file cannot be used; the message names it.
     """
+    try:
+        return _load(model)
+    except (DecalsError, BlobTreeError) as error:
+        if model in str(error):
+            raise
+        raise UsageError(f"{model!r}: {error}") from error
+
+
+def _load(model: str) -> SceneObject | Scene:
     if model in SAMPLES:
         return sample(model)
     path = Path(model)

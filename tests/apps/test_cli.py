@@ -1,0 +1,319 @@
+import json
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.typing import NDArray
+from PIL import Image
+
+import blobtree
+from blobtree import Point
+from decals.camera import Camera
+from decals.errors import NoGraphics
+from decals.scene import Scene, TreeObject
+from decals.scene_file import save_scene
+from implicit_decals.apps import demo as demo_module
+from implicit_decals.apps import render as render_module
+from implicit_decals.apps.cli import run
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _small(*arguments: str) -> list[str]:
+    return ["render", *arguments, "--decals", "30", "--size", "64x48", "--samples", "1"]
+
+
+def _picture(path: Path) -> NDArray[np.uint8]:
+    return np.asarray(Image.open(path))
+
+
+# -- what works ---------------------------------------------------------------------------------------
+
+
+def test_version(capsys: Capture) -> None:
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == version("implicit-decals")
+
+
+def test_help_names_the_commands_and_their_options(capsys: Capture) -> None:
+    assert run(["--help"]) == 0
+    listing = capsys.readouterr().out
+    assert all(name in listing for name in ("demo", "render", "polygonize", "doctor"))
+    assert run(["render", "--help"]) == 0
+    page = capsys.readouterr().out
+    options = (
+        "--decals",
+        "--image",
+        "--camera",
+        "--size",
+        "--seed",
+        "--samples",
+        "--save",
+        "implicit-decals render knot",
+    )
+    assert all(option in page for option in options)
+
+
+def test_render_a_mesh_and_a_blob_together(folder: Path, capsys: Capture) -> None:
+    pv.Sphere(radius=0.5, center=(1, 0, 0)).save(folder / "ball.ply")
+    blobtree.save(Point((0, 0, 0), radius=0.6), folder / "blob.json")
+    assert (
+        run([*_small("ball.ply", "blob.json"), "--image", "rock", "--image", "tile", "-o", "both.png"]) == 0
+    )
+    picture = _picture(folder / "both.png")
+    assert picture.shape == (48, 64, 4)
+    middle, corner = picture[20:28, 24:40, :3].reshape(-1, 3), picture[0, 0, :3]
+    assert np.abs(middle.astype(int) - corner).max(axis=1).mean() > 40
+    progress = capsys.readouterr()
+    assert "Drawing" in progress.err
+    assert progress.out == ""
+
+
+def test_the_same_seed_gives_the_same_picture_and_another_another(folder: Path) -> None:
+    for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
+        assert run([*_small("spheres"), "--seed", seed, "-o", f"{name}.png"]) == 0
+    pictures = [_picture(folder / f"{name}.png") for name in "abc"]
+    assert np.array_equal(pictures[0], pictures[1])
+    assert not np.array_equal(pictures[0], pictures[2])
+
+
+def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
+    pv.Sphere().save(folder / "ball.stl")
+    Image.new("RGB", (8, 8), (200, 30, 30)).save(folder / "red.png")
+    models = ("ball.stl", "knot", "spheres")
+    assert (
+        run([*_small(*models), "--image", "red.png", "--image", "eye", "--save", "s.json", "-o", "a.png"])
+        == 0
+    )
+    assert run(["render", "s.json", "--size", "64x48", "--samples", "1", "-o", "b.png"]) == 0
+    assert np.array_equal(_picture(folder / "a.png"), _picture(folder / "b.png"))
+    written = json.loads((folder / "s.json").read_text())
+    assert [item.get("source") for item in written["objects"]] == ["ball.stl", "sample:knot", None]
+    assert len(written["decals"]) == 30
+
+
+def test_a_camera_for_a_saved_scene(folder: Path) -> None:
+    assert run([*_small("spheres"), "--save", "s.json", "-o", "a.png"]) == 0
+    assert run(["render", "s.json", "--size", "64x48", "--camera", "back", "-o", "b.png"]) == 0
+    assert not np.array_equal(_picture(folder / "a.png"), _picture(folder / "b.png"))
+
+
+@pytest.mark.parametrize("camera", ["top", "bottom", "left", "-1,0.5,2", "0,3,0"])
+def test_cameras_see_the_model(folder: Path, camera: str) -> None:
+    assert run([*_small("knot"), f"--camera={camera}", "-o", "a.png"]) == 0
+    picture = _picture(folder / "a.png")[..., :3].astype(int)
+    assert (np.abs(picture - picture[:, :1]).max(axis=-1) > 30).mean() > 0.1
+
+
+def test_no_decals_at_all(folder: Path) -> None:
+    assert run(["render", "spheres", "--decals", "0", "--size", "40x30", "-o", "a.jpg"]) == 0
+    assert _picture(folder / "a.jpg").shape == (30, 40, 3)
+
+
+def test_two_of_a_name_are_told_apart(folder: Path) -> None:
+    assert run([*_small("knot", "knot"), "--save", "s.json", "-o", "a.png"]) == 0
+    assert [item["name"] for item in json.loads((folder / "s.json").read_text())["objects"]] == [
+        "knot",
+        "knot-2",
+    ]
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp"])
+def test_polygonize(folder: Path, suffix: str) -> None:
+    blobtree.save(Point((1, 2, 3), radius=0.5, color=(1.0, 0.5, 0.0)), folder / "ball.json")
+    assert run(["polygonize", "ball.json", "--resolution", "40", "-o", f"ball.{suffix}"]) == 0
+    mesh = pv.read(folder / f"ball.{suffix}")
+    assert np.allclose(np.linalg.norm(mesh.points - [1, 2, 3], axis=1), 0.5, atol=1e-3)
+    assert mesh.triangulate().volume == pytest.approx(4 / 3 * np.pi * 0.125, rel=0.02)
+    if suffix in ("ply", "vtp"):
+        assert np.asarray(mesh["RGB"])[0].tolist() == [255, 128, 0]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(["ball.json", f"ball.{suffix}"])
+
+
+def test_polygonize_by_cell_size(folder: Path) -> None:
+    for cell, name in (("0.4", "coarse"), ("0.1", "fine")):
+        assert run(["polygonize", "spheres", "--cell-size", cell, "-o", f"{name}.ply"]) == 0
+    assert pv.read(folder / "fine.ply").n_cells > 8 * pv.read(folder / "coarse.ply").n_cells
+
+
+def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr("implicit_decals.apps.hatching.COUNT", 120)
+    assert run(["demo", "--size", "80x60", "--samples", "1"]) == 0
+    names = capsys.readouterr().out.split()
+    assert names == ["out/hero.png", "out/contact.png", "out/span.png"]
+    for name in names:
+        assert _picture(folder / name).shape == (60, 80, 4)
+
+
+# -- what people get wrong ----------------------------------------------------------------------------
+
+
+def _no_work(*_arguments: object, **_options: object) -> None:
+    pytest.fail("the long work began before the input was checked")
+
+
+@pytest.fixture
+def bad(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> Callable[..., str]:
+    """Run a command that must fail before any work, with one line and exit code 2; gives the line."""
+    monkeypatch.setattr(render_module, "seed_decals", _no_work)
+    monkeypatch.setattr(demo_module, "hatching", _no_work)
+    pv.Sphere().save(folder / "ball.ply")
+
+    def check(*arguments: str) -> str:
+        assert run(arguments) == 2
+        out, err = capfd.readouterr()
+        assert out == ""
+        assert "Traceback" not in err
+        lines = err.strip().splitlines()
+        assert len(lines) == 1
+        assert lines[0].startswith("error: ")
+        return lines[0]
+
+    return check
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["render", "nowhere.ply", "-o", "a.png"], "nowhere.ply"),
+        (["render", "nowhere", "-o", "a.png"], "creature, dragon, horse, knot, spheres"),
+        (["render", ".", "-o", "a.png"], "found no file"),
+        (["render", "ball.ply"], "--output"),
+        (["render", "-o", "a.png"], "MODEL"),
+        (["render", "ball.ply", "-o", "nowhere/a.png"], "'nowhere' does not exist"),
+        (["render", "ball.ply", "-o", "a.gif"], ".png"),
+        (["render", "ball.ply", "-o", "a"], ".png"),
+        (["render", "ball.ply", "-o", "."], "folder"),
+        (["render", "ball.ply", "-o", "a.png", "--save", "nowhere/s.json"], "does not exist"),
+        (["render", "ball.ply", "-o", "a.png", "--save", "s.txt"], ".json"),
+        (["render", "ball.ply", "-o", "a.png", "--decals", "-1"], "--decals"),
+        (["render", "ball.ply", "-o", "a.png", "--decals", "many"], "--decals"),
+        (["render", "ball.ply", "-o", "a.png", "--decals", "99999999999"], "--decals"),
+        (["render", "ball.ply", "-o", "a.png", "--seed", "-1"], "--seed"),
+        (["render", "ball.ply", "-o", "a.png", "--samples", "0"], "--samples"),
+        (["render", "ball.ply", "-o", "a.png", "--size", "0x10"], "--size"),
+        (["render", "ball.ply", "-o", "a.png", "--size", "10"], "WIDTHxHEIGHT"),
+        (["render", "ball.ply", "-o", "a.png", "--size", "99999x99999"], "16384"),
+        (["render", "ball.ply", "-o", "a.png", "--camera", "up"], "three-quarter"),
+        (["render", "ball.ply", "-o", "a.png", "--camera", "0,0,0"], "0,0,0"),
+        (["render", "ball.ply", "-o", "a.png", "--camera", "1,nan,0"], "finite"),
+        (["render", "ball.ply", "-o", "a.png", "--image", "nowhere.png"], "nowhere.png"),
+        (["render", "ball.ply", "-o", "a.png", "--image", "ball.ply"], "ball.ply"),
+        (["render", "ball.ply", "-o", "a.png", "--frobnicate"], "frobnicate"),
+        (["polygonize", "ball.ply", "-o", "b.ply"], "BlobTree"),
+        (["polygonize", "spheres", "-o", "b.txt"], ".ply"),
+        (["polygonize", "spheres", "-o", "nowhere/b.ply"], "does not exist"),
+        (["polygonize", "spheres", "-o", "b.ply", "--resolution", "0"], "resolution"),
+        (["polygonize", "spheres", "-o", "b.ply", "--cell-size", "-1"], "cell_size"),
+        (["polygonize", "spheres", "-o", "b.ply", "--cell-size", "1", "--resolution", "9"], "drop one"),
+        (["demo", "--size", "big"], "--size"),
+        (["demo", "-o", "nowhere/deep"], "nowhere"),
+        (["demo", "-o", "ball.ply"], "ball.ply"),
+        (["frobnicate"], "frobnicate"),
+    ],
+)
+def test_bad_arguments(bad: Callable[..., str], arguments: list[str], message: str) -> None:
+    assert message in bad(*arguments)
+
+
+def _obj(rows: str) -> bytes:
+    return rows.replace("; ", "\n").encode() + b"\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("junk.stl", b"hello world\n" * 9, "junk.stl"),
+        ("cut.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 9\n", "cut.ply"),
+        ("empty.obj", b"", "no faces"),
+        ("cloud.obj", _obj("v 0 0 0; v 1 0 0; v 0 1 0"), "no faces"),
+        ("nan.obj", _obj("v 0 0 0; v nan 0 0; v 0 1 0; f 1 2 3"), "nan.obj"),
+        ("flat.obj", _obj("v 0 0 0; v 1 1 1; v 2 2 2; f 1 2 3"), "area"),
+        ("out.obj", _obj("v 0 0 0; v 1 0 0; v 0 1 0; f 1 2 9"), "out.obj"),
+        ("empty.json", b"", "empty.json"),
+        ("list.json", b"[1, 2]", "list.json"),
+        ("cut.json", b'{"format": "blobtree", "version": 1, "nodes": [{"type": "po', "cut.json"),
+        (
+            "cycle.json",
+            b'{"format": "blobtree", "version": 1, "nodes": [{"type": "sum", "operands": [0]}]}',
+            "cycle.json",
+        ),
+        (
+            "radius.json",
+            b'{"format": "blobtree", "version": 1, "nodes": '
+            b'[{"type": "point", "center": [0, 0, 0], "radius": -1, "color": [1, 1, 1]}]}',
+            "radius",
+        ),
+        ("scene.json", b'{"format": "implicit-decals-scene", "version": 1, "objects": 3}', "$.objects"),
+        ("newer.json", b'{"format": "implicit-decals-scene", "version": 9}', "version 9"),
+    ],
+)
+def test_bad_models(bad: Callable[..., str], name: str, content: bytes, message: str) -> None:
+    Path(name).write_bytes(content)
+    assert message in bad("render", name, "-o", "a.png")
+
+
+def test_a_scene_brings_its_own_decals(bad: Callable[..., str], folder: Path) -> None:
+    blob = TreeObject("blob", Point((0, 0, 0), radius=1))
+    save_scene(Scene(objects=(blob,), camera=Camera((0, 0, 5))), folder / "s.json")
+    assert "own decals" in bad("render", "s.json", "-o", "a.png", "--decals", "5")
+    assert "render it alone" in bad("render", "s.json", "ball.ply", "-o", "a.png")
+    assert "BlobTree" in bad("polygonize", "s.json", "-o", "a.ply")
+
+
+def test_no_graphics(bad: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise NoGraphics("drawing needs libEGL.so.1; run: apt-get install libegl1")
+
+    monkeypatch.setattr(render_module, "Renderer", fail)
+    monkeypatch.setattr(demo_module, "Renderer", fail)
+    assert "apt-get install" in bad("render", "ball.ply", "-o", "a.png")
+    assert "apt-get install" in bad("demo")
+
+
+def test_a_sample_that_cannot_be_downloaded(bad: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def offline() -> None:
+        raise ConnectionError("no network")
+
+    monkeypatch.setattr("pyvista.examples.download_dragon", offline)
+    line = bad("render", "dragon", "-o", "a.png")
+    assert "PYVISTA_DATA" in line
+    assert "internet" in line
+
+
+def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> None:
+    def interrupt(*_arguments: object, **_options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(render_module, "seed_decals", interrupt)
+    assert run([*_small("knot"), "-o", "a.png"]) == 130
+    err = capfd.readouterr().err
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    assert list(folder.iterdir()) == []
+
+
+def test_square_brackets_in_names_survive(bad: Callable[..., str]) -> None:
+    assert "[bold]x[/].ply" in bad("render", "[bold]x[/].ply", "-o", "a.png")
+
+
+def test_files_are_replaced_not_left_half(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "a.png").write_bytes(b"old")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    assert run([*_small("knot"), "-o", "a.png"]) == 2
+    assert (folder / "a.png").read_bytes() == b"old"
+    assert [path.name for path in folder.iterdir()] == ["a.png"]
