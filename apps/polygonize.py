@@ -27,12 +27,6 @@ def polygonize(
 ) -> None:
     """Write an implicit model's surface as a triangle mesh.
 
-    Examples
-    --------
-        implicit-decals polygonize spheres -o spheres.ply
-
-        implicit-decals polygonize blob.json --cell-size 0.02 -o blob.obj
-
     Parameters
     ----------
     model

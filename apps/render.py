@@ -3,32 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from blobtree import Progress
 from decals.render import Renderer
-from decals.scene import DecalImage, Scene, SceneObject, bounds_of
+from decals.scene import DecalImage, Scene, SceneObject
 from decals.scene_file import save_scene
 from decals.seeding import seed as seed_decals
 
 from .errors import UsageError
 from .models import load_models
-from .options import (
-    CAMERAS,
-    MAX_DECALS,
-    MAX_SAMPLES,
-    MAX_SEED,
-    Direction,
-    Size,
-    check_count,
-    frame,
-    parse_direction,
-    parse_size,
-)
+from .options import MAX_DECALS, MAX_SAMPLES, MAX_SEED, check_count, parse_size
 from .output import PICTURE_SUFFIXES, check_output, write_picture
 from .progress_bars import progress_bars
+from .samples import axes_of
+from .views import UPRIGHT, Size, View, frame, parse_view
 
 DEFAULT_COUNT = 500
 DEFAULT_IMAGES = ("scale",)
@@ -42,6 +33,7 @@ def render(
     decals: Annotated[int | None, Parameter(show_default=False)] = None,
     image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     camera: str | None = None,
+    up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x900",
     samples: int = 2,
     seed: Annotated[int | None, Parameter(show_default=False)] = None,
@@ -50,16 +42,6 @@ def render(
     """Cover models with one coat of decals and draw a picture.
 
     Several models keep their own coordinates; where they touch, the decals run across.
-
-    Examples
-    --------
-        implicit-decals render knot --decals 800 -o knot.png
-
-        implicit-decals render bunny.ply blob.json --image scale --image rock -o both.png
-
-        implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json -o dragon.png
-
-        implicit-decals render dragon.json --size 2400x1800 -o large.png
 
     Parameters
     ----------
@@ -75,6 +57,8 @@ def render(
         picture file. May be given several times; decals choose at random. Default: scale.
     camera
         Where from: three-quarter, front, back, left, right, top, bottom, or a direction x,y,z.
+    up
+        The axis that points upward, which the cameras go by. Default: y, or what suits the sample.
     size
         Width and height of the picture in pixels.
     samples
@@ -85,7 +69,7 @@ def render(
         Also write the scene to this JSON file, which can be rendered again.
     """
     pixels = parse_size(size)
-    direction = None if camera is None else parse_direction(camera)
+    view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
     check_count("--samples", samples, 1, MAX_SAMPLES)
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
@@ -95,9 +79,9 @@ def render(
         raise UsageError("a saved scene brings its own decals; leave out --decals, --image and --seed")
     coat = Coat.asked(decals, image, seed)
     with Renderer() as renderer, progress_bars() as progress:  # no graphics: say so before the long work
-        scene = loaded if isinstance(loaded, Scene) else coat.scene(loaded, direction, pixels, progress)
-        if isinstance(loaded, Scene) and direction is not None:
-            scene = scene.replace(camera=frame(scene.bounds, direction, pixels))
+        scene = loaded if isinstance(loaded, Scene) else coat.scene(loaded, view, pixels, progress)
+        if isinstance(loaded, Scene) and (camera is not None or up is not None):
+            scene = scene.replace(camera=frame(scene.objects, view, pixels))
         if save is not None:
             save_scene(scene, save)
         progress("Drawing", 0.0)
@@ -120,13 +104,11 @@ class Coat:
         check_count("--seed", seed, 0, MAX_SEED)
         return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
 
-    def scene(
-        self, objects: Sequence[SceneObject], direction: Direction | None, size: Size, progress: Progress
-    ) -> Scene:
-        """Cover objects with the decals and look at them from a direction."""
+    def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
+        """Cover objects with the decals and look at them."""
         return Scene(
             objects=tuple(objects),
-            camera=frame(bounds_of(objects), direction or CAMERAS["three-quarter"], size),
+            camera=frame(objects, view, size),
             images=self.images,
             decals=seed_decals(
                 [item.surface for item in objects],

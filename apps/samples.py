@@ -17,6 +17,7 @@ from .creature import creature
 from .errors import UsageError
 from .knot import torus_knot
 from .spheres import spheres
+from .views import UPRIGHT, Axes
 
 _DATA = "https://github.com/pyvista/vtk-data"
 
@@ -44,8 +45,15 @@ _MESHES: dict[str, Callable[[], MeshArrays]] = {
 }
 _TREES: dict[str, Callable[[], Node]] = {"creature": creature, "spheres": spheres}
 
+_AXES = {"horse": Axes(up=(0.0, 0.0, 1.0), front=(1.0, 0.0, 0.0))}
+
 SAMPLES: tuple[str, ...] = tuple(sorted([*_MESHES, *_TREES]))
 """Names of the samples."""
+
+
+def axes_of(model: str) -> Axes:
+    """Which way a sample stands; other models stand along y."""
+    return _AXES.get(model, UPRIGHT["y"])
 
 
 def sample_mesh(name: str) -> MeshArrays:

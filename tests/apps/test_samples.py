@@ -1,0 +1,104 @@
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.typing import NDArray
+
+from blobtree import polygonize
+from decals.mesh_file import MeshArrays
+from decals.scene import MeshObject, TreeObject
+from implicit_decals.apps.errors import UsageError
+from implicit_decals.apps.hatching import hatching, mosaic
+from implicit_decals.apps.knot import torus_knot
+from implicit_decals.apps.samples import SAMPLES, axes_of, sample, sample_mesh
+from implicit_decals.apps.shapes import egg, rounded_box
+from implicit_decals.apps.spanning import spanning
+
+
+def _volume(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> float:
+    a, b, c = vertices[faces].transpose(1, 0, 2).astype(np.float64)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        torus_knot,
+        lambda: torus_knot(turns=3, windings=5, along=200, around=16, tube=0.1),
+        lambda: egg((1, 2, 3), radius=0.5, height=0.7),
+        lambda: rounded_box((0, 0, 0), half=(1, 2, 3)),
+    ],
+)
+def test_meshes_are_closed_and_wound_outward(make: Callable[[], MeshArrays]) -> None:
+    vertices, faces = make()
+    assert vertices.dtype == np.float32
+    assert faces.dtype == np.int32
+    points: NDArray[Any] = vertices
+    corners: NDArray[Any] = faces
+    assert pv.PolyData.from_regular_faces(points, corners).is_manifold
+    assert _volume(vertices, faces) > 0
+
+
+def test_the_knot_has_its_tube_everywhere() -> None:
+    vertices, _ = torus_knot(along=300, around=20, tube=0.2)
+    rings = vertices.reshape(300, 20, 3)
+    distances = np.linalg.norm(rings - rings.mean(axis=1, keepdims=True), axis=2)
+    assert np.allclose(distances, 0.2, atol=1e-5)
+
+
+def test_sizes_are_those_asked_for() -> None:
+    vertices, _ = rounded_box((1, 0, 0), half=(1, 2, 3))
+    assert np.allclose(vertices.min(axis=0), [0, -2, -3], atol=0.01)
+    assert np.allclose(vertices.max(axis=0), [2, 2, 3], atol=0.01)
+    vertices, _ = egg((0, 5, 0), radius=0.5, height=0.7)
+    assert np.allclose([vertices[:, 1].min(), vertices[:, 1].max()], [4.3, 5.7], atol=1e-3)
+
+
+def test_every_sample_is_listed_and_the_made_ones_come_without_a_network() -> None:
+    assert SAMPLES == ("creature", "dragon", "horse", "knot", "spheres")
+    for name in ("creature", "spheres"):
+        made = sample(name)
+        assert isinstance(made, TreeObject)
+        assert len(polygonize(made.tree, resolution=24).faces) > 100
+    knot = sample("knot")
+    assert isinstance(knot, MeshObject)
+    assert knot.source == "sample:knot"
+    assert np.array_equal(knot.vertices, sample_mesh("knot")[0])
+
+
+def test_no_such_sample_mesh() -> None:
+    with pytest.raises(UsageError, match="dragon, horse, knot"):
+        sample_mesh("spheres")
+
+
+def test_models_stand_along_y_but_the_horse() -> None:
+    assert axes_of("bunny.ply").up == (0.0, 1.0, 0.0)
+    assert axes_of("horse").up == (0.0, 0.0, 1.0)
+
+
+def test_one_coat_runs_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("implicit_decals.apps.hatching.COUNT", 300)
+    scene = hatching(progress=lambda _stage, _fraction: None)
+    creature, shell = (item.surface for item in scene.objects)
+    distance = [
+        np.linalg.norm(surface.project(scene.decals.positions)[0] - scene.decals.positions, axis=1)
+        for surface in (creature, shell)
+    ]
+    radii = scene.decals.radii
+    crossing = (np.maximum(*distance) < 0.8 * radii) & (np.minimum(*distance) < 1e-3)
+    assert crossing.sum() >= 3
+    tiles = mosaic(scene)
+    assert np.array_equal(tiles.decals.positions, scene.decals.positions)
+    assert set(tiles.decals.images.tolist()) == set(range(len(tiles.images)))
+
+
+def test_the_one_decal_spans_both_surfaces() -> None:
+    scene = spanning()
+    assert len(scene.decals) == 1
+    center, radius = scene.decals.positions[0], scene.decals.radii[0]
+    rim = center + radius * np.array([[-0.9, 0, 0], [0.9, 0, 0]], np.float32)
+    box, blob = (item.surface for item in scene.objects)
+    assert np.linalg.norm(box.project(rim[:1])[0] - rim[:1]) < 0.1 * radius
+    assert np.linalg.norm(blob.project(rim[1:])[0] - rim[1:]) < 0.5 * radius
