@@ -14,7 +14,7 @@ from decals.relaxation import Relaxation
 from decals.sizing import covering_radii
 from decals.surface import Surface
 
-SAMPLES = 48
+SAMPLES = 64
 """Samples for each decal from which its size is measured."""
 
 FEWEST_SAMPLES = 4096

@@ -24,10 +24,10 @@ OUTSIZED = 1.5
 TIE = 1.02
 """A point this little farther from a decal than from its owner is a corner of both."""
 
-TRIALS = 8
+TRIALS = 6
 """Places tried around each corner in each round."""
 
-SHRINK = (0.6, 0.3, 0.15)
+SHRINK = (1.0, 0.6, 0.3, 0.15)
 """Distance of the trials in each round, in mean distances of the samples."""
 
 Project = Callable[[Sites], Sites]
@@ -89,13 +89,13 @@ class _Measured:
     decals: NDArray[np.int64]
 
     def peaks(self, radii: NDArray[np.float64]) -> "_Measured":
-        """Keep the point farthest from any decal, of those with the same three decals nearest.
+        """Keep the point farthest from its owner, of those with the same owner and the same next two decals.
 
-        Such points share one corner of the Voronoi diagram. Those well within the radius drop out.
+        Such points share one corner of the owner's Voronoi cell. Those well within its radius drop out.
         """
         owners = self.decals[:, 0]
         outer = np.flatnonzero((owners >= 0) & (self.distances[:, 0] > RIM * radii[owners]))
-        corners = np.sort(self.decals[outer], axis=1)
+        corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:], axis=1)])
         order = np.lexsort((-self.distances[outer, 0], *corners.T))
         sorted_corners = corners[order]
         first = np.ones(len(order), np.bool_)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import SphericalVoronoi
 
 from blobtree import Point, Segment
 from decals.errors import InvalidSeeding
@@ -36,14 +37,15 @@ def test_a_sphere_is_covered_evenly_and_without_gap_at_any_size(scale):
 
 
 def test_radii_are_those_of_the_voronoi_cells():
-    ball = sphere()
-    decals = seed(ball, count=300)
-    points, _ = ball.sample(60_000, seed=9)
-    distances = np.linalg.norm(points[:, None] - decals.positions, axis=2)
-    farthest = np.zeros(300)
-    np.maximum.at(farthest, distances.argmin(axis=1), distances.min(axis=1))
-    assert (decals.radii >= farthest).all()
-    assert (decals.radii <= 1.12 * farthest).all()
+    decals = seed(sphere(level=5), count=300)
+    directions = decals.positions.astype(float)
+    cells = SphericalVoronoi(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    least = [
+        np.linalg.norm(cells.vertices[region] - position, axis=1).max()
+        for region, position in zip(cells.regions, cells.points, strict=True)
+    ]
+    assert (decals.radii > np.array(least) * 1.01).all()
+    assert (decals.radii < np.array(least) * 1.06).all()
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
