@@ -20,7 +20,8 @@ void main() {
     vec4 decal = vec4(-1.0, 0.0, 0.0, 0.0);
     vec4 light = vec4(0.0);
     if (position.w > 0.0) {
-        vec3 normal = texelFetch(g_normal, texel, 0).xyz;
+        vec4 side = texelFetch(g_normal, texel, 0);
+        vec3 normal = side.xyz;
         vec3 albedo = texelFetch(g_color, texel, 0).rgb;
         vec3 ray = ray_direction(gl_FragCoord.xy);
 #ifdef DECALS
@@ -29,8 +30,10 @@ void main() {
         albedo = albedo * (1.0 - color.a) + color.rgb;
         decal = vec4(float(hit.owner), hit.field, hit.uv);
 #endif
-        float open_ = openness(g_position, texel, position.xyz, facing(normal, ray), ray);
-        light = vec4(clamp(shade(albedo, normal, -normalize(ray), open_), 0.0, 1.0), 1.0);
+        vec3 toward_eye = -normalize(ray);
+        vec3 seen = visible_normal(side.w * normal, toward_eye);
+        float open_ = openness(g_position, texel, position.xyz, seen, ray);
+        light = vec4(clamp(shade(albedo, seen, toward_eye, open_), 0.0, 1.0), 1.0);
     }
     out_light = light;
 #ifdef BUFFERS

@@ -11,19 +11,18 @@ const float KEY_SOFTNESS = 0.6;  // how far the key's light, too, is kept out of
 const float GLOSS = 60.0;      // Blinn-Phong exponent
 const float SHEEN = 0.22;      // strength of the highlight
 
-// The side of the surface that is seen.
-vec3 facing(vec3 normal, vec3 ray) {
-    return dot(normal, ray) > 0.0 ? -normal : normal;
+// A smooth normal may look away from the eye at a silhouette: turn it as far as is just visible.
+vec3 visible_normal(vec3 normal, vec3 toward_eye) {
+    return normalize(normal - min(dot(normal, toward_eye) - 1e-3, 0.0) * toward_eye);
 }
 
-// `open_` is how much of the sky the surroundings leave, from 0 to 1.
-vec3 shade(vec3 albedo, vec3 normal, vec3 toward_eye, float open_) {
+// `n` looks toward the eye; `open_` is how much of the sky the surroundings leave, from 0 to 1.
+vec3 shade(vec3 albedo, vec3 n, vec3 toward_eye, float open_) {
     vec3 right = normalize(ray_right.xyz);
     vec3 up = normalize(ray_up.xyz);
     vec3 back = cross(right, up);
     vec3 key = normalize(-0.55 * right + 0.75 * up + 0.70 * back);
     vec3 fill = normalize(0.85 * right + 0.10 * up + 0.45 * back);
-    vec3 n = facing(normal, -toward_eye);
 
     float lit = max((dot(n, key) + WRAP) / (1.0 + WRAP), 0.0);
     float key_open = mix(1.0, open_, KEY_SOFTNESS);

@@ -110,3 +110,29 @@ def test_vertex_normals_are_weighted_by_area() -> None:
     expected = np.array([2, 0, 4.0]) / np.linalg.norm([2, 0, 4])
     np.testing.assert_allclose(normals[0], expected, atol=1e-6)
     np.testing.assert_allclose(normals[[1, 3, 4]], [[0, 0, 1], [1, 0, 0], [0, 0, 1]], atol=1e-6)
+
+
+def test_both_sides_are_lit(renderer: Renderer) -> None:
+    """A sheet is as bright from behind as from the front; so is a model whose faces wind the wrong way."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    pixels = [
+        renderer.render(View((Shape(corners, order),), Camera((0, 0, z))), size=(16, 16))[8, 8]
+        for order in (faces, faces[:, ::-1])
+        for z in (4, -4)
+    ]
+    assert (np.ptp(np.array(pixels, int), axis=0) <= 1).all()
+    assert pixels[0][0] > 100
+
+
+def test_silhouettes_are_not_speckled(renderer: Renderer) -> None:
+    """Smooth normals of a coarse mesh look away from the eye at its edge: no pixel there may go dark."""
+    shape = torus(1, 0.4, 10, 5)
+    view = look((shape,))
+    buffers = renderer.buffers(view, size=SIZE)
+    toward = np.array(view.camera.position) - buffers.position
+    toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
+    away = (buffers.object_id == 0) & (np.einsum("hwi,hwi->hw", buffers.normal, toward) < -0.02)
+    upper = away & (buffers.normal @ view.camera.axes[1] > 0.5)
+    assert upper.sum() > 3
+    assert buffers.color[upper][:, :3].min() > 100
