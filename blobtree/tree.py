@@ -97,7 +97,7 @@ class Node:
 
     def scale(self, factor: float | ArrayLike) -> "Transform":
         """This node scaled about the origin by one factor, or by one per axis."""
-        factors = finite_vector("factor", np.broadcast_to(np.asarray(factor, dtype=np.float64), 3))
+        factors = finite_vector("factor", factor if isinstance(factor, Iterable) else (factor,) * 3)
         if 0.0 in factors:
             raise InvalidNode(f"factor: expected a scale other than 0, got {factor!r}")
         return self.transform(np.column_stack([np.diag(factors), np.zeros(3)]))
@@ -331,7 +331,10 @@ def _settle(node: Node, **fields: object) -> None:
 
 def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
     """`operands` as a tuple of nodes, at least one."""
-    nodes = tuple(operands)
+    try:
+        nodes = tuple(operands)
+    except TypeError:
+        raise InvalidNode(f"operands: expected several BlobTree nodes, got {operands!r}") from None
     if not nodes:
         raise InvalidNode("operands: expected at least one node, got none")
     for node in nodes:
