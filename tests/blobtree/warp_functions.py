@@ -1,0 +1,129 @@
+"""Every typed function of a module as a Warp kernel over arrays, made from its annotations.
+
+    call(falloff, squared_distance=np.linspace(0, 1, 100))      the function at 100 arguments
+    typed_functions(blobtree.kernels)                           what a module defines, with the types
+
+Warp reads kernels from files, so a file of kernels is written per module; its text, and so Warp's cache of
+the compiled kernels, is the same in every run.
+"""
+
+import importlib.util
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+_SCALARS = {wp.float32: np.float32, wp.int32: np.int32, wp.uint32: np.uint32, wp.bool: np.bool_}
+
+
+@dataclass(frozen=True)
+class TypedFunction:
+    """A `@wp.func`, what it takes and what it returns, as Warp types or `wp.array`s of them."""
+
+    function: wp.Function
+    parameters: dict[str, Any]
+    returned: Any
+
+    @property
+    def name(self) -> str:
+        return str(self.function.key)
+
+
+def typed_functions(module: ModuleType) -> list[TypedFunction]:
+    """The typed functions that `module` defines, save those that Warp specialises as it compiles."""
+    found = []
+    for value in vars(module).values():
+        if (
+            isinstance(value, wp.Function)
+            and value.func is not None
+            and value.func.__module__ == module.__name__
+        ):
+            hints = dict(value.func.__annotations__)
+            returned = hints.pop("return")
+            if not value.func.__code__.co_freevars:
+                found.append(TypedFunction(value, hints, returned))
+    return found
+
+
+def element(hint: Any) -> Any:
+    """The type of one value of a parameter: of an array its elements'."""
+    return hint.dtype if isinstance(hint, wp.array) else hint
+
+
+def numpy_type(hint: Any) -> tuple[Any, tuple[int, ...]]:
+    """NumPy type and shape of one value."""
+    if hint in _SCALARS:
+        return _SCALARS[hint], ()
+    return _SCALARS[hint._wp_scalar_type_], hint._shape_
+
+
+def call(function: Any, **arguments: ArrayLike) -> NDArray[Any]:
+    """`function` at row i of every argument, for all i; parameters that are arrays are given whole."""
+    kernel, typed = _kernels(function.func.__module__)[str(function.key)]
+    assert set(arguments) == set(typed.parameters), f"{typed.name} takes {list(typed.parameters)}"
+    prepared = {name: _prepared(hint, arguments[name]) for name, hint in typed.parameters.items()}
+    singles = [name for name, hint in typed.parameters.items() if not isinstance(hint, wp.array)]
+    count = max((len(prepared[name]) for name in singles), default=1)
+    inputs: list[Any] = []
+    for name, hint in typed.parameters.items():
+        array = prepared[name]
+        if name in singles:
+            array = np.ascontiguousarray(np.broadcast_to(array, (count, *array.shape[1:])))
+        inputs.append(wp.array(array, dtype=element(hint), device="cpu"))
+    out = wp.empty(count, dtype=typed.returned, device="cpu")
+    wp.launch(kernel, dim=count, inputs=inputs, outputs=[out], device="cpu")
+    result: NDArray[Any] = out.numpy()
+    return result
+
+
+def _prepared(hint: Any, argument: ArrayLike) -> NDArray[Any]:
+    dtype, shape = numpy_type(element(hint))
+    array = np.asarray(argument, dtype)
+    return array.reshape(-1, *shape)
+
+
+@lru_cache
+def _kernels(module_name: str) -> dict[str, tuple[wp.Kernel, TypedFunction]]:
+    """Name → kernel over arrays, of every typed function of the module of this name."""
+    functions = typed_functions(import_module(module_name))
+    generated = f"generated_{module_name.replace('.', '_')}"
+    path = Path(tempfile.mkdtemp(prefix="kernels-")) / f"{generated}.py"
+    path.write_text("\n".join([_HEAD, *(_kernel_source(module_name, function) for function in functions)]))
+    spec = importlib.util.spec_from_file_location(generated, path)
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[generated] = made
+    spec.loader.exec_module(made)
+    return {function.name: (getattr(made, f"run_{function.name}"), function) for function in functions}
+
+
+_HEAD = 'import warp as wp\n\nwp.set_module_options({"enable_backward": False})\n'
+
+
+def _kernel_source(module_name: str, typed: TypedFunction) -> str:
+    def spelled(hint: Any) -> str:
+        return f"wp.array(dtype=wp.{element(hint).__name__})"
+
+    parameters = ", ".join(f"x_{name}: {spelled(hint)}" for name, hint in typed.parameters.items())
+    arguments = ", ".join(
+        f"x_{name}" if isinstance(hint, wp.array) else f"x_{name}[i]"
+        for name, hint in typed.parameters.items()
+    )
+    separator = ", " if parameters else ""
+    return f"""\
+from {module_name} import {typed.name}
+
+@wp.kernel
+def run_{typed.name}({parameters}{separator}out: {spelled(typed.returned)}):
+    i = wp.tid()
+    out[i] = {typed.name}({arguments})
+"""
