@@ -140,6 +140,12 @@ class Relaxation:
         return self._sites.surface_ids
 
     @property
+    def energies(self) -> Floats:
+        """Energy of each particle among its neighbours at the last step, ``float32[n]``: how crowded it was."""
+        energies: Floats = self._energies.numpy().copy()
+        return energies
+
+    @property
     def finished(self) -> bool:
         """Whether the schedule has been run."""
         return self.steps >= self.iterations

@@ -15,7 +15,10 @@ MARGIN = 0.03
 RIM = 0.75
 """Corners beyond this part of the radius found so far are where the search goes on."""
 
-SPECK = 0.02
+HOPE = 2.5
+"""How much farther a round of trials may get, in its own distances; corners beyond hope drop out."""
+
+SPECK = 0.05
 """Largest part of a decal's mean area that may stay bare, and only to spare it an outsized radius."""
 
 OUTSIZED = 1.5
@@ -69,14 +72,13 @@ def covering_radii(decals: Sites, samples: Sites, project: Project, seed: int) -
     _grow(radii, found, limits)
     rng = np.random.default_rng(seed)
     pitch = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
-    found = found.peaks(radii)
-    trials = _corners(found, decals)
+    found = found.peaks(RIM * radii)
+    found = found.joined(_measure(tree, project(_corners(found, decals))))
+    _grow(radii, found, limits)
     for shrink in SHRINK:
-        trials = Sites.joined([found.sites, trials, _around(found.sites, shrink * pitch, rng)])
-        found = _measure(tree, project(trials))
+        found = found.peaks(np.maximum(RIM * radii, radii - HOPE * shrink * pitch))
+        found = found.joined(_measure(tree, project(_around(found.sites, shrink * pitch, rng))))
         _grow(radii, found, limits)
-        found = found.peaks(radii)
-        trials = found.sites[:0]
     return (1.0 + MARGIN) * _without_zeros(radii, tree, decals)
 
 
@@ -88,13 +90,22 @@ class _Measured:
     distances: NDArray[np.float64]
     decals: NDArray[np.int64]
 
-    def peaks(self, radii: NDArray[np.float64]) -> "_Measured":
+    def joined(self, other: "_Measured") -> "_Measured":
+        """Put the points of both together."""
+        return _Measured(
+            Sites.joined([self.sites, other.sites]),
+            np.concatenate([self.distances, other.distances]),
+            np.concatenate([self.decals, other.decals]),
+        )
+
+    def peaks(self, least: NDArray[np.float64]) -> "_Measured":
         """Keep the point farthest from its owner, of those with the same owner and the same next two decals.
 
-        Such points share one corner of the owner's Voronoi cell. Those well within its radius drop out.
+        Such points share one corner of the owner's Voronoi cell. Those nearer to their owner than its
+        `least` drop out.
         """
         owners = self.decals[:, 0]
-        outer = np.flatnonzero((owners >= 0) & (self.distances[:, 0] > RIM * radii[owners]))
+        outer = np.flatnonzero((owners >= 0) & (self.distances[:, 0] > least[owners]))
         corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:], axis=1)])
         order = np.lexsort((-self.distances[outer, 0], *corners.T))
         sorted_corners = corners[order]

@@ -19,6 +19,17 @@ def test_step_by_step_is_the_same_as_in_one_run():
     assert by_hand.positions.tobytes() == at_once.positions.tobytes()
 
 
+def test_energies_tell_the_crowded_from_the_lonely():
+    relaxation = Relaxation([plane()], count=200, iterations=100)
+    relaxation.step()
+    nearest = nearest_facing(relaxation.positions, relaxation.normals)
+    crowded = np.argsort(nearest)[:20]
+    assert relaxation.energies[crowded].mean() > 3 * np.median(relaxation.energies)
+    before = relaxation.energies.sum()
+    relaxation.run()
+    assert relaxation.energies.sum() < 0.5 * before
+
+
 def test_statistics_are_those_of_all_pairs():
     relaxation = Relaxation([box()], count=150, iterations=60)
     relaxation.run()
