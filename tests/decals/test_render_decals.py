@@ -50,10 +50,10 @@ def compare(view: View, buffers: Buffers, mapping: Mapping) -> np.ndarray:
     assert sure.mean() > 0.95
     np.testing.assert_array_equal(owner[sure], reference.owner[sure])
     agree = owner == reference.owner
-    np.testing.assert_allclose(field[agree], reference.field[agree], atol=2e-3)
+    np.testing.assert_allclose(field[agree], reference.field[agree], atol=5e-4)
     conditioned = agree & (reference.stretch < 20)
-    error = np.abs(uv - reference.uv).max(axis=1)
-    assert np.quantile(error[conditioned], 0.999) < 1e-3
+    np.testing.assert_allclose(uv[conditioned], reference.uv[conditioned], atol=1e-3)
+    assert conditioned.sum() > 0.99 * agree.sum()
     return owner >= 0
 
 

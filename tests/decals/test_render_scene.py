@@ -60,7 +60,7 @@ def test_a_tree_lies_where_its_rays_hit(renderer: Renderer) -> None:
 
 
 def test_one_coat_over_both_kinds_is_the_oracles(renderer: Renderer, both: Scene) -> None:
-    buffers = renderer.buffers(both, size=SIZE)
+    buffers = renderer.buffers(both, size=(320, 240))
     assert set(np.unique(buffers.object_id)) == {-1, 0, 1}
     assert compare(both, buffers, Mapping.CORRECTED).mean() > 0.99
     spans = [set(buffers.owner[buffers.object_id == number]) - {-1} for number in (0, 1)]
