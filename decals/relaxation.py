@@ -141,7 +141,7 @@ class Relaxation:
 
     @property
     def energies(self) -> Floats:
-        """Energy of each particle among its neighbours at the last step, ``float32[n]``: how crowded it was."""
+        """How crowded each particle was at the last step: its energy there, ``float32[n]``."""
         energies: Floats = self._energies.numpy().copy()
         return energies
 
