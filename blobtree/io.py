@@ -10,7 +10,8 @@ shared subtree is written once, and depth costs no recursion.
 """
 
 import os
-import tempfile
+import shutil
+import uuid
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -179,15 +180,17 @@ def load(path: str | os.PathLike[str]) -> Node:
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Put `content` into `path` so that a crash leaves either the old file or the new one."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".tmp")
+    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex}.tmp")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with temporary.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        Path(temporary).replace(path)
+        if path.exists():
+            shutil.copymode(path, temporary)
+        temporary.replace(path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
 
 
