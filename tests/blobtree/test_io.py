@@ -1,0 +1,240 @@
+"""BlobTree files: they come back as they went, are written whole or not at all, and say what is wrong."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blobtree import InvalidFile, Node, Point, Union, from_json, load, save, to_json
+from tests.blobtree.trees import random_trees, trees
+
+BALL = {"type": "point", "center": [0, 0, 0], "radius": 1, "color": [1, 1, 1]}
+
+
+def document(*nodes: Any, **changes: Any) -> str:
+    return json.dumps({"format": "blobtree", "version": 1, "nodes": nodes} | changes)
+
+
+@given(trees())
+@settings(max_examples=100, deadline=None)
+def test_a_tree_comes_back_equal(tree: Node) -> None:
+    assert from_json(to_json(tree)) == tree
+    assert to_json(from_json(to_json(tree))) == to_json(tree)
+
+
+def test_a_file_comes_back_equal(tmp_path: Path) -> None:
+    for tree in random_trees(seed=4, count=10):
+        save(tree, tmp_path / "träe.json")
+        assert load(str(tmp_path / "träe.json")) == tree
+
+
+def test_the_documented_form_is_read() -> None:
+    read = from_json(document(BALL, {**BALL, "center": [1, 0, 0]}, {"type": "sum", "operands": [0, 1]}))
+    white = (1, 1, 1)
+    assert read == Point((0, 0, 0), radius=1, color=white) + Point((1, 0, 0), radius=1, color=white)
+
+
+def test_a_shared_subtree_is_written_once_and_read_back_shared() -> None:
+    tree: Node = Point((0, 0, 0), radius=1.0)
+    for _ in range(30):
+        tree = Union((tree, tree))
+    text = to_json(tree)
+    assert len(json.loads(text)["nodes"]) == 31
+    read = from_json(text)
+    assert read.children[0] is read.children[1]
+    assert to_json(read) == text
+
+
+def test_a_spine_of_ten_thousand_is_no_recursion() -> None:
+    tree: Node = Point((0, 0, 0), radius=1.0)
+    for i in range(10_000):
+        tree = tree - Point((0, 0, float(i)), radius=1.0)
+    assert to_json(from_json(to_json(tree))) == to_json(tree)
+
+
+BROKEN: dict[str, tuple[str, str]] = {
+    "a cycle": (
+        document({"type": "sum", "operands": [1]}, {"type": "sum", "operands": [0]}),
+        r"nodes\[0\] \(sum\): operand 1 does not stand before this node, which is node 0",
+    ),
+    "itself": (
+        document(BALL, {"type": "union", "operands": [0, 1]}),
+        r"nodes\[1\] \(union\): operand 1 does not",
+    ),
+    "a negative place": (
+        document(BALL, {"type": "transform", "child": -1, "matrix": [[1, 0, 0, 0]] * 3}),
+        r"nodes\[1\] \(transform\): operand -1 does not stand before",
+    ),
+    "beyond the end": (
+        document(BALL, {"type": "difference", "solid": 0, "tool": 9}),
+        r"nodes\[1\] \(difference\): operand 9",
+    ),
+    "radius 0": (
+        document(BALL, {**BALL, "radius": 0}),
+        r"nodes\[1\] \(point\): radius: expected a number above 0",
+    ),
+    "radius −1": (
+        document({**BALL, "radius": -1}),
+        r"nodes\[0\] \(point\): radius: expected a number above 0",
+    ),
+    "a huge radius": (
+        document({**BALL, "radius": 1e300}),
+        r"nodes\[0\] \(point\): radius: expected a finite number",
+    ),
+    "a colour": (
+        document({**BALL, "color": [2, 0, 0]}),
+        r"nodes\[0\] \(point\): color: expected red, green, blue",
+    ),
+    "an exponent": (
+        document(BALL, {"type": "ricci", "operands": [0], "exponent": 0.5}),
+        r"nodes\[1\] \(ricci\): exponent",
+    ),
+    "a flat map": (
+        document(BALL, {"type": "transform", "child": 0, "matrix": [[0, 0, 0, 0]] * 3}),
+        r"nodes\[1\] \(transform\): matrix: expected an invertible map",
+    ),
+    "a ragged map": (
+        document(BALL, {"type": "transform", "child": 0, "matrix": [[1, 0], [1]]}),
+        r"nodes\[1\] \(transform\): matrix: expected a finite 3×4",
+    ),
+    "no operands": (
+        document({"type": "sum", "operands": []}),
+        r"nodes\[0\] \(sum\): operands: expected at least one",
+    ),
+    "no nodes": (document(), "nodes: expected at least one node, got none"),
+    "a wrong version": (
+        document(BALL, version=2),
+        r"not a BlobTree of version 1: Invalid enum value 2 - at `\$.version`",
+    ),
+    "a wrong format": (
+        document(BALL, format="scene"),
+        r"not a BlobTree of version 1: Invalid enum value 'scene'",
+    ),
+    "an unknown field": (document({**BALL, "colour": 1}), r"unknown field `colour` - at `\$.nodes\[0\]`"),
+    "an unknown field outside": (document(BALL, author="x"), r"unknown field `author`"),
+    "an unknown type": (
+        document(BALL, {**BALL, "type": "torus"}),
+        r"Invalid value 'torus' - at `\$.nodes\[1\].type`",
+    ),
+    "no type": (document({"radius": 1}), r"missing required field `type` - at `\$.nodes\[0\]`"),
+    "a missing field": (
+        document({"type": "point", "center": [0, 0, 0]}),
+        r"missing required field `radius` - at `\$.nodes\[0\]`",
+    ),
+    "two coordinates": (
+        document({**BALL, "center": [0, 0]}),
+        r"Expected `array` of length 3 - at `\$.nodes\[0\].center`",
+    ),
+    "a word for a number": (
+        document({**BALL, "radius": "1"}),
+        r"Expected `float`, got `str` - at `\$.nodes\[0\].radius`",
+    ),
+    "NaN": (document({**BALL, "radius": float("nan")}), "not a BlobTree of version 1: JSON is malformed"),
+    "a place that is no integer": (
+        document(BALL, {"type": "sum", "operands": [0.5]}),
+        r"\$.nodes\[1\].operands\[0\]",
+    ),
+    "truncated": (document(BALL)[:-20], "not a BlobTree of version 1: Input data was truncated"),
+    "empty": ("", "not a BlobTree of version 1: Input data was truncated"),
+    "no JSON": ("solid cube", "not a BlobTree of version 1: JSON is malformed"),
+    "a list": ("[]", "not a BlobTree of version 1: Expected `object`, got `array`"),
+    "null": ("null", "not a BlobTree of version 1: Expected `object`, got `null`"),
+    "deep nesting": ('{"nodes": ' + "[" * 100_000, "not a BlobTree"),
+    "more after the end": (document(BALL) + "{}", "not a BlobTree of version 1: JSON is malformed"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), BROKEN.values(), ids=BROKEN)
+def test_a_broken_file_says_what_is_wrong_and_where(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidFile, match=message):
+        from_json(text)
+    path = tmp_path / "broken.json"
+    path.write_text(text)
+    with pytest.raises(InvalidFile, match=r"broken\.json: .*" + message):
+        load(path)
+
+
+@pytest.mark.parametrize(
+    "content", [b"\xff\xfe\x00", b"\x00" * 64, b'{"format": "\xff"}', b"ply\nformat ascii"]
+)
+def test_bytes_that_are_no_text(content: bytes) -> None:
+    with pytest.raises(InvalidFile, match="not a BlobTree"):
+        from_json(content)
+
+
+@given(st.binary(max_size=200) | st.text(max_size=200))
+@settings(max_examples=200, deadline=None)
+def test_rubbish_is_an_invalid_file_and_nothing_else(rubbish: bytes | str) -> None:
+    with pytest.raises(InvalidFile):
+        from_json(rubbish)
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_a_damaged_file_is_a_tree_or_an_invalid_file(data: st.DataObject) -> None:
+    text = bytearray(document(BALL, {**BALL, "radius": 2}, {"type": "sum", "operands": [0, 1]}), "ascii")
+    for _ in range(data.draw(st.integers(1, 3))):
+        text[data.draw(st.integers(0, len(text) - 1))] = data.draw(st.integers(0, 255))
+    try:
+        read = from_json(bytes(text))
+    except InvalidFile:
+        return
+    assert isinstance(read, Node)
+
+
+def test_a_missing_file_and_a_folder_are_an_os_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        load(tmp_path / "none.json")
+    with pytest.raises(OSError, match=r".+"):
+        load(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        save(Point((0, 0, 0), radius=1.0), tmp_path / "none" / "tree.json")
+
+
+# -- atomic ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moment", ["fsync", "replace"])
+def test_a_failure_while_saving_leaves_the_old_file(
+    moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    path = tmp_path / "tree.json"
+    old = Point((0, 0, 0), radius=1.0)
+    save(old, path)
+    if moment == "fsync":
+        monkeypatch.setattr(os, "fsync", fail)
+    else:
+        monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(OSError, match="No space left"):
+        save(old.scale(2.0), path)
+    monkeypatch.undo()
+    assert load(path) == old
+    assert [entry.name for entry in tmp_path.iterdir()] == ["tree.json"]
+
+
+def test_a_failure_while_writing_a_new_file_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", stop)
+    with pytest.raises(KeyboardInterrupt):
+        save(Point((0, 0, 0), radius=1.0), tmp_path / "tree.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_saved_file_may_be_read_by_whoever_may_read_other_new_files(tmp_path: Path) -> None:
+    save(Point((0, 0, 0), radius=1.0), tmp_path / "tree.json")
+    (tmp_path / "other").write_text("")
+    assert (tmp_path / "tree.json").stat().st_mode == (tmp_path / "other").stat().st_mode
+    (tmp_path / "tree.json").chmod(0o640)
+    save(Point((0, 0, 0), radius=2.0), tmp_path / "tree.json")
+    assert (tmp_path / "tree.json").stat().st_mode & 0o777 == 0o640
