@@ -190,14 +190,11 @@ class Relaxation:
         """Compute the move of every particle."""
         part = min(self.steps / self.iterations, 1.0)
         exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
-        self._grid.build(_vectors(self.positions), CUTOFF * self.spacing)
-        wp.launch(
-            repel,
-            dim=self.count,
-            inputs=[self._grid.id, _vectors(self.positions), _vectors(self._guides), self.spacing, CUTOFF],
-            outputs=[exponent, FACING_LIMIT, DAMPING, LONGEST, _vectors(self._moves), self._energies],
-            device="cpu",
-        )
+        positions, guides, moves = (_vectors(rows) for rows in (self.positions, self._guides, self._moves))
+        self._grid.build(positions, CUTOFF * self.spacing)
+        inputs = [self._grid.id, positions, guides, self.spacing, CUTOFF, exponent]
+        inputs += [FACING_LIMIT, DAMPING, LONGEST]
+        wp.launch(repel, dim=self.count, inputs=inputs, outputs=[moves, self._energies], device="cpu")
 
     def _settle(self) -> None:
         """Project the moved particles; those that would leave their side or get hidden stay."""
