@@ -60,3 +60,9 @@ def falloff_slope_bound(distance: wp.float32, reach: wp.float32) -> wp.float32:
     nearest = wp.max(distance - reach, 0.0)
     farthest = distance + reach
     return falloff_steepness(wp.clamp(STEEPEST_DISTANCE, nearest, farthest))
+
+
+@wp.func
+def falloff_range(nearest: wp.float32, farthest: wp.float32) -> wp.vec2:
+    """Smallest and largest g(d) over squared distances from `nearest` to `farthest`."""
+    return wp.vec2(falloff(farthest), falloff(nearest))

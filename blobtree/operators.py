@@ -6,6 +6,11 @@ Each operator is two typed functions:
 * `slope(slope_a, slope_b, max_a, max_b, parameter)`: a bound on |∇F| wherever the operands' gradients are
   bounded by slope_a, slope_b and their values by max_a, max_b. The tracer's proof rests on it.
 
+And two that let a cell forget what cannot matter in it; a = (smallest, largest) of the operand over the cell:
+
+* `range(a, b, parameter) -> (smallest, largest)` of F;
+* `choice(a, b) -> KEEP_…`: which operands F depends on there.
+
 Whatever rides along with the field (colour) is averaged with the weights |∂F/∂a|·a and |∂F/∂b|·b: a sum mixes
 by strength, a union takes the winner, a difference paints the cut with the tool that cut it.
 Every operator here gives its first operand back where the second is exactly 0, save intersection, which is 0.
@@ -110,6 +115,92 @@ def difference_slope(
     return slope_a + (2.0 * max_a - 1.0) * slope_b
 
 
+KEEP_BOTH = 0
+KEEP_LEFT = 1
+KEEP_RIGHT = 2
+KEEP_NONE = 3
+
+
+@wp.func
+def sum_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
+    """Grows with both operands."""
+    return a + b
+
+
+@wp.func
+def ricci_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
+    """Grows with both operands."""
+    return wp.vec2(ricci_norm(a[0], b[0], exponent), ricci_norm(a[1], b[1], exponent))
+
+
+@wp.func
+def blend_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """A blend depends on every operand that is not 0."""
+    if b[1] <= 0.0:
+        return KEEP_LEFT
+    if a[1] <= 0.0:
+        return KEEP_RIGHT
+    return KEEP_BOTH
+
+
+@wp.func
+def union_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
+    """Grows with both operands."""
+    return wp.max(a, b)
+
+
+@wp.func
+def union_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """The operand that is always the larger one."""
+    if b[1] <= a[0] or b[1] <= 0.0:
+        return KEEP_LEFT
+    if a[1] <= b[0] or a[1] <= 0.0:
+        return KEEP_RIGHT
+    return KEEP_BOTH
+
+
+@wp.func
+def intersection_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
+    """Grows with both operands."""
+    return wp.min(a, b)
+
+
+@wp.func
+def intersection_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """The operand that is always the smaller one; nothing where one is absent."""
+    if a[1] <= 0.0 or b[1] <= 0.0:
+        return KEEP_NONE
+    if a[1] <= b[0]:
+        return KEEP_LEFT
+    if b[1] <= a[0]:
+        return KEEP_RIGHT
+    return KEEP_BOTH
+
+
+@wp.func
+def difference_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
+    """The complement m − b(2m − 1) is linear in m and in b, so its extremes lie at the corners."""
+    low_top = wp.max(a[0], 1.0)
+    high_top = wp.max(a[1], 1.0)
+    c0 = low_top - b[0] * (2.0 * low_top - 1.0)
+    c1 = low_top - b[1] * (2.0 * low_top - 1.0)
+    c2 = high_top - b[0] * (2.0 * high_top - 1.0)
+    c3 = high_top - b[1] * (2.0 * high_top - 1.0)
+    smallest = wp.min(wp.min(c0, c1), wp.min(c2, c3))
+    largest = wp.max(wp.max(c0, c1), wp.max(c2, c3))
+    return wp.vec2(wp.max(wp.min(a[0], smallest), 0.0), wp.max(wp.min(a[1], largest), 0.0))
+
+
+@wp.func
+def difference_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """The tool is forgotten where it does not cut; everything where it has cut all away."""
+    if a[1] <= 0.0 or b[0] >= 1.0:
+        return KEEP_NONE
+    if b[1] <= 0.0 or (a[1] <= 1.0 and a[1] + b[1] <= 1.0):
+        return KEEP_LEFT
+    return KEEP_BOTH
+
+
 @dataclass(frozen=True)
 class Operator:
     """One row of the table: an operator's name, its functions and its algebra."""
@@ -117,18 +208,33 @@ class Operator:
     name: str
     partials: wp.Function
     slope: wp.Function
+    range: wp.Function
+    choice: wp.Function
     commutes: bool = True
     """Operands may change places and nest in any way."""
     starts_from_zero: bool = True
     """F(0, b) = b, so that a fold may start from the empty field."""
 
 
-SUM = Operator("sum", sum_partials, sum_slope)
-RICCI = Operator("ricci", ricci_partials, ricci_slope)
-UNION = Operator("union", union_partials, extremum_slope)
-INTERSECTION = Operator("intersection", intersection_partials, extremum_slope, starts_from_zero=False)
+SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice)
+RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice)
+UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice)
+INTERSECTION = Operator(
+    "intersection",
+    intersection_partials,
+    extremum_slope,
+    intersection_range,
+    intersection_choice,
+    starts_from_zero=False,
+)
 DIFFERENCE = Operator(
-    "difference", difference_partials, difference_slope, commutes=False, starts_from_zero=False
+    "difference",
+    difference_partials,
+    difference_slope,
+    difference_range,
+    difference_choice,
+    commutes=False,
+    starts_from_zero=False,
 )
 
 OPERATORS = (SUM, RICCI, UNION, INTERSECTION, DIFFERENCE)

@@ -4,6 +4,11 @@ Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2); bit c of a cell's code s
 The surface inside a cell falls apart into patches, each around a loop of crossed edges; the dual mesh has one
 vertex per patch. On a face where inside and outside corners alternate, the inside ones are kept apart: both
 cells that share the face see the same corners, so both decide alike.
+
+There is one exception. Where both strands on such a face belong to one patch in both cells, the mesh would
+have an edge with four triangles; there the inside corners are joined instead, which splits the patch in
+either cell (Wenger 2013). It only happens to cells with a single alternating face, so a cell has two rows in
+the tables: its code, and its code + FLIPPED.
 """
 
 import numpy as np
@@ -14,42 +19,73 @@ EDGES: tuple[tuple[int, int], ...] = tuple(
 )
 """The 12 edges as pairs of corners: four along x, four along y, four along z."""
 
-_FACES: tuple[tuple[int, ...], ...] = tuple(
+FACES: tuple[tuple[int, ...], ...] = tuple(
     tuple(corner for corner in range(8) if corner >> axis & 1 == side)
     for axis in range(3)
     for side in range(2)
 )
 
 
-def _loops(code: int) -> list[int]:
+FLIPPED = 256
+"""Added to a cell's code where its alternating face joins the inside corners."""
+
+
+def _crossed_edges(code: int, face: tuple[int, ...]) -> list[int]:
+    """The edges of a face whose ends differ."""
+    return [
+        edge
+        for edge, (a, b) in enumerate(EDGES)
+        if {a, b} <= set(face) and (code >> a & 1) != (code >> b & 1)
+    ]
+
+
+def _alternating_faces(code: int) -> list[int]:
+    return [f for f, face in enumerate(FACES) if len(_crossed_edges(code, face)) == 4]
+
+
+def _loops(code: int, *, join_inside: bool) -> list[int]:
     """For each edge the smallest edge of its loop, −1 where the edge is not crossed."""
-    inside = [bool(code >> corner & 1) for corner in range(8)]
-    loop = [edge if inside[a] != inside[b] else -1 for edge, (a, b) in enumerate(EDGES)]
+    loop = [edge if (code >> a & 1) != (code >> b & 1) else -1 for edge, (a, b) in enumerate(EDGES)]
 
     def join(first: int, second: int) -> None:
         low, high = sorted((loop[first], loop[second]))
         loop[:] = [low if label == high else label for label in loop]
 
-    for face in _FACES:
-        crossed = [edge for edge, ends in enumerate(EDGES) if loop[edge] >= 0 and set(ends) <= set(face)]
+    for face in FACES:
+        crossed = _crossed_edges(code, face)
         if len(crossed) == 2:
             join(*crossed)
-        for corner in face if len(crossed) == 4 else ():
-            if inside[corner]:
-                join(*(edge for edge in crossed if corner in EDGES[edge]))
+        elif len(crossed) == 4:
+            for corner in face:
+                if bool(code >> corner & 1) != join_inside:
+                    join(*(edge for edge in crossed if corner in EDGES[edge]))
     return loop
 
 
-def _tables() -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    patch_of_edge = np.full((256, 12), -1, dtype=np.int8)
-    patch_count = np.zeros(256, dtype=np.int8)
-    for code in range(256):
-        loop = _loops(code)
+def _knotted_face(code: int) -> int:
+    """The alternating face whose strands belong to one patch, −1 where there is none."""
+    loop = _loops(code, join_inside=False)
+    knotted = [
+        face
+        for face in _alternating_faces(code)
+        if len({loop[e] for e in _crossed_edges(code, FACES[face])}) == 1
+    ]
+    assert not knotted or len(_alternating_faces(code)) == 1
+    return knotted[0] if knotted else -1
+
+
+def _tables() -> tuple[NDArray[np.int8], NDArray[np.int8], NDArray[np.int8]]:
+    patch_of_edge = np.full((2 * FLIPPED, 12), -1, dtype=np.int8)
+    patch_count = np.zeros(2 * FLIPPED, dtype=np.int8)
+    for row in range(2 * FLIPPED):
+        loop = _loops(row % FLIPPED, join_inside=row >= FLIPPED)
         labels = sorted(set(loop) - {-1})
-        patch_count[code] = len(labels)
-        patch_of_edge[code] = [labels.index(label) if label >= 0 else -1 for label in loop]
-    return patch_of_edge, patch_count
+        patch_count[row] = len(labels)
+        patch_of_edge[row] = [labels.index(label) if label >= 0 else -1 for label in loop]
+    knotted_face = np.array([_knotted_face(code) for code in range(FLIPPED)], dtype=np.int8)
+    return patch_of_edge, patch_count, knotted_face
 
 
-PATCH_OF_EDGE, PATCH_COUNT = _tables()
-"""By code: patch (256, 12) of every edge, −1 where it is not crossed; number of patches (256,)."""
+PATCH_OF_EDGE, PATCH_COUNT, KNOTTED_FACE = _tables()
+"""By row: patch (512, 12) of every edge, −1 where it is not crossed; number of patches (512,).
+By code: the face (256,) on which the exception may apply, −1 where there is none."""

@@ -1,23 +1,28 @@
-"""Field → triangle mesh: a dense grid, one vertex per patch of surface in a cell, Newton onto the surface."""
+"""Field → triangle mesh on sparse cells: one vertex per patch of surface in a cell, Newton onto the surface.
+
+Dual marching cubes (Nielson 2004) over the blocks that the surface may cross, so cost grows with the
+surface's area; vertices lie on the surface as exactly as float32 can tell.
+"""
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
+from .cells import CHILDREN, SparseCells, build_cells
+from .dual import SAMPLES, classify_cells, connect_vertices, place_vertices, sample_blocks, settle_rows
 from .errors import InvalidResolution
-from .evaluate import colors_at, values_at
-from .kernels import ISO
-from .patches import EDGES, PATCH_COUNT, PATCH_OF_EDGE
+from .launch import launch
+from .patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
 from .progress import Progress
-from .project import project
 from .tree import Node
 
 DEFAULT_RESOLUTION = 64
-LARGEST_GRID = 300_000_000
-"""Samples beyond which a dense grid is refused: 1.2 GB of field values."""
-
-_SAMPLES_PER_SLAB = 1 << 20
+FINEST_RESOLUTION = 1 << 20
+"""Cells along a side beyond which their places do not fit into 32 bits."""
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -33,23 +38,12 @@ class Mesh:
     colors: Floats
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Sample points lower + cell · (i, j, k), `shape` of them."""
-
-    lower: NDArray[np.float64]
-    cell: float
-    shape: tuple[int, int, int]
-
-    def points(self, indices: NDArray[np.floating | np.integer]) -> Floats:
-        return (self.lower + self.cell * indices).astype(np.float32)
-
-
 def polygonize(
     tree: Node,
     *,
     resolution: int | None = None,
     cell_size: float | None = None,
+    device: str | None = None,
     progress: Progress | None = None,
 ) -> Mesh:
     """The surface of `tree` as closed, consistently oriented triangles (counter-clockwise from outside).
@@ -60,27 +54,24 @@ def polygonize(
         Cells along the longest side of the tree's box; 64 by default.
     cell_size
         Side of a cell in the model's units, in place of `resolution`; thinner features may be lost.
+    device
+        Warp device that does the work, by default the current one.
 
     Raises
     ------
     InvalidResolution
-        Both or a senseless value were given, or the grid would not fit in memory.
+        Both or a senseless value were given, or more cells than can be counted.
     """
     report = progress or (lambda _stage, _fraction: None)
-    grid = _make_grid(tree, resolution, cell_size)
-    values = _sample(tree, grid, report)
-    report("connecting vertices", 0.0)
-    vertices, faces = _dual_surface(values, grid)
-    report("moving vertices onto the surface", 0.5)
-    positions, normals = project(tree.tape, vertices, longest_step=0.5 * grid.cell)
-    triangles = _split_quads(faces, positions)
-    colors = colors_at(tree.tape, positions)
-    report("moving vertices onto the surface", 1.0)
-    return Mesh(positions, triangles, normals, colors)
+    size = _cell_size(tree, resolution, cell_size)
+    report("finding the surface", 0.0)
+    cells = build_cells(tree.tape, _grid_box(tree, size), size, device=device)
+    report("finding the surface", 1.0)
+    return mesh_cells(cells, report)
 
 
-def _make_grid(tree: Node, resolution: int | None, cell_size: float | None) -> _Grid:
-    """A grid over the box of influence, one cell wider on every side so that its rim lies outside."""
+def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> float:
+    """Side of a cell that the caller asked for in one way or the other."""
     lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
     longest = float((upper - lower).max())
     if resolution is not None and cell_size is not None:
@@ -94,108 +85,77 @@ def _make_grid(tree: Node, resolution: int | None, cell_size: float | None) -> _
         cell_size = longest / int(cells)
     if not 0.0 < cell_size < np.inf:
         raise InvalidResolution(f"cell_size: expected a finite size above 0, got {cell_size!r}")
-    shape = np.ceil((upper - lower) / cell_size) + 3.0
-    if shape.prod() > LARGEST_GRID:
+    if longest / cell_size > FINEST_RESOLUTION:
         raise InvalidResolution(
-            f"a grid of {shape[0]:.0f}×{shape[1]:.0f}×{shape[2]:.0f} samples does not fit in memory "
-            f"(at most {LARGEST_GRID:,}); take larger cells"
+            f"cell_size: {cell_size:g} makes {longest / cell_size:.3g} cells along the model, at most "
+            f"{FINEST_RESOLUTION:,} can be counted; take larger cells"
         )
-    nx, ny, nz = (int(n) for n in shape)
-    return _Grid(lower - cell_size, float(cell_size), (nx, ny, nz))
+    return float(cell_size)
 
 
-def _sample(tree: Node, grid: _Grid, report: Progress) -> Floats:
-    """Field values on the whole grid, slab by slab along x."""
-    nx, ny, nz = grid.shape
-    values = np.empty(grid.shape, np.float32)
-    thickness = max(1, _SAMPLES_PER_SLAB // (ny * nz))
-    for start in range(0, nx, thickness):
-        report("sampling the field", start / nx)
-        stop = min(start + thickness, nx)
-        indices = np.stack(
-            np.meshgrid(np.arange(start, stop), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1
-        )
-        values[start:stop] = values_at(tree.tape, grid.points(indices.reshape(-1, 3))).reshape(-1, ny, nz)
+def _grid_box(tree: Node, cell_size: float) -> tuple[Floats, Floats]:
+    """The box of influence, one cell wider so that the grid's rim lies outside the surface."""
+    lower, upper = tree.bounds
+    return lower - np.float32(cell_size), upper + np.float32(cell_size)
+
+
+def mesh_cells(cells: SparseCells, report: Progress) -> Mesh:
+    """The triangles of the surface in `cells`."""
+    leaves, device = cells.leaves, cells.device
+    count = len(leaves)
+    geometry = [leaves.blocks, leaves.spans, leaves.tape, wp.vec3(*cells.origin), cells.cell_size]
+    tables = _tables(device)
+
+    def array(size: int, dtype: Any) -> Any:
+        return wp.empty(size, dtype=dtype, device=device)
+
+    report("sampling the field", 0.0)
+    values = array(count * SAMPLES, wp.float32)
+    launch(sample_blocks, count * SAMPLES, geometry, [values], device)
+    codes = array(count * CHILDREN, wp.uint8)
+    quad_counts, vertex_counts = array(count, wp.int32), array(count, wp.int32)
+    launch(classify_cells, count, [values], [codes, quad_counts], device)
+    rows = array(count * CHILDREN, wp.int16)
+    inputs: list[Any] = [leaves.blocks, codes, tables.patch_count, tables.knotted_face]
+    launch(settle_rows, count, inputs, [rows, vertex_counts], device)
     report("sampling the field", 1.0)
-    return values
+    vertex_starts, vertex_total = _starts(vertex_counts, device)
+    quad_starts, quad_total = _starts(quad_counts, device)
+    first_vertices = array(count * CHILDREN, wp.int32)
+    positions, normals, colors = (array(vertex_total, wp.vec3) for _ in range(3))
+    report("placing vertices", 0.0)
+    inputs = [*geometry, values, rows, tables.patch_count, tables.patch_of_edge, vertex_starts]
+    launch(place_vertices, count, inputs, [first_vertices, positions, normals, colors], device)
+    report("placing vertices", 1.0)
+    faces = array(2 * quad_total, wp.vec3i)
+    inputs = [leaves.blocks, rows, tables.patch_of_edge, quad_starts, first_vertices, positions]
+    launch(connect_vertices, count, inputs, [faces], device)
+    report("connecting vertices", 1.0)
+    return Mesh(positions.numpy(), faces.numpy(), normals.numpy(), colors.numpy())
 
 
-def _dual_surface(values: Floats, grid: _Grid) -> tuple[Floats, Ints]:
-    """One vertex per patch, at the mean of its edge crossings, and one quad (m, 4) per crossed grid edge."""
-    inside = values >= ISO
-    codes = _cell_codes(inside)
-    active = np.flatnonzero(PATCH_COUNT[codes.ravel()])
-    active_codes = codes.ravel()[active]
-    counts = PATCH_COUNT[active_codes].astype(np.int64)
-    first_vertex = np.zeros(codes.size, np.int32)
-    first_vertex[active] = np.cumsum(counts) - counts
-    vertices = _crossing_means(values, codes.shape, active, active_codes, first_vertex)
-    quads = [_quads_along(axis, inside, codes, first_vertex.reshape(codes.shape)) for axis in range(3)]
-    return grid.points(vertices), np.concatenate(quads)
+@dataclass(frozen=True)
+class _Tables:
+    """`patches`' tables in a device's memory."""
+
+    patch_count: Any
+    patch_of_edge: Any
+    knotted_face: Any
 
 
-def _cell_codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Code of every cell: bit c tells whether its corner c is inside."""
-    codes = np.zeros(tuple(n - 1 for n in inside.shape), np.uint8)
-    for corner in range(8):
-        codes |= inside[_shifted(corner, codes.shape)].astype(np.uint8) << corner
-    return codes
+@cache
+def _tables(device: str) -> _Tables:
+    return _Tables(
+        wp.array(PATCH_COUNT, dtype=wp.int8, device=device),
+        wp.array(PATCH_OF_EDGE.ravel(), dtype=wp.int8, device=device),
+        wp.array(KNOTTED_FACE, dtype=wp.int8, device=device),
+    )
 
 
-def _shifted(corner: int, shape: tuple[int, ...]) -> tuple[slice, ...]:
-    """Slices that give every cell the sample at its `corner`."""
-    return tuple(slice(corner >> axis & 1, (corner >> axis & 1) + n) for axis, n in enumerate(shape))
-
-
-def _crossing_means(
-    values: Floats,
-    shape: tuple[int, ...],
-    active: NDArray[np.int64],
-    codes: NDArray[np.uint8],
-    first_vertex: Ints,
-) -> NDArray[np.float64]:
-    """Grid coordinates (n, 3) of every patch's vertex."""
-    cells = np.stack(np.unravel_index(active, shape), axis=1)
-    total = int(PATCH_COUNT[codes].astype(np.int64).sum())
-    sums, crossings = np.zeros((total, 3)), np.zeros(total)
-    for edge, (a, b) in enumerate(EDGES):
-        patch = PATCH_OF_EDGE[codes, edge]
-        here = np.flatnonzero(patch >= 0)
-        ends = [cells[here] + [corner & 1, corner >> 1 & 1, corner >> 2] for corner in (a, b)]
-        value_a, value_b = (values[tuple(end.T)].astype(np.float64) for end in ends)
-        share = (ISO - value_a) / (value_b - value_a)
-        vertex = first_vertex[active[here]] + patch[here]
-        crossing = ends[0] + share[:, None] * (ends[1] - ends[0])
-        for axis in range(3):
-            sums[:, axis] += np.bincount(vertex, crossing[:, axis], minlength=total)
-        crossings += np.bincount(vertex, minlength=total)
-    return sums / np.maximum(crossings, 1.0)[:, None]
-
-
-def _quads_along(axis: int, inside: NDArray[np.bool_], codes: NDArray[np.uint8], first_vertex: Ints) -> Ints:
-    """Quads (m, 4) around the crossed grid edges along `axis`, counter-clockwise from outside."""
-    u, v = (axis + 1) % 3, (axis + 2) % 3
-    crossed = np.diff(inside, axis=axis)
-    i = np.stack(np.nonzero(crossed), axis=1)
-    corners = []
-    for du, dv in ((1, 1), (0, 1), (0, 0), (1, 0)):  # the four cells around the edge, in order about `axis`
-        cell = i.copy()
-        cell[:, u] -= du
-        cell[:, v] -= dv
-        edge = EDGES.index((du << u | dv << v, du << u | dv << v | 1 << axis))
-        where = tuple(cell.T)
-        corners.append(first_vertex[where] + PATCH_OF_EDGE[codes[where], edge])
-    quads = np.stack(corners, axis=1).astype(np.int32)
-    leaving = inside[tuple(i.T)]
-    return np.where(leaving[:, None], quads, quads[:, ::-1])
-
-
-def _split_quads(quads: Ints, positions: Floats) -> Ints:
-    """Two triangles (2m, 3) per quad, along its shorter diagonal."""
-    a, b, c, d = quads.T
-    first = np.linalg.norm(positions[a] - positions[c], axis=1)
-    second = np.linalg.norm(positions[b] - positions[d], axis=1)
-    along_ac = np.stack([a, b, c, a, c, d], axis=1)
-    along_bd = np.stack([b, c, d, b, d, a], axis=1)
-    chosen: Ints = np.where((first <= second)[:, None], along_ac, along_bd).reshape(-1, 3)
-    return chosen
+def _starts(counts: Any, device: str) -> tuple[Any, int]:
+    """Where each block's share begins, with one more place for the end; and the total."""
+    ends = np.cumsum(counts.numpy(), dtype=np.int64)
+    total = int(ends[-1]) if len(ends) else 0
+    if total > np.iinfo(np.int32).max:
+        raise InvalidResolution(f"{total:,} vertices cannot be numbered in 32 bits; take larger cells")
+    return wp.array(np.concatenate([[0], ends]).astype(np.int32), dtype=wp.int32, device=device), total

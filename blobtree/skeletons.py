@@ -6,11 +6,15 @@ The field of a primitive is g(|q − closest| / influence). Because the closest 
 own motion does not enter the gradient (envelope theorem), so gradients are exact.
 """
 
+import math
 from dataclasses import dataclass
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
+
+HALF_DIAGONAL = math.sqrt(3.0)
+"""Distance from a cube's centre to its corners, in half sides."""
 
 
 @wp.func
@@ -31,18 +35,48 @@ def closest_on_segment(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
     return wp.vec4(c[0], c[1], c[2], start[3])
 
 
+@wp.func
+def squared_distances_to_ball(center: wp.vec3, radius: wp.float32, c: wp.vec4) -> wp.vec2:
+    """Bounds on (|x − skeleton| / influence)² over a ball, c being the skeleton's answer at its center."""
+    distance = wp.length(center - wp.vec3(c[0], c[1], c[2]))
+    nearest = wp.max(distance - radius, 0.0) / c[3]
+    farthest = (distance + radius) / c[3]
+    return wp.vec2(nearest * nearest, farthest * farthest)
+
+
+@wp.func
+def box_to_point(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Exact bounds on (|x − point| / influence)² over the cube center ± half."""
+    point = tape[at]
+    nearest = float(0.0)
+    farthest = float(0.0)
+    for axis in range(3):
+        gap = wp.abs(center[axis] - point[axis])
+        near = wp.max(gap - half, 0.0)
+        nearest += near * near
+        farthest += (gap + half) * (gap + half)
+    return wp.vec2(nearest, farthest) / (point[3] * point[3])
+
+
+@wp.func
+def box_to_segment(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − segment| / influence)² over the ball around the cube center ± half."""
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, closest_on_segment(center, tape, at))
+
+
 @dataclass(frozen=True)
 class Skeleton:
     """One row of the table: how a kind is called, computed and stored."""
 
     name: str
     closest: wp.Function
+    box_distances: wp.Function
     parameters: int
     """Texels (vec4) that the parameters take on the tape."""
 
 
-POINT = Skeleton("point", closest_on_point, parameters=1)
-SEGMENT = Skeleton("segment", closest_on_segment, parameters=2)
+POINT = Skeleton("point", closest_on_point, box_to_point, parameters=1)
+SEGMENT = Skeleton("segment", closest_on_segment, box_to_segment, parameters=2)
 
 SKELETONS = (POINT, SEGMENT)
 """Every kind; its place here is its code on the tape."""

@@ -1,0 +1,137 @@
+"""The polygonizer's mesh by brute force: every cell of a dense grid, the whole tape at every sample."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree import Mesh, Node
+from blobtree.evaluate import colors_at, values_at
+from blobtree.kernels import ISO
+from blobtree.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
+from blobtree.project import project
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Sample points lower + cell · (i, j, k), `shape` of them."""
+
+    lower: Floats
+    cell: float
+    shape: tuple[int, int, int]
+
+    def points(self, indices: NDArray[np.floating | np.integer]) -> Floats:
+        return self.lower + indices.astype(np.float32) * np.float32(self.cell)
+
+
+def polygonize(tree: Node, *, cell_size: float) -> Mesh:
+    """The surface of `tree` over the same grid as `blobtree.polygonize`."""
+    grid = _make_grid(tree, cell_size)
+    values = values_at(tree.tape, grid.points(np.argwhere(np.ones(grid.shape, bool)))).reshape(grid.shape)
+    vertices, quads = _dual_surface(values, grid)
+    positions, normals = project(tree.tape, vertices, longest_step=0.5 * grid.cell)
+    return Mesh(positions, _split_quads(quads, positions), normals, colors_at(tree.tape, positions))
+
+
+def _make_grid(tree: Node, cell_size: float) -> _Grid:
+    """A grid over the box of influence, one cell wider on every side."""
+    lower, upper = tree.bounds
+    shape = np.ceil((upper - lower) / cell_size) + 4.0
+    nx, ny, nz = (int(n) for n in shape)
+    return _Grid(lower - np.float32(cell_size), cell_size, (nx, ny, nz))
+
+
+def _dual_surface(values: Floats, grid: _Grid) -> tuple[Floats, Ints]:
+    """One vertex per patch, at the mean of its edge crossings, and one quad (m, 4) per crossed grid edge."""
+    inside = values >= ISO
+    codes = _rows(_cell_codes(inside))
+    active = np.flatnonzero(PATCH_COUNT[codes.ravel()])
+    active_codes = codes.ravel()[active]
+    counts = PATCH_COUNT[active_codes].astype(np.int64)
+    first_vertex = np.zeros(codes.size, np.int32)
+    first_vertex[active] = np.cumsum(counts) - counts
+    vertices = _crossing_means(values, codes.shape, active, active_codes, first_vertex)
+    quads = [_quads_along(axis, inside, codes, first_vertex.reshape(codes.shape)) for axis in range(3)]
+    return grid.points(vertices), np.concatenate(quads)
+
+
+def _cell_codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Code of every cell: bit c tells whether its corner c is inside."""
+    codes = np.zeros(tuple(n - 1 for n in inside.shape), np.uint8)
+    for corner in range(8):
+        codes |= inside[_shifted(corner, codes.shape)].astype(np.uint8) << corner
+    return codes
+
+
+def _rows(codes: NDArray[np.uint8]) -> NDArray[np.int16]:
+    """Rows of the patch tables: a cell's code, + FLIPPED where its knotted face is its neighbour's too."""
+    rows = codes.astype(np.int16)
+    knotted = np.pad(KNOTTED_FACE[codes], 1, constant_values=-1)
+    for face in range(6):
+        axis, side = divmod(face, 2)
+        across = np.roll(knotted, 1 - 2 * side, axis=axis)
+        both = (knotted == face) & (across == face ^ 1)
+        rows[both[1:-1, 1:-1, 1:-1]] += FLIPPED
+    return rows
+
+
+def _shifted(corner: int, shape: tuple[int, ...]) -> tuple[slice, ...]:
+    """Slices that give every cell the sample at its `corner`."""
+    return tuple(slice(corner >> axis & 1, (corner >> axis & 1) + n) for axis, n in enumerate(shape))
+
+
+def _crossing_means(
+    values: Floats,
+    shape: tuple[int, ...],
+    active: NDArray[np.int64],
+    codes: NDArray[np.int16],
+    first_vertex: Ints,
+) -> NDArray[np.float64]:
+    """Grid coordinates (n, 3) of every patch's vertex."""
+    cells = np.stack(np.unravel_index(active, shape), axis=1)
+    total = int(PATCH_COUNT[codes].astype(np.int64).sum())
+    sums, crossings = np.zeros((total, 3)), np.zeros(total)
+    for edge, (a, b) in enumerate(EDGES):
+        patch = PATCH_OF_EDGE[codes, edge]
+        here = np.flatnonzero(patch >= 0)
+        ends = [cells[here] + [corner & 1, corner >> 1 & 1, corner >> 2] for corner in (a, b)]
+        value_a, value_b = (values[tuple(end.T)].astype(np.float64) for end in ends)
+        share = (ISO - value_a) / (value_b - value_a)
+        vertex = first_vertex[active[here]] + patch[here]
+        crossing = ends[0] + share[:, None] * (ends[1] - ends[0])
+        for axis in range(3):
+            sums[:, axis] += np.bincount(vertex, crossing[:, axis], minlength=total)
+        crossings += np.bincount(vertex, minlength=total)
+    return sums / np.maximum(crossings, 1.0)[:, None]
+
+
+def _quads_along(axis: int, inside: NDArray[np.bool_], codes: NDArray[np.int16], first_vertex: Ints) -> Ints:
+    """Quads (m, 4) around the crossed grid edges along `axis`, counter-clockwise from outside."""
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    crossed = np.diff(inside, axis=axis)
+    i = np.stack(np.nonzero(crossed), axis=1)
+    corners = []
+    for du, dv in ((1, 1), (0, 1), (0, 0), (1, 0)):  # the four cells around the edge, in order about `axis`
+        cell = i.copy()
+        cell[:, u] -= du
+        cell[:, v] -= dv
+        edge = EDGES.index((du << u | dv << v, du << u | dv << v | 1 << axis))
+        where = tuple(cell.T)
+        corners.append(first_vertex[where] + PATCH_OF_EDGE[codes[where], edge])
+    quads = np.stack(corners, axis=1).astype(np.int32)
+    leaving = inside[tuple(i.T)]
+    return np.where(leaving[:, None], quads, quads[:, ::-1])
+
+
+def _split_quads(quads: Ints, positions: Floats) -> Ints:
+    """Two triangles (2m, 3) per quad, along its shorter diagonal."""
+    a, b, c, d = quads.T
+    first = np.linalg.norm(positions[a] - positions[c], axis=1)
+    second = np.linalg.norm(positions[b] - positions[d], axis=1)
+    along_ac = np.stack([a, b, c, a, c, d], axis=1)
+    along_bd = np.stack([b, c, d, b, d, a], axis=1)
+    chosen: Ints = np.where((first <= second)[:, None], along_ac, along_bd).reshape(-1, 3)
+    return chosen
