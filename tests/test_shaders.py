@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from implicit_decals.shaders import CompileError, ComposeError, Origin, Source, compile_error, compose
 from implicit_decals.shaders.compose import DIRECTORY
 

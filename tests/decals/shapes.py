@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from decals.camera import Camera
+from decals.camera import Camera, Vector
 from decals.model import Decals
 from decals.render.drawables import register
 from decals.render.mesh import MeshDrawable
@@ -48,7 +48,12 @@ def grid(rows: int, columns: int) -> np.ndarray:
 
 
 def torus(
-    radius: float = 1.0, tube: float = 0.4, rows: int = 24, columns: int = 12, *, shift=(0, 0, 0)
+    radius: float = 1.0,
+    tube: float = 0.4,
+    rows: int = 24,
+    columns: int = 12,
+    *,
+    shift: Vector = (0, 0, 0),
 ) -> Shape:
     """A torus around the z axis, faces counter-clockwise from outside."""
     u, v = np.meshgrid(*(np.arange(n) * 2 * np.pi / n for n in (rows, columns)), indexing="ij")

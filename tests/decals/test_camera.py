@@ -1,11 +1,14 @@
 """Cameras: matrices against plain NumPy, rays against the matrices, framing against the frustum."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
-from decals.camera import NEAR_OVER_FAR, Camera
+from decals.camera import NEAR_OVER_FAR, Bounds, Camera, Vector
 from decals.errors import InvalidScene
 
 coordinate = st.floats(-100, 100)
@@ -22,7 +25,8 @@ def cameras(draw: st.DrawFn) -> Camera:
 
 def project(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
-    return clip[:, :3] / clip[:, 3:]
+    divided: np.ndarray = clip[:, :3] / clip[:, 3:]
+    return divided
 
 
 def test_a_plain_view_by_hand() -> None:
@@ -62,7 +66,9 @@ def all_seen(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
 
 
 @given(vector, vector, vector, st.floats(5, 120), st.floats(0.3, 3))
-def test_framing_sees_the_whole_box_and_little_more(a, b, direction, fov, aspect) -> None:
+def test_framing_sees_the_whole_box_and_little_more(
+    a: Vector, b: Vector, direction: Vector, fov: float, aspect: float
+) -> None:
     lower, upper = np.minimum(a, b), np.maximum(a, b)
     assume(np.linalg.norm(upper - lower) > 1e-2)
     assume(np.linalg.norm(direction) > 1e-3)
@@ -78,7 +84,7 @@ def test_framing_sees_the_whole_box_and_little_more(a, b, direction, fov, aspect
 def test_fitting_touches_opposite_edges(seed: int, fov: float, aspect: float) -> None:
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(20, 3)) * rng.uniform(0.1, 5, 3) + rng.uniform(-10, 10, 3)
-    camera = Camera.fitting(points, direction=rng.normal(size=3), fov=fov, aspect=aspect, margin=1.0)
+    camera = Camera.fitting(points, direction=rng.normal(size=3).tolist(), fov=fov, aspect=aspect, margin=1.0)
     seen = all_seen(camera, points, aspect)[:, :2]
     touched = np.isclose(seen.max(axis=0), 1, atol=1e-6) & np.isclose(seen.min(axis=0), -1, atol=1e-6)
     depth = (np.array(camera.position) - points) @ camera.axes[2]
@@ -86,7 +92,7 @@ def test_fitting_touches_opposite_edges(seed: int, fov: float, aspect: float) ->
 
 
 @pytest.mark.parametrize("points", [np.zeros((0, 3)), np.zeros(3), [[0, 0, np.nan]]])
-def test_bad_points_are_refused(points) -> None:
+def test_bad_points_are_refused(points: ArrayLike) -> None:
     with pytest.raises(InvalidScene, match="points must be finite"):
         Camera.fitting(points)
 
@@ -128,7 +134,7 @@ def test_clip_range_follows_the_scene() -> None:
         {"position": (0, 0, 1), "fov": np.nan},
     ],
 )
-def test_bad_cameras_are_refused(arguments: dict) -> None:
+def test_bad_cameras_are_refused(arguments: dict[str, Any]) -> None:
     with pytest.raises(InvalidScene, match="camera's"):
         Camera(**arguments)
 
@@ -136,13 +142,14 @@ def test_bad_cameras_are_refused(arguments: dict) -> None:
 @pytest.mark.parametrize(
     "bounds", [([1, 0, 0], [0, 1, 1]), ([0, 0], [1, 1]), ([0, 0, np.inf], [1, 1, np.inf])]
 )
-def test_bad_bounds_are_refused(bounds) -> None:
+def test_bad_bounds_are_refused(bounds: Bounds) -> None:
     with pytest.raises(InvalidScene, match="bounds"):
         Camera.framing(bounds)
 
 
 def test_arrays_become_tuples() -> None:
-    camera = Camera(np.array([0, 0, 1], np.float32), fov=np.float32(30))
+    place: Any = np.array([0, 0, 1], np.float32)
+    camera = Camera(place, fov=np.float32(30))  # type: ignore[arg-type]  # at run time it is a number
     assert camera.position == (0.0, 0.0, 1.0)
     assert isinstance(camera.position[0], float)
     assert isinstance(camera.fov, float)

@@ -1,5 +1,7 @@
 """Arrays and images on the graphics card come back as they went."""
 
+from typing import Any
+
 import moderngl
 import numpy as np
 import pytest
@@ -93,15 +95,16 @@ def test_image_layers_rows_and_mip_levels(context: Context) -> None:
     array.release()
 
 
-def test_no_images_and_bad_images(context: Context) -> None:
+def test_no_images(context: Context) -> None:
     assert ImageArray(context, []).size == 1
-    for bad in (
-        np.zeros((4, 4, 3), np.uint8),
-        np.zeros((4, 4, 4), np.float32),
-        np.zeros((0, 4, 4), np.uint8),
-    ):
-        with pytest.raises(InvalidImage, match="image 0 must be"):
-            ImageArray(context, [bad])
+
+
+@pytest.mark.parametrize(
+    "bad", [np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4, 4), np.float32), np.zeros((0, 4, 4), np.uint8)]
+)
+def test_bad_images(context: Context, bad: Any) -> None:
+    with pytest.raises(InvalidImage, match="image 0 must be"):
+        ImageArray(context, [bad])
 
 
 @pytest.mark.parametrize(
@@ -115,7 +118,7 @@ def test_no_images_and_bad_images(context: Context) -> None:
         ([(2048, 2048)] * 17, 1024),
     ],
 )
-def test_the_common_size(shapes: list, size: int) -> None:
+def test_the_common_size(shapes: list[tuple[int, int]], size: int) -> None:
     assert common_size(shapes) == size
 
 

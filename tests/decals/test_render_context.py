@@ -6,7 +6,6 @@ import moderngl
 import pytest
 
 from decals.errors import NoGraphics
-from decals.render import context as module
 from decals.render.context import Context
 from implicit_decals.shaders import CompileError, Source, compose
 
@@ -23,7 +22,7 @@ def test_no_context_is_a_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(**_: object) -> None:
         raise Exception("eglInitialize failed (0x3001)")  # noqa: TRY002
 
-    monkeypatch.setattr(module.moderngl, "create_context", fail)
+    monkeypatch.setattr(moderngl, "create_context", fail)
     with pytest.raises(NoGraphics, match=r"no OpenGL 3.3 context .*0x3001.*doctor"):
         Context.standalone()
 
@@ -32,8 +31,8 @@ def test_missing_libraries_are_asked_for_first(monkeypatch: pytest.MonkeyPatch) 
     def missing() -> None:
         raise NoGraphics("apt-get install libegl1")
 
-    monkeypatch.setattr(module, "require_gl", missing)
-    monkeypatch.setattr(module.moderngl, "create_context", lambda **_: pytest.fail("must not be reached"))
+    monkeypatch.setattr("decals.render.context.require_gl", missing)
+    monkeypatch.setattr(moderngl, "create_context", lambda **_: pytest.fail("must not be reached"))
     with pytest.raises(NoGraphics, match="libegl1"):
         Context.standalone()
 

@@ -1,5 +1,7 @@
 """The decal pass at every pixel: against float64 brute force, against Warp, and the colours that it makes."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,37 +12,40 @@ from decals.model import Decals
 from decals.render import tile
 from decals.render.context import Context
 from decals.render.renderer import Buffers, Renderer
+from decals.render.scene_like import SceneLike
 from tests.decals.shapes import Picture, Shape, View, torus
 from tests.oracles.decals import decals_at
 
 SIZE = (80, 60)
+Color = tuple[float, float, float]
+
 TIE = 1e-4
 """Owners may differ where a relative change of this size decides."""
 WHITE = Picture(np.full((4, 4, 4), 255, np.uint8))
 
 
-def scattered(shape: Shape, count: int, seed: int, *, radii: tuple[float, float], images: int = 1) -> Decals:
+def scattered(shape: Shape, count: int, seed: int, *, radii: tuple[float, float]) -> Decals:
     """Decals at random vertices of a shape, random in size and turn."""
     rng = np.random.default_rng(seed)
     corners = shape.vertices[shape.faces[rng.integers(0, len(shape.faces), count)]].astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return Decals(
-        positions=np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], count), corners),
-        normals=normals,
-        tangents=np.cross(normals, rng.normal(size=(count, 3))),
-        radii=np.exp(rng.uniform(*np.log(radii), count)),
-        images=rng.integers(0, images, count),
-        spill=rng.random(count) < 0.2,
-    )
+    arrays: dict[str, Any] = {
+        "positions": np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], count), corners),
+        "normals": normals,
+        "tangents": np.cross(normals, rng.normal(size=(count, 3))),
+        "radii": np.exp(rng.uniform(np.log(radii[0]), np.log(radii[1]), count)),
+        "spill": rng.random(count) < 0.2,
+    }
+    return Decals(**arrays)
 
 
-def view_of(decals: Decals, *shapes: Shape, images: int = 1, direction=(0.5, -0.9, 0.8)) -> View:
+def view_of(decals: Decals, *shapes: Shape) -> View:
     points = np.concatenate([shape.vertices for shape in shapes])
-    camera = Camera.framing((points.min(0), points.max(0)), direction=direction, up=(0, 0, 1))
-    return View(shapes, camera, decals, (WHITE,) * images)
+    camera = Camera.fitting(points, direction=(0.5, -0.9, 0.8), up=(0, 0, 1))
+    return View(shapes, camera, decals, (WHITE,))
 
 
-def compare(view: View, buffers: Buffers, mapping: Mapping) -> np.ndarray:
+def compare(view: SceneLike, buffers: Buffers, mapping: Mapping) -> np.ndarray:
     """Owner, field and uv of all covered pixels against brute force; which of them have an owner."""
     seen = buffers.object_id >= 0
     points, normals = buffers.position[seen], buffers.normal[seen]
@@ -59,7 +64,9 @@ def compare(view: View, buffers: Buffers, mapping: Mapping) -> np.ndarray:
 
 @pytest.mark.parametrize("mapping", list(Mapping))
 @pytest.mark.parametrize(("count", "radii"), [(1, (0.5, 0.6)), (40, (0.2, 0.6)), (800, (0.004, 0.4))])
-def test_every_pixel_is_the_oracles(renderer: Renderer, mapping: Mapping, count: int, radii) -> None:
+def test_every_pixel_is_the_oracles(
+    renderer: Renderer, mapping: Mapping, count: int, radii: tuple[float, float]
+) -> None:
     shapes = torus(), torus(0.8, 0.3, shift=(0.7, 0, 0.5))
     decals = Decals.concatenate([scattered(shape, count, 7, radii=radii) for shape in shapes])
     view = view_of(decals, *shapes)
@@ -115,12 +122,13 @@ def test_tiles_fit_together(
 # -- colours --------------------------------------------------------------------------------------------
 
 
-def wall(picture: np.ndarray, *, pixels: int, radius: float = 1.0, color=(0.5, 0.5, 0.5)) -> View:
-    """One decal whose rim fills a wall seen face on, at this many pixels across."""
+def wall(picture: np.ndarray, *, color: Color = (0.5, 0.5, 0.5)) -> View:
+    """One decal on a wall, seen face on; its rim fills the picture's height."""
     corners = np.array([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], np.float32)
     square = Shape(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), color)
-    decals = Decals(positions=[[0, 0, 0]], normals=[[0, 0, 1]], tangents=[[1, 0, 0]], radii=[radius])
-    camera = Camera((0, 0, 10), fov=2 * np.degrees(np.arctan(radius / 10)))
+    arrays: dict[str, Any] = {"positions": [[0, 0, 0]], "normals": [[0, 0, 1]], "tangents": [[1, 0, 0]]}
+    decals = Decals(**arrays, radii=np.ones(1, np.float32))
+    camera = Camera((0, 0, 10), fov=2 * np.degrees(np.arctan(1 / 10)))
     return View((square,), camera, decals, (Picture(picture),))
 
 
@@ -132,7 +140,7 @@ def quarters() -> np.ndarray:
 
 
 def test_an_image_stands_upright(renderer: Renderer) -> None:
-    picture = renderer.render(wall(quarters(), pixels=64, color=(1, 1, 1)), size=(64, 64), samples=1)
+    picture = renderer.render(wall(quarters(), color=(1, 1, 1)), size=(64, 64), samples=1)
     upper_left, upper_right, lower_left, lower_right = (
         picture[y, x, :3].astype(int) for y, x in [(24, 24), (24, 40), (40, 24), (40, 40)]
     )
@@ -145,7 +153,7 @@ def test_an_image_stands_upright(renderer: Renderer) -> None:
 
 
 def test_uv_of_a_flat_decal_by_hand(renderer: Renderer) -> None:
-    buffers = renderer.buffers(wall(quarters(), pixels=64), size=(64, 64))
+    buffers = renderer.buffers(wall(quarters()), size=(64, 64))
     x, y = np.meshgrid((np.arange(64) + 0.5) / 64, 1 - (np.arange(64) + 0.5) / 64)
     inside = np.hypot(x - 0.5, y - 0.5) < 0.499
     np.testing.assert_array_equal(buffers.owner == 0, np.hypot(x - 0.5, y - 0.5) < 0.5)
@@ -161,16 +169,16 @@ def test_a_fine_pattern_averages_to_grey(renderer: Renderer, pixels: int) -> Non
     grey = np.full((4, 4, 4), 255, np.uint8)
     grey[..., :3] = 188
     inside = np.s_[pixels // 4 : -pixels // 4, pixels // 4 : -pixels // 4, :3]
-    fine = renderer.render(wall(board, pixels=pixels), size=(pixels, pixels), samples=1)[inside]
-    flat = renderer.render(wall(grey, pixels=pixels), size=(pixels, pixels), samples=1)[inside]
+    fine = renderer.render(wall(board), size=(pixels, pixels), samples=1)[inside]
+    flat = renderer.render(wall(grey), size=(pixels, pixels), samples=1)[inside]
     np.testing.assert_allclose(fine.astype(int), flat, atol=3)
 
 
 def test_an_opaque_decal_looks_like_an_object_of_its_colour(renderer: Renderer) -> None:
     image = np.full((4, 4, 4), 255, np.uint8)
     image[..., :3] = 200, 90, 40
-    covered = renderer.render(wall(image, pixels=32), size=(32, 32))
-    painted = wall(image, pixels=32, color=(200 / 255, 90 / 255, 40 / 255))
+    covered = renderer.render(wall(image), size=(32, 32))
+    painted = wall(image, color=(200 / 255, 90 / 255, 40 / 255))
     plain = renderer.render(View(painted.objects, painted.camera), size=(32, 32))
     np.testing.assert_allclose(covered[12:20, 12:20].astype(int), plain[12:20, 12:20], atol=1)
 
@@ -202,6 +210,6 @@ def test_light_is_kept_out_of_corners(renderer: Renderer) -> None:
 
 
 def test_transparent_images_leave_the_object(renderer: Renderer) -> None:
-    view = wall(np.zeros((8, 8, 4), np.uint8), pixels=32)
+    view = wall(np.zeros((8, 8, 4), np.uint8))
     bare = View(view.objects, view.camera)
     np.testing.assert_array_equal(renderer.render(view, size=(32, 32)), renderer.render(bare, size=(32, 32)))

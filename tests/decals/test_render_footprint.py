@@ -1,12 +1,14 @@
 """Ray differentials on the tangent plane, against the plane's own neighbours."""
 
+from pathlib import Path
+
 import moderngl
 import numpy as np
 import pytest
 
 from decals.camera import Camera
 from decals.render.context import Context
-from decals.render.tile import CameraBuffer, Rectangle, Tile, attach_camera
+from decals.render.tile import CameraBuffer, Rectangle, Tile, attach_camera, set_uniform
 from implicit_decals.shaders import compose
 from implicit_decals.shaders.compose import DIRECTORY
 
@@ -31,18 +33,22 @@ def on_plane(camera: Camera, x: np.ndarray, y: np.ndarray, normal: np.ndarray) -
     rays = camera.rays(*SIZE)
     directions = rays.directions(x, y)
     t = normal @ (camera.target - rays.origin) / (directions @ normal)
-    return rays.origin + t[..., None] * directions
+    places: np.ndarray = rays.origin + t[..., None] * directions
+    return places
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.8, 0, 0.6), (0.5, -0.7, 0.5), (0, 0.9, 0.3)])
-def test_a_footprint_is_the_way_to_the_next_pixel(context: Context, tmp_path, normal) -> None:
+def test_a_footprint_is_the_way_to_the_next_pixel(
+    context: Context, tmp_path: Path, normal: tuple[float, float, float]
+) -> None:
     (tmp_path / "main.frag").write_text(MAIN)
     for name in ("footprint.glsl", "camera.glsl"):
         (tmp_path / name).write_text((DIRECTORY / name).read_text(encoding="utf-8"), encoding="utf-8")
     unit = np.array(normal) / np.linalg.norm(normal)
     camera = Camera((0.3, 0.2, 6), (0.1, 0, 0), fov=10)
     program = attach_camera(context.program(compose("screen.vert"), compose("main.frag", directory=tmp_path)))
-    program["point"].value, program["normal"].value = camera.target, tuple(unit)
+    set_uniform(program, "point", camera.target)
+    set_uniform(program, "normal", tuple(unit))
     targets = [context.gl.texture(SIZE, 4, dtype="f4") for _ in range(2)]
     framebuffer = context.gl.framebuffer(targets)
     framebuffer.use()

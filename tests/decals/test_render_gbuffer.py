@@ -13,23 +13,21 @@ from tests.oracles.raster import cast, edges
 SIZE = (80, 60)
 
 
-def look(shapes: tuple[Shape, ...], **options) -> View:
+def look(shapes: tuple[Shape, ...]) -> View:
     points = np.concatenate([shape.vertices for shape in shapes])
-    camera = Camera.framing(
-        (points.min(0), points.max(0)), direction=(0.5, -0.9, 0.8), up=(0, 0, 1), **options
-    )
+    camera = Camera.framing((points.min(0), points.max(0)), direction=(0.5, -0.9, 0.8), up=(0, 0, 1))
     return View(shapes, camera)
 
 
-def oracle(view: View, size: tuple[int, int]):
+def oracle(camera: Camera, shapes: tuple[Shape, ...], size: tuple[int, int]) -> list[np.ndarray]:
     """Position, smooth normal and object of every pixel, row 0 at the top."""
     width, height = size
     x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
-    rays = view.camera.rays(width, height)
+    rays = camera.rays(width, height)
     directions = rays.directions(x, y).reshape(-1, 3)
     nearest = np.full(len(directions), np.inf)
     normal, object_id = np.zeros((len(directions), 3)), np.full(len(directions), -1)
-    for number, shape in enumerate(view.objects):
+    for number, shape in enumerate(shapes):
         t, face, weights = cast(shape.vertices, shape.faces, rays.origin, directions)
         closer = t < nearest
         corners = vertex_normals(shape.vertices, shape.faces)[shape.faces[face[closer]]].astype(np.float64)
@@ -46,10 +44,11 @@ def oracle(view: View, size: tuple[int, int]):
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
 def test_two_meshes_against_rays(renderer: Renderer, scale: float) -> None:
-    shapes = torus(), torus(0.8, 0.3, shift=(0.7, 0, 0.5))
-    view = look(tuple(Shape(shape.vertices * np.float32(scale), shape.faces) for shape in shapes))
+    pair = torus(), torus(0.8, 0.3, shift=(0.7, 0, 0.5))
+    shapes = tuple(Shape(shape.vertices * np.float32(scale), shape.faces) for shape in pair)
+    view = look(shapes)
     buffers = renderer.buffers(view, size=SIZE)
-    position, normal, object_id, depth = oracle(view, SIZE)
+    position, normal, object_id, depth = oracle(view.camera, shapes, SIZE)
     sure = ~edges(object_id) & ~(np.hypot(*np.gradient(depth)) > 0.05 * scale)
     assert sure.mean() > 0.7
     assert set(np.unique(buffers.object_id[sure])) == {-1, 0, 1}

@@ -1,5 +1,7 @@
 """Whole scenes: meshes and BlobTrees in one picture, under one coat of decals."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,9 +9,10 @@ from blobtree import Point, Segment, polygonize
 from blobtree.trace import trace
 from decals.camera import Camera
 from decals.mapping import Mapping
+from decals.model import Decals
 from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers, tile
 from decals.render.context import Context
-from decals.scene import DecalImage, MeshObject, Scene, TreeObject
+from decals.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.seeding import seed
 from tests.decals.shapes import torus
 from tests.decals.test_render_decals import compare
@@ -23,7 +26,7 @@ TREE = Segment((-0.8, 0, 0), (0.5, 0, 0), radius=0.4, color=(0.8, 0.2, 0.1)) + P
 WHITE = DecalImage("white", np.full((4, 4, 4), 255, np.uint8))
 
 
-def framed(*objects, decals=None) -> Scene:
+def framed(*objects: SceneObject, decals: Decals | None = None) -> Scene:
     scene = Scene(objects=objects, camera=Camera((0, 0, 1)), images=(WHITE,))
     camera = Camera.framing(scene.bounds, direction=(0.4, -0.9, 0.7), up=(0, 0, 1))
     return scene.replace(camera=camera, decals=decals)
@@ -130,7 +133,7 @@ def test_one_call_makes_its_own_context(renderer: Renderer, both: Scene) -> None
     )
 
 
-def test_an_edited_scene_releases_what_it_no_longer_shows(context, both: Scene) -> None:
+def test_an_edited_scene_releases_what_it_no_longer_shows(context: Context, both: Scene) -> None:
     with Renderer(context) as own:
         own.render(both, size=(16, 12))
         drawable = own._drawables._things[(id(both.objects[0]),)][1]
@@ -154,6 +157,6 @@ def test_tiles_send_the_same_rays(
 
 
 @pytest.mark.parametrize(("size", "samples"), [((0, 4), 1), ((4, -1), 1), ((4, 4), 0), ((4,), 1)])
-def test_impossible_sizes_are_refused(renderer: Renderer, both: Scene, size, samples) -> None:
+def test_impossible_sizes_are_refused(renderer: Renderer, both: Scene, size: Any, samples: int) -> None:
     with pytest.raises(ValueError, match="a picture needs a width"):
         renderer.render(both, size=size, samples=samples)

@@ -1,5 +1,7 @@
 """What a camera sees of a triangle mesh, by brute force in float64."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,8 +39,9 @@ def cast(
     return first, np.where(np.isfinite(first), face, -1), weights
 
 
-def edges(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def edges(mask: NDArray[Any]) -> NDArray[np.bool_]:
     """Pixels whose 3 × 3 neighbourhood is not uniform: where a rasteriser and a ray may differ."""
     padded = np.pad(mask, 1, mode="edge")
     shifts = [padded[i : i + mask.shape[0], j : j + mask.shape[1]] for i in range(3) for j in range(3)]
-    return np.any([shift != mask for shift in shifts], axis=0)
+    differs: NDArray[np.bool_] = np.any([shift != mask for shift in shifts], axis=0)
+    return differs
