@@ -70,6 +70,7 @@ class _Translator:
 
     function: wp.Function
     types: dict[str, str] = field(default_factory=dict)
+    returned: str = ""
     callees: list[wp.Function] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -89,12 +90,15 @@ class _Translator:
     def signature(self) -> str:
         """What the function returns, its name, and its parameters."""
         annotations = {name: type_name(hint) for name, hint in self.hints.items()}
-        returned = annotations.pop("return", "void")
+        returned = annotations.pop("return", None)
+        if returned is None:
+            raise self.refusal(self.definition, "it does not say what it returns")
         for name, glsl_type in annotations.items():
             if glsl_type is None:
                 raise self.refusal(self.definition, f"parameter {name!r} has no type that GLSL knows")
         if len(annotations) != len(self.definition.args.args):
             raise self.refusal(self.definition, "a parameter lacks its type")
+        self.returned = returned
         self.types = {name: str(glsl_type) for name, glsl_type in annotations.items()}
         parameters = ", ".join(f"{glsl_type} {spell(name)}" for name, glsl_type in self.types.items())
         return f"{returned} {self.function.key}({parameters})"
@@ -124,8 +128,11 @@ class _Translator:
         match node:
             case ast.Expr(value=ast.Constant()) | ast.Pass():
                 return
-            case ast.Return(value=value):
-                yield f"    return {self.expression(value).code};" if value else "    return;"
+            case ast.Return(value=value) if value is not None:
+                result = self.expression(value)
+                if result.type != self.returned:
+                    raise self.refusal(node, f"it returns {result.type}, not {self.returned}")
+                yield f"    return {result.code};"
             case ast.Assign(targets=[target], value=value):
                 yield self.assignment(target, self.expression(value))
             case ast.AnnAssign(target=target, value=value) if value is not None:
@@ -213,9 +220,12 @@ class _Translator:
                     f"({self.expression(left).code} {symbol} {self.expression(right).code})", "bool"
                 )
             case ast.IfExp(test=test, body=body, orelse=orelse):
-                chosen = self.expression(body)
-                condition, other = self.expression(test).code, self.expression(orelse).code
-                return Expression(f"({condition} ? {chosen.code} : {other})", chosen.type)
+                chosen, other = self.expression(body), self.expression(orelse)
+                if chosen.type != other.type:
+                    raise self.refusal(node, f"{chosen.type} and {other.type} do not mix")
+                return Expression(
+                    f"({self.expression(test).code} ? {chosen.code} : {other.code})", chosen.type
+                )
             case ast.Subscript(value=value, slice=index):
                 return self.element(node, self.expression(value), self.expression(index))
             case ast.Attribute(value=value, attr=component) if component in "xyzw":
@@ -302,9 +312,15 @@ class _Translator:
             return BUILTINS[callee.key](*arguments)
         if callee not in self.callees:
             self.callees.append(callee)
-        returned = type_name(getattr(callee.func, "__annotations__", {}).get("return"))
+        hints = dict(getattr(callee.func, "__annotations__", {}))
+        returned = type_name(hints.pop("return", None))
         if returned is None:
             raise self.refusal(node, f"{callee.key} does not say what it returns")
+        expected, given = [type_name(hint) for hint in hints.values()], [a.type for a in arguments]
+        if expected != given:
+            raise self.refusal(
+                node, f"{callee.key} takes {', '.join(map(str, expected))}, got {', '.join(given)}"
+            )
         return Expression(f"{callee.key}({codes})", returned)
 
 
