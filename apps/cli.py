@@ -1,4 +1,7 @@
-"""The command ``implicit-decals``: argument parsing, and errors as one line each."""
+"""The command ``implicit-decals``: argument parsing, and errors as one line each.
+
+Nothing heavy is imported here, so that ``--help`` and ``--version`` answer at once.
+"""
 
 import sys
 from collections.abc import Sequence
@@ -6,9 +9,7 @@ from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 from rich.console import Console
-
-from blobtree import BlobTreeError
-from decals.errors import DecalsError
+from rich.markup import escape
 
 from .errors import UsageError
 from .help_texts import HELP
@@ -23,7 +24,6 @@ app = App(
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
 )
-# Each command is imported when it is called, so that --help and --version answer at once.
 for _name, _help in HELP.items():
     app.command(f"implicit_decals.apps.{_name}:{_name}", name=_name, help=_help)
 
@@ -43,24 +43,30 @@ def run(tokens: Sequence[str] | None = None) -> int:
     """
     try:
         result = app(tokens, print_error=False, exit_on_error=False, result_action="return_value")
-    except (CycloptsError, UsageError, DecalsError, BlobTreeError) as error:
-        return _complain(str(error))
-    except OSError as error:
-        return _complain(f"{error.strerror or error}: {error.filename or 'the file'}")
     except KeyboardInterrupt:
         Console(stderr=True).print("interrupted")
         return INTERRUPTED
+    except OSError as error:
+        return _complain(f"{error.strerror or error}: {error.filename or 'a file'}")
+    except Exception as error:
+        if not isinstance(error, _bad_input()):
+            raise  # a bug: its traceback is what we want to see
+        return _complain(str(error))
     return result if isinstance(result, int) else 0
+
+
+def _bad_input() -> tuple[type[Exception], ...]:
+    """Give the errors that mean bad input; their packages are loaded by now, or failed to."""
+    from blobtree import BlobTreeError
+    from decals.errors import DecalsError
+
+    return CycloptsError, UsageError, DecalsError, BlobTreeError
 
 
 def _complain(message: str) -> int:
     line = " ".join(message.split())
-    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_escaped(line)}", highlight=False)
+    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {escape(line)}", highlight=False)
     return BAD_INPUT
-
-
-def _escaped(text: str) -> str:
-    return text.replace("[", r"\[")
 
 
 def main() -> None:

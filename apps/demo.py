@@ -10,10 +10,11 @@ from decals.render import Renderer
 
 from .errors import UsageError
 from .hatching import hatching, mosaic
-from .options import MAX_SAMPLES, check_count, parse_size
+from .options import MAX_SAMPLES, TILE, check_count, parse_size
 from .output import check_output, write_picture
 from .progress_bars import progress_bars
 from .spanning import spanning
+from .warp_start import start_warp
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 
@@ -43,7 +44,8 @@ def demo(
     _make_folder(output)
     for name in PICTURES:
         check_output(output / name, (".png",))
-    with Renderer() as renderer, progress_bars() as progress:
+    start_warp()
+    with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:
         nest = hatching(progress=progress)
         for name, scene in zip(PICTURES, (nest, mosaic(nest), spanning()), strict=True):
             progress(f"Drawing {name}", 0.0)

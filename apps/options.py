@@ -8,6 +8,8 @@ from .views import Size
 MAX_EDGE = 16384
 """Longest edge of a picture, in pixels."""
 MAX_SAMPLES = 8
+TILE = 768
+"""Most samples that are drawn at once, per axis: a command must be interruptible within seconds."""
 MAX_DECALS = 1_000_000
 MAX_SEED = 2**32 - 1
 

@@ -1,7 +1,7 @@
 """Where results go: checked before the long work, written in one step after it."""
 
 import io
-import os
+import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,8 +35,11 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(f"the output folder {str(folder)!r} does not exist; make it first")
-    if not os.access(folder, os.W_OK):
-        raise UsageError(f"the output folder {str(folder)!r} cannot be written; choose another")
+    try:
+        tempfile.TemporaryFile(dir=folder).close()  # permissions alone do not tell
+    except OSError as error:
+        reason = f"the output folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
+        raise UsageError(reason) from error
 
 
 def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:

@@ -15,6 +15,7 @@ from .errors import UsageError
 from .models import load_model
 from .output import MESH_SUFFIXES, check_output, replacing
 from .progress_bars import progress_bars
+from .warp_start import start_warp
 
 
 def polygonize(
@@ -39,6 +40,7 @@ def polygonize(
         Side of a cell in the model's units, in place of the resolution.
     """
     check_output(output, MESH_SUFFIXES)
+    start_warp()
     loaded = load_model(model)
     if not isinstance(loaded, TreeObject):
         raise UsageError(f"expected a BlobTree in JSON or a sample (creature, spheres), {model!r} is none")

@@ -15,11 +15,12 @@ from decals.seeding import seed as seed_decals
 
 from .errors import UsageError
 from .models import load_models
-from .options import MAX_DECALS, MAX_SAMPLES, MAX_SEED, check_count, parse_size
+from .options import MAX_DECALS, MAX_SAMPLES, MAX_SEED, TILE, check_count, parse_size
 from .output import PICTURE_SUFFIXES, check_output, write_picture
 from .progress_bars import progress_bars
 from .samples import axes_of
 from .views import UPRIGHT, Size, View, frame, parse_view
+from .warp_start import start_warp
 
 DEFAULT_COUNT = 500
 DEFAULT_IMAGES = ("scale",)
@@ -74,11 +75,15 @@ def render(
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
         check_output(save, (".json",))
+    start_warp()
     loaded = load_models(model)
     if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
         raise UsageError("a saved scene brings its own decals; leave out --decals, --image and --seed")
     coat = Coat.asked(decals, image, seed)
-    with Renderer() as renderer, progress_bars() as progress:  # no graphics: say so before the long work
+    with (
+        Renderer(max_tile=TILE) as renderer,
+        progress_bars() as progress,
+    ):  # no graphics: say so before the long work
         scene = loaded if isinstance(loaded, Scene) else coat.scene(loaded, view, pixels, progress)
         if isinstance(loaded, Scene) and (camera is not None or up is not None):
             scene = scene.replace(camera=frame(scene.objects, view, pixels))

@@ -272,7 +272,7 @@ def test_a_scene_brings_its_own_decals(bad: Callable[..., str], folder: Path) ->
 
 
 def test_no_graphics(bad: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> None:
+    def fail(**_options: object) -> None:
         raise NoGraphics("drawing needs libEGL.so.1; run: apt-get install libegl1")
 
     monkeypatch.setattr(render_module, "Renderer", fail)
@@ -301,6 +301,11 @@ def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture
     assert "interrupted" in err
     assert "Traceback" not in err
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="wants a folder that not even root can write to")
+def test_a_folder_that_cannot_be_written(bad: Callable[..., str]) -> None:
+    assert "cannot be written" in bad("render", "ball.ply", "-o", "/proc/a.png")
 
 
 def test_square_brackets_in_names_survive(bad: Callable[..., str]) -> None:
