@@ -48,11 +48,23 @@ def ricci_norm(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.float32
 
 @wp.func
 def ricci_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
-    """F = (aⁿ + bⁿ)^(1/n) (Ricci 1973): n = 1 is the sum, n → ∞ the union; ∂F/∂a = (a/F)^(n−1)."""
-    value = ricci_norm(a, b, exponent)
-    if value <= 0.0:
+    """F = (aⁿ + bⁿ)^(1/n) (Ricci 1973): n = 1 is the sum, n → ∞ the union; ∂F/∂a = (a/F)^(n−1).
+
+    Written in r = smaller / larger, because float32 cannot take (a/F) to a large power to more than 4 digits.
+    """
+    larger = wp.max(a, b)
+    if larger <= 0.0:
         return wp.vec3(0.0, 0.0, 0.0)
-    return wp.vec3(value, wp.pow(a / value, exponent - 1.0), wp.pow(b / value, exponent - 1.0))
+    ratio = wp.min(a, b) / larger
+    power = wp.pow(ratio, exponent)
+    root = wp.pow(1.0 + power, 1.0 / exponent)
+    by_larger = root / (1.0 + power)
+    by_smaller = float(0.0)
+    if ratio > 0.0:
+        by_smaller = by_larger * power / ratio
+    if a >= b:
+        return wp.vec3(larger * root, by_larger, by_smaller)
+    return wp.vec3(larger * root, by_smaller, by_larger)
 
 
 @wp.func
