@@ -26,6 +26,9 @@ BRANCHING = 1 << BRANCHING_BITS
 
 CHILDREN = BRANCHING**3
 
+SURELY_OUTSIDE = -1
+SURELY_INSIDE = -2
+
 KEY_DIGITS = 10
 """Levels that a key has room for: 4¹⁰ blocks along a side."""
 
@@ -85,10 +88,11 @@ def _write(
     parent = chosen[i] // CHILDREN
     block = child_block(parents[parent], chosen[i] % CHILDREN)
     result = prune(
-        block_center(block, origin, size), 0.5 * size + pad, tape, spans[parent], out, starts[i], True
+        block_center(block, origin, size), 0.5 * size + pad, tape, spans[parent], out, starts[i] + 1, True
     )
+    out[starts[i]] = wp.vec4(result[3], 0.0, 0.0, 0.0)
     blocks[i] = block
-    new_spans[i] = wp.vec2i(starts[i], starts[i] + int(result[3]))
+    new_spans[i] = wp.vec2i(starts[i] + 1, starts[i] + 1 + int(result[3]))
 
 
 @wp.func
@@ -126,11 +130,18 @@ def find_block(block: wp.vec3i, blocks: wp.array(dtype=wp.vec3i)) -> wp.int32:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Blocks (n, 3) of one level that the surface may cross, in key order; spans (n, 2) of their tapes."""
+    """The blocks of one level that the surface may cross, in key order.
+
+    `tape` holds the pruned tape of every block, each behind a texel (its length, 0, 0, 0).
+    """
 
     blocks: "wp.array[wp.vec3i]"
+    """Coordinates (n, 3), in blocks of this level."""
     spans: "wp.array[wp.vec2i]"
+    """Where in `tape` each block's tape begins and ends (n, 2)."""
     tape: "wp.array[wp.vec4]"
+    parent_children: Ints
+    """For every child of the level above its place in this one, or SURELY_OUTSIDE, SURELY_INSIDE."""
 
     def __len__(self) -> int:
         return len(self.blocks)
@@ -148,8 +159,14 @@ class SparseCells:
     cell_size: float
     blocks_per_side: int
     """Blocks of the finest level along each side of the root block."""
-    leaves: Level
+    levels: tuple[Level, ...]
+    """From the root, a single block, to the finest."""
     device: str
+
+    @property
+    def leaves(self) -> Level:
+        """The finest level."""
+        return self.levels[-1]
 
 
 def build_cells(
@@ -170,11 +187,13 @@ def build_cells(
         wp.zeros(1, dtype=wp.vec3i, device=place),
         wp.array([uploaded.span], dtype=wp.vec2i, device=place),
         uploaded.data,
+        np.zeros(0, np.int32),
     )
+    levels = [level]
     for remaining in reversed(range(depth)):
         size = cell_size * BRANCHING ** (remaining + 1)
-        level = _refine(level, origin, size, pad, place)
-    return SparseCells(lower, cell_size, BRANCHING**depth, level, place)
+        levels.append(_refine(levels[-1], origin, size, pad, place))
+    return SparseCells(lower, cell_size, BRANCHING**depth, tuple(levels), place)
 
 
 def _depth(lower: NDArray[np.float64], upper: NDArray[np.float64], cell_size: float) -> int:
@@ -194,7 +213,9 @@ def _refine(level: Level, origin: wp.vec3, size: float, pad: float, device: str)
     launch(_measure, count, geometry, [measured], device)
     smallest, largest, texels, _ = measured.numpy().T
     chosen = np.flatnonzero((smallest <= ISO) & (largest >= ISO)).astype(np.int32)
-    needed = texels[chosen].astype(np.int64)
+    children = np.where(smallest > ISO, SURELY_INSIDE, SURELY_OUTSIDE).astype(np.int32)
+    children[chosen] = np.arange(len(chosen))
+    needed = texels[chosen].astype(np.int64) + 1
     starts = np.cumsum(needed) - needed
     blocks: wp.array[Any] = wp.empty(len(chosen), dtype=wp.vec3i, device=device)
     spans: wp.array[Any] = wp.empty(len(chosen), dtype=wp.vec2i, device=device)
@@ -210,4 +231,4 @@ def _refine(level: Level, origin: wp.vec3, size: float, pad: float, device: str)
         [blocks, spans, tape],
         device,
     )
-    return Level(blocks, spans, tape)
+    return Level(blocks, spans, tape, children)

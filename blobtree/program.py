@@ -14,12 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import affine
+from .errors import InvalidNode
 from .operators import RICCI, SUM, Operator
 from .skeletons import Skeleton
 from .traversal import fold
 
 if TYPE_CHECKING:
     from .tree import Combination, Node, Primitive
+
+MOST_PRIMITIVES = 1 << 24
+"""Beyond it a float32 cannot count the primitives of a run."""
 
 SIMPLE = -1
 """Weight of a node that folds into the accumulator without one of its own."""
@@ -83,6 +87,10 @@ class _Emit:
 
 def compile_program(root: "Node") -> list[Instruction]:
     """The instructions that leave the value of `root` in the accumulator, which starts empty (0)."""
+    if fold(root, _count_primitives) > MOST_PRIMITIVES:
+        raise InvalidNode(
+            f"tree: its subtrees, counted as often as they are used, exceed {MOST_PRIMITIVES:,} primitives"
+        )
     weights: dict[int, int] = {}
 
     def weigh(node: "Node", child_weights: list[int]) -> int:
@@ -101,6 +109,11 @@ def compile_program(root: "Node") -> list[Instruction]:
         else:
             program.append(step)
     return program
+
+
+def _count_primitives(_node: "Node", child_counts: list[int]) -> int:
+    """Leaves below a node, those of shared subtrees as often as they are used."""
+    return sum(child_counts) if child_counts else 1
 
 
 def registers_needed(program: list[Instruction]) -> int:

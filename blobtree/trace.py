@@ -1,22 +1,36 @@
-"""Sphere tracing with a proven step bound: a ray never passes through the surface unseen.
+"""Sphere tracing with a proven step bound, through sparse cells: no ray passes through the surface unseen.
 
-At each place the tape gives the value f and a bound L on the slope over a ball of radius r. Within the ball
-the field can rise by at most L · distance, so the ray is free for min(r, (ISO − f) / L) (Hart 1996, with the
-global Lipschitz constant replaced by one of the ball ahead, after Galin et al. 2020). The ball then takes
-twice the length of the last step, so rays speed up through empty space and slow down near the surface.
+A ray leaps over blocks that hold no surface; in the others it reads their pruned tapes alone. At each place
+the tape gives the value f and a bound L on the slope over a ball of radius r. Within the ball the field can
+rise by at most L · distance, so the ray is free for min(r, (ISO − f) / L) (Hart 1996, with the global
+Lipschitz constant replaced by one of the ball ahead, after Galin et al. 2020). The ball then takes twice the
+length of the last step, so rays speed up through empty space and slow down near the surface.
 """
 
-from typing import Any
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from .cells import (
+    BRANCHING,
+    BRANCHING_BITS,
+    CHILDREN,
+    SURELY_INSIDE,
+    build_cells,
+)
 from .errors import InvalidPoints
 from .evaluate import field_bound, field_gradient
 from .kernels import ISO
+from .launch import launch
 from .tape import Tape
 from .validation import point_array
+
+if TYPE_CHECKING:
+    from .tree import Node
 
 wp.set_module_options({"enable_backward": False})
 
@@ -27,6 +41,15 @@ DEFAULT_TOLERANCE = 1e-5
 """Distance to the surface, relative to the model's size, at which a ray has arrived."""
 
 MISS = -1.0
+
+BLOCKS_ALONG = 64
+"""Finest blocks along the longest side of a tree's box."""
+
+MAX_BLOCKS = 4096
+"""More than any ray can cross."""
+
+BLOCK_OVERLAP = 0.1
+"""How far a ray reaches into the next block before it asks which one that is, in tolerances."""
 
 
 @wp.func
@@ -44,7 +67,7 @@ def first_hit(
     A ray that starts inside hits at t_min.
     """
     t = t_min
-    reach = wp.max((t_max - t_min) * 0.125, 4.0 * tolerance)
+    reach = wp.max(t_max - t_min, 4.0 * tolerance)
     for _step in range(MAX_STEPS):
         if t > t_max:
             return MISS
@@ -96,35 +119,83 @@ def box_interval(origin: wp.vec3, direction: wp.vec3, lower: wp.vec3, upper: wp.
 
 
 @wp.func
+def find_node(place: wp.vec3i, depth: wp.int32, nodes: wp.array(dtype=wp.int32)) -> wp.vec2i:
+    """(what is known of the finest block at `place`, log₂ of the size of the block that it is known of).
+
+    Known is the first texel of a block's tape, or SURELY_OUTSIDE, SURELY_INSIDE.
+    """
+    node = int(0)
+    shift = BRANCHING_BITS * depth
+    for _level in range(depth):
+        shift -= BRANCHING_BITS
+        x = (place[0] >> shift) & (BRANCHING - 1)
+        y = (place[1] >> shift) & (BRANCHING - 1)
+        z = (place[2] >> shift) & (BRANCHING - 1)
+        node = nodes[node * CHILDREN + (x << (2 * BRANCHING_BITS)) + (y << BRANCHING_BITS) + z]
+        if node < 0:
+            return wp.vec2i(node, shift)
+    return wp.vec2i(node, shift)
+
+
+@wp.func
 def trace_ray(
     origin: wp.vec3,
     direction: wp.vec3,
     lower: wp.vec3,
-    upper: wp.vec3,
+    block_size: wp.float32,
+    depth: wp.int32,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-) -> wp.float32:
-    """first_hit within the box of influence of a tree."""
-    inside = box_interval(origin, direction, lower, upper)
-    if inside[1] < inside[0]:
-        return MISS
-    return first_hit(origin, direction, inside[0], inside[1], tolerance, tape, span)
+    nodes: wp.array(dtype=wp.int32),
+) -> wp.vec3:
+    """First hit of a ray: (distance or MISS, first texel of the tape that holds there, one past the last)."""
+    side = 1 << (BRANCHING_BITS * depth)
+    extent = block_size * float(side)
+    inside = box_interval(origin, direction, lower, lower + wp.vec3(extent, extent, extent))
+    t = inside[0]
+    for _block in range(MAX_BLOCKS):
+        if t > inside[1]:
+            return wp.vec3(MISS, 0.0, 0.0)
+        p = (origin + direction * t - lower) / block_size
+        place = wp.vec3i(
+            wp.clamp(int(wp.floor(p[0])), 0, side - 1),
+            wp.clamp(int(wp.floor(p[1])), 0, side - 1),
+            wp.clamp(int(wp.floor(p[2])), 0, side - 1),
+        )
+        known = find_node(place, depth, nodes)
+        size = block_size * float(1 << known[1])
+        corner = lower + size * wp.vec3(
+            float(place[0] >> known[1]), float(place[1] >> known[1]), float(place[2] >> known[1])
+        )
+        leave = box_interval(origin, direction, corner, corner + wp.vec3(size, size, size))[1]
+        leave = wp.max(leave, t) + BLOCK_OVERLAP * tolerance
+        if known[0] == SURELY_INSIDE:
+            return wp.vec3(t, 1.0, 1.0 + tape[0][0])
+        if known[0] >= 0:
+            span = wp.vec2i(known[0] + 1, known[0] + 1 + int(tape[known[0]][0]))
+            hit = first_hit(origin, direction, t, leave, tolerance, tape, span)
+            if hit >= 0.0:
+                return wp.vec3(hit, float(span[0]), float(span[1]))
+        t = leave
+    return wp.vec3(MISS, 0.0, 0.0)
 
 
 @wp.kernel
 def _trace(
+    first: wp.int32,
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     lower: wp.vec3,
-    upper: wp.vec3,
+    block_size: wp.float32,
+    depth: wp.int32,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
+    nodes: wp.array(dtype=wp.int32),
     out: wp.array(dtype=wp.float32),
 ) -> None:
-    i = wp.tid()
-    t = trace_ray(origins[i], wp.normalize(directions[i]), lower, upper, tolerance, tape, span)
+    i = first + wp.tid()
+    direction = wp.normalize(directions[i])
+    t = trace_ray(origins[i], direction, lower, block_size, depth, tolerance, tape, nodes)[0]
     if t < 0.0:
         t = wp.inf
     out[i] = t
@@ -133,12 +204,67 @@ def _trace(
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
+@dataclass(frozen=True, eq=False)
+class TracingCells:
+    """What a ray reads of a tree's sparse cells.
+
+    Attributes
+    ----------
+    tape
+        float32[m, 4]: the whole tape and the blocks' pruned ones, each behind a texel with its length.
+    nodes
+        int32[64 n]: for every child of every inner block, from the root on, the place of its own children
+        (in blocks) or, at the finest level, of its tape; SURELY_OUTSIDE or SURELY_INSIDE where it has none.
+    lower, block_size, depth
+        The grid: lowest corner (3,), side of the finest blocks, levels below the root.
+    tolerance
+        Distance to the surface at which a ray has arrived.
+    """
+
+    tape: NDArray[np.float32]
+    nodes: NDArray[np.int32]
+    lower: NDArray[np.float32]
+    block_size: float
+    depth: int
+    tolerance: float
+
+
+def tracing_cells(tree: "Node") -> TracingCells:
+    """The cells that rays through `tree` walk, BLOCKS_ALONG finest blocks along its longest side."""
+    lower, upper = (tuple(corner.tolist()) for corner in tree.bounds)
+    return _tracing_cells(tree.tape, lower, upper)
+
+
+@lru_cache(maxsize=16)
+def _tracing_cells(tape: Tape, lower: tuple[float, ...], upper: tuple[float, ...]) -> TracingCells:
+    bounds = np.array(lower, np.float32), np.array(upper, np.float32)
+    cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
+    cells = build_cells(tape, bounds, cell_size, device="cpu")
+    whole = np.array([[len(tape.data), 0.0, 0.0, 0.0]], np.float32)
+    tables = [level.parent_children.copy() for level in cells.levels[1:]]
+    first_child = 0
+    for level, table in zip(cells.levels[:-1], tables, strict=True):
+        first_child += len(level)
+        table[table >= 0] += first_child
+    first_texel = 1 + len(tape.data)
+    leaf_texels = cells.leaves.spans.numpy()[:, 0] - 1 + first_texel
+    tables[-1][tables[-1] >= 0] = leaf_texels
+    return TracingCells(
+        tape=np.concatenate([whole, tape.data, cells.leaves.tape.numpy()]),
+        nodes=np.concatenate(tables),
+        lower=cells.origin.astype(np.float32),
+        block_size=cell_size * BRANCHING,
+        depth=len(tables),
+        tolerance=trace_tolerance(bounds),
+    )
+
+
 def trace_tolerance(bounds: Bounds) -> float:
     """Distance to the surface at which a ray has arrived, for a tree of these bounds."""
     return DEFAULT_TOLERANCE * float(np.linalg.norm(bounds[1] - bounds[0]))
 
 
-def trace(tape: Tape, bounds: Bounds, origins: ArrayLike, directions: ArrayLike) -> NDArray[np.float32]:
+def trace(tree: "Node", origins: ArrayLike, directions: ArrayLike) -> NDArray[np.float32]:
     """Distances (n,) from `origins` (n, 3) along `directions` (n, 3) to the surface, inf where a ray misses.
 
     Raises
@@ -151,15 +277,22 @@ def trace(tape: Tape, bounds: Bounds, origins: ArrayLike, directions: ArrayLike)
         raise InvalidPoints(f"directions: expected one per origin, {len(starts)}, got {len(headings)}")
     if not (np.abs(headings).max(axis=1, initial=0.0) > 0.0).all():
         raise InvalidPoints("directions: expected vectors with a length, got a zero vector")
-    uploaded = tape.on()
-    out = wp.empty(len(starts), dtype=wp.float32)
-    inputs: list[Any] = [wp.array(array, dtype=wp.vec3) for array in (starts, headings)]
-    inputs += [wp.vec3(*corner.tolist()) for corner in bounds]
-    wp.launch(
+    cells = tracing_cells(tree)
+    out: wp.array[Any] = wp.empty(len(starts), dtype=wp.float32, device="cpu")
+    launch(
         _trace,
-        dim=len(starts),
-        inputs=[*inputs, trace_tolerance(bounds), uploaded.data, uploaded.span],
-        outputs=[out],
+        len(starts),
+        [
+            *(wp.array(array, dtype=wp.vec3, device="cpu") for array in (starts, headings)),
+            wp.vec3(*cells.lower.tolist()),
+            cells.block_size,
+            cells.depth,
+            cells.tolerance,
+            wp.array(cells.tape, dtype=wp.vec4, device="cpu"),
+            wp.array(cells.nodes, dtype=wp.int32, device="cpu"),
+        ],
+        [out],
+        "cpu",
     )
     distances: NDArray[np.float32] = out.numpy()
     return distances

@@ -90,7 +90,7 @@ class ImplicitSurface:
         distances = np.full(len(starts), np.inf, np.float32)
         aimed = ways.any(axis=1)
         if aimed.any():
-            distances[aimed] = trace(self.tree.tape, self.tree.bounds, starts[aimed], ways[aimed])
+            distances[aimed] = trace(self.tree, starts[aimed], ways[aimed])
         return distances
 
     def contains(self, points: ArrayLike) -> Flags:

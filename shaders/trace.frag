@@ -1,10 +1,12 @@
 // An implicit object in the G-buffer: every pixel of its box sends a ray to the surface (blobtree/trace.py).
 //@ include gbuffer.glsl
+// blobtree.trace.TracingCells
 uniform sampler2D tape;
-uniform ivec2 tape_span;  // first texel, one past the last
-uniform vec3 box_lower;
-uniform vec3 box_upper;
-uniform float tolerance;  // distance to the surface at which a ray has arrived
+uniform isampler2D nodes;
+uniform vec3 grid_lower;
+uniform float block_size;
+uniform int grid_depth;
+uniform float tolerance;
 
 vec4 tape_texel(sampler2D data, int i) {
     return texelFetch(data, ivec2(i & 1023, i >> 10), 0);
@@ -24,12 +26,13 @@ vec4 field_gradient(vec3 q, sampler2D tape_, ivec2 span) {
 
 void main() {
     vec3 direction = normalize(ray_direction(gl_FragCoord.xy));
-    float distance_ = trace_ray(eye.xyz, direction, box_lower, box_upper, tolerance, tape, tape_span);
-    if (distance_ < 0.0) {
+    vec3 hit = trace_ray(eye.xyz, direction, grid_lower, block_size, grid_depth, tolerance, tape, nodes);
+    if (hit.x < 0.0) {
         discard;
     }
-    vec3 position = eye.xyz + direction * distance_;
-    vec3 normal = -field_gradient(position, tape, tape_span).yzw;
-    write_surface(position, normal, interpret_color(position, 0.0, tape, tape_span).yzw);
+    ivec2 span = ivec2(hit.yz);
+    vec3 position = eye.xyz + direction * hit.x;
+    vec3 normal = -field_gradient(position, tape, span).yzw;
+    write_surface(position, normal, interpret_color(position, 0.0, tape, span).yzw);
     gl_FragDepth = window_depth(position);
 }

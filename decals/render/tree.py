@@ -5,7 +5,7 @@ from typing import Protocol
 import moderngl
 
 from blobtree import Node
-from blobtree.trace import trace_tolerance
+from blobtree.trace import tracing_cells
 from decals.camera import Bounds
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
@@ -25,21 +25,27 @@ class TreeLike(Protocol):
 
 
 class TreeDrawable:
-    """A tree's tape on the graphics card."""
+    """A tree's tracing cells on the graphics card."""
 
     def __init__(self, context: Context, thing: TreeLike) -> None:
-        tape = thing.tree.tape
-        self._bounds = thing.tree.bounds
+        tree = thing.tree
+        cells = tracing_cells(tree)
+        self._bounds = tree.bounds
         self._gl = context.gl
-        self._tape = DataTexture(context, tape.data)
+        self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.nodes))
         self._uniforms: dict[str, object] = {
             "tape": 0,
-            "tape_span": (0, len(tape.data)),
+            "nodes": 1,
+            "grid_lower": tuple(cells.lower.tolist()),
+            "block_size": cells.block_size,
+            "grid_depth": cells.depth,
+            "tolerance": cells.tolerance,
             "box_lower": tuple(self._bounds[0].tolist()),
             "box_upper": tuple(self._bounds[1].tolist()),
-            "tolerance": trace_tolerance(self._bounds),
         }
-        self._program = attach_camera(context.program(compose("box.vert"), tracing_shader(Kinds.of(tape))))
+        self._program = attach_camera(
+            context.program(compose("box.vert"), tracing_shader(Kinds.of(tree.tape)))
+        )
         self._array = context.gl.vertex_array(self._program, [])
 
     @property
@@ -49,7 +55,8 @@ class TreeDrawable:
 
     def draw(self, object_id: int, tile: Tile) -> None:
         """Trace the rays of all pixels on which the back of the box falls."""
-        self._tape.use(0)
+        for unit, texture in enumerate(self._textures):
+            texture.use(unit)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
             set_uniform(self._program, name, value)
         self._gl.enable(moderngl.CULL_FACE)
@@ -60,5 +67,5 @@ class TreeDrawable:
 
     def release(self) -> None:
         """Give the memory back."""
-        self._array.release()
-        self._tape.release()
+        for resource in (self._array, *self._textures):
+            resource.release()

@@ -148,3 +148,11 @@ def test_a_tree_that_needs_more_registers_than_there_are_is_refused(monkeypatch:
     assert balanced(4, add, unite).tape.registers == 3
     with pytest.raises(InvalidNode, match="tree: needs 4 registers, at most 3 exist; group its operands"):
         _ = balanced(5, add, unite).tape
+
+
+def test_subtrees_shared_beyond_counting_are_refused() -> None:
+    tree: Node = Point((0, 0, 0), radius=1.0)
+    for _ in range(60):
+        tree = Union((tree, tree.translate((1, 0, 0))))
+    with pytest.raises(InvalidNode, match="exceed"):
+        compile_program(tree)

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 def cast(tree: Node, origins: ArrayLike, directions: ArrayLike) -> NDArray[np.float32]:
-    return trace(tree.tape, tree.bounds, origins, directions)
+    return trace(tree, origins, directions)
 
 
 def unit(vectors: Floats) -> Floats:
