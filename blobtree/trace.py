@@ -152,11 +152,13 @@ def trace_ray(
     side = 1 << (BRANCHING_BITS * depth)
     extent = block_size * float(side)
     inside = box_interval(origin, direction, lower, lower + wp.vec3(extent, extent, extent))
-    t = inside[0]
+    entry = origin + direction * inside[0]  # distances are counted from here: an eye may be far away
+    last = inside[1] - inside[0]
+    t = float(0.0)
     for _block in range(MAX_BLOCKS):
-        if t > inside[1]:
+        if t > last:
             return wp.vec3(MISS, 0.0, 0.0)
-        p = (origin + direction * t - lower) / block_size
+        p = (entry + direction * t - lower) / block_size
         place = wp.vec3i(
             wp.clamp(int(wp.floor(p[0])), 0, side - 1),
             wp.clamp(int(wp.floor(p[1])), 0, side - 1),
@@ -167,15 +169,15 @@ def trace_ray(
         corner = lower + size * wp.vec3(
             float(place[0] >> known[1]), float(place[1] >> known[1]), float(place[2] >> known[1])
         )
-        leave = box_interval(origin, direction, corner, corner + wp.vec3(size, size, size))[1]
+        leave = box_interval(entry, direction, corner, corner + wp.vec3(size, size, size))[1]
         leave = wp.max(leave, t) + BLOCK_OVERLAP * tolerance
         if known[0] == SURELY_INSIDE:
-            return wp.vec3(t, 1.0, 1.0 + tape[0][0])
+            return wp.vec3(inside[0] + t, 1.0, 1.0 + tape[0][0])
         if known[0] >= 0:
             span = wp.vec2i(known[0] + 1, known[0] + 1 + int(tape[known[0]][0]))
-            hit = first_hit(origin, direction, t, leave, tolerance, tape, span)
+            hit = first_hit(entry, direction, t, leave, tolerance, tape, span)
             if hit >= 0.0:
-                return wp.vec3(hit, float(span[0]), float(span[1]))
+                return wp.vec3(inside[0] + hit, float(span[0]), float(span[1]))
         t = leave
     return wp.vec3(MISS, 0.0, 0.0)
 
