@@ -35,7 +35,9 @@ def main() -> None:
         subprocess.run(pip, check=True, cwd=ROOT)
         tests = [python, "-m", "pytest", "-m", "not slow and not gpu", "-p", "no:cacheprovider"]
         environment = os.environ | {"WARP_CACHE_PATH": str(folder / "warp-cache")}
-        sys.exit(subprocess.run([*tests, *sys.argv[1:]], cwd=ROOT, env=environment, check=False).returncode)
+        ran = subprocess.run([*tests, *sys.argv[1:]], cwd=ROOT, env=environment, check=False)
+        if ran.returncode:
+            sys.exit(f"pytest ended with {ran.returncode}")
 
 
 if __name__ == "__main__":
