@@ -48,7 +48,7 @@ def test_a_tree_lies_where_its_rays_hit(renderer: Renderer) -> None:
     rays = scene.camera.rays(width, height)
     directions = rays.directions(x, y).reshape(-1, 3)
     origins = np.broadcast_to(rays.origin, directions.shape)
-    distance = trace(TREE.tape, TREE.bounds, origins, directions).reshape(height, width)
+    distance = trace(TREE, origins, directions).reshape(height, width)
     hit = np.isfinite(distance)
     sure = ~edges(hit)
     np.testing.assert_array_equal((buffers.object_id == 0)[sure], hit[sure])
