@@ -4,6 +4,7 @@ from blobtree import Node, Point, Ricci, Segment
 
 _SKIN = (0.34, 0.50, 0.28)
 _CHEST = (0.82, 0.76, 0.52)
+_SOCKET = (0.17, 0.12, 0.07)
 _HORN = (0.90, 0.85, 0.72)
 
 _BLEND = 3.0
@@ -47,7 +48,7 @@ def _side(z: float) -> list[Node]:
         Segment((-0.22, 0.20, 0.60 * z), (0.26, 0.13, 0.68 * z), radius=0.17, color=_SKIN),
         Segment((0.40, 0.98, 0.32 * z), (0.60, 0.62, 0.50 * z), radius=0.16, color=_SKIN),
         Segment((0.60, 0.62, 0.50 * z), (0.98, 0.70, 0.46 * z), radius=0.14, color=_SKIN),
-        Point((0.92, 2.24, 0.24 * z), radius=0.19, color=_SKIN),
+        Point((0.92, 2.24, 0.24 * z), radius=0.19, color=_SOCKET),
         Point((1.42, 1.92, 0.11 * z), radius=0.075, color=_SKIN),
         Segment((0.58, 2.34, 0.20 * z), (0.30, 2.56, 0.30 * z), radius=0.095, color=_HORN),
     ]

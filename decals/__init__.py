@@ -1,0 +1,99 @@
+"""Decals as implicit fields: images that touch, push and deform each other on any surface.
+
+Pictures are drawn by `decals.render`. The names here are loaded when they are first asked for, so a part that
+needs little, such as `decals.errors`, costs little.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .camera import Camera
+    from .errors import (
+        DecalsError,
+        InvalidDecals,
+        InvalidImage,
+        InvalidMesh,
+        InvalidPoints,
+        InvalidScene,
+        InvalidSeeding,
+        NoGraphics,
+    )
+    from .images import BUILTIN_IMAGES, generate_image, load_image
+    from .implicit_surface import ImplicitSurface
+    from .index import DecalIndex
+    from .mesh_file import read_mesh
+    from .mesh_surface import MeshSurface
+    from .model import Decals
+    from .relaxation import Relaxation
+    from .scene import DecalImage, MeshObject, Scene, TreeObject
+    from .scene_file import load_scene, save_scene
+    from .seeding import seed
+    from .surface import Surface
+
+__all__ = [
+    "BUILTIN_IMAGES",
+    "Camera",
+    "DecalImage",
+    "DecalIndex",
+    "Decals",
+    "DecalsError",
+    "ImplicitSurface",
+    "InvalidDecals",
+    "InvalidImage",
+    "InvalidMesh",
+    "InvalidPoints",
+    "InvalidScene",
+    "InvalidSeeding",
+    "MeshObject",
+    "MeshSurface",
+    "NoGraphics",
+    "Relaxation",
+    "Scene",
+    "Surface",
+    "TreeObject",
+    "generate_image",
+    "load_image",
+    "load_scene",
+    "read_mesh",
+    "save_scene",
+    "seed",
+]
+
+_HOMES = {
+    "camera": ("Camera",),
+    "errors": (
+        "DecalsError",
+        "InvalidDecals",
+        "InvalidImage",
+        "InvalidMesh",
+        "InvalidPoints",
+        "InvalidScene",
+        "InvalidSeeding",
+        "NoGraphics",
+    ),
+    "images": ("BUILTIN_IMAGES", "generate_image", "load_image"),
+    "implicit_surface": ("ImplicitSurface",),
+    "index": ("DecalIndex",),
+    "mesh_file": ("read_mesh",),
+    "mesh_surface": ("MeshSurface",),
+    "model": ("Decals",),
+    "relaxation": ("Relaxation",),
+    "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject"),
+    "scene_file": ("load_scene", "save_scene"),
+    "seeding": ("seed",),
+    "surface": ("Surface",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME_OF[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

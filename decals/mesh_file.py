@@ -4,6 +4,7 @@ import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ _SOLIDS = (pv.UnstructuredGrid, pv.StructuredGrid, pv.MultiBlock)
 """What has a boundary that is a surface; an image or a point set has none."""
 
 
-def read_mesh(path: Path) -> MeshArrays:
+def read_mesh(path: str | PathLike[str]) -> MeshArrays:
     """Read a mesh file of any format that pyvista knows as triangles.
 
     Polygons and triangle strips are triangulated and volume meshes give their boundary; points stay as they
@@ -37,6 +38,7 @@ def read_mesh(path: Path) -> MeshArrays:
     InvalidMesh
         If the file is missing, of an unknown kind, unreadable, or holds no faces or wrong indices.
     """
+    path = Path(path)
     if not path.is_file():
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     if path.suffix.lower() == ".ply":

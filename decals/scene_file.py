@@ -95,7 +95,7 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
     decals: list[_DecalRecord]
 
 
-def save_scene(scene: Scene, path: Path) -> None:
+def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene to a JSON file, whole or not at all.
 
     Meshes with a ``source`` and images are written as references, other meshes in full.
@@ -105,6 +105,7 @@ def save_scene(scene: Scene, path: Path) -> None:
     InvalidScene
         If the folder does not exist or cannot be written.
     """
+    path = Path(path)
     folder = path.parent
     if not folder.is_dir():
         raise InvalidScene(
@@ -116,12 +117,12 @@ def save_scene(scene: Scene, path: Path) -> None:
         raise InvalidScene(f"could not write the scene {str(path)!r} ({error.strerror})") from error
 
 
-def load_scene(path: Path, *, samples: SampleLoader | None = None) -> Scene:
+def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = None) -> Scene:
     """Read a scene from a JSON file.
 
     Parameters
     ----------
-    path : Path
+    path : str or path
         A file that `save_scene` wrote, or somebody's own.
     samples : callable, optional
         Gives the meshes whose source is ``"sample:NAME"``.
@@ -133,6 +134,7 @@ def load_scene(path: Path, *, samples: SampleLoader | None = None) -> Scene:
     InvalidMesh, InvalidImage, blobtree.BlobTreeError
         If something that the scene refers to is missing or broken.
     """
+    path = Path(path)
     try:
         text = path.read_bytes()
     except OSError as error:
