@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .mesh_surface import MeshSurface
     from .model import Decals
     from .relaxation import Relaxation
-    from .scene import DecalImage, MeshObject, Scene, TreeObject
+    from .scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
     from .scene_file import load_scene, save_scene
     from .seeding import seed
     from .surface import Surface
@@ -52,6 +52,7 @@ __all__ = [
     "Scene",
     "Surface",
     "TreeObject",
+    "bounds_of",
     "generate_image",
     "load_image",
     "load_scene",
@@ -79,7 +80,7 @@ _HOMES = {
     "mesh_surface": ("MeshSurface",),
     "model": ("Decals",),
     "relaxation": ("Relaxation",),
-    "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject"),
+    "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
     "scene_file": ("load_scene", "save_scene"),
     "seeding": ("seed",),
     "surface": ("Surface",),
