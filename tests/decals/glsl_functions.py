@@ -1,0 +1,100 @@
+"""GLSL over arrays: a program per function, one fragment per row."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import moderngl
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree.glsl_builtins import type_name
+from decals.render.buffers import WIDTH, DataTexture
+from decals.render.context import Context
+from tests.blobtree.warp_functions import TypedFunction
+
+VERTEX = """#version 330 core
+void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
+"""
+_SWIZZLES = {"float": ".x", "vec2": ".xy", "vec3": ".xyz", "vec4": "", "int": ".x"}
+_RESULTS = {
+    "float": "vec4({}, 0.0, 0.0, 0.0)",
+    "vec2": "vec4({}, 0.0, 0.0)",
+    "vec3": "vec4({}, 0.0)",
+    "vec4": "{}",
+    "int": "ivec4({}, 0, 0, 0)",
+    "uint": "ivec4(int({}), 0, 0, 0)",
+    "ivec2": "ivec4({}, 0, 0)",
+}
+
+
+def fetch(name: str, glsl_type: str) -> str:
+    """The fragment's own row of a texture."""
+    return f"texelFetch({name}, ivec2(gl_FragCoord.xy), 0){_SWIZZLES[glsl_type]}"
+
+
+def rows(array: NDArray[Any]) -> NDArray[Any]:
+    """`array` as a data texture takes it: int32[n], or float32[n, 4] padded with zeros."""
+    if array.dtype.kind in "iu" and array.ndim == 1:
+        return array.astype(np.int32)
+    columns = array.reshape(len(array), -1).astype(np.float32)
+    return np.pad(columns, ((0, 0), (0, 4 - columns.shape[1])))
+
+
+def run_program(
+    context: Context,
+    fragment: str,
+    count: int,
+    textures: Mapping[str, NDArray[Any]],
+    uniforms: Mapping[str, object],
+    *,
+    whole_numbers: bool = False,
+) -> NDArray[Any]:
+    """What `fragment` writes for rows 0 to count − 1: float32[count, 4] or int32[count, 4]."""
+    gl = context.gl
+    program = gl.program(vertex_shader=VERTEX, fragment_shader=fragment)
+    held = [DataTexture(context, array) for array in textures.values()]
+    for unit, (name, texture) in enumerate(zip(textures, held, strict=True)):
+        texture.use(unit)
+        if name in program:
+            program[name] = unit
+    for name, value in uniforms.items():
+        if name in program:
+            program[name] = value
+    kind = "i4" if whole_numbers else "f4"
+    image = gl.texture((WIDTH, -(-count // WIDTH)), 4, dtype=kind)
+    target = gl.framebuffer([image])
+    target.use()
+    gl.enable_only(moderngl.NOTHING)
+    vertices = gl.vertex_array(program, [])
+    vertices.render(vertices=3)
+    seen = (
+        np.frombuffer(image.read(), np.int32 if whole_numbers else np.float32).reshape(-1, 4)[:count].copy()
+    )
+    made: list[Any] = [vertices, target, image, program, *held]
+    for thing in made:
+        thing.release()
+    return seen
+
+
+def through_glsl(
+    context: Context, typed: TypedFunction, library: str, arguments: Mapping[str, NDArray[Any]], count: int
+) -> NDArray[Any]:
+    """`typed` at row i of every argument, for all i; parameters that are arrays are given whole."""
+    uniforms, expressions = [], []
+    for name, hint in typed.parameters.items():
+        glsl_type = str(type_name(hint))
+        if isinstance(hint, wp.array):
+            uniforms.append(f"uniform {glsl_type} x_{name};")
+            expressions.append(f"x_{name}")
+        else:
+            uniforms.append(f"uniform {'isampler2D' if glsl_type == 'int' else 'sampler2D'} x_{name};")
+            expressions.append(fetch(f"x_{name}", glsl_type))
+    returned = str(type_name(typed.returned))
+    result = _RESULTS[returned].format(f"{typed.name}({', '.join(expressions)})")
+    whole = result.startswith("ivec4")
+    out = f"out {'ivec4' if whole else 'vec4'} result;"
+    main = f"void main() {{ result = {result}; }}"
+    source = "\n".join(["#version 330 core", *uniforms, out, library, main, ""])
+    textures = {f"x_{name}": rows(array) for name, array in arguments.items()}
+    return run_program(context, source, count, textures, {}, whole_numbers=whole)
