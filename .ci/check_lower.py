@@ -24,7 +24,7 @@ def oldest(requirement: str) -> str:
 
 def main() -> None:
     """Install the oldest versions beside the checkout's own code, and test that."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     bounds = [oldest(requirement) for requirement in project["dependencies"]]
     print("\n".join(bounds), flush=True)
     with tempfile.TemporaryDirectory() as name:

@@ -31,7 +31,7 @@ FORBIDDEN = {
 
 @cache
 def project() -> dict[str, Any]:
-    return tomllib.loads((ROOT / "pyproject.toml").read_text())
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
 def files(room: str) -> list[Path]:
@@ -40,7 +40,7 @@ def files(room: str) -> list[Path]:
 
 def imports(path: Path) -> Iterator[str]:
     """Yield what a file imports from elsewhere, by its full name."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
@@ -90,5 +90,5 @@ def test_only_files_of_kernels_are_excused_from_types() -> None:
     excused = project()["tool"]["mypy"]["overrides"][0]["module"]
     assert excused == sorted(excused)
     for name in excused:
-        source = (ROOT / name.replace(".", "/")).with_suffix(".py").read_text()
+        source = (ROOT / name.replace(".", "/")).with_suffix(".py").read_text(encoding="utf-8")
         assert re.search(r"^\s*@wp\.(func|kernel)", source, re.MULTILINE), name

@@ -47,7 +47,7 @@ def test_the_advice_names_every_missing_package() -> None:
 
 
 def test_the_set_up_installs_the_same_libraries() -> None:
-    script = (ROOT / ".ci" / "install-gl").read_text()
+    script = (ROOT / ".ci" / "install-gl").read_text(encoding="utf-8")
     for library, package in GL_LIBRARIES.items():
         assert f'"{library}"' in script
         assert f" {package}" in script
