@@ -13,12 +13,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .launch import launch
 from .prune import prune
 from .tape import Tape
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 BRANCHING_BITS = 2
 BRANCHING = 1 << BRANCHING_BITS

@@ -8,11 +8,12 @@ import warp as wp
 
 from .cells import BRANCHING, BRANCHING_BITS, CHILDREN, find_block
 from .evaluate import field_color, field_gradient, field_value
+from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .patches import EDGES, FLIPPED
 from .project import project_to_surface
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 SIDE = BRANCHING + 1
 """Samples along the side of a block."""

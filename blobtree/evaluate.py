@@ -7,10 +7,11 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from .interpreter import interpret_bound, interpret_color, interpret_gradient, interpret_value
+from .kernel_options import KERNEL_OPTIONS
 from .tape import Tape
 from .validation import point_array
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.func

@@ -8,12 +8,13 @@ from typing import Any
 
 import warp as wp
 
+from .kernel_options import KERNEL_OPTIONS
 from .kernels import falloff, falloff_derivative, falloff_slope_bound
 from .operators import OPERATORS
 from .skeletons import SKELETONS
 from .tape import POP, POP_SWAPPED, PREFIX, PUSH, REGISTERS, STRETCHED
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.func

@@ -7,11 +7,12 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from .evaluate import field_gradient
+from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .tape import Tape
 from .validation import point_array
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 NEWTON_STEPS = 8
 CONVERGED = 1e-6

@@ -9,12 +9,13 @@ value, gradient and colour as the whole one at every point of the cube.
 import warp as wp
 
 from .interpreter import closest, stride, to_local
+from .kernel_options import KERNEL_OPTIONS
 from .kernels import falloff_range
 from .operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
 from .skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
 from .tape import POP, PREFIX, PUSH, REGISTERS, STRETCHED
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 SUM_CODE = wp.constant(OPERATORS.index(SUM))
 

@@ -24,6 +24,7 @@ from .cells import (
 )
 from .errors import InvalidPoints
 from .evaluate import field_bound, field_gradient
+from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .launch import launch
 from .tape import Tape
@@ -32,7 +33,7 @@ from .validation import point_array
 if TYPE_CHECKING:
     from .tree import Node
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 MAX_STEPS = 1024
 """A ray that grazes the surface for longer than this is a miss."""
