@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .camera import Camera
+    from .cover import cover
     from .errors import (
         DecalsError,
         InvalidDecals,
@@ -53,6 +54,7 @@ __all__ = [
     "Surface",
     "TreeObject",
     "bounds_of",
+    "cover",
     "generate_image",
     "load_image",
     "load_scene",
@@ -63,6 +65,7 @@ __all__ = [
 
 _HOMES = {
     "camera": ("Camera",),
+    "cover": ("cover",),
     "errors": (
         "DecalsError",
         "InvalidDecals",
