@@ -32,7 +32,7 @@ types: $(INSTALLED)  ## Check types
 	@mkdir -p build/types/implicit_decals
 	@ln -sfn ../../../apps build/types/implicit_decals/apps
 	@ln -sfn ../../../shaders build/types/implicit_decals/shaders
-	$(BIN)/mypy -p blobtree -p decals -p implicit_decals.apps -p implicit_decals.shaders -p tests
+	$(BIN)/mypy -p blobtree -p decals -p implicit_decals.apps -p implicit_decals.shaders
 
 wheel: $(INSTALLED)  ## Build the wheel and try it outside the checkout
 	$(BIN)/python .ci/check_wheel.py

@@ -22,7 +22,7 @@ PICTURES = ("hero.png", "contact.png", "span.png")
 def demo(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out"),
-    size: str = "1000x750",
+    size: str = "1200x900",
     samples: int = 2,
 ) -> None:
     """Draw three pictures that show what this is about.

@@ -34,11 +34,13 @@ _COMPONENTS = {
 _SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x")}
 
 
-def translate_library(functions: Iterable[wp.Function], *, provided: Iterable[wp.Function] = ()) -> str:
+def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ()) -> str:
     """GLSL source of `functions` and of everything they call, each once, callees first.
 
     Parameters
     ----------
+    functions
+        What `@wp.func` makes.
     provided
         Functions that the shader defines by hand, under the same names; they are only declared.
 

@@ -31,7 +31,7 @@ class DecalData:
         }
         self._numbers = {"index_level_count": index.level_count, "index_mask": index.mask}
 
-    def use(self, program: moderngl.Program, first_unit: int) -> None:
+    def use(self, program: moderngl.Program | moderngl.ComputeShader, first_unit: int) -> None:
         """Bind everything for a program, textures from a unit on."""
         for unit, (name, texture) in enumerate(self._textures.items(), first_unit):
             texture.use(unit)
@@ -48,4 +48,4 @@ class DecalData:
 @cache
 def library() -> str:
     """Give the GLSL of all decal formulas, for the slot ``functions``."""
-    return f"const float RIM = {float(RIM)!r};\n" + translate_library(FUNCTIONS)  # type: ignore[arg-type]  # Warp's decorator hides its result's type
+    return f"const float RIM = {float(RIM)!r};\n" + translate_library(FUNCTIONS)
