@@ -25,6 +25,8 @@ class Mapping(IntEnum):
 
 
 SMALLEST_BEND = 1.0e-4
+SMALLEST_SQUARE = 1.0e-37
+MOST_TIGHTENING = 0.5
 
 
 @wp.func
@@ -49,11 +51,14 @@ def arc_over_chord(sine: wp.float32, cosine: wp.float32) -> wp.float32:
 
 @wp.func
 def corrected_offset(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
-    """Offset of q along the surface, as if it bent from n_p to n_q on a circular arc.
+    """Offset of q along the surface, as if it bent from n_p to n_q on a circular arc that may tighten.
 
-    Across the arc's axis the chord w runs along n_q − n_p and is stretched to the length of the arc; along
-    the axis it stays. Smooth at n_q = n_p, where it is the projection. Where n_q = −n_p no arc is told from
-    any other: it is the projection again.
+    With T the geodesic's direction at p, κ and τ its normal curvature and torsion, s its length, and ′ along it,
+    the chord's projection misses the log map s T by κ s²/6 (s n′) + O(s⁴), and n_q − n_p shows s n′. The heights
+    h_p = w·n_p and h_q = w·n_q give κ s² = h_p − h_q and κ′ s³ = −6 (h_p + h_q): the arc's part, unrolled to all
+    orders, needs only their difference; their sum is the change of curvature, whose part along T is added.
+    What remains is κ τ′ s⁴/24 across T, which two normals cannot tell. Exact on planes, spheres and cylinders.
+    Where n_q = n_p, or −n_p, so that no arc is told from any other, it is the projection.
     """
     height = wp.dot(w, n_p)
     flat = w - height * n_p
@@ -66,9 +71,11 @@ def corrected_offset(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
     sine = 0.5 * wp.length(turn)
     cosine = 0.5 * wp.length(n_q + n_p)
     stretch = arc_over_chord(sine, cosine)
-    # What unrolling adds to the projection; written so that a small angle cancels nothing.
-    more = wp.dot(flat, along) * (stretch * cosine - 1.0) - height * stretch * sine
-    return flat + more * along
+    arc = 0.5 * wp.dot(w, turn) * (stretch - cosine) / sine
+    # Projected onto flat; limited, because points of no common surface may have any heights.
+    ahead = wp.dot(flat, along) / wp.max(wp.length_sq(flat), SMALLEST_SQUARE)
+    tightening = -0.5 * (height + wp.dot(w, n_q)) * sine * stretch * stretch * ahead
+    return flat * (1.0 + wp.clamp(tightening, -MOST_TIGHTENING, MOST_TIGHTENING)) + arc * along
 
 
 @wp.func

@@ -170,7 +170,7 @@ def discs(rng, points, gradient, n=4000):
 
 @pytest.mark.parametrize(
     ("points", "gradient", "limit"),
-    [(torus_points, torus_gradient, 0.006), (ellipsoid_points, ellipsoid_gradient, 0.004)],
+    [(torus_points, torus_gradient, 0.003), (ellipsoid_points, ellipsoid_gradient, 0.0045)],
 )
 def test_error_on_curved_surfaces(points, gradient, limit):
     w, n_p, n_q, log = discs(np.random.default_rng(3), points, gradient)
@@ -195,14 +195,14 @@ direction = vector.filter(lambda v: np.linalg.norm(v) > 1e-3).map(unit)
 
 @settings(max_examples=150, deadline=None)
 @given(w=vector, n_p=direction, n_q=direction, opposed=st.booleans(), noise=vector, size=st.floats(0, 1e-3))
-def test_finite_tangent_and_no_longer_than_a_half_turn(w, n_p, n_q, opposed, noise, size):
+def test_finite_tangent_and_bounded(w, n_p, n_q, opposed, noise, size):
     if opposed:
         n_q = unit(-n_p + size * noise)
     for mapping in Mapping:
         m = mapped(w, n_p, n_q, mapping)[0]
         assert np.isfinite(m).all()
         assert abs(m @ np.float32(n_p)) < 2e-3
-        assert np.linalg.norm(m) <= np.pi / 2 * np.linalg.norm(w) + 1e-6
+        assert np.linalg.norm(m) <= 2.4 * np.linalg.norm(w) + 1e-6
 
 
 def test_opposed_and_equal_normals_give_the_projection():

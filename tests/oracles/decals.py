@@ -100,15 +100,17 @@ def _tangent_offsets(decals, points, normals, k, corrected):
 
 
 def _bent(w, n_p, n_q):
-    """Unroll the arc from n_p to n_q about the axis n_p × n_q; the chord where there is no such axis."""
-    axis = np.cross(n_p, n_q)
-    sine = np.linalg.norm(axis, axis=1, keepdims=True)
-    cosine = (n_p * n_q).sum(axis=1, keepdims=True)
-    half = np.arctan2(sine, cosine) / 2
-    bends = (sine > 1e-4)[:, 0]
-    axis = np.where(sine > 1e-4, axis / np.maximum(sine, 1e-300), 0.0)
-    ahead = np.cross(axis, n_p)
-    chord = np.cos(half) * ahead - np.sin(half) * n_p  # the direction from one end of the arc to the other
-    unrolled = (w * chord).sum(axis=1, keepdims=True) * half / np.maximum(np.sin(half), 1e-300) * ahead
-    unrolled += (w * axis).sum(axis=1, keepdims=True) * axis
-    return np.where(bends[:, None], unrolled, w)
+    """Unroll the arc from n_p to n_q; then scale the chord's shadow for the change of curvature along it."""
+    heights = [(w * n).sum(axis=1, keepdims=True) for n in (n_p, n_q)]
+    shadow = w - heights[0] * n_p
+    toward = n_q - (n_p * n_q).sum(axis=1, keepdims=True) * n_p
+    sine = np.linalg.norm(toward, axis=1, keepdims=True)
+    toward = np.where(sine > 1e-4, toward / np.maximum(sine, 1e-300), 0.0)
+    half = np.arctan2(sine, (n_p * n_q).sum(axis=1, keepdims=True)) / 2
+    half = np.maximum(half, 1e-12)
+    radius = (heights[1] - heights[0]) / (4 * np.sin(half) ** 2)
+    unrolled = radius * (2 * half - np.sin(2 * half)) * toward
+    squared = np.maximum((shadow * shadow).sum(axis=1, keepdims=True), 1e-300)
+    sideways = (shadow * toward).sum(axis=1, keepdims=True) / squared
+    tighter = -(heights[0] + heights[1]) * half**2 / np.sin(half) / 2 * sideways
+    return shadow * (1 + np.clip(tighter, -0.5, 0.5)) + unrolled
