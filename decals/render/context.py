@@ -4,12 +4,14 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from types import TracebackType
 from typing import Any, Self
 
 import moderngl
 
 from decals.errors import NoGraphics
+from decals.render.entry import Entry, Program, checked_entry, choose_entry
 from decals.render.libraries import require_gl
 from implicit_decals.shaders import Source, compile_error
 
@@ -50,23 +52,34 @@ class Context:
         A moderngl context to draw in, such as one attached to a window's; `standalone` makes one.
     owned
         Whether `release` ends the context too, or only what was made in it.
+    entry
+        How passes over all pixels are run: ``"fragment"`` or ``"compute"``. Not given, the environment
+        variable ``IMPLICIT_DECALS_ENTRY`` says it, or a short measurement.
+
+    Raises
+    ------
+    NoGraphics
+        The entry point that was asked for is unknown or cannot be had here.
     """
 
-    def __init__(self, gl: moderngl.Context, *, owned: bool = False) -> None:
+    def __init__(self, gl: moderngl.Context, *, owned: bool = False, entry: str | None = None) -> None:
         self.gl = gl
         self._owned = owned
         self._programs: dict[tuple[str, str], moderngl.Program] = {}
+        self._compute_programs: dict[str, moderngl.ComputeShader] = {}
+        self._wished_entry = checked_entry(self, entry) if entry else None
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         self.anisotropy = _anisotropy(gl)
 
     @classmethod
-    def standalone(cls) -> "Context":
-        """Make a context of its own, without a window.
+    def standalone(cls, *, entry: str | None = None) -> "Context":
+        """Make a context of its own, without a window; `entry` is as for the class.
 
         Raises
         ------
         NoGraphics
-            There is no OpenGL here, or one older than 3.3; the message says what to install.
+            There is no OpenGL here, or one older than 3.3; the message says what to install. Or the entry
+            point that was asked for cannot be had.
         """
         require_gl()
         settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
@@ -77,7 +90,7 @@ class Context:
                 f"no OpenGL 3.3 context could be made here ({error}); "
                 "`implicit-decals doctor` shows what is missing"
             ) from error
-        context = cls(gl, owned=True)
+        context = cls(gl, owned=True, entry=entry)
         with context.current():  # making it made it current; hand the thread back to whoever had it
             return context
 
@@ -85,6 +98,11 @@ class Context:
     def name(self) -> str:
         """What draws, in the driver's words."""
         return f"{self.gl.info['GL_RENDERER']}, OpenGL {self.gl.info['GL_VERSION']}"
+
+    @cached_property
+    def entry(self) -> Entry:
+        """How passes over all pixels are run here. Ask while the context is current."""
+        return self._wished_entry or choose_entry(self)
 
     @contextmanager
     def current(self) -> Iterator[Self]:
@@ -126,12 +144,29 @@ class Context:
                 raise compile_error(str(error), stages) from error
         return self._programs[key]
 
+    def compute_program(self, source: Source) -> moderngl.ComputeShader:
+        """Compile a compute shader, or give the program that it already is.
+
+        Raises
+        ------
+        implicit_decals.shaders.CompileError
+            The driver refuses it.
+        """
+        if source.text not in self._compute_programs:
+            try:
+                self._compute_programs[source.text] = self.gl.compute_shader(source.text)
+            except moderngl.Error as error:
+                raise compile_error(str(error), {"compute_shader": source}) from error
+        return self._compute_programs[source.text]
+
     def release(self) -> None:
         """Give the programs back, and the context if it is owned. Calling twice is harmless."""
         with self.current():
-            for program in self._programs.values():
+            programs: list[Program] = [*self._programs.values(), *self._compute_programs.values()]
+            for program in programs:
                 program.release()
         self._programs.clear()
+        self._compute_programs.clear()
         if self._owned:
             self.gl.release()
             self._owned = False

@@ -2,8 +2,6 @@
 
 from functools import cache
 
-import moderngl
-
 from blobtree.glsl import translate_library
 from blobtree.kernels import RIM
 from decals.index import DecalIndex
@@ -12,6 +10,7 @@ from decals.model import Decals
 from decals.ownership import complement_at, owner_at, uv_at
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
+from decals.render.entry import Program
 from decals.render.tile import set_uniform
 
 FUNCTIONS = (owner_at, complement_at, uv_at, tangent_coordinates)
@@ -31,7 +30,7 @@ class DecalData:
         }
         self._numbers = {"index_level_count": index.level_count, "index_mask": index.mask}
 
-    def use(self, program: moderngl.Program | moderngl.ComputeShader, first_unit: int) -> None:
+    def use(self, program: Program, first_unit: int) -> None:
         """Bind everything for a program, textures from a unit on."""
         for unit, (name, texture) in enumerate(self._textures.items(), first_unit):
             texture.use(unit)

@@ -15,10 +15,11 @@ from decals.errors import InvalidScene
 from decals.mapping import Mapping
 from decals.render.context import Context
 from decals.render.decal_data import DecalData
-from decals.render.decal_pass import DecalPass, Look
+from decals.render.decal_pass import DecalPass
 from decals.render.drawables import Drawable, drawable_for
 from decals.render.gbuffer import GBuffer
 from decals.render.kept import Kept
+from decals.render.light_pass import LightPass
 from decals.render.resolve import STUDIO, Background, ResolvePass
 from decals.render.scene_like import SceneLike
 from decals.render.textures import ImageArray
@@ -127,7 +128,7 @@ class Renderer:
         _check_size(size, samples)
         picture = _Picture(size, 4, np.uint8)
         for tile, targets in self._tiles(scene, size, samples, mapping, buffers=False):
-            light = targets.decal_pass.light
+            light = targets.light_pass.light
             picture.place(targets.resolve.pixels(light, tile, samples, background), tile, samples)
         return picture.pixels
 
@@ -139,7 +140,7 @@ class Renderer:
         color = _Picture(size, 4, np.uint8)
         position, normal, decal = (_Picture(size, 4, np.float32) for _ in range(3))
         for tile, targets in self._tiles(scene, size, 1, mapping, buffers=True):
-            color.place(targets.resolve.pixels(targets.decal_pass.light, tile, 1, STUDIO), tile)
+            color.place(targets.resolve.pixels(targets.light_pass.light, tile, 1, STUDIO), tile)
             position.place(targets.gbuffer.read_position(tile), tile)
             normal.place(targets.gbuffer.read_normal(tile), tile)
             decal.place(targets.decal_pass.read_decal(tile), tile)
@@ -162,14 +163,15 @@ class Renderer:
             data, images = self._uploads(scene)
             bounds = _union([drawable.bounds for drawable in drawables])
             clip_range = scene.camera.clip_range(bounds)
-            look = Look(mapping=mapping, ambient_radius=AMBIENT_RADIUS * _diagonal(bounds))
+            ambient_radius = AMBIENT_RADIUS * _diagonal(bounds)
             targets = self._targets_for(largest_tile(size, samples, limit=self._max_tile), buffers=buffers)
             for tile in tiles(scene.camera, size, samples, clip_range, limit=self._max_tile):
                 self._camera.use(tile)
                 targets.gbuffer.begin(tile.width, tile.height)
                 for object_id, drawable in enumerate(drawables):
                     drawable.draw(object_id, tile)
-                targets.decal_pass.draw(targets.gbuffer, tile, data, images, look)
+                targets.decal_pass.draw(targets.gbuffer, tile, data, images, mapping)
+                targets.light_pass.draw(targets.gbuffer, targets.decal_pass.paint, tile, ambient_radius)
                 yield tile, targets
             for kept in (self._drawables, self._decals, self._images):
                 kept.sweep()
@@ -220,11 +222,13 @@ class _Targets:
         self.buffers = buffers
         self.gbuffer = GBuffer(context, size)
         self.decal_pass = DecalPass(context, size, buffers=buffers)
+        self.light_pass = LightPass(context, size)
         self.resolve = ResolvePass(context, size)
 
     def release(self) -> None:
         self.gbuffer.release()
         self.decal_pass.release()
+        self.light_pass.release()
         self.resolve.release()
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Self
+from typing import Self, TypeVar
 
 import moderngl
 import numpy as np
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from decals.camera import Camera
 from decals.render.context import Context
+from decals.render.entry import Program
+
+Compiled = TypeVar("Compiled", bound=Program)
 
 CAMERA_BINDING = 0
 """Binding point of the uniform block in ``shaders/camera.glsl``."""
@@ -112,7 +115,7 @@ class CameraBuffer:
         self._buffer.release()
 
 
-def attach_camera(program: moderngl.Program) -> moderngl.Program:
+def attach_camera(program: Compiled) -> Compiled:
     """Let a program read its ``CameraBlock``, if it has one, from the bound buffer."""
     block = program.get("CameraBlock", None)
     if isinstance(block, moderngl.UniformBlock):
@@ -120,7 +123,7 @@ def attach_camera(program: moderngl.Program) -> moderngl.Program:
     return program
 
 
-def set_uniform(program: moderngl.Program, name: str, value: object) -> None:
+def set_uniform(program: Program, name: str, value: object) -> None:
     """Set a uniform; one that the driver found unused is passed over."""
     uniform = program.get(name, None)
     if isinstance(uniform, moderngl.Uniform):

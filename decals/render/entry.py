@@ -1,0 +1,212 @@
+"""Passes over all pixels of a target, as fragment or as compute shaders, from the same text.
+
+Neither is faster everywhere: data-centre cards, where few units take fragments, run compute shaders up to
+thirty times faster; software rasterisers run them no faster or several times slower. So a short measurement
+decides.
+"""
+
+import os
+import time
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from typing import TYPE_CHECKING, Protocol
+
+import moderngl
+import numpy as np
+
+from decals.errors import NoGraphics
+from implicit_decals.shaders import Source, compose
+
+if TYPE_CHECKING:
+    from decals.render.context import Context
+
+OVERRIDE = "IMPLICIT_DECALS_ENTRY"
+"""Environment variable that names the entry point to take: ``fragment`` or ``compute``."""
+COMPUTE_BASELINE = 430
+"""Compute shaders came with OpenGL 4.3; macOS has none."""
+GROUP = 8
+"""Side of a compute shader's square group of pixels."""
+
+CLEARLY = 1.5
+"""How many times faster compute must be to be taken: around 1, the choice would change from run to run."""
+
+_PROBE_SIZE = (256, 256)
+_PROBE_RUNS = 3
+_NOISE_SIZE = 64
+
+Defines = Mapping[str, bool]
+Slots = Mapping[str, str | Source]
+Program = moderngl.Program | moderngl.ComputeShader
+"""What takes a pass's uniforms."""
+
+
+class Entry(StrEnum):
+    """How a pass over all pixels is run."""
+
+    FRAGMENT = "fragment"
+    COMPUTE = "compute"
+
+
+class PixelPass(Protocol):
+    """A compiled pass over all pixels."""
+
+    @property
+    def program(self) -> Program:
+        """What takes the uniforms."""
+        ...
+
+    def run(self, width: int, height: int) -> None:
+        """Fill the lower left part of this size of all targets."""
+        ...
+
+    def release(self) -> None:
+        """Give the memory back, less the targets and the program."""
+        ...
+
+
+def pixel_pass(
+    context: "Context",
+    body: str,
+    targets: Sequence[moderngl.Texture],
+    *,
+    slots: Slots | None = None,
+    defines: Defines | None = None,
+    entry: Entry | None = None,
+) -> PixelPass:
+    """Compile a pass.
+
+    Parameters
+    ----------
+    context
+        Where it runs.
+    body
+        Shader file that defines ``Pixel pixel_at(ivec2 texel)``.
+    targets
+        One or two textures of floats that it fills.
+    slots, defines
+        For the body, as in `implicit_decals.shaders.compose`.
+    entry
+        How it is run; the context's choice if not given.
+    """
+    entry = entry or context.entry
+    make = _ComputePass if entry is Entry.COMPUTE else _FragmentPass
+    return make(context, _source(entry, body, len(targets), slots or {}, defines or {}), targets)
+
+
+def _source(entry: Entry, body: str, targets: int, slots: Slots, defines: Defines) -> Source:
+    given: dict[str, str | int | float | bool] = {**defines, "TWO_TARGETS": targets > 1}
+    filled = {"body": f"//@ include {body}", **slots}
+    if entry is Entry.COMPUTE:
+        return compose("pixels.comp", slots=filled, defines={**given, "GROUP": GROUP}, version="430 core")
+    return compose("pixels.frag", slots=filled, defines=given)
+
+
+class _FragmentPass:
+    """One triangle over all pixels."""
+
+    def __init__(self, context: "Context", source: Source, targets: Sequence[moderngl.Texture]) -> None:
+        self.program: Program = context.program(compose("screen.vert"), source)
+        self._array = context.gl.vertex_array(self.program, [])
+        self._framebuffer = context.gl.framebuffer(list(targets))
+        self._gl = context.gl
+
+    def run(self, width: int, height: int) -> None:
+        self._framebuffer.use()
+        self._framebuffer.viewport = (0, 0, width, height)
+        self._gl.enable_only(moderngl.NOTHING)
+        self._array.render(vertices=3)
+
+    def release(self) -> None:
+        self._array.release()
+        self._framebuffer.release()
+
+
+class _ComputePass:
+    """A group of invocations for every square of pixels."""
+
+    def __init__(self, context: "Context", source: Source, targets: Sequence[moderngl.Texture]) -> None:
+        self.program: Program = context.compute_program(source)
+        self._targets = tuple(targets)
+        self._gl = context.gl
+
+    def run(self, width: int, height: int) -> None:
+        for unit, target in enumerate(self._targets):
+            target.bind_to_image(unit, read=False, write=True)
+        program = self.program
+        assert isinstance(program, moderngl.ComputeShader)
+        program["target_size"] = width, height
+        program.run(-(-width // GROUP), -(-height // GROUP))
+        self._gl.memory_barrier()
+
+    def release(self) -> None:
+        """Nothing but targets and program was made."""
+
+
+_chosen: dict[str, Entry] = {}
+
+
+def choose_entry(context: "Context") -> Entry:
+    """Give the faster entry point of a context; it must be current.
+
+    Measured once for each driver (a few milliseconds, and two compilations), never where there is no choice.
+
+    Raises
+    ------
+    NoGraphics
+        The environment asks for an entry point that is unknown or cannot be had here.
+    """
+    wish = os.environ.get(OVERRIDE, "")
+    if wish:
+        return checked_entry(context, wish)
+    if not supports_compute(context):
+        return Entry.FRAGMENT
+    if context.name not in _chosen:
+        gain = measure(context, Entry.FRAGMENT) / measure(context, Entry.COMPUTE)
+        _chosen[context.name] = Entry.COMPUTE if gain > CLEARLY else Entry.FRAGMENT
+    return _chosen[context.name]
+
+
+def checked_entry(context: "Context", wish: str) -> Entry:
+    """Give the entry point of a name.
+
+    Raises
+    ------
+    NoGraphics
+        There is none, or the context cannot run it.
+    """
+    try:
+        entry = Entry(wish.lower())
+    except ValueError as error:
+        raise NoGraphics(f"expected one of {', '.join(Entry)} as the entry point, got {wish!r}") from error
+    if entry is Entry.COMPUTE and not supports_compute(context):
+        raise NoGraphics(
+            f"compute shaders need OpenGL 4.3, here is {context.name}; ask for {Entry.FRAGMENT}, or for none"
+        )
+    return entry
+
+
+def supports_compute(context: "Context") -> bool:
+    """Whether a context runs compute shaders."""
+    return context.gl.version_code >= COMPUTE_BASELINE
+
+
+def measure(context: "Context", entry: Entry) -> float:
+    """Give the seconds that a short piece of work takes through an entry point: the best of a few runs."""
+    noise = np.random.default_rng(0).random((_NOISE_SIZE, _NOISE_SIZE, 4), np.float32)
+    source = context.gl.texture((_NOISE_SIZE, _NOISE_SIZE), 4, noise.tobytes(), dtype="f4")
+    target = context.gl.texture(_PROBE_SIZE, 4, dtype="f2")
+    probe = pixel_pass(context, "probe.glsl", [target], entry=entry)
+    source.use(0)
+    probe.program["noise"] = 0
+    times = [_seconds(context, probe) for _ in range(_PROBE_RUNS + 1)]
+    for resource in (probe, target, source):
+        resource.release()
+    return min(times[1:])
+
+
+def _seconds(context: "Context", probe: PixelPass) -> float:
+    context.gl.finish()
+    begin = time.perf_counter()
+    probe.run(*_PROBE_SIZE)
+    context.gl.finish()
+    return time.perf_counter() - begin

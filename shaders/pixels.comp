@@ -1,0 +1,22 @@
+// The same pass as pixels.frag as a compute shader, for GLSL 4.30 on: an invocation a pixel.
+layout(local_size_x = GROUP, local_size_y = GROUP) in;
+uniform ivec2 target_size;
+
+//@ slot body
+
+layout(binding = 0) writeonly uniform image2D out_color;
+#ifdef TWO_TARGETS
+layout(binding = 1) writeonly uniform image2D out_buffers;
+#endif
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(texel, target_size))) {
+        return;
+    }
+    Pixel pixel = pixel_at(texel);
+    imageStore(out_color, texel, pixel.color);
+#ifdef TWO_TARGETS
+    imageStore(out_buffers, texel, pixel.buffers);
+#endif
+}

@@ -1,0 +1,146 @@
+"""Two entry points from one source: the same pixels, chosen by measurement, by wish, or by what there is."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from decals.errors import NoGraphics
+from decals.mapping import Mapping
+from decals.render import entry as entries
+from decals.render.context import Context
+from decals.render.entry import COMPUTE_BASELINE, OVERRIDE, Entry, measure
+from decals.render.renderer import Buffers, Renderer
+from tests.decals.shapes import torus
+from tests.decals.test_render_decals import SIZE, compare, scattered, view_of
+
+NO_COMPUTE = {"MESA_GL_VERSION_OVERRIDE": "4.1", "MESA_GLSL_VERSION_OVERRIDE": "410"}
+"""Mesa then offers what macOS does."""
+
+
+@pytest.fixture(scope="module")
+def compute(context: Context) -> Iterator[Renderer]:
+    if context.gl.version_code < COMPUTE_BASELINE:
+        pytest.skip(f"no compute shaders in {context.name}")
+    with Context.standalone(entry="compute") as made, Renderer(made) as drawing:
+        yield drawing
+
+
+@pytest.fixture(scope="module")
+def fragment() -> Iterator[Renderer]:
+    with Context.standalone(entry="fragment") as made, Renderer(made) as drawing:
+        yield drawing
+
+
+@pytest.mark.parametrize("count", [0, 1, 400])
+def test_both_entry_points_find_the_same(fragment: Renderer, compute: Renderer, count: int) -> None:
+    shapes = torus(), torus(0.8, 0.3, shift=(0.7, 0, 0.5))
+    view = view_of(scattered(shapes[0], count, 5, radii=(0.05, 0.4)), *shapes)
+    first, second = (drawing.buffers(view, size=SIZE) for drawing in (fragment, compute))
+    for name in ("position", "normal", "object_id", "owner"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name), err_msg=name)
+    np.testing.assert_allclose(second.field, first.field, atol=1e-6)
+    np.testing.assert_allclose(second.uv, first.uv, atol=1e-6)
+    assert most_colors(first, second) <= 1
+
+
+def most_colors(first: Buffers, second: Buffers) -> int:
+    return int(np.abs(first.color.astype(int) - second.color).max())
+
+
+def test_compute_is_the_oracles_at_every_pixel(compute: Renderer) -> None:
+    shape = torus()
+    view = view_of(scattered(shape, 200, 7, radii=(0.02, 0.5)), shape)
+    assert compare(view, compute.buffers(view, size=SIZE), Mapping.CORRECTED).any()
+
+
+def test_odd_sizes_and_tiles(compute: Renderer, fragment: Renderer) -> None:
+    shape = torus()
+    view = view_of(scattered(shape, 100, 5, radii=(0.05, 0.3)), shape)
+    whole = fragment.render(view, size=(37, 53), samples=3)
+    with Renderer(compute.context, max_tile=41) as tiled:
+        parts = tiled.render(view, size=(37, 53), samples=3)
+    assert (np.abs(parts.astype(int) - whole).max(axis=-1) > 2).mean() < 0.01
+
+
+def test_a_context_chooses_the_faster_one(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    if context.gl.version_code < COMPUTE_BASELINE:
+        pytest.skip(f"no compute shaders in {context.name}")
+    monkeypatch.delenv(OVERRIDE, raising=False)
+    for faster in Entry:
+        monkeypatch.setattr(entries, "_chosen", {})
+        monkeypatch.setattr(entries, "measure", lambda _, entry, faster=faster: 1.0 + (entry is not faster))
+        assert Context(context.gl).entry is faster
+
+
+def test_equally_fast_means_fragment(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(OVERRIDE, raising=False)
+    monkeypatch.setattr(entries, "_chosen", {})
+    monkeypatch.setattr(entries, "measure", lambda _, entry: 1.0 if entry is Entry.COMPUTE else 1.4)
+    assert Context(context.gl).entry is Entry.FRAGMENT
+
+
+def test_it_measures_once_for_each_driver(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(OVERRIDE, raising=False)
+    monkeypatch.setattr(entries, "_chosen", {})
+    first = Context(context.gl).entry
+    monkeypatch.setattr(entries, "measure", lambda *_: pytest.fail("measured again"))
+    assert Context(context.gl).entry is first
+
+
+def test_both_can_be_measured(context: Context) -> None:
+    if context.gl.version_code < COMPUTE_BASELINE:
+        pytest.skip(f"no compute shaders in {context.name}")
+    assert all(0.0 < measure(context, entry) < 10.0 for entry in Entry)
+
+
+def test_the_environment_and_an_argument_decide(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(entries, "measure", lambda *_: pytest.fail("measured"))
+    monkeypatch.setenv(OVERRIDE, "Fragment")
+    assert Context(context.gl).entry is Entry.FRAGMENT
+    if context.gl.version_code >= COMPUTE_BASELINE:
+        assert Context(context.gl, entry="compute").entry is Entry.COMPUTE
+
+
+@pytest.mark.parametrize("wish", ["vertex", " "])
+def test_unknown_entry_points(context: Context, monkeypatch: pytest.MonkeyPatch, wish: str) -> None:
+    with pytest.raises(NoGraphics, match="expected one of fragment, compute"):
+        Context(context.gl, entry=wish)
+    monkeypatch.setenv(OVERRIDE, wish)
+    with pytest.raises(NoGraphics, match="expected one of fragment, compute"):
+        assert Context(context.gl).entry
+
+
+def test_without_compute_shaders_fragments_do(context: Context) -> None:
+    """In a process of its own: Mesa reads its version when it starts."""
+    script = """
+from decals.errors import NoGraphics
+from decals.render.context import Context
+with Context.standalone() as context:
+    if context.gl.version_code >= 430:
+        raise SystemExit("skip: not Mesa")
+    with context.current():
+        assert context.entry == "fragment", context.entry
+    try:
+        Context(context.gl, entry="compute")
+    except NoGraphics as error:
+        assert "4.3" in str(error), error
+    else:
+        raise AssertionError("compute was accepted")
+from decals.render.renderer import Renderer
+from tests.decals.test_render_decals import scattered, torus, view_of
+with Renderer() as renderer:
+    view = view_of(scattered(torus(), 50, 5, radii=(0.05, 0.3)), torus())
+    assert (renderer.buffers(view, size=(32, 24)).owner >= 0).any()
+"""
+    environment = {**os.environ, **NO_COMPUTE}
+    environment.pop(OVERRIDE, None)
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False
+    )
+    if "skip:" in done.stderr:
+        pytest.skip(done.stderr.strip())
+    assert done.returncode == 0, done.stderr
