@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .camera import Camera
+    from .contact import Contact
     from .cover import cover
     from .errors import (
         DecalsError,
@@ -20,12 +21,14 @@ if TYPE_CHECKING:
         InvalidSeeding,
         NoGraphics,
     )
+    from .evaluate import Samples, evaluate
     from .images import BUILTIN_IMAGES, generate_image, load_image
     from .implicit_surface import ImplicitSurface
     from .index import DecalIndex
+    from .mapping import Mapping
     from .mesh_file import read_mesh
     from .mesh_surface import MeshSurface
-    from .model import Decals
+    from .model import Decals, Interaction
     from .relaxation import Relaxation
     from .scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
     from .scene_file import load_scene, save_scene
@@ -35,26 +38,31 @@ if TYPE_CHECKING:
 __all__ = [
     "BUILTIN_IMAGES",
     "Camera",
+    "Contact",
     "DecalImage",
     "DecalIndex",
     "Decals",
     "DecalsError",
     "ImplicitSurface",
+    "Interaction",
     "InvalidDecals",
     "InvalidImage",
     "InvalidMesh",
     "InvalidPoints",
     "InvalidScene",
     "InvalidSeeding",
+    "Mapping",
     "MeshObject",
     "MeshSurface",
     "NoGraphics",
     "Relaxation",
+    "Samples",
     "Scene",
     "Surface",
     "TreeObject",
     "bounds_of",
     "cover",
+    "evaluate",
     "generate_image",
     "load_image",
     "load_scene",
@@ -65,6 +73,7 @@ __all__ = [
 
 _HOMES = {
     "camera": ("Camera",),
+    "contact": ("Contact",),
     "cover": ("cover",),
     "errors": (
         "DecalsError",
@@ -76,12 +85,14 @@ _HOMES = {
         "InvalidSeeding",
         "NoGraphics",
     ),
+    "evaluate": ("Samples", "evaluate"),
     "images": ("BUILTIN_IMAGES", "generate_image", "load_image"),
     "implicit_surface": ("ImplicitSurface",),
     "index": ("DecalIndex",),
+    "mapping": ("Mapping",),
     "mesh_file": ("read_mesh",),
     "mesh_surface": ("MeshSurface",),
-    "model": ("Decals",),
+    "model": ("Decals", "Interaction"),
     "relaxation": ("Relaxation",),
     "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
     "scene_file": ("load_scene", "save_scene"),

@@ -16,11 +16,25 @@ E = 1 − F, and push = 1 − ∏ h_i in place of the product. All are in the su
 # mypy: ignore-errors
 # (kernel code is Python to look at only: its names have Warp types)
 
+from enum import IntEnum
+
 import warp as wp
 
 from blobtree.kernels import RIM
 
 wp.set_module_options({"enable_backward": False})
+
+
+class Contact(IntEnum):
+    """How neighbours push the decal that owns a point."""
+
+    PAPER = 0
+    """Equation 5, repaired: neighbours' factors h multiply."""
+    SMOOTH = 1
+    """The strongest push alone, min h: no image is torn where three decals meet."""
+    RADIAL = 2
+    """Along the ray from the centre alone, in convex cells: never folds (decals/radial.py)."""
+
 
 REACH = 0.575
 """Neighbours act within this many influence radii; one beyond would move r by less than 7e-5 of the rim."""
@@ -58,8 +72,10 @@ def contact_push(e_i: wp.float32, e_k: wp.float32) -> wp.float32:
 
 
 @wp.func
-def add_push(push: wp.float32, phi: wp.float32) -> wp.float32:
-    """1 − ∏(1 − φ), extended by one more neighbour."""
+def add_push(push: wp.float32, phi: wp.float32, contact: wp.int32) -> wp.float32:
+    """1 − ∏(1 − φ), or the largest φ, extended by one more neighbour."""
+    if contact == Contact.SMOOTH:
+        return wp.max(push, phi)
     return push + phi * (1.0 - push)
 
 

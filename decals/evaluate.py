@@ -1,5 +1,6 @@
 """Decals at arbitrary points, without graphics: for baking, experiments and tests."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,11 +8,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from decals.errors import InvalidPoints
+from decals.contact import Contact
+from decals.errors import InvalidImage, InvalidPoints
 from decals.index import DecalIndex
 from decals.mapping import Mapping
-from decals.model import Decals
-from decals.ownership import sample_points
+from decals.model import PLAIN, Decals
+from decals.sampling import color_points, sample_points
+from decals.texels import RGBA, texel_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,16 +24,19 @@ class Samples:
     Attributes
     ----------
     owner : int32[m]
-        Number of the decal that owns each point, −1 where none does.
+        Number of the topmost decal that shows at each point, −1 where none does.
     uv : float32[m, 2]
         Place in the owner's image, in [0, 1]² with ½ at its centre; 0 where there is no owner.
     field : float32[m]
         F after contact (paper, equation 5): 1 at the centre, ½ on rims and contact lines; 0 without owner.
+    color : float32[m, 4] or None
+        Colour of all decals over each other, in linear light with premultiplied alpha; None without images.
     """
 
     owner: NDArray[np.int32]
     uv: NDArray[np.float32]
     field: NDArray[np.float32]
+    color: NDArray[np.float32] | None = None
 
 
 def evaluate(
@@ -39,10 +45,12 @@ def evaluate(
     normals: ArrayLike,
     *,
     mapping: Mapping = Mapping.CORRECTED,
+    contact: Contact = Contact.PAPER,
     index: DecalIndex | None = None,
+    images: Sequence[RGBA] | None = None,
     device: Any = None,
 ) -> Samples:
-    """Find owner, image coordinates and field of surface points.
+    """Find owner, image coordinates, field and colour of surface points.
 
     Parameters
     ----------
@@ -53,8 +61,12 @@ def evaluate(
         has no owner.
     mapping : Mapping, optional
         How the images bend with the surface.
+    contact : Contact, optional
+        How contact decals push each other.
     index : DecalIndex, optional
         The index of these very decals; built where not given.
+    images : sequence of uint8[h, w, 4], optional
+        sRGB images with alpha, of any sizes; with them, colours are found too.
     device : optional
         Warp device; its default where not given.
 
@@ -62,12 +74,14 @@ def evaluate(
     ------
     InvalidPoints
         Points and normals are not two arrays of the same shape [m, 3].
+    InvalidImage
+        Something that is no image, or fewer images than decals show.
     """
     places, directions = _rows("points", points), _rows("normals", normals)
     if len(places) != len(directions):
         raise InvalidPoints(f"normals: expected one for each of {len(places)} points, got {len(directions)}")
     if index is None:
-        index = DecalIndex.build(decals.positions, decals.influence)
+        index = DecalIndex.of(decals)
     count = len(places)
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
@@ -76,11 +90,31 @@ def evaluate(
         wp.array(places, dtype=wp.vec3, device=device),
         wp.array(directions, dtype=wp.vec3, device=device),
         int(mapping),
+        int(contact),
+        decals.layered,
         wp.array(decals.packed(), dtype=wp.vec4, device=device),
         *index.on(device).arguments(),
     ]
     wp.launch(sample_points, count, inputs, [owner, uv, field], device=device)
-    return Samples(owner.numpy(), uv.numpy(), field.numpy())
+    color = None if images is None else _colors(decals, images, [*inputs, owner], device)
+    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color)
+
+
+def _colors(decals: Decals, images: Sequence[RGBA], inputs: list[Any], device: Any) -> NDArray[np.float32]:
+    needed = int(decals.images.max(initial=PLAIN)) + 1
+    if len(images) < needed:
+        raise InvalidImage(
+            f"images: expected {needed} or more, got {len(images)}; decals show them by number"
+        )
+    places, texels = texel_arrays(images)
+    colors: Any = wp.zeros(len(inputs[0]), dtype=wp.vec4, device=device)
+    arrays: list[Any] = [
+        wp.array(places, dtype=wp.vec3i, device=device),
+        wp.array(texels, dtype=wp.vec4, device=device),
+    ]
+    wp.launch(color_points, len(inputs[0]), [*inputs, *arrays], [colors], device=device)
+    result: NDArray[np.float32] = colors.numpy()
+    return result
 
 
 def _rows(name: str, values: ArrayLike) -> NDArray[np.float32]:

@@ -4,9 +4,10 @@ It replaces the paper's octree (section 3.4). Each decal is stored once for ever
 radius ρ = REACH·s touches, on the one level whose cells are larger than ρ and at most 2ρ wide: at most 27
 cells. A look-up reads one cell per level. Three flat arrays go to the device:
 
-    levels  float32[l, 4]   per level: (cells per unit length, cell size, 0, 0)
+    levels  float32[l, 4]   per level: (cells per unit length, cell size, lowest rank, highest rank)
     table   int32[4 · 2^k]  slots of an open-addressing hash table: (x + level·2²⁴, y, z, head), x < 0: empty
-    ids     int32[m]        lists: ids[head] is a count, that many decal numbers follow, ascending
+    ids     int32[m]        lists: ids[head] is a count, that many decal numbers follow, in
+                            the order in which they are drawn (decals/stack.py)
 
 Cell sizes are powers of two and cells are counted from the world's origin, so the cell of a float32 point is
 found without any rounding: no decal is ever lost to it, near or far from the origin.
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from decals.contact import REACH
 from decals.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, count_candidates, list_candidates
+from decals.model import DEFAULT_RANK, Decals
 
 SLACK = 1e-5
 """Relative growth of each ball, above the rounding of a float32 distance."""
@@ -61,21 +63,29 @@ class DecalIndex:
     ids: Ints
 
     @classmethod
-    def build(cls, positions: ArrayLike, influence: ArrayLike) -> Self:
-        """Index decals by position (float32[n, 3]) and radius of influence (float32[n])."""
+    def build(cls, positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike = DEFAULT_RANK) -> Self:
+        """Index decals by position (float32[n, 3]), radius of influence (float32[n]) and rank (int32[n])."""
         centres = np.asarray(positions, np.float64).reshape(-1, 3)
         reach = np.asarray(influence, np.float64).reshape(-1) * (REACH * (1.0 + SLACK))
         exponents = _exponents(centres, reach)
         used, level = np.unique(exponents, return_inverse=True)
         keys, owners = _entries(centres, reach, np.exp2(exponents), level)
-        order = np.lexsort(keys.T)
+        rank = np.broadcast_to(np.asarray(ranks, np.int64), len(centres))
+        order = np.lexsort((rank[owners], *keys.T))
         keys, owners = keys[order], owners[order]
         starts = np.flatnonzero((np.diff(keys, axis=0, prepend=_EMPTY) != 0).any(axis=1))
         ids, heads = _lists(owners, starts)
         levels = np.zeros((len(used), 4), np.float32)
         levels[:, 0] = np.exp2(-used)
         levels[:, 1] = np.exp2(used)
+        levels[:, 2] = [rank[level == number].min() for number in range(len(used))]
+        levels[:, 3] = [rank[level == number].max() for number in range(len(used))]
         return cls(levels, _hash_table(keys[starts], heads), ids)
+
+    @classmethod
+    def of(cls, decals: Decals) -> Self:
+        """Index decals."""
+        return cls.build(decals.positions, decals.influence, decals.ranks)
 
     @property
     def level_count(self) -> int:

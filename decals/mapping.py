@@ -53,12 +53,13 @@ def arc_over_chord(sine: wp.float32, cosine: wp.float32) -> wp.float32:
 def corrected_offset(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
     """Offset of q along the surface, as if it bent from n_p to n_q on a circular arc that may tighten.
 
-    With T the geodesic's direction at p, κ and τ its normal curvature and torsion, s its length, and ′ along it,
-    the chord's projection misses the log map s T by κ s²/6 (s n′) + O(s⁴), and n_q − n_p shows s n′. The heights
-    h_p = w·n_p and h_q = w·n_q give κ s² = h_p − h_q and κ′ s³ = −6 (h_p + h_q): the arc's part, unrolled to all
-    orders, needs only their difference; their sum is the change of curvature, whose part along T is added.
-    What remains is κ τ′ s⁴/24 across T, which two normals cannot tell. Exact on planes, spheres and cylinders.
-    Where n_q = n_p, or −n_p, so that no arc is told from any other, it is the projection.
+    With T the geodesic's direction at p, κ and τ its normal curvature and torsion, s its length, and ′
+    along it, the chord's projection misses the log map s T by κ s²/6 (s n′) + O(s⁴), and n_q − n_p shows
+    s n′. The heights h_p = w·n_p and h_q = w·n_q give κ s² = h_p − h_q and κ′ s³ = −6 (h_p + h_q): the
+    arc's part, unrolled to all orders, needs only their difference; their sum is the change of curvature,
+    whose part along T is added. What remains is κ τ′ s⁴/24 across T, which two normals cannot tell. Exact
+    on planes, spheres and cylinders. Where n_q = n_p, or −n_p, so that no arc is told from any other, it
+    is the projection.
     """
     height = wp.dot(w, n_p)
     flat = w - height * n_p

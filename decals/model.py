@@ -1,14 +1,26 @@
 """Decals as data: a frozen, validated structure of arrays (paper, section 3.1)."""
 
 from collections.abc import Iterable
-from dataclasses import KW_ONLY, dataclass, replace
-from typing import Any, Self
+from dataclasses import KW_ONLY, dataclass, fields, replace
+from enum import IntEnum
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.kernels import RIM
-from decals.errors import InvalidDecals
+from decals.columns import (
+    Bools,
+    Ints,
+    check_range,
+    chosen_rows,
+    flags,
+    floats,
+    orthogonal,
+    shares,
+    unit,
+    whole,
+)
 
 FACING_LIMIT = -0.25
 """Smallest cosine between a decal's normal and that of the surface it colours, unless it spills."""
@@ -19,13 +31,37 @@ LARGEST = 2.0**50
 SMALLEST_RADIUS = 2.0**-50
 """Smallest radius, about 1e-15: its square is still a normal float32."""
 
-_ROUNDING = 1e-6
-_PARALLEL = 1e-3
-_SPILL_LIMIT = -2.0
+LAYERS = 2**19
+"""Layers run from -LAYERS to LAYERS - 1."""
+
+PLAIN = -1
+"""Image of a decal that shows its tint alone."""
+
+RECORD = 4
+"""Rows of the packed record of a decal."""
+
+DEFAULT_RANK = 4 * LAYERS + 1
+"""Rank of a contact decal of layer 0."""
+
+_MOST_IMAGES = 2**24  # the packed record carries an image's index as a float32
 
 Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
+
+
+class Interaction(IntEnum):
+    """What a decal does to the others of its layer (paper, sections 1 and 3.2), from the lowest up.
+
+    In every layer the contact decals together are one sheet: at each point the one of highest field shows,
+    deformed so that it touches its neighbours. Independent decals lie under the sheet of their layer,
+    overlapping ones over it; both are drawn whole, push nobody and are pushed by nobody.
+    """
+
+    INDEPENDENT = 0
+    """Undeformed, overlapped by the contact decals of its layer."""
+    CONTACT = 1
+    """Jostles with the other contact decals of its layer."""
+    OVERLAP = 2
+    """Undeformed, drawn over the contact decals of its layer: eyes on scales."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +83,24 @@ class Decals:
     radii : float32[n]
         Visible radius of an undisturbed decal: where its rim lies.
     images : int32[n], optional
-        Index into the scene's list of images. Default 0.
+        Index into the scene's list of images, or PLAIN (-1) for the tint alone. Default 0.
     spill : bool[n], optional
         Whether a decal also colours surface that faces away from it, such as the far side of a thin wall.
+    interactions : int32[n], optional
+        An `Interaction` each. Default CONTACT.
+    layers : int32[n], optional
+        Layers are drawn from the lowest up, decals of equal rank in the order of their numbers. Default 0.
+    tints : float32[n, 3], optional
+        sRGB colour by which the image is multiplied (in linear light), or of a plain decal. Default white.
+    opacities : float32[n], optional
+        From 0, unseen, to 1, the default.
 
     Raises
     ------
     InvalidDecals
         For wrong shapes, NaN or infinity, coordinates beyond LARGEST, radii outside SMALLEST_RADIUS to
-        LARGEST, zero normals or tangents, a tangent along its normal, or a negative image.
+        LARGEST, zero normals or tangents, a tangent along its normal, or images, interactions, layers, tints
+        or opacities out of range.
     """
 
     positions: Floats
@@ -65,23 +110,33 @@ class Decals:
     _: KW_ONLY
     images: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
     spill: Bools = None  # type: ignore[assignment]  # filled in by __post_init__
+    interactions: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
+    layers: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
+    tints: Floats = None  # type: ignore[assignment]  # filled in by __post_init__
+    opacities: Floats = None  # type: ignore[assignment]  # filled in by __post_init__
 
     def __post_init__(self) -> None:
-        positions = _floats("positions", self.positions, (-1, 3))
+        positions = floats("positions", self.positions, (-1, 3))
         count = len(positions)
-        normals = _floats("normals", self.normals, (count, 3))
-        tangents = _floats("tangents", self.tangents, (count, 3))
-        radii = _floats("radii", self.radii, (count,))
-        _check_range("radii", radii, SMALLEST_RADIUS, LARGEST)
-        _check_range("positions", np.abs(positions), 0.0, LARGEST)
-        normals = _unit("normals", normals)
+        normals = floats("normals", self.normals, (count, 3))
+        tangents = floats("tangents", self.tangents, (count, 3))
+        radii = floats("radii", self.radii, (count,))
+        check_range("radii", radii, SMALLEST_RADIUS, LARGEST)
+        check_range("positions", np.abs(positions), 0.0, LARGEST)
+        normals = unit("normals", normals)
         arrays = {
             "positions": positions.astype(np.float32),
             "normals": normals.astype(np.float32),
-            "tangents": _orthogonal(_unit("tangents", tangents), normals).astype(np.float32),
+            "tangents": orthogonal(unit("tangents", tangents), normals).astype(np.float32),
             "radii": radii.astype(np.float32),
-            "images": _images(self.images, count),
-            "spill": _flags("spill", self.spill, count),
+            "images": whole("images", self.images, count, low=PLAIN, high=_MOST_IMAGES - 1, default=0),
+            "spill": flags("spill", self.spill, count),
+            "interactions": whole(
+                "interactions", self.interactions, count, low=0, high=2, default=Interaction.CONTACT
+            ),
+            "layers": whole("layers", self.layers, count, low=-LAYERS, high=LAYERS - 1, default=0),
+            "tints": shares("tints", self.tints, (count, 3)).astype(np.float32),
+            "opacities": shares("opacities", self.opacities, (count,)).astype(np.float32),
         }
         for name, array in arrays.items():
             array.flags.writeable = False
@@ -108,7 +163,7 @@ class Decals:
 
     def __getitem__(self, rows: slice | ArrayLike) -> Self:
         """Pick some of the decals by a slice, a mask or an array of indices."""
-        chosen = rows if isinstance(rows, slice) else np.atleast_1d(_rows(rows))
+        chosen = rows if isinstance(rows, slice) else np.atleast_1d(chosen_rows(rows))
         return type(self)(**{name: getattr(self, name)[chosen] for name in _FIELDS})
 
     @property
@@ -121,108 +176,43 @@ class Decals:
         """Radius s at which each decal's field ends (paper, figure 1): float32[n], radii / 0.454202."""
         return (self.radii / np.float64(RIM)).astype(np.float32)
 
-    def packed(self) -> Floats:
-        """Lay out the record that devices read: float32[3n, 4], three rows a decal.
+    @property
+    def ranks(self) -> Ints:
+        """Place of each decal's sheet or own drawing in the stack, from the lowest up: int32[n].
 
-        Rows are (position, s), (normal, facing limit) and (tangent, image); the facing limit of a decal
-        that spills lies below every cosine.
+        Decals of one rank are drawn in the order of their numbers, save contact decals, which share a sheet.
         """
-        record = np.empty((len(self), 3, 4), np.float32)
+        return (self.layers + LAYERS) * 4 + self.interactions
+
+    @property
+    def layered(self) -> bool:
+        """Whether decals lie over each other: they are not all contact decals of one layer."""
+        return bool(
+            (self.interactions != Interaction.CONTACT).any() or (self.layers != self.layers[:1]).any()
+        )
+
+    def packed(self) -> Floats:
+        """Lay out the record that devices read: float32[4n, 4], RECORD rows a decal.
+
+        Rows are (position, s), (normal, rank), (tangent, image) and (tint in linear light, opacity). The rank
+        of a decal that spills is a half more: decals/ownership.py reads both.
+        """
+        record = np.empty((len(self), RECORD, 4), np.float32)
         record[:, 0, :3] = self.positions
         record[:, 0, 3] = self.influence
         record[:, 1, :3] = self.normals
-        record[:, 1, 3] = np.where(self.spill, _SPILL_LIMIT, FACING_LIMIT)
+        record[:, 1, 3] = self.ranks + np.where(self.spill, 0.5, 0.0)
         record[:, 2, :3] = self.tangents
         record[:, 2, 3] = self.images
+        record[:, 3, :3] = linear_light(self.tints)
+        record[:, 3, 3] = self.opacities
         return record.reshape(-1, 4)
 
 
-_FIELDS = ("positions", "normals", "tangents", "radii", "images", "spill")
-_MOST_IMAGES = 2**24  # the packed record carries an image's index as a float32
+def linear_light(colors: Floats) -> Floats:
+    """Decode sRGB colours from 0 to 1."""
+    wide = colors.astype(np.float64)
+    return np.where(wide <= 0.04045, wide / 12.92, ((wide + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def _floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Copy to float64, checking shape (-1: any length) and refusing NaN and infinity."""
-    try:
-        array = np.array(values, np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidDecals(f"{name}: expected numbers, got {values!r:.80}") from error
-    _check_shape(name, array.shape, shape)
-    bad = ~np.isfinite(array)
-    if bad.any():
-        row = int(np.argwhere(bad)[0][0])
-        raise InvalidDecals(
-            f"{name}: expected finite numbers, got {array[row]} in row {row}; drop or repair it"
-        )
-    return array
-
-
-def _check_shape(name: str, got: tuple[int, ...], expected: tuple[int, ...]) -> None:
-    if len(got) != len(expected) or any(e not in (-1, g) for g, e in zip(got, expected, strict=True)):
-        wanted = ", ".join("n" if e == -1 else str(e) for e in expected)
-        raise InvalidDecals(f"{name}: expected shape [{wanted}], got {list(got)}; give one row per decal")
-
-
-def _check_range(name: str, values: NDArray[np.float64], low: float, high: float) -> None:
-    bad = (values < low) | (values > high)
-    if bad.any():
-        place = tuple(np.argwhere(bad)[0])
-        raise InvalidDecals(
-            f"{name}: expected values from {low:g} to {high:g}, got {values[place]:g} in row {place[0]};"
-            " rescale the model"
-        )
-
-
-def _unit(name: str, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Scale vectors to length 1; those that have it within rounding stay."""
-    largest = np.abs(vectors).max(axis=1, initial=0.0)
-    if (largest == 0.0).any():
-        row = int(np.argmin(largest))
-        raise InvalidDecals(f"{name}: expected a direction, got a zero vector in row {row}; give it a length")
-    scaled = vectors / largest[:, None]
-    lengths = np.linalg.norm(scaled, axis=1) * largest
-    keep = np.abs(lengths - 1.0) <= _ROUNDING
-    return np.where(keep[:, None], vectors, scaled / np.linalg.norm(scaled, axis=1, keepdims=True))
-
-
-def _orthogonal(tangents: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn unit tangents perpendicular to unit normals; those that are within rounding stay."""
-    along = (tangents * normals).sum(axis=1)
-    across = tangents - along[:, None] * normals
-    lengths = np.linalg.norm(across, axis=1)
-    if (lengths < _PARALLEL).any():
-        row = int(np.argmin(lengths))
-        raise InvalidDecals(
-            f"tangents: expected a direction across the normal, got {tangents[row]}"
-            f" along normal {normals[row]} in row {row}; turn one of them"
-        )
-    keep = np.abs(along) <= _ROUNDING
-    return np.where(keep[:, None], tangents, across / np.maximum(lengths, _PARALLEL)[:, None])
-
-
-def _images(values: Any, count: int) -> Ints:
-    array = np.zeros(count, np.int64) if values is None else np.array(values)
-    _check_shape("images", array.shape, (count,))
-    if count and array.dtype.kind not in "iu":
-        raise InvalidDecals(
-            f"images: expected whole numbers, got {array.dtype}; give indices into the images"
-        )
-    if (array < 0).any() or (array >= _MOST_IMAGES).any():
-        row = int(np.argmax((array < 0) | (array >= _MOST_IMAGES)))
-        raise InvalidDecals(
-            f"images: expected an index from 0 to {_MOST_IMAGES - 1}, got {array[row]} in row {row}"
-        )
-    return array.astype(np.int32)
-
-
-def _flags(name: str, values: Any, count: int) -> Bools:
-    array = np.zeros(count, np.bool_) if values is None else np.array(values)
-    _check_shape(name, array.shape, (count,))
-    if count and array.dtype != np.bool_:
-        raise InvalidDecals(f"{name}: expected True or False, got {array.dtype}; compare or cast it first")
-    return array.astype(np.bool_)
-
-
-def _rows(rows: ArrayLike) -> NDArray[Any]:
-    array = np.asarray(rows)
-    return array.astype(np.intp) if array.size == 0 else array
+_FIELDS = tuple(field.name for field in fields(Decals))

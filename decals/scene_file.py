@@ -9,22 +9,25 @@
       "images": ["scale", "pictures/moss.png"],
       "camera": {"position": [x, y, z], ...},
       "decals": [
-        {"position": [x, y, z], "normal": ..., "tangent": ..., "radius": r, "image": 0, "spill": false},
+        {"position": [x, y, z], "normal": ..., "tangent": ..., "radius": r, "image": 0, "spill": false,
+         "interaction": "overlap", "layer": 1, "tint": [r, g, b], "opacity": 1.0},
         ...
       ]
     }
+
+The last four of a decal are written where they are not contact, 0, white and 1. Image -1 is the plain tint.
 
 Numbers are the shortest decimals that give the same float32 again. Paths are relative to the scene file.
 """
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta, Raw, Struct
+from msgspec import UNSET, Meta, Raw, Struct, UnsetType
 from numpy.typing import NDArray
 
 from blobtree.io import Document, from_document, to_document, write_atomically
@@ -33,7 +36,7 @@ from .camera import Camera
 from .errors import DecalsError, InvalidScene
 from .images import is_builtin
 from .mesh_file import MeshArrays, read_mesh
-from .model import Decals
+from .model import PLAIN, Decals, Interaction
 from .scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
 
 FORMAT = "implicit-decals-scene"
@@ -44,6 +47,9 @@ SAMPLE = "sample:"
 Triple = tuple[float, float, float]
 SampleLoader = Callable[[str], MeshArrays]
 """Gives the vertices and faces of a sample mesh by its name."""
+
+
+_INTERACTIONS = {kind.name.lower(): kind for kind in Interaction}
 
 
 class _Header(Struct):
@@ -82,8 +88,12 @@ class _DecalRecord(Struct, forbid_unknown_fields=True):
     normal: Triple
     tangent: Triple
     radius: float
-    image: Annotated[int, Meta(ge=0)] = 0
+    image: Annotated[int, Meta(ge=PLAIN)] = 0
     spill: bool = False
+    interaction: Literal["independent", "contact", "overlap"] | UnsetType = UNSET
+    layer: int | UnsetType = UNSET
+    tint: Triple | UnsetType = UNSET
+    opacity: float | UnsetType = UNSET
 
 
 class _SceneRecord(Struct, forbid_unknown_fields=True):
@@ -293,8 +303,30 @@ def _decal_records(decals: Decals) -> Iterator[_DecalRecord]:
         _decimals(decals.radii).tolist(),
         decals.images.tolist(),
         decals.spill.tolist(),
+        _unless_default(decals.interactions, Interaction.CONTACT, list(_INTERACTIONS)),
+        _unless_default(decals.layers, 0),
+        _unless_default(_decimals(decals.tints), 1.0),
+        _unless_default(_decimals(decals.opacities), 1.0),
     )
     return (_DecalRecord(*values) for values in zip(*columns, strict=True))
+
+
+def _unless_default(array: NDArray[Any], default: float, names: Sequence[str] | None = None) -> Iterator[Any]:
+    """Give each row's value, or its name, as JSON has it; UNSET where it is the default throughout."""
+    usual = (array == default).all(axis=tuple(range(1, array.ndim)))
+    for value, omit in zip(array.tolist(), usual.tolist(), strict=True):
+        known = value if names is None else names[value]
+        yield UNSET if omit else tuple(known) if isinstance(known, list) else known
+
+
+def _given(value: Any, default: Any) -> Any:
+    """Give the default for what a file leaves out."""
+    return default if value is UNSET else value
+
+
+def _whole(values: Iterable[int]) -> Any:
+    """Give whole numbers of any size, which `Decals` checks."""
+    return np.array(list(values), np.int64)
 
 
 def _rows(array: NDArray[np.float64]) -> list[Any]:
@@ -318,6 +350,10 @@ def _decals(records: list[_DecalRecord]) -> Decals:
             radii=np.array([record.radius for record in records], np.float32),
             images=np.array([record.image for record in records], np.int32),
             spill=np.array([record.spill for record in records], np.bool_),
+            interactions=_whole(_INTERACTIONS[_given(r.interaction, "contact")] for r in records),
+            layers=_whole(_given(record.layer, 0) for record in records),
+            tints=np.array([_given(record.tint, (1.0, 1.0, 1.0)) for record in records], np.float32),
+            opacities=np.array([_given(record.opacity, 1.0) for record in records], np.float32),
         )
     except DecalsError as error:
         raise InvalidScene(f"decals: {error}") from error

@@ -1,7 +1,7 @@
-// Which decal owns a surface point, where in its image the point lies, and what colour that is. All formulas and
-// loops are those of decals/ownership.py; GLSL adds the image look-up.
+// Which decals show at a surface point, where in their images the point lies, and what colour that is. All formulas
+// and loops are those of decals/ownership.py; GLSL adds the image look-up.
 //@ include footprint.glsl
-uniform sampler2D decal_records;  // decal i: texels 3i (position, s), 3i + 1 (normal, facing limit), 3i + 2 (u, image)
+uniform sampler2D decal_records;  // decal i: 4i (position, s), 4i + 1 (normal, rank), (u, image), (tint, opacity)
 uniform sampler2D index_levels;
 uniform isampler2D index_table;
 uniform isampler2D index_ids;
@@ -9,6 +9,8 @@ uniform int index_level_count;
 uniform int index_mask;
 uniform int decal_mapping;
 uniform sampler2DArray decal_images;  // linear, premultiplied
+
+const float OPAQUE = 0.9999;  // decals under so much alpha are not looked for
 
 //@ slot functions
 
@@ -18,31 +20,53 @@ struct DecalHit {
     vec2 uv;
 };
 
-DecalHit decal_at(vec3 q, vec3 n) {
-    int owner = owner_at(q, n, decal_records, index_level_count, index_levels, index_table, index_mask, index_ids);
-    if (owner < 0) {
-        return DecalHit(-1, 0.0, vec2(0.0));
-    }
-    float complement = complement_at(
-        q, n, owner, decal_records, index_level_count, index_levels, index_table, index_mask, index_ids);
-    return DecalHit(owner, 1.0 - complement, uv_at(q, n, owner, complement, decal_mapping, decal_records));
-}
-
 vec4 decal_texel(int i) {
     return texelFetch(decal_records, ivec2(i & 1023, i >> 10), 0);
 }
 
-// Premultiplied linear colour of a hit. The derivatives are those of the undeformed image of the one decal that owns
-// the pixel, so no edge between decals, or of an object, ever shows in them.
-vec4 decal_color(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
-    if (hit.owner < 0) {
-        return vec4(0.0);
+DecalHit decal_hit(int owner, vec3 q, vec3 n) {
+    if (owner < 0) {
+        return DecalHit(-1, 0.0, vec2(0.0));
     }
-    float s = decal_texel(3 * hit.owner).w;
-    vec3 n_p = decal_texel(3 * hit.owner + 1).xyz;
-    vec4 u = decal_texel(3 * hit.owner + 2);
-    float scale = 0.5 / (RIM * s);
-    vec2 dx = scale * tangent_coordinates(surface_step(q, n, ray, ray_right.xyz), n_p, u.xyz);
-    vec2 dy = scale * tangent_coordinates(surface_step(q, n, ray, ray_up.xyz), n_p, u.xyz);
-    return textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
+    float complement = complement_at(q, n, owner, decal_contact, decal_layered, decal_records,
+        index_level_count, index_levels, index_table, index_mask, index_ids);
+    return DecalHit(owner, 1.0 - complement, uv_at(q, n, owner, complement, decal_mapping, decal_records));
+}
+
+// The topmost decal.
+DecalHit decal_at(vec3 q, vec3 n) {
+    return decal_hit(owner_at(q, n, decal_contact, decal_layered, decal_records,
+        index_level_count, index_levels, index_table, index_mask, index_ids), q, n);
+}
+
+// Premultiplied linear colour of one decal. The derivatives are those of the undeformed image of the one decal that
+// owns the pixel, so no edge between decals, or of an object, ever shows in them.
+vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
+    vec4 u = decal_texel(4 * hit.owner + 2);
+    vec4 tint = decal_texel(4 * hit.owner + 3);
+    vec4 color = vec4(1.0);
+    if (u.w >= 0.0) {
+        float s = decal_texel(4 * hit.owner).w;
+        vec3 n_p = decal_texel(4 * hit.owner + 1).xyz;
+        float scale = 0.5 / (RIM * s);
+        vec2 dx = scale * tangent_coordinates(surface_step(q, n, ray, ray_right.xyz), n_p, u.xyz);
+        vec2 dy = scale * tangent_coordinates(surface_step(q, n, ray, ray_up.xyz), n_p, u.xyz);
+        color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
+    }
+    return tint.w * color * vec4(tint.rgb, 1.0);
+}
+
+// Premultiplied linear colour of all decals at a point over each other, from the topmost (`hit`) down; no cap.
+vec4 decal_color(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
+    vec4 color = vec4(0.0);
+    if (!decal_layered) {
+        return hit.owner < 0 ? color : decal_paint(hit, q, n, ray);
+    }
+    while (hit.owner >= 0 && color.a < OPAQUE) {
+        color += (1.0 - color.a) * decal_paint(hit, q, n, ray);
+        int below = owner_below(q, n, rank_of(hit.owner, decal_records), number_below(hit.owner, decal_records),
+            decal_contact, decal_layered, decal_records, index_level_count, index_levels, index_table, index_mask, index_ids);
+        hit = decal_hit(below, q, n);
+    }
+    return color;
 }

@@ -3,6 +3,7 @@
 `render` makes one picture. `Renderer` is the thing to keep where many pictures of a scene are wanted.
 """
 
+from decals.contact import Contact
 from decals.mapping import Mapping
 from decals.render.context import Context
 from decals.render.drawables import register
@@ -22,6 +23,7 @@ __all__ = [
     "TRANSPARENT",
     "Background",
     "Buffers",
+    "Contact",
     "Context",
     "Mapping",
     "Renderer",

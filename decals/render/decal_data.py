@@ -4,16 +4,18 @@ from functools import cache
 
 from blobtree.glsl import translate_library
 from blobtree.kernels import RIM
+from decals.contact import Contact
 from decals.index import DecalIndex
 from decals.mapping import tangent_coordinates
 from decals.model import Decals
-from decals.ownership import complement_at, owner_at, uv_at
+from decals.ownership import complement_at, owner_at, owner_below, uv_at
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import Program
 from decals.render.tile import set_uniform
+from decals.stack import number_below
 
-FUNCTIONS = (owner_at, complement_at, uv_at, tangent_coordinates)
+FUNCTIONS = (owner_at, owner_below, number_below, complement_at, uv_at, tangent_coordinates)
 """What ``shaders/decals.glsl`` calls."""
 
 
@@ -21,7 +23,8 @@ class DecalData:
     """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
 
     def __init__(self, context: Context, decals: Decals) -> None:
-        index = DecalIndex.build(decals.positions, decals.influence)
+        index = DecalIndex.of(decals)
+        self.layered = decals.layered
         self._textures = {
             "decal_records": DataTexture(context, decals.packed()),
             "index_levels": DataTexture(context, index.levels),
@@ -45,6 +48,11 @@ class DecalData:
 
 
 @cache
-def library() -> str:
-    """Give the GLSL of all decal formulas, for the slot ``functions``."""
-    return f"const float RIM = {float(RIM)!r};\n" + translate_library(FUNCTIONS)
+def library(contact: Contact, *, layered: bool) -> str:
+    """Give the GLSL of all decal formulas, for the slot ``functions``, in one mode of contact."""
+    constants = (
+        f"const float RIM = {float(RIM)!r};\n"
+        f"const int decal_contact = {int(contact)};\n"
+        f"const bool decal_layered = {str(layered).lower()};\n"
+    )
+    return constants + translate_library(FUNCTIONS)

@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.contact import Contact
 from decals.mapping import Mapping
 from decals.render.context import Context
 from decals.render.decal_data import DecalData, library
@@ -38,7 +39,7 @@ class DecalPass:
         self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
         self._reading = context.gl.framebuffer(self._targets)
         self._context = context
-        self._passes: dict[bool, PixelPass] = {}
+        self._passes: dict[str, PixelPass] = {}
 
     def draw(
         self,
@@ -47,12 +48,13 @@ class DecalPass:
         decals: DecalData | None,
         images: ImageArray | None,
         mapping: Mapping,
+        contact: Contact,
     ) -> None:
         """Paint a tile; without decals (or images for them) only the objects' own colours are seen.
 
-        ``mapping`` is how images are laid onto curved surface.
+        ``mapping`` is how images are laid onto curved surface, ``contact`` how decals push each other.
         """
-        painting = self._pass(with_decals=decals is not None)
+        painting = self._pass("" if decals is None else library(contact, layered=decals.layered))
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         use_textures(program, textures)
@@ -67,15 +69,15 @@ class DecalPass:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""
         return read_floats(self._reading, 1, tile)
 
-    def _pass(self, *, with_decals: bool) -> PixelPass:
-        if with_decals not in self._passes:
-            slots = {"decals": "//@ include decals.glsl", "functions": library()} if with_decals else {}
-            made = pixel_pass(
-                self._context, BODY, self._targets, slots=slots, defines={"DECALS": with_decals}
-            )
+    def _pass(self, functions: str) -> PixelPass:
+        """Give the pass with these decal functions, or without decals where there are none."""
+        if functions not in self._passes:
+            slots = {"decals": "//@ include decals.glsl", "functions": functions} if functions else {}
+            defines = {"DECALS": bool(functions)}
+            made = pixel_pass(self._context, BODY, self._targets, slots=slots, defines=defines)
             attach_camera(made.program)
-            self._passes[with_decals] = made
-        return self._passes[with_decals]
+            self._passes[functions] = made
+        return self._passes[functions]
 
     def release(self) -> None:
         """Give the memory back."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.camera import Bounds
+from decals.contact import Contact
 from decals.errors import InvalidScene
 from decals.mapping import Mapping
 from decals.render.context import Context
@@ -99,6 +100,7 @@ class Renderer:
         samples: int = 2,
         background: Background = STUDIO,
         mapping: Mapping = Mapping.CORRECTED,
+        contact: Contact = Contact.PAPER,
     ) -> NDArray[np.uint8]:
         """Draw a scene.
 
@@ -114,6 +116,8 @@ class Renderer:
             What is behind the objects.
         mapping
             How images are laid onto curved surface.
+        contact
+            How contact decals push each other.
 
         Returns
         -------
@@ -127,19 +131,24 @@ class Renderer:
         """
         _check_size(size, samples)
         picture = _Picture(size, 4, np.uint8)
-        for tile, targets in self._tiles(scene, size, samples, mapping, buffers=False):
+        for tile, targets in self._tiles(scene, size, samples, mapping, contact, buffers=False):
             light = targets.light_pass.light
             picture.place(targets.resolve.pixels(light, tile, samples, background), tile, samples)
         return picture.pixels
 
     def buffers(
-        self, scene: SceneLike, *, size: Size = (800, 600), mapping: Mapping = Mapping.CORRECTED
+        self,
+        scene: SceneLike,
+        *,
+        size: Size = (800, 600),
+        mapping: Mapping = Mapping.CORRECTED,
+        contact: Contact = Contact.PAPER,
     ) -> Buffers:
         """Give what lies behind every pixel's centre; arguments and errors as for `render`."""
         _check_size(size, 1)
         color = _Picture(size, 4, np.uint8)
         position, normal, decal = (_Picture(size, 4, np.float32) for _ in range(3))
-        for tile, targets in self._tiles(scene, size, 1, mapping, buffers=True):
+        for tile, targets in self._tiles(scene, size, 1, mapping, contact, buffers=True):
             color.place(targets.resolve.pixels(targets.light_pass.light, tile, 1, STUDIO), tile)
             position.place(targets.gbuffer.read_position(tile), tile)
             normal.place(targets.gbuffer.read_normal(tile), tile)
@@ -155,7 +164,14 @@ class Renderer:
         )
 
     def _tiles(
-        self, scene: SceneLike, size: Size, samples: int, mapping: Mapping, *, buffers: bool
+        self,
+        scene: SceneLike,
+        size: Size,
+        samples: int,
+        mapping: Mapping,
+        contact: Contact,
+        *,
+        buffers: bool,
     ) -> Iterator[tuple[Tile, _Targets]]:
         """Draw tile after tile; the targets hold a tile until the next is asked for."""
         with self.context.current():
@@ -170,7 +186,7 @@ class Renderer:
                 targets.gbuffer.begin(tile.width, tile.height)
                 for object_id, drawable in enumerate(drawables):
                     drawable.draw(object_id, tile)
-                targets.decal_pass.draw(targets.gbuffer, tile, data, images, mapping)
+                targets.decal_pass.draw(targets.gbuffer, tile, data, images, mapping, contact)
                 targets.light_pass.draw(targets.gbuffer, targets.decal_pass.paint, tile, ambient_radius)
                 yield tile, targets
             for kept in (self._drawables, self._decals, self._images):

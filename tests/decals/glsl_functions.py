@@ -16,13 +16,14 @@ from tests.blobtree.warp_functions import TypedFunction
 VERTEX = """#version 330 core
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 """
-_SWIZZLES = {"float": ".x", "vec2": ".xy", "vec3": ".xyz", "vec4": "", "int": ".x"}
+_SWIZZLES = {"float": ".x", "vec2": ".xy", "vec3": ".xyz", "vec4": "", "int": ".x", "bool": ".x != 0"}
 _RESULTS = {
     "float": "vec4({}, 0.0, 0.0, 0.0)",
     "vec2": "vec4({}, 0.0, 0.0)",
     "vec3": "vec4({}, 0.0)",
     "vec4": "{}",
     "int": "ivec4({}, 0, 0, 0)",
+    "bool": "ivec4(int({}), 0, 0, 0)",
     "uint": "ivec4(int({}), 0, 0, 0)",
     "ivec2": "ivec4({}, 0, 0)",
 }
@@ -88,7 +89,9 @@ def through_glsl(
             uniforms.append(f"uniform {glsl_type} x_{name};")
             expressions.append(f"x_{name}")
         else:
-            uniforms.append(f"uniform {'isampler2D' if glsl_type == 'int' else 'sampler2D'} x_{name};")
+            uniforms.append(
+                f"uniform {'isampler2D' if glsl_type in ('int', 'bool') else 'sampler2D'} x_{name};"
+            )
             expressions.append(fetch(f"x_{name}", glsl_type))
     returned = str(type_name(typed.returned))
     result = _RESULTS[returned].format(f"{typed.name}({', '.join(expressions)})")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import Node, Point, Segment
@@ -19,6 +20,7 @@ from blobtree.skeletons import SKELETONS
 from blobtree.trace import trace
 from decals.camera import Camera
 from decals.index import DecalIndex
+from decals.model import RECORD
 from decals.ownership import owner_at
 from decals.render.context import Context
 from decals.render.drawables import register
@@ -40,7 +42,8 @@ DECALS = 300
 
 MODULES = (
     "blobtree.kernels", "blobtree.skeletons", "blobtree.operators", "blobtree.interpreter", "blobtree.trace",
-    "decals.contact", "decals.mapping", "decals.lookup", "decals.ownership",
+    "decals.contact", "decals.mapping", "decals.lookup", "decals.radial", "decals.records", "decals.stack",
+    "decals.cells", "decals.ownership",
 )  # fmt: skip
 WRITTEN_TWICE = {"closest", "stride"}
 """Switches over the tables, written per backend."""
@@ -109,13 +112,17 @@ share, field, four = uniform(0.0, 1.0), uniform(0.0, 3.0), uniform(-3.0, 3.0, 4)
 BY_NAME: dict[str, Draw] = {
     "a": field, "b": field, "max_a": field, "max_b": field, "slope_a": uniform(0, 5),
     "slope_b": uniform(0, 5),
-    "at": whole(0, (TEXELS - 8) // 2, step=2), "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
-    "center": place, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5), "decal": whole(0, DECALS),
+    "at": whole(0, (TEXELS - 8) // 2, step=2), "apart": place,
+    "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
+    "center": place, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5), "contact": whole(0, 3),
+    "decal": whole(0, DECALS),
     "direction": units, "distance": uniform(0.0, 1.5), "e_k": uniform(0.0, 0.5), "e_i": share,
     "exponent": among(1.5, 2, 3, 7, 20, 100), "parameter": among(1.5, 2, 3, 7, 20, 100), "f": field,
     "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3), "m": place,
     "mapping": whole(0, 2), "n": units, "n_p": units, "n_q": units, "nearest": uniform(0.0, 1.5),
-    "offset": beside(powers(-9, 9), powers(-9, 9)), "operator": whole(0, len(OPERATORS)), "origin": place,
+    "offset": beside(powers(-9, 9), powers(-9, 9)),
+    "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
+    "operator": whole(0, len(OPERATORS)), "origin": place,
     "phi": share, "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
     "rim": share,
     "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3), "v": four, "w": place,
@@ -128,6 +135,13 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "bound_unstretch": {"f": uniform(0, 3, 2)},
     "gradient_unstretch": {"f": four},
     "color_unstretch": {"f": four},
+    "power": {"radius": uniform(0.1, 2.0)},
+    "are_stacked": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
+    "plane_distance": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
+    "apart": {"other": whole(0, DECALS)},
+    "lies_over": {"other": whole(0, DECALS)},
+    "stacked": {"other": whole(0, DECALS)},
+    "cell_owner": {"rank": among(1)},
     "log_of_rest": {"w": uniform(0.0, 0.999)},
     "cell_coordinate": {"x": uniform(-1000.0, 1000.0)},
     "cell_hash": dict.fromkeys("xyz", whole(-(2**31), 2**31)),
@@ -157,8 +171,9 @@ class World:
     @property
     def arguments(self) -> dict[str, Any]:
         index = self.index
-        return {"decals": self.decals, "level_count": index.level_count, "levels": index.levels,
-                "table": index.table, "mask": index.mask, "ids": index.ids}  # fmt: skip
+        return {"decals": self.decals, "level_count": index.level_count, "layered": True,
+                "levels": index.levels, "table": index.table, "mask": index.mask,
+                "ids": index.ids}  # fmt: skip
 
 
 @lru_cache
@@ -166,13 +181,14 @@ def world() -> World:
     rng = np.random.default_rng(11)
     centres, tangents = units(rng, DECALS), units(rng, DECALS)
     reach = rng.choice([0.1, 0.35], DECALS)
-    record = np.zeros((DECALS, 3, 4), np.float32)
+    record = np.zeros((DECALS, RECORD, 4), np.float32)
+    kind = rng.choice(3, DECALS, p=[0.1, 0.8, 0.1])
     record[:, 0] = np.column_stack([centres, reach])
-    record[:, 1] = np.column_stack([centres, np.full(DECALS, -0.25)])
+    record[:, 1] = np.column_stack([centres, kind + 0.5 * (rng.random(DECALS) < 0.2)])
     record[:, 2, :3] = np.cross(centres, np.cross(tangents, centres))
     near = centres[rng.integers(0, DECALS, COUNT)] + rng.normal(size=(COUNT, 3)) * 0.1
     points = near / np.linalg.norm(near, axis=1, keepdims=True)
-    return World(record.reshape(-1, 4), DecalIndex.build(centres, reach), points.astype(np.float32))
+    return World(record.reshape(-1, 4), DecalIndex.build(centres, reach, kind), points.astype(np.float32))
 
 
 def arguments_of(typed: TypedFunction) -> dict[str, Array]:
@@ -184,7 +200,9 @@ def arguments_of(typed: TypedFunction) -> dict[str, Array]:
         known |= world().arguments | {"q": world().points, "n_q": world().points}
         known["level"] = rng.integers(0, world().index.level_count, COUNT)
     if "owner" in typed.parameters:
-        owned = np.resize(np.flatnonzero(owners() >= 0), COUNT)
+        sheet = world().decals[1::RECORD, 3][owners()].astype(int) == 1
+        fits = (owners() >= 0) & (sheet | (typed.name != "pushed_complement"))
+        owned = np.resize(np.flatnonzero(fits), COUNT)
         known |= {"q": world().points[owned], "n_q": world().points[owned], "owner": owners()[owned]}
     if typed.name == "contact_push":
         least = draws["e_k"](rng, COUNT)
@@ -192,21 +210,31 @@ def arguments_of(typed: TypedFunction) -> dict[str, Array]:
     if typed.name == "arc_over_chord":
         angle = uniform(0.0, 0.5 * np.pi)(rng, COUNT)
         known |= {"sine": np.sin(angle), "cosine": np.cos(angle)}
+    if typed.name == "plane_distance":
+        known["apart"] = ahead_of(known.setdefault("ray", units(rng, COUNT)), place(rng, COUNT))
     if {"n_p", "n_q"} <= set(typed.parameters):
         normal, other = units(rng, COUNT), units(rng, COUNT)
         opposite = (normal * other).sum(axis=1) < -0.9  # towards −1, no float32 tells the arc
         known |= {"n_p": normal, "n_q": np.where(opposite[:, None], -other, other)}
     drawn = {name: known[name] if name in known else draws[name](rng, COUNT) for name in typed.parameters}
-    whole_names = {name for name, hint in typed.parameters.items() if "int32" in repr(hint)}
+    whole_names = {
+        name for name, hint in typed.parameters.items() if "int32" in repr(hint) or hint is wp.bool
+    }
     arrays = {
         name: np.asarray(v, np.int32 if name in whole_names else np.float32) for name, v in drawn.items()
     }
     return {name: np.full(COUNT, v) if v.ndim == 0 else v for name, v in arrays.items()}
 
 
+def ahead_of(ray: Array, apart: Array) -> Array:
+    """Neighbours that a ray comes to."""
+    ahead = (ray * apart).sum(axis=1, keepdims=True)
+    return np.asarray(apart + (0.2 - np.minimum(ahead, 0.2)) * ray)
+
+
 @lru_cache
 def owners() -> Array:
-    everything = {**world().arguments, "q": world().points, "n_q": world().points}
+    everything: Any = {**world().arguments, "contact": 0, "q": world().points, "n_q": world().points}
     return call(owner_at, **everything)
 
 
@@ -228,7 +256,7 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
     seen = through_glsl(context, typed, library, arguments, count)
     expected = call(typed.function, **arguments).reshape(count, -1)
     seen = seen[:, : expected.shape[1]]
-    if expected.dtype.kind in "iu":
+    if expected.dtype.kind in "iub":
         np.testing.assert_array_equal(seen.astype(expected.dtype), expected)
         return
     assert np.isfinite(expected).all()

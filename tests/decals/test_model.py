@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from blobtree.kernels import RIM
 from decals.errors import DecalsError, InvalidDecals
-from decals.model import FACING_LIMIT, LARGEST, SMALLEST_RADIUS, Decals
+from decals.model import LARGEST, LAYERS, RECORD, SMALLEST_RADIUS, Decals, Interaction
 
 
 def some(count=5, seed=0, **changes):
@@ -86,12 +86,27 @@ def test_concatenate_keeps_order_and_all_fields():
 def test_packed_record():
     decals = some(3, spill=np.array([False, True, False]))
     record = decals.packed()
-    assert record.shape == (9, 4)
+    assert record.shape == (3 * RECORD, 4)
     assert record.dtype == np.float32
-    assert np.array_equal(record[0::3], np.column_stack([decals.positions, decals.influence]))
-    assert np.array_equal(record[1::3, :3], decals.normals)
-    assert record[1::3, 3].tolist() == [FACING_LIMIT, -2.0, FACING_LIMIT]
-    assert np.array_equal(record[2::3], np.column_stack([decals.tangents, decals.images]))
+    assert np.array_equal(record[0::4], np.column_stack([decals.positions, decals.influence]))
+    assert np.array_equal(record[1::4, :3], decals.normals)
+    rank = 4 * LAYERS + 1
+    assert record[1::4, 3].tolist() == [rank, rank + 0.5, rank]
+    assert np.array_equal(record[2::4], np.column_stack([decals.tangents, decals.images]))
+    assert record[3::4].tolist() == [[1, 1, 1, 1]] * 3
+
+
+def test_ranks_order_layers_first_and_interactions_in_them():
+    layers, kinds = np.repeat([-LAYERS, -1, 0, LAYERS - 1], 3), np.tile(list(Interaction), 4)
+    decals = some(12, layers=layers, interactions=kinds, spill=np.ones(12, bool))
+    assert (np.diff(decals.ranks) > 0).all()
+    assert decals.packed()[1::4, 3].tolist() == (decals.ranks + 0.5).tolist()
+
+
+def test_tints_are_packed_as_linear_light():
+    decals = some(2, tints=[[0, 0.5, 1], [0.04, 0.2, 0.9]], opacities=[0.25, 1])
+    expected = [[0, 0.21404114, 1, 0.25], [0.0030959752, 0.033104767, 0.7874123, 1]]
+    assert decals.packed()[3::4] == pytest.approx(np.array(expected), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -112,11 +127,19 @@ def test_packed_record():
         ("radii", [1e-20, 1.0], "got 1e-20"),
         ("radii", [1.0, 1e20], "got 1e[+]20"),
         ("radii", 1.0, "shape"),
-        ("images", [0, -1], "got -1 in row 1"),
+        ("images", [0, -2], "got -2 in row 1"),
         ("images", [0, 2**24], "row 1"),
         ("images", [0.5, 1.0], "whole numbers"),
         ("images", [0], "shape"),
         ("spill", [0, 1], "True or False"),
+        ("interactions", [0, 3], "got 3 in row 1"),
+        ("interactions", [0.0, 1.0], "whole numbers"),
+        ("layers", [0, LAYERS], "in row 1"),
+        ("layers", [-LAYERS - 1, 0], "in row 0"),
+        ("tints", [[1, 1, 1], [1, 1, 1.1]], "divide .* 255"),
+        ("tints", [1, 1], "shape"),
+        ("opacities", [-0.1, 1], "from 0 to 1"),
+        ("opacities", [np.nan, 1], "finite"),
     ],
 )
 def test_refuses(name, value, says):

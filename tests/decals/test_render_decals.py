@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from decals.camera import Camera
+from decals.contact import Contact
 from decals.evaluate import evaluate
 from decals.mapping import Mapping
-from decals.model import Decals
+from decals.model import Decals, linear_light
 from decals.render import tile
 from decals.render.context import Context
 from decals.render.renderer import Buffers, Renderer
 from decals.render.scene_like import SceneLike
 from tests.decals.shapes import Picture, Shape, View, torus
-from tests.oracles.decals import decals_at
+from tests.oracles.decals import colors_at, decals_at
 
 SIZE = (80, 60)
 Color = tuple[float, float, float]
@@ -45,11 +46,19 @@ def view_of(decals: Decals, *shapes: Shape) -> View:
     return View(shapes, camera, decals, (WHITE,))
 
 
-def compare(view: SceneLike, buffers: Buffers, mapping: Mapping) -> np.ndarray:
+def compare(
+    view: SceneLike, buffers: Buffers, mapping: Mapping, contact: Contact = Contact.PAPER
+) -> np.ndarray:
     """Owner, field and uv of all covered pixels against brute force; which of them have an owner."""
     seen = buffers.object_id >= 0
     points, normals = buffers.position[seen], buffers.normal[seen]
-    reference = decals_at(view.decals, points, normals, corrected=mapping is Mapping.CORRECTED)
+    reference = decals_at(
+        view.decals,
+        points,
+        normals,
+        corrected=mapping is Mapping.CORRECTED,
+        contact=contact.name.lower(),
+    )
     owner, field, uv = buffers.owner[seen], buffers.field[seen], buffers.uv[seen]
     sure = reference.doubt > TIE
     assert sure.mean() > 0.95
@@ -73,6 +82,69 @@ def test_every_pixel_is_the_oracles(
     owned = compare(view, renderer.buffers(view, size=SIZE, mapping=mapping), mapping)
     assert owned.any()
     assert count > 1 or not owned.all()
+
+
+def in_layers(decals: Decals, seed: int) -> Decals:
+    """The same decals, of all interactions, in a few layers."""
+    rng = np.random.default_rng(seed)
+    return decals.replace(
+        interactions=rng.integers(0, 3, len(decals)), layers=rng.integers(-2, 2, len(decals))
+    )
+
+
+@pytest.mark.parametrize("contact", list(Contact))
+@pytest.mark.parametrize("layered", [False, True])
+def test_every_pixel_of_every_contact_mode(renderer: Renderer, contact: Contact, layered: bool) -> None:
+    shape = torus()
+    decals = scattered(shape, 90, 8, radii=(0.05, 0.4))
+    view = view_of(in_layers(decals, 8) if layered else decals, shape)
+    buffers = renderer.buffers(view, size=SIZE, contact=contact)
+    assert compare(view, buffers, Mapping.CORRECTED, contact).any()
+
+
+@pytest.mark.parametrize("count", [64, 500])
+def test_pixels_under_many_decals_have_all_their_colours(renderer: Renderer, count: int) -> None:
+    """A wall under translucent plain decals: the light of one colour, composed by hand."""
+    rng = np.random.default_rng(count)
+    view = wall(quarters(), color=(0, 0, 0))
+    arrays: dict[str, Any] = {
+        "positions": np.zeros((count, 3)),
+        "normals": [[0, 0, 1]] * count,
+        "tangents": [[1, 0, 0]] * count,
+        "radii": np.full(count, 2.0),
+        "interactions": rng.integers(0, 2, count) * 2,
+        "layers": rng.integers(-9, 9, count),
+        "images": np.full(count, -1),
+        "tints": rng.random((count, 3)),
+        "opacities": np.full(count, 3 / count),
+    }
+    decals = Decals(**arrays)
+    seen = renderer.render(View(view.objects, view.camera, decals), size=(16, 12), samples=1)
+    points, normals = np.zeros((1, 3)), np.array([[0, 0, 1.0]])
+    color = colors_at(decals, points, normals, lambda i, uv: plain_colors(decals, i))[0]
+    srgb = 1.055 * color[:3] ** (1 / 2.4) - 0.055
+    painted = wall(quarters(), color=tuple(srgb.tolist()))
+    plain = renderer.render(View(painted.objects, painted.camera), size=(16, 12), samples=1)
+    np.testing.assert_allclose(seen.astype(int), plain, atol=1)
+
+
+def plain_colors(decals: Decals, numbers: np.ndarray) -> np.ndarray:
+    """Premultiplied linear colours of plain decals."""
+    tints, opacity = linear_light(decals.tints[numbers]), decals.opacities[numbers, None]
+    return np.column_stack([tints * opacity, opacity])
+
+
+def test_what_lies_over_what_is_the_same_from_every_side(renderer: Renderer) -> None:
+    """The topmost decal at points seen by two cameras."""
+    shape = torus()
+    decals = in_layers(scattered(shape, 300, 9, radii=(0.1, 0.4)), 9)
+    view = view_of(decals, shape)
+    for turn in range(0, 360, 45):
+        angle = np.radians(turn)
+        direction = (float(np.cos(angle)), float(np.sin(angle)), 0.8)
+        camera = Camera.fitting(shape.vertices, direction=direction, up=(0, 0, 1))
+        buffers = renderer.buffers(View((shape,), camera, decals, view.images), size=SIZE)
+        compare(view, buffers, Mapping.CORRECTED)
 
 
 def test_many_decals_on_one_point(renderer: Renderer) -> None:

@@ -1,4 +1,5 @@
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,10 @@ def _decals(count: int = 50) -> Decals:
         radii=10.0 ** rng.uniform(-6, 6, count),
         images=rng.integers(0, 2, count),
         spill=rng.random(count) < 0.5,
+        interactions=rng.integers(0, 3, count),
+        layers=rng.integers(-1, 2, count),
+        tints=np.where(rng.random((count, 1)) < 0.5, 1.0, rng.random((count, 3))),
+        opacities=np.where(rng.random(count) < 0.5, 1.0, rng.random(count)),
     )
 
 
@@ -58,7 +63,7 @@ def test_what_is_saved_is_loaded_bit_for_bit(tmp_path: Path) -> None:
     scene = _scene()
     save_scene(scene, tmp_path / "scene.json")
     again = load_scene(tmp_path / "scene.json")
-    for name in ("positions", "normals", "tangents", "radii", "images", "spill"):
+    for name in [field.name for field in fields(Decals)]:
         assert _bits(getattr(again.decals, name)) == _bits(getattr(scene.decals, name)), name
     assert again.camera == scene.camera
     mesh, blob = again.objects
@@ -89,6 +94,17 @@ def test_numbers_are_the_shortest_that_round_to_the_same_float32(tmp_path: Path)
     record = json.loads(to_json(scene, folder=tmp_path))["decals"][0]
     assert record["position"] == [0.33333334, 0.1, 2e-8]
     assert record["radius"] == 0.7
+
+
+def test_decals_of_older_files_have_the_defaults(tmp_path: Path) -> None:
+    """Before there were interactions, layers, tints and opacities; and without them the file is the same."""
+    scene = _scene()
+    plain = scene.decals.replace(interactions=None, layers=None, tints=None, opacities=None)
+    text = to_json(scene.replace(decals=plain), folder=tmp_path)
+    assert not any(word in text for word in (b"interaction", b"layer", b"tint", b"opacity"))
+    again = from_json(text, folder=tmp_path).decals
+    for field in fields(Decals):
+        assert _bits(getattr(again, field.name)) == _bits(getattr(plain, field.name))
 
 
 def test_one_decal_a_line_for_people_and_diffs(tmp_path: Path) -> None:
@@ -185,7 +201,12 @@ def _broken(change: str, value: object) -> bytes:
         ("decals.3.radius", -1.0, "radii"),
         ("decals.3.radius", None, r"\$\.decals\[3\]\.radius"),
         ("decals.3.normal", [0.0, 0.0, 0.0], "normals"),
-        ("decals.3.image", -1, r"\$\.decals\[3\]\.image"),
+        ("decals.3.image", -2, r"\$\.decals\[3\]\.image"),
+        ("decals.3.interaction", "stick", r"\$\.decals\[3\]\.interaction"),
+        ("decals.3.layer", 1.5, r"\$\.decals\[3\]\.layer"),
+        ("decals.3.layer", 10**9, "layers"),
+        ("decals.3.tint", [1, 2, 3], "tints"),
+        ("decals.3.opacity", -1, "opacities"),
         ("decals.3.image", 2, "shows image 2"),
         ("decals.3.colour", "red", "colour"),
         ("objects.0.type", "cube", r"\$\.objects\[0\]"),

@@ -43,14 +43,18 @@ def log_factor(e, least):
     return np.where(e == least, -np.inf, np.where(w < 1, log_h, 0.0))
 
 
-def contact_complement(e):
-    """(owner, E = 1 − F) of rows of complements, to full relative precision; owner −1 outside all rims."""
+def contact_complement(e, *, strongest=False):
+    """(owner, E = 1 − F) of rows of complements, to full relative precision; owner −1 outside all rims.
+
+    strongest: the least of the factors h in place of their product.
+    """
     e = np.asarray(e, np.float64)
     rows, owner = np.arange(len(e)), e.argmin(axis=1)
     least = e[rows, owner][:, None]
     log_h = log_factor(e, least)
     log_h[rows, owner] = 0.0
-    result = least[:, 0] + (0.5 - least[:, 0]) * -np.expm1(log_h.sum(axis=1))
+    together = log_h.min(axis=1) if strongest else log_h.sum(axis=1)
+    result = least[:, 0] + (0.5 - least[:, 0]) * -np.expm1(together)
     return np.where(least[:, 0] <= 0.5, owner, -1), result
 
 

@@ -1,15 +1,17 @@
-"""Every decal against every point, in float64 NumPy: owner, field and image coordinates by brute force.
+"""Every decal against every point, in float64 NumPy, by brute force: owner, field, image place, colours.
 
 Written from the paper (equations 1 to 5) and the design, not from the implementation. Nothing is culled.
 """
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
 from tests.oracles.contact import RIM, complements, log_factor, rim_distance
 
 FACING_LIMIT = -0.25
+LEAST = 0.21
 CHUNK = 2_000_000
 
 
@@ -17,78 +19,174 @@ CHUNK = 2_000_000
 class Reference:
     """What the decals show at m points, and how near each point lies to a change of its owner.
 
-    owner int[m], −1: none; e[m]: the owner's complement 1 − f before contact; field[m]: F after contact,
-    0: none; uv[m, 2], 0: none; doubt[m]: smallest relative change of a distance, or change of a facing
-    cosine, that would change the owner; stretch[m]: |q − p| over its length in the tangent plane, so how
-    ill uv is conditioned.
+    owner int[m], −1: none; field[m]: F after contact, 0: none; uv[m, 2], 0: none; doubt[m]: smallest relative
+    change of a distance, or change of a facing cosine, that would change the owner; stretch[m]: |q − p| over
+    its length in the tangent plane, so how ill uv is conditioned.
     """
 
     owner: np.ndarray
-    e: np.ndarray
     field: np.ndarray
     uv: np.ndarray
     doubt: np.ndarray
     stretch: np.ndarray
 
 
-def decals_at(decals, points, normals, *, corrected=True, reach=1.0):
-    """Evaluate `decals` (anything with their arrays) at points with unit normals.
+def decals_at(decals, points, normals, *, corrected=True, reach=1.0, contact="paper"):
+    """What the topmost of `decals` (anything with their arrays) shows at points with unit normals.
 
     reach 1 is the paper; less leaves out whatever is farther than that many influence radii.
     """
+    return _in_chunks(_topmost, decals, points, normals, corrected, reach, contact)
+
+
+def colors_at(decals, points, normals, color_of, *, corrected=True, contact="paper"):
+    """Premultiplied colours of all decals over each other, from the lowest up.
+
+    color_of(numbers, uv) gives the premultiplied colours of these decals at these image coordinates.
+    """
+
+    def composed(decals, points, normals):
+        scene = _Scene(decals, points, normals, 1.0)
+        color = np.zeros((len(points), 4))
+        for members in reversed(_drawings(decals)):
+            owner, complement, _ = scene.shown(members, contact)
+            rows = np.flatnonzero(owner >= 0)
+            uv, _ = _image_place(
+                decals, points[rows], normals[rows], owner[rows], complement[rows], corrected
+            )
+            front = color_of(owner[rows], uv)
+            color[rows] = front + (1 - front[:, 3:]) * color[rows]
+        return (color,)
+
+    return _in_chunks(lambda *arrays: composed(*arrays[:3]), decals, points, normals)[0]
+
+
+def _in_chunks(function, decals, points, normals, *options):
     points, normals = np.asarray(points, np.float64), np.asarray(normals, np.float64)
     rows = max(1, CHUNK // max(1, len(decals.radii)))
     parts = [
-        _chunk(decals, points[i : i + rows], normals[i : i + rows], corrected, reach)
+        function(decals, points[i : i + rows], normals[i : i + rows], *options)
         for i in range(0, max(1, len(points)), rows)
     ]
-    return Reference(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return Reference(*columns) if function is _topmost else columns
 
 
-def _chunk(decals, points, normals, corrected, reach):
-    count = len(points)
-    centres, frames = decals.positions.astype(np.float64), decals.normals.astype(np.float64)
-    influence = decals.radii.astype(np.float64) / RIM
-    squared = sum((points[:, None, a] - centres[None, :, a]) ** 2 for a in range(3)) / influence**2
-    cosine = normals @ frames.T
-    acts = (squared < reach**2) & (decals.spill | (cosine > FACING_LIMIT))
-    e = np.where(acts, complements(squared), 2.0)
-    e = np.column_stack([e, np.full(count, 2.0)])  # a decal that never acts, so that there is one
-    owner = e.argmin(axis=1)
-    least = e[np.arange(count), owner]
-    owned = least <= 0.5
-
-    pair, other = np.nonzero(owned[:, None] & (e + least[:, None] < 1))
-    pair, other = pair[other != owner[pair]], other[other != owner[pair]]
-    log_h = np.bincount(pair, log_factor(e[pair, other], least[pair]), minlength=count)
-    complement = least + (0.5 - least) * -np.expm1(log_h)
-
-    uv, stretch = np.zeros((count, 2)), np.ones(count)
-    k = owner[owned]
-    xy, w = _tangent_offsets(decals, points[owned], normals[owned], k, corrected)
-    length = np.hypot(xy[:, 0], xy[:, 1])
-    stretch[owned] = np.linalg.norm(w, axis=1) / np.maximum(length, 1e-300)
-    direction = xy / np.maximum(length, 1e-300)[:, None]
-    uv[owned] = 0.5 + 0.5 * rim_distance(complement[owned])[:, None] * direction
-    return (
-        np.where(owned, owner, -1),
-        least,
-        np.where(owned, 1 - complement, 0.0),
-        uv,
-        _doubt(squared, cosine, decals.spill, acts),
-        stretch,
+def _drawings(decals):
+    """Who is drawn together, from the top down: every sheet of contact decals, every other decal alone."""
+    order = sorted(range(len(decals.radii)), key=lambda i: (decals.layers[i], decals.interactions[i], i))
+    together = groupby(
+        order,
+        lambda i: (decals.layers[i], decals.interactions[i], None if decals.interactions[i] == 1 else i),
     )
+    return [np.array(sorted(members)) for _, members in together][::-1]
 
 
-def _doubt(squared, cosine, spill, acts):
-    """Distance to a tie, to the rim, or to the facing limit of a decal whose rim holds the point."""
+def _topmost(decals, points, normals, corrected, reach, contact):
+    scene = _Scene(decals, points, normals, reach)
+    count = len(points)
+    owner, complement, doubt = np.full(count, -1), np.ones(count), np.full(count, 4.0)
+    for members in _drawings(decals):
+        under, e, unsure = scene.shown(members, contact)
+        free = owner < 0
+        doubt[free] = np.minimum(doubt, unsure)[free]
+        owner, complement = np.where(free, under, owner), np.where(free & (under >= 0), e, complement)
+    owned = owner >= 0
+    uv, stretch = np.zeros((count, 2)), np.ones(count)
+    uv[owned], stretch[owned] = _image_place(
+        decals, points[owned], normals[owned], owner[owned], complement[owned], corrected
+    )
+    return owner, np.where(owned, 1 - complement, 0.0), uv, np.minimum(doubt, scene.facing_doubt()), stretch
+
+
+class _Scene:
+    """All distances between points and decals."""
+
+    def __init__(self, decals, points, normals, reach):
+        self.points, self.centres = points, decals.positions.astype(np.float64)
+        self.radii, self.spill = decals.radii.astype(np.float64), decals.spill
+        self.alone = np.asarray(decals.interactions) != 1
+        self.cosine = normals @ decals.normals.astype(np.float64).T
+        offsets = [points[:, None, a] - self.centres[None, :, a] for a in range(3)]
+        self.squared = sum(w**2 for w in offsets) / (self.radii / RIM) ** 2
+        self.facing = self.spill | (self.cosine > FACING_LIMIT)
+        self.acts = (self.squared < reach**2) & self.facing
+
+    def shown(self, members, contact):
+        """Who of a sheet, or of one other decal, shows; E = 1 − F; and the doubt about it."""
+        squared, acts = self.squared[:, members], self.acts[:, members]
+        if contact == "radial" and not self.alone[members[0]]:
+            return self.radial(members)
+        count = len(squared)
+        e = np.column_stack([np.where(acts, complements(squared), 2.0), np.full(count, 2.0)])
+        owner = e.argmin(axis=1)
+        least = e[np.arange(count), owner]
+        owned = least <= 0.5
+        pair, other = np.nonzero(owned[:, None] & (e + least[:, None] < 1))
+        pair, other = pair[other != owner[pair]], other[other != owner[pair]]
+        log_h = log_factor(e[pair, other], least[pair])
+        if contact == "smooth":
+            together = np.zeros(count)
+            np.minimum.at(together, pair, log_h)
+        else:
+            together = np.bincount(pair, log_h, minlength=count)
+        complement = least + (0.5 - least) * -np.expm1(together)
+        who = np.append(members, -1)
+        return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
+
+    def radial(self, members):
+        """Convex cells between radical planes; stacked decals over each other, the smaller uppermost."""
+        centres, radii = self.centres[members], self.radii[members]
+        apart = centres[None] - centres[:, None]
+        distance = np.linalg.norm(apart, axis=2)
+        with np.errstate(all="ignore"):
+            plane = (distance**2 + radii[:, None] ** 2 - radii[None] ** 2) / (2 * distance)
+            keeps = plane / radii[:, None]
+        stacked = ~((keeps > LEAST) & (keeps.T > LEAST))
+        squared, facing = self.squared[:, members], self.facing[:, members]
+        power = (squared / RIM**2 - 1) * radii**2
+        inside = facing & (power <= 0)
+        # Beyond the plane to j where j has less power, unless i and j are stacked or j faces away.
+        beyond = (power[:, None, :] < power[:, :, None]) & facing[:, None, :] & ~stacked
+        shows = inside & ~beyond.any(axis=2)
+        upper = np.argsort(np.argsort(radii, kind="stable"), kind="stable")
+        owner = np.where(shows, upper, len(members)).argmin(axis=1)
+        owned = shows.any(axis=1)
+        w = self.points - centres[owner]
+        x = np.linalg.norm(w, axis=1)
+        ray = w / np.maximum(x, 1e-300)[:, None]
+        ahead = np.einsum("ma,mna->mn", ray, apart[owner])
+        blocks = facing & ~stacked[owner] & (ahead > 0)
+        end = np.where(blocks, (plane * distance)[owner] / np.where(ahead > 0, ahead, 1), np.inf).min(axis=1)
+        z = (np.minimum(x / np.minimum(end, radii[owner]), 1) * RIM) ** 2
+        near = inside | (np.abs(power) < 1e-3 * radii**2)
+        sizes = np.where(near[:, None] & near[:, :, None], radii**2 + (radii**2)[:, None], 1e-300)
+        gap = np.abs(power[:, None] - power[:, :, None]) / sizes
+        gap[:, np.arange(len(members)), np.arange(len(members))] = 4.0
+        doubt = np.minimum((np.abs(power) / radii**2).min(axis=1), gap.min(axis=(1, 2)))
+        return np.where(owned, members[owner], -1), complements(z), doubt
+
+    def facing_doubt(self):
+        """Distance to the facing limit of a decal that reaches the point."""
+        near = (self.squared < 1) & ~self.spill
+        return np.where(near, np.abs(self.cosine - FACING_LIMIT), 4.0).min(axis=1, initial=4.0)
+
+
+def _tie_doubt(squared, acts):
+    """Relative distance to a tie of the two nearest, or to the rim."""
     count = len(squared)
     d = np.sqrt(np.column_stack([np.where(acts, squared, 4.0), np.full((count, 2), [RIM**2, 4.0])]))
     d.sort(axis=1)
-    tie = np.where(d[:, 0] < 1e-30, 0.0, (d[:, 1] - d[:, 0]) / np.maximum(d[:, 0], 1e-300))
-    near = (squared < 1) & ~spill
-    facing = np.where(near, np.abs(cosine - FACING_LIMIT), 4.0).min(axis=1, initial=4.0)
-    return np.minimum(tie, facing)
+    return np.where(d[:, 0] < 1e-30, 0.0, (d[:, 1] - d[:, 0]) / np.maximum(d[:, 0], 1e-300))
+
+
+def _image_place(decals, points, normals, owner, complement, corrected):
+    """uv, and |q − p| over its length in the tangent plane."""
+    xy, w = _tangent_offsets(decals, points, normals, owner, corrected)
+    length = np.hypot(xy[:, 0], xy[:, 1])
+    direction = xy / np.maximum(length, 1e-300)[:, None]
+    uv = 0.5 + 0.5 * rim_distance(complement)[:, None] * direction
+    return uv, np.linalg.norm(w, axis=1) / np.maximum(length, 1e-300)
 
 
 def _tangent_offsets(decals, points, normals, k, corrected):

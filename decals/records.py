@@ -1,0 +1,74 @@
+"""Reading the records of decals, as `Decals.packed` lays them out."""
+
+# mypy: ignore-errors
+# (kernel code is Python to look at only: its names have Warp types)
+
+import warp as wp
+
+from blobtree.kernels import RIM
+from decals.contact import NOWHERE, REACH, field_complement
+from decals.model import FACING_LIMIT as MODEL_FACING_LIMIT
+from decals.model import RECORD as MODEL_RECORD
+from decals.model import Interaction
+
+wp.set_module_options({"enable_backward": False})
+
+RECORD = MODEL_RECORD
+FACING_LIMIT = MODEL_FACING_LIMIT
+NO_LIMIT = -2.0
+RIM_RADIUS = float(RIM)
+REACH_SQUARED = REACH * REACH
+KINDS = 3
+"""Mask of a rank's `Interaction`."""
+
+
+@wp.func
+def xyz(v: wp.vec4) -> wp.vec3:
+    """First three components."""
+    return wp.vec3(v[0], v[1], v[2])
+
+
+@wp.func
+def rank_of(decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.int32:
+    """Rank of a decal."""
+    return int(decals[RECORD * decal + 1][3])
+
+
+@wp.func
+def is_sheet(rank: wp.int32) -> wp.bool:
+    """Whether the decals of this rank are a sheet of contact decals."""
+    return (rank & KINDS) == Interaction.CONTACT
+
+
+@wp.func
+def facing_limit(packed_rank: wp.float32) -> wp.float32:
+    """Smallest cosine between the normals of decal and surface; a half more means a decal that spills."""
+    if packed_rank - wp.floor(packed_rank) > 0.25:
+        return NO_LIMIT
+    return FACING_LIMIT
+
+
+@wp.func
+def complement_of(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
+    """Complement e of a decal's field at q; NOWHERE where it is out of reach or faces away."""
+    ball = decals[RECORD * decal]
+    w = q - xyz(ball)
+    z = wp.dot(w, w) / (ball[3] * ball[3])
+    if z >= REACH_SQUARED:
+        return NOWHERE
+    facing = decals[RECORD * decal + 1]
+    if wp.dot(xyz(facing), n_q) <= facing_limit(facing[3]):
+        return NOWHERE
+    return field_complement(z)
+
+
+@wp.func
+def apart(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.vec3:
+    """From one decal's centre to another's."""
+    return xyz(decals[RECORD * other]) - xyz(decals[RECORD * decal])
+
+
+@wp.func
+def visible_radius(decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
+    """Where the rim of an undeformed decal lies."""
+    return RIM_RADIUS * decals[RECORD * decal][3]
