@@ -11,7 +11,7 @@ from typing import Any, Self
 import moderngl
 
 from decals.errors import NoGraphics
-from decals.render.entry import Entry, Program, checked_entry, choose_entry
+from decals.render.entry import COMPUTE_BASELINE, Entry, Program, checked_entry, choose_entry
 from decals.render.libraries import require_gl
 from implicit_decals.shaders import Source, compile_error
 
@@ -39,6 +39,19 @@ def _anisotropy(gl: moderngl.Context) -> float:
     """
     software = "llvmpipe" in gl.info["GL_RENDERER"] or "softpipe" in gl.info["GL_RENDERER"]
     return 1.0 if software else min(ANISOTROPY, gl.max_anisotropy)
+
+
+def _newest() -> moderngl.Context:
+    """Make a context with compute shaders, or else one that draws: some drivers give just what is asked."""
+    settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
+    for version in (COMPUTE_BASELINE, BASELINE):
+        try:
+            return moderngl.create_context(require=version, standalone=True, **settings)
+        except Exception as error:  # glcontext raises bare Exceptions
+            reason = error
+    raise NoGraphics(
+        f"no OpenGL 3.3 context could be made here ({reason}); `implicit-decals doctor` shows what is missing"
+    ) from reason
 
 
 class Context:
@@ -82,14 +95,7 @@ class Context:
             point that was asked for cannot be had.
         """
         require_gl()
-        settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
-        try:
-            gl = moderngl.create_context(require=BASELINE, standalone=True, **settings)
-        except Exception as error:  # glcontext raises bare Exceptions
-            raise NoGraphics(
-                f"no OpenGL 3.3 context could be made here ({error}); "
-                "`implicit-decals doctor` shows what is missing"
-            ) from error
+        gl = _newest()
         context = cls(gl, owned=True, entry=entry)
         with context.current():  # making it made it current; hand the thread back to whoever had it
             return context

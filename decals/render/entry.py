@@ -89,8 +89,10 @@ def pixel_pass(
         How it is run; the context's choice if not given.
     """
     entry = entry or context.entry
-    make = _ComputePass if entry is Entry.COMPUTE else _FragmentPass
-    return make(context, _source(entry, body, len(targets), slots or {}, defines or {}), targets)
+    source = _source(entry, body, len(targets), slots or {}, defines or {})
+    if entry is Entry.COMPUTE:
+        return ComputePass(context, body, source, targets)
+    return FragmentPass(context, body, source, targets)
 
 
 def _source(entry: Entry, body: str, targets: int, slots: Slots, defines: Defines) -> Source:
@@ -101,35 +103,44 @@ def _source(entry: Entry, body: str, targets: int, slots: Slots, defines: Define
     return compose("pixels.frag", slots=filled, defines=given)
 
 
-class _FragmentPass:
+class FragmentPass:
     """One triangle over all pixels."""
 
-    def __init__(self, context: "Context", source: Source, targets: Sequence[moderngl.Texture]) -> None:
+    def __init__(
+        self, context: "Context", body: str, source: Source, targets: Sequence[moderngl.Texture]
+    ) -> None:
+        self.body, self.source = body, source
         self.program: Program = context.program(compose("screen.vert"), source)
         self._array = context.gl.vertex_array(self.program, [])
         self._framebuffer = context.gl.framebuffer(list(targets))
         self._gl = context.gl
 
     def run(self, width: int, height: int) -> None:
+        """Fill the lower left part of this size of all targets."""
         self._framebuffer.use()
         self._framebuffer.viewport = (0, 0, width, height)
         self._gl.enable_only(moderngl.NOTHING)
         self._array.render(vertices=3)
 
     def release(self) -> None:
+        """Give the memory back."""
         self._array.release()
         self._framebuffer.release()
 
 
-class _ComputePass:
+class ComputePass:
     """A group of invocations for every square of pixels."""
 
-    def __init__(self, context: "Context", source: Source, targets: Sequence[moderngl.Texture]) -> None:
+    def __init__(
+        self, context: "Context", body: str, source: Source, targets: Sequence[moderngl.Texture]
+    ) -> None:
+        self.body, self.source = body, source
         self.program: Program = context.compute_program(source)
         self._targets = tuple(targets)
         self._gl = context.gl
 
     def run(self, width: int, height: int) -> None:
+        """Fill the lower left part of this size of all targets."""
         for unit, target in enumerate(self._targets):
             target.bind_to_image(unit, read=False, write=True)
         program = self.program

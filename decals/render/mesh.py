@@ -26,13 +26,9 @@ class MeshDrawable:
     """A mesh's vertices and faces on the graphics card."""
 
     def __init__(self, context: Context, mesh: MeshLike) -> None:
-        vertices = np.asarray(mesh.vertices, np.float32)
+        rows = mesh_rows(mesh)
         faces = np.ascontiguousarray(mesh.faces, np.int32)
-        rows = np.empty((len(vertices), 9), np.float32)
-        rows[:, :3] = vertices
-        rows[:, 3:6] = vertex_normals(vertices, faces)
-        rows[:, 6:] = np.asarray(mesh.color, np.float32)
-        self._bounds = vertices.min(axis=0), vertices.max(axis=0)
+        self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
         self._program = attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
         self._vertices = context.gl.buffer(rows.tobytes())
         self._indices = context.gl.buffer(faces.tobytes())
@@ -53,6 +49,16 @@ class MeshDrawable:
         """Give the memory back."""
         for resource in (self._array, self._vertices, self._indices):
             resource.release()
+
+
+def mesh_rows(mesh: MeshLike) -> NDArray[np.float32]:
+    """Position, normal and sRGB colour of every vertex, ``float32[n, 9]``, as the card gets them."""
+    vertices = np.asarray(mesh.vertices, np.float32)
+    rows = np.empty((len(vertices), 9), np.float32)
+    rows[:, :3] = vertices
+    rows[:, 3:6] = vertex_normals(vertices, np.ascontiguousarray(mesh.faces, np.int32))
+    rows[:, 6:] = np.asarray(mesh.color, np.float32)
+    return rows
 
 
 def vertex_normals(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.float32]:

@@ -1,6 +1,7 @@
 """Contexts: what they cannot do they say; they nest; programs are compiled once."""
 
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import pytest
@@ -25,6 +26,22 @@ def test_no_context_is_a_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(moderngl, "create_context", fail)
     with pytest.raises(NoGraphics, match=r"no OpenGL 3.3 context .*0x3001.*doctor"):
         Context.standalone()
+
+
+def test_the_newest_context_that_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some drivers give no more than what is asked for, others fail where they have less."""
+    real, asked = moderngl.create_context, []
+
+    def old(*, require: int, **settings: Any) -> moderngl.Context:
+        asked.append(require)
+        if require > 410:
+            raise Exception("requested OpenGL version is not supported")  # noqa: TRY002
+        return real(require=require, **settings)
+
+    monkeypatch.setattr(moderngl, "create_context", old)
+    with Context.standalone() as context, context.current():
+        assert usable(context)
+    assert asked == [430, 330]
 
 
 def test_missing_libraries_are_asked_for_first(monkeypatch: pytest.MonkeyPatch) -> None:
