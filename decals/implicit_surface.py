@@ -69,7 +69,7 @@ class ImplicitSurface:
         """Points uniform by area on the coarse mesh, taken to the surface."""
         return self.project(self._coarse.sample(count, seed)[0])
 
-    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
+    def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
         """Surface points near the points and the normals there."""
         queries = as_points(points)
         positions, normals, lost = self._descend(queries)

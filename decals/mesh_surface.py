@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from blobtree.launch import launch
 from decals.errors import InvalidMesh
 from decals.mesh_queries import closest_points, first_hits, inside_flags
 from decals.surface import Flags, Floats, as_points, as_rays, frozen
@@ -81,18 +82,31 @@ class MeshSurface:
         positions = (1 - root) * a + root * ((1 - along) * b + along * c)
         return positions.astype(np.float32), self._normals[face]
 
-    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
+    def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
         """Closest points of the mesh and the normals of their faces."""
         queries = as_points(points)
-        positions, normals = np.empty_like(queries), np.empty_like(queries)
-        wp.launch(
+        positions, normals = queries.copy(), np.zeros_like(queries)
+        if within is None:
+            self._closest(
+                queries, np.full(len(queries), self._reach(queries), np.float32), positions, normals
+            )
+            return positions, normals
+        self._closest(queries, within.astype(np.float32), positions, normals)
+        missed = np.flatnonzero(~normals.any(axis=1))
+        if len(missed):
+            positions[missed], normals[missed] = self.project(queries[missed])
+        return positions, normals
+
+    def _closest(self, points: Floats, reaches: Floats, positions: Floats, normals: Floats) -> None:
+        """Write the closest points within reach, and their normals, where there are any."""
+        bounds: wp.array[wp.float32] = wp.array(reaches, dtype=wp.float32, device="cpu", copy=False)
+        launch(
             closest_points,
-            dim=len(queries),
-            inputs=[self._mesh.id, self._device_normals, _shared(queries), self._reach(queries)],
-            outputs=[_shared(positions), _shared(normals)],
+            len(points),
+            [self._mesh.id, self._device_normals, _shared(points), bounds],
+            [_shared(positions), _shared(normals)],
             device="cpu",
         )
-        return positions, normals
 
     def normal(self, points: ArrayLike) -> Floats:
         """Return the normals of the faces closest to the points."""
@@ -102,11 +116,11 @@ class MeshSurface:
         """Distance to the first face that each ray meets, from either side."""
         starts, ways = as_rays(origins, directions)
         distances = np.empty(len(starts), np.float32)
-        wp.launch(
+        launch(
             first_hits,
-            dim=len(starts),
-            inputs=[self._mesh.id, _shared(starts), _shared(ways)],
-            outputs=[wp.array(distances, dtype=wp.float32, device="cpu", copy=False)],
+            len(starts),
+            [self._mesh.id, _shared(starts), _shared(ways)],
+            [wp.array(distances, dtype=wp.float32, device="cpu", copy=False)],
             device="cpu",
         )
         distances[~ways.any(axis=1)] = np.inf
@@ -121,11 +135,11 @@ class MeshSurface:
             return np.zeros(len(queries), np.bool_)
         near = np.ascontiguousarray(queries[inside])
         flags = np.empty(len(near), np.int32)
-        wp.launch(
+        launch(
             inside_flags,
-            dim=len(near),
-            inputs=[self._winding_mesh.id, _shared(near), self._reach(near)],
-            outputs=[wp.array(flags, dtype=wp.int32, device="cpu", copy=False)],
+            len(near),
+            [self._winding_mesh.id, _shared(near), self._reach(near)],
+            [wp.array(flags, dtype=wp.int32, device="cpu", copy=False)],
             device="cpu",
         )
         inside[inside] = flags == 1

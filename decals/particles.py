@@ -1,9 +1,10 @@
 """Warp kernels of particle repulsion on surfaces.
 
-Particles repel each other by a power law of their distance, the sharper the later in the relaxation
-(Witkin and Heckbert 1994 started the family; the steep power law packed best of those that were measured
-here). Each kernel thread owns one particle and adds up its neighbours in the order of the grid,
-so that the result does not depend on scheduling.
+Particles repel each other by a soft power law of their distance, and by a stiff spring where they come too
+close (Witkin and Heckbert 1994 started the family). The soft law alone makes rings of six even and leaves
+pairs too close at each flaw of the tiling, a steep one does the reverse; together they do both.
+Each kernel thread owns one particle and adds up its neighbours in the order of the grid, so that the
+result does not depend on scheduling.
 """
 
 # mypy: disable-error-code="call-overload"
@@ -22,8 +23,8 @@ ISOTROPY = 0.1
 
 @wp.func
 def facing_weight(cosine: wp.float32, facing_limit: wp.float32) -> wp.float32:
-    """How far two particles are neighbours: 1 on one side of a wall, 0 on its two sides, smooth between."""
-    t = wp.clamp(0.5 + 2.0 * (cosine - facing_limit), 0.0, 1.0)
+    """How far two particles are neighbours: 1 above the facing limit, falling to 0 below it."""
+    t = wp.clamp(1.0 + 4.0 * (cosine - facing_limit), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
@@ -47,14 +48,54 @@ def apart(offset: wp.vec3, i: wp.int32, j: wp.int32, tangent: wp.vec3, closest: 
 
 
 @wp.kernel
-def repel(
+def list_neighbours(
+    first: wp.int32,
     grid: wp.uint64,
     positions: wp.array(dtype=wp.vec3),
+    guides: wp.array(dtype=wp.vec3),
+    sizes: wp.array(dtype=wp.float32),
+    reach: wp.float32,
+    widening: wp.float32,
+    facing_limit: wp.float32,
+    room: wp.int32,
+    counts: wp.array(dtype=wp.int32),
+    neighbours: wp.array(dtype=wp.int32),
+    weights: wp.array(dtype=wp.float32),
+) -> None:
+    """Neighbours of each particle on its side of a wall, as many as have room, in the grid's order."""
+    i = first + wp.tid()
+    p = positions[i]
+    n = guides[i]
+    size = sizes[i]
+    count = int(0)
+    j = int(0)
+    query = wp.hash_grid_query(grid, p, reach * widening * size)
+    while wp.hash_grid_query_next(query, j):
+        if j != i and count < room:
+            limit = reach * 0.5 * (size + sizes[j])
+            if wp.length_sq(p - positions[j]) < limit * limit:
+                weight = facing_weight(wp.dot(n, guides[j]), facing_limit)
+                if weight > 0.0:
+                    neighbours[i * room + count] = j
+                    weights[i * room + count] = weight
+                    count += 1
+    counts[i] = count
+
+
+@wp.kernel
+def repel(
+    first: wp.int32,
+    positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
-    spacing: wp.float32,
+    sizes: wp.array(dtype=wp.float32),
+    room: wp.int32,
+    counts: wp.array(dtype=wp.int32),
+    neighbours: wp.array(dtype=wp.int32),
+    weights: wp.array(dtype=wp.float32),
     cutoff: wp.float32,
     exponent: wp.float32,
-    facing_limit: wp.float32,
+    core: wp.float32,
+    stiffness: wp.float32,
     damping: wp.float32,
     longest: wp.float32,
     moves: wp.array(dtype=wp.vec3),
@@ -62,14 +103,16 @@ def repel(
 ) -> None:
     """One damped Newton step of each particle in its tangent plane, against its neighbours at rest.
 
-    The energy of a pair at distance x, in spacings, is x^-p, shifted so that value and slope vanish
-    at the cutoff. Curvature across the line of a pair is left out: it is negative.
+    The energy of a pair at distance x, in its own spacing, is x^-p, shifted so that value and slope vanish
+    at the cutoff, and a spring of the given stiffness within the core; times its spacing squared, so that
+    pressure is the same where spacings differ. Curvature across the line of a pair
+    is left out: it is negative.
     """
-    i = wp.tid()
+    i = first + wp.tid()
     p = positions[i]
-    n = normals[i]
-    u = some_tangent(n)
-    v = wp.cross(n, u)
+    u = some_tangent(normals[i])
+    v = wp.cross(normals[i], u)
+    size = sizes[i]
     fx = float(0.0)
     fy = float(0.0)
     hxx = float(0.0)
@@ -78,28 +121,32 @@ def repel(
     energy = float(0.0)
     rim_value = wp.pow(cutoff, -exponent)
     rim_slope = exponent * rim_value / cutoff
-    query = wp.hash_grid_query(grid, p, cutoff * spacing)
-    j = int(0)
-    while wp.hash_grid_query_next(query, j):
-        if j != i:
-            offset = p - positions[j]
-            if wp.length_sq(offset) < cutoff * cutoff * spacing * spacing:
-                weight = facing_weight(wp.dot(n, normals[j]), facing_limit)
-                if weight > 0.0:
-                    away = apart(offset, i, j, u, CLOSEST * spacing) / spacing
-                    x = wp.length(away)
-                    value = wp.pow(x, -exponent)
-                    slope = exponent * value / x
-                    curve = (exponent + 1.0) * slope / x
-                    ax = wp.dot(away, u) / x
-                    ay = wp.dot(away, v) / x
-                    push = weight * (slope - rim_slope)
-                    fx += push * ax
-                    fy += push * ay
-                    hxx += weight * curve * ax * ax
-                    hxy += weight * curve * ax * ay
-                    hyy += weight * curve * ay * ay
-                    energy += weight * (value - rim_value + rim_slope * (x - cutoff))
+    for k in range(counts[i]):
+        j = neighbours[i * room + k]
+        pair = 0.5 * (size + sizes[j])
+        offset = p - positions[j]
+        if wp.length_sq(offset) < cutoff * cutoff * pair * pair:
+            weight = weights[i * room + k]
+            away = apart(offset, i, j, u, CLOSEST * pair) / pair
+            x = wp.length(away)
+            value = wp.pow(x, -exponent)
+            slope = exponent * value / x
+            curve = (exponent + 1.0) * slope / x
+            overlap = wp.max(core - x, 0.0)
+            if overlap > 0.0:
+                curve += stiffness
+            ax = wp.dot(away, u) / x
+            ay = wp.dot(away, v) / x
+            push = weight * (pair / size) * (slope - rim_slope + stiffness * overlap)
+            bend = weight * curve
+            fx += push * ax
+            fy += push * ay
+            hxx += bend * ax * ax
+            hxy += bend * ax * ay
+            hyy += bend * ay * ay
+            energy += weight * (
+                value - rim_value + rim_slope * (x - cutoff) + 0.5 * stiffness * overlap * overlap
+            )
     energies[i] = energy
     extra = ISOTROPY * (hxx + hyy)
     hxx += extra
@@ -109,8 +156,8 @@ def repel(
     if determinant > 0.0:
         dx = (hyy * fx - hxy * fy) / determinant
         dy = (hxx * fy - hxy * fx) / determinant
-        move = (dx * u + dy * v) * (damping * spacing)
-        size = wp.length(move)
-        if size > longest * spacing:
-            move = move * (longest * spacing / size)
+        move = (dx * u + dy * v) * (damping * size)
+        length = wp.length(move)
+        if length > longest * size:
+            move = move * (longest * size / length)
     moves[i] = move

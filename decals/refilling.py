@@ -5,83 +5,78 @@ from numpy.typing import NDArray
 
 from decals.neighbours import FacingTree
 from decals.population import Sites
+from decals.surface import Floats
 
-GAIN = 1.3
-"""A particle moves if it will be this many times farther from its neighbours than it was."""
+EXCESS = 1.8
+"""A particle moves if its energy is this many times that of the median one."""
 
-APART = 0.8
+BARE = 0.55
+"""Least distance of a filled place from all particles, in spacings; a hole of a perfect tiling has 0.577."""
+
+APART = 1.2
 """Least distance between places that are filled at the same time, in spacings."""
 
-MOST = 0.05
+MOST = 0.02
 """Largest part of the population that moves at once, besides one."""
 
 
-def refill(particles: Sites, scouts: Sites, spacing: float) -> Sites:
-    """Move the most crowded particles to the barest scouts, each within its own surface.
+def crowded(particles: Sites, energies: Floats, movable: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Particles that should move elsewhere, the most crowded first; of neighbours one only."""
+    most = 1 + int(MOST * len(particles))
+    rows = np.flatnonzero(movable & (energies > EXCESS * np.median(energies)))
+    rows = rows[np.argsort(-energies[rows], kind="stable")][: 4 * most]
+    if len(rows) == 0:
+        return rows
+    tree = FacingTree(particles.positions, particles.normals)
+    near = tree.nearest(particles.positions[rows], particles.normals[rows], count=7)[1]
+    kept: set[int] = set()
+    chosen: list[int] = []
+    for particle, others in zip(rows.tolist(), near.tolist(), strict=True):
+        if len(chosen) < most and particle not in kept:
+            chosen.append(particle)
+            kept.update(others)
+    return np.array(chosen, np.int64)
+
+
+def refill(
+    particles: Sites, movers: NDArray[np.int64], scouts: Sites, scout_sizes: Floats
+) -> tuple[Sites, NDArray[np.int64]]:
+    """Move particles to the barest scouts, each within its own surface; which of them moved comes along.
 
     Repulsion only acts nearby: it carries no particle to another component, round a sharp tip, or past
-    its neighbours. Counts per surface stay as they are.
+    its neighbours. Counts per surface stay as they are. `scout_sizes` are the spacings wished for there.
     """
     tree = FacingTree(particles.positions, particles.normals)
-    crowding, partner = tree.nearest(particles.positions, particles.normals, skip_self=True)
-    bareness, _ = tree.nearest(scouts.positions, scouts.normals)
-    pairs = _matches(particles, scouts, crowding[:, 0], partner[:, 0], bareness[:, 0], spacing)
-    if not pairs:
-        return particles
-    movers, places = np.array(pairs).T
+    bareness = tree.nearest(scouts.positions, scouts.normals)[0][:, 0] / scout_sizes
+    moved: list[int] = []
+    filled: list[int] = []
+    for surface in np.unique(particles.surface_ids[movers]):
+        own = movers[particles.surface_ids[movers] == surface].tolist()
+        places = _places(
+            np.flatnonzero(scouts.surface_ids == surface), scouts, bareness, scout_sizes, len(own)
+        )
+        moved += own[: len(places)]
+        filled += places
     positions, normals = particles.positions.copy(), particles.normals.copy()
-    positions[movers], normals[movers] = scouts.positions[places], scouts.normals[places]
-    return Sites(positions, normals, particles.surface_ids)
-
-
-def _matches(
-    particles: Sites,
-    scouts: Sites,
-    crowding: NDArray[np.float64],
-    partner: NDArray[np.int64],
-    bareness: NDArray[np.float64],
-    spacing: float,
-) -> list[tuple[int, int]]:
-    """Pairs (particle, scout) from the most crowded and the barest on."""
-    pairs: list[tuple[int, int]] = []
-    for surface in np.unique(particles.surface_ids):
-        members = np.flatnonzero(particles.surface_ids == surface)
-        most = 1 + int(MOST * len(members))
-        donors = _donors(members, crowding, partner, most)
-        places = _places(np.flatnonzero(scouts.surface_ids == surface), scouts, bareness, spacing, most)
-        for mover, place in zip(donors, places, strict=False):
-            if bareness[place] <= GAIN * crowding[mover]:
-                break
-            pairs.append((mover, place))
-    return pairs
-
-
-def _donors(
-    members: NDArray[np.int64], crowding: NDArray[np.float64], partner: NDArray[np.int64], most: int
-) -> list[int]:
-    """Choose the most crowded members; of a close pair one only."""
-    kept: set[int] = set()
-    donors: list[int] = []
-    for particle in members[np.argsort(crowding[members], kind="stable")].tolist():
-        if len(donors) == most:
-            break
-        if particle not in kept:
-            donors.append(particle)
-            kept.add(int(partner[particle]))
-    return donors
+    positions[moved], normals[moved] = scouts.positions[filled], scouts.normals[filled]
+    return Sites(positions, normals, particles.surface_ids), np.array(moved, np.int64)
 
 
 def _places(
-    members: NDArray[np.int64], scouts: Sites, bareness: NDArray[np.float64], spacing: float, most: int
+    members: NDArray[np.int64],
+    scouts: Sites,
+    bareness: NDArray[np.float64],
+    sizes: Floats,
+    most: int,
 ) -> list[int]:
     """Choose the barest members that keep apart from each other."""
     places: list[int] = []
     taken = np.empty((0, 3))
     for scout in members[np.argsort(-bareness[members], kind="stable")][: 64 * most].tolist():
-        if len(places) == most:
+        if len(places) == most or bareness[scout] < BARE:
             break
         position = scouts.positions[scout].astype(np.float64)
-        if (((taken - position) ** 2).sum(axis=1) > (APART * spacing) ** 2).all():
+        if (((taken - position) ** 2).sum(axis=1) > (APART * sizes[scout]) ** 2).all():
             places.append(scout)
             taken = np.vstack([taken, position])
     return places

@@ -1,51 +1,50 @@
 """Particles that repel each other on surfaces until they lie evenly."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import warp as wp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
 from decals.errors import InvalidSeeding
 from decals.model import FACING_LIMIT
 from decals.neighbours import FacingTree
-from decals.particles import repel
-from decals.population import Sites, World, shares
-from decals.refilling import refill
-from decals.surface import Flags, Floats, Surface, unit_rows
+from decals.polishing import polish
+from decals.population import Density, Mask, Sites, World, shares
+from decals.refilling import crowded, refill
+from decals.repulsion import Repulsion
+from decals.surface import Flags, Floats, Surface, as_points
 
-EXPONENTS = (4.0, 12.0)
-"""Power law of the repulsion at the first and the last step: soft to even out, hard to pack."""
+EXPONENTS = (3.0, 4.0)
+"""Power law of the repulsion at the first and the last step."""
 
-CUTOFF = 2.5
-"""Reach of the repulsion, in spacings."""
+STIFFNESS = 300.0
+"""Of the spring between particles that are too close, at the end."""
 
-DAMPING = 0.6
-"""Share of a Newton step taken, since neighbours move at the same time."""
+HARDENING = (0.5, 0.8)
+"""Parts of the schedule between which the spring stiffens: soft to even out, hard to pack."""
 
-LONGEST = 0.3
-"""Longest move of a step, in spacings."""
+REFILLS = (0.1, 0.8, 0.05)
+"""First and last part of the schedule at which crowded particles move to bare places, and the step."""
 
-REFILLS = (0.3, 0.6, 0.9)
-"""Parts of the schedule after which crowded particles move to bare places."""
+SCOUTS_PER_MOVER, SCOUTS_PER_PARTICLE = 200, 4
+"""Samples among which bare places are found: so many for each that must move, at most so many for each."""
 
-MEMORY = 0.7
-"""Share of the past in the normal that guides a particle. At a sharp tip the surface's normal jumps from one
-side to the other with every small move; its mean over some steps tells neighbours from far sides better."""
+POLISHING = 60
+"""Rounds at most that part the last close pairs."""
 
-VOID_SAMPLES = 32
-"""Samples for each particle among which bare places are found."""
-
-GRID_CELLS = (16, 128)
-"""Fewest and most cells of the hash grid along each axis."""
+BEYOND = 2.0
+"""Particles farther than this many spacings are no neighbours when evenness is measured."""
 
 
 @dataclass(frozen=True)
 class Spacing:
-    """How evenly particles lie; distances count between particles that face the same way.
+    """How evenly particles lie.
+
+    Distances are straight, in units of the spacing wished for there, between particles within two spacings
+    that face the same way: their normals' cosine is above `FACING_LIMIT`, the rule by which decals act.
+    A particle alone on its side of a thin part has no such neighbour; what it lacks is left out.
 
     Attributes
     ----------
@@ -59,6 +58,8 @@ class Spacing:
         Coefficient of variation of the distance to the nearest neighbour.
     cv6
         Coefficient of variation of the mean distance to six neighbours.
+    ringed
+        Part of the particles that have six neighbours: the others lie on rims, tips and thin parts.
     """
 
     ideal: float
@@ -66,6 +67,7 @@ class Spacing:
     rho: float
     cv: float
     cv6: float
+    ringed: float = 1.0
 
 
 class Relaxation:
@@ -74,45 +76,74 @@ class Relaxation:
     Energy minimisation after Witkin and Heckbert (1994): particles repel each other within their tangent
     planes and are projected back onto their own surface. Particles of different surfaces repel each other
     too; those on two sides of a wall do not (their normals part). None lies or moves inside another
-    closed surface. Each surface keeps its share of the count, by visible area.
+    closed surface. Each surface keeps its share of the count, by visible area and density. Now and then
+    crowded particles move to bare places, and the last step parts what is still too close (`polish`).
 
     Parameters
     ----------
     surfaces
         Where the particles live.
     count
-        How many there are, exactly.
+        How many there are, exactly, the fixed ones included.
+    spacing
+        In place of the count: distance of neighbours; as many as fit follow.
     seed
         From 0 upward; the same one gives the same bytes on the same kind of machine.
     iterations
         Steps of the whole schedule. More may be taken; they go on with its last energy.
+    density
+        How densely particles lie, relative to elsewhere: a function of ``points[n, 3]`` to ``[n]`` above
+        zero. It should change by less than a factor of four between neighbours.
+    mask
+        Where particles may lie: a function of ``points[n, 3]`` to ``bool[n]``.
+    fixed
+        Particles that stay where they are, ``float[k, 3]``, on the surfaces that they are closest to.
+    device
+        Warp device on which repulsion is computed.
 
     Raises
     ------
     InvalidSeeding
-        For a negative count or seed, no steps, or a count without visible area.
+        For a negative count or seed, no steps, a spacing that is not above zero, more fixed particles than
+        the count, a density or mask that answers nonsense, or a count without visible area.
     """
 
     def __init__(
-        self, surfaces: Sequence[Surface], *, count: int, seed: int = 0, iterations: int = 200
+        self,
+        surfaces: Sequence[Surface],
+        *,
+        count: int | None = None,
+        spacing: float | None = None,
+        seed: int = 0,
+        iterations: int = 150,
+        density: Density | None = None,
+        mask: Mask | None = None,
+        fixed: ArrayLike | None = None,
+        device: str = "cpu",
     ) -> None:
-        _check("count", count, 0)
         _check("seed", seed, 0)
         _check("iterations", iterations, 1)
         self.iterations = iterations
         self.steps = 0
-        self.world = World(surfaces, seed)
-        counts = shares(self.world.areas, count)
-        self.spacing = ideal_spacing(self.world.area, count)
-        self._ends = np.concatenate([[0], np.cumsum(counts)])
-        self._sites = self.world.sample(counts, stream=1) if count else _nobody()
-        self._scouts = self.world.sample(counts * VOID_SAMPLES, stream=2) if count else _nobody()
-        self._refills = {int(part * iterations) for part in REFILLS} - {0}
-        side = int(np.clip(2 * np.sqrt(max(count, 1)) / CUTOFF, *GRID_CELLS))
-        self._grid: Any = wp.HashGrid(side, side, side, device="cpu")
-        self._guides = self.normals.copy()
-        self._moves = np.zeros((count, 3), np.float32)
-        self._energies = wp.zeros(count, dtype=wp.float32, device="cpu")
+        self._seed = seed
+        self._device = device
+        self.world = World(surfaces, seed, density=density, mask=mask)
+        count = _count(count, spacing, self.world.mass)
+        self.spacing = ideal_spacing(self.world.mass, count)
+        placed = _placed(self.world, fixed)
+        if len(placed) > count:
+            raise InvalidSeeding(
+                f"fixed: expected at most the count of {count}, got {len(placed)}; raise the count"
+            )
+        counts = _remaining(shares(self.world.masses, count), placed)
+        others = self.world.sample(counts, stream=1) if count else _nobody()
+        joined = Sites.joined([placed, others])
+        order = np.argsort(joined.surface_ids, kind="stable")
+        self._fixed: Flags = (np.arange(count) < len(placed))[order]
+        self._sites = joined[order]
+        self._refills = {int(part * iterations) for part in np.arange(*REFILLS)} - {0}
+        self._repulsion = Repulsion(count, device=device)
+        self._sizes = self.sizes_at(self.positions)
 
     @property
     def count(self) -> int:
@@ -140,22 +171,49 @@ class Relaxation:
         return self._sites.surface_ids
 
     @property
+    def fixed(self) -> Flags:
+        """Which particles stay where they are, ``bool[n]``."""
+        return self._fixed.copy()
+
+    @property
     def energies(self) -> Floats:
         """How crowded each particle was at the last step: its energy there, ``float32[n]``."""
-        energies: Floats = self._energies.numpy().copy()
-        return energies
+        return self._repulsion.energies
 
     @property
     def finished(self) -> bool:
         """Whether the schedule has been run."""
         return self.steps >= self.iterations
 
-    def run(self, progress: Progress | None = None) -> None:
-        """Take the steps that are left of the schedule."""
-        while not self.finished:
+    def sizes_at(self, positions: Floats) -> Floats:
+        """Spacing wished for at each position, ``float32[n]``."""
+        sizes: Floats = (self.spacing / np.sqrt(self.world.density(positions))).astype(np.float32)
+        return sizes
+
+    def run(
+        self,
+        progress: Progress | None = None,
+        *,
+        until: float | None = None,
+        cancel: Callable[[], bool] | None = None,
+    ) -> None:
+        """Take the steps that are left of the schedule.
+
+        Parameters
+        ----------
+        progress
+            Called with a stage in plain words and the fraction done.
+        until
+            Stop as soon as rho has come up to this; it is measured at every tenth step.
+        cancel
+            Asked before every step whether to stop; the particles stay as they are then.
+        """
+        while not self.finished and not (cancel is not None and cancel()):
             self.step()
             if progress is not None:
                 progress("spreading seeds", self.steps / self.iterations)
+            if until is not None and self.steps % 10 == 0 and self.statistics().rho >= until:
+                break
 
     def step(self) -> None:
         """Move every particle once against its neighbours, and now and then some to bare places."""
@@ -165,59 +223,90 @@ class Relaxation:
         if self.steps in self._refills:
             self._refill()
         self._push()
-        self._settle()
+        if self.steps == self.iterations:
+            self.polish()
+
+    def polish(self, rounds: int = POLISHING) -> None:
+        """Part the pairs that are still too close by trial, as long as that helps."""
+        if self.count < 2:
+            return
+        self._sites = polish(
+            self._sites, self._sizes, ~self._fixed, self.world.settle, rounds=rounds, seed=self._seed
+        )
+        self._repulsion.forget()
 
     def statistics(self) -> Spacing:
         """How evenly the particles lie now."""
-        distances, _ = FacingTree(self.positions, self.normals).nearest(
+        distances, indices = FacingTree(self.positions, self.normals).nearest(
             self.positions, self.normals, count=6, skip_self=True
         )
-        nearest, six = distances[:, 0], distances.mean(axis=1)
-        nearest, six = nearest[np.isfinite(nearest)], six[np.isfinite(six)]
-        if len(nearest) == 0:
-            return Spacing(self.spacing, np.inf, np.inf, 0.0, 0.0)
-        rho = float(nearest.min()) / self.spacing
-        return Spacing(self.spacing, float(nearest.mean()), rho, _variation(nearest), _variation(six))
+        sizes = self.sizes_at(self.positions).astype(np.float64)
+        distances /= 0.5 * (sizes[:, None] + np.where(indices >= 0, sizes[indices], 1.0))
+        return evenness(self.spacing * distances, self.spacing)
 
     def _refill(self) -> None:
-        """Move crowded particles to bare places, where they forget their past."""
-        before = self._sites
-        self._sites = refill(before, self._scouts, self.spacing)
-        moved = (before.positions != self.positions).any(axis=1)
-        self._guides[moved] = self.normals[moved]
+        """Move crowded particles to bare places."""
+        if self.steps == 1:
+            return
+        movers = crowded(self._sites, self.energies, ~self._fixed)
+        if len(movers) == 0:
+            return
+        most = min(SCOUTS_PER_PARTICLE * self.count, SCOUTS_PER_MOVER * len(movers) + 1000)
+        scouts = self.world.sample(shares(self.world.masses, most), stream=1000 + self.steps)
+        self._sites, moved = refill(self._sites, movers, scouts, self.sizes_at(scouts.positions))
+        if len(moved):
+            self._repulsion.forget()
 
     def _push(self) -> None:
-        """Compute the move of every particle."""
+        """Move every particle; those that would leave their side or get hidden stay."""
         part = min(self.steps / self.iterations, 1.0)
         exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
-        positions, guides, moves = (_vectors(rows) for rows in (self.positions, self._guides, self._moves))
-        self._grid.build(positions, CUTOFF * self.spacing)
-        inputs = [self._grid.id, positions, guides, self.spacing, CUTOFF, exponent]
-        inputs += [FACING_LIMIT, DAMPING, LONGEST]
-        wp.launch(repel, dim=self.count, inputs=inputs, outputs=[moves, self._energies], device="cpu")
+        stiffness = STIFFNESS * float(np.interp(part, HARDENING, (0.0, 1.0)))
+        if self._repulsion.stale:
+            self._sizes = self.sizes_at(self.positions)
+            self._repulsion.relist(self.positions, self.normals, self._sizes)
+        moves = self._repulsion.moves(
+            self.positions, self.normals, self._sizes, exponent=exponent, stiffness=stiffness
+        )
+        moves[self._fixed] = 0.0
+        self._sites = moved(self.world, self._sites, moves, self._sizes)
 
-    def _settle(self) -> None:
-        """Project the moved particles; those that would leave their side or get hidden stay."""
-        positions, normals = np.empty_like(self.positions), np.empty_like(self.normals)
-        stays: Flags = np.zeros(self.count, np.bool_)
-        for number, surface in enumerate(self.world.surfaces):
-            own = slice(self._ends[number], self._ends[number + 1])
-            positions[own], normals[own] = surface.project(self.positions[own] + self._moves[own])
-            stays[own] = self.world.hidden(number, positions[own], normals[own])
-        stays |= np.einsum("ni,ni->n", normals, self.normals) <= FACING_LIMIT
-        positions[stays], normals[stays] = self.positions[stays], self.normals[stays]
-        self._sites = Sites(positions, normals, self.surface_ids)
-        self._guides = unit_rows(MEMORY * self._guides + (1.0 - MEMORY) * normals)
+
+def moved(world: World, sites: Sites, moves: Floats, sizes: Floats) -> Sites:
+    """Sites after the moves, put back onto their surfaces; who would turn away or be barred stays."""
+    lengths = np.sqrt(np.einsum("ni,ni->n", moves, moves))
+    wished = Sites(sites.positions + moves, sites.normals, sites.surface_ids)
+    # a particle on its surface that moves by some length is no farther than that from the surface
+    found, allowed = world.settle(wished, within=np.float32(1.01) * lengths + np.float32(1e-4) * sizes)
+    allowed &= np.einsum("ni,ni->n", found.normals, sites.normals) > FACING_LIMIT
+    allowed &= lengths > 0.0
+    return Sites(
+        np.where(allowed[:, None], found.positions, sites.positions),
+        np.where(allowed[:, None], found.normals, sites.normals),
+        sites.surface_ids,
+    )
+
+
+def evenness(distances: NDArray[np.float64], spacing: float) -> Spacing:
+    """Figures of the distances of each particle to its six nearest neighbours, ``[n, 6]``, ascending."""
+    near = np.where(distances <= BEYOND * spacing, distances, np.inf)
+    nearest, six = near[:, 0], near.mean(axis=1)
+    nearest, six = nearest[np.isfinite(nearest)], six[np.isfinite(six)]
+    if len(nearest) == 0:
+        return Spacing(spacing, np.inf, np.inf, 0.0, 0.0, 0.0)
+    return Spacing(
+        ideal=spacing,
+        mean=float(nearest.mean()),
+        rho=float(nearest.min()) / spacing,
+        cv=_variation(nearest),
+        cv6=_variation(six),
+        ringed=len(six) / len(distances),
+    )
 
 
 def ideal_spacing(area: float, count: int) -> float:
     """Distance of neighbours in the hexagonal tiling of an area by so many points."""
     return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * max(count, 1))))
-
-
-def _vectors(rows: Floats) -> wp.array[wp.vec3]:
-    """Show rows to a kernel without a copy."""
-    return wp.array(rows, dtype=wp.vec3, device="cpu", copy=False)
 
 
 def _variation(values: NDArray[np.float64]) -> float:
@@ -234,3 +323,43 @@ def _check(name: str, value: int, least: int) -> None:
         raise InvalidSeeding(f"{name}: expected a whole number, got {value!r}")
     if value < least:
         raise InvalidSeeding(f"{name}: expected at least {least}, got {value}")
+
+
+def _count(count: int | None, spacing: float | None, mass: float) -> int:
+    """Count that was wished for, or follows from the spacing."""
+    if (count is None) == (spacing is None):
+        raise InvalidSeeding("expected either a count or a spacing, got both or none; give one of them")
+    if count is not None:
+        _check("count", count, 0)
+        return int(count)
+    assert spacing is not None
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
+    return int(round(2.0 * mass / (np.sqrt(3.0) * spacing**2)))
+
+
+def _placed(world: World, fixed: ArrayLike | None) -> Sites:
+    """Put fixed particles onto the surfaces that they are closest to, in the surfaces' order."""
+    if fixed is None or np.size(fixed) == 0:
+        return _nobody()
+    if not world.surfaces:
+        raise InvalidSeeding("fixed: expected a surface for them to lie on, got none")
+    points = as_points(fixed, "fixed")
+    found = [surface.project(points) for surface in world.surfaces]
+    gaps = np.stack([np.linalg.norm(positions - points, axis=1) for positions, _ in found])
+    nearest = gaps.argmin(axis=0)
+    rows = np.arange(len(points))
+    return Sites(
+        np.stack([positions for positions, _ in found])[nearest, rows],
+        np.stack([normals for _, normals in found])[nearest, rows],
+        nearest.astype(np.int32),
+    )
+
+
+def _remaining(counts: NDArray[np.int64], placed: Sites) -> NDArray[np.int64]:
+    """What is left of each surface's share after the fixed particles; the sum stays exact."""
+    left = counts - np.bincount(placed.surface_ids, minlength=len(counts))
+    while (left < 0).any():
+        left[int(left.argmax())] -= 1
+        left[int(left.argmin())] += 1
+    return left

@@ -1,6 +1,6 @@
 """From surfaces to decals in one call."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,7 +9,7 @@ from blobtree.progress import Progress
 from decals.errors import InvalidSeeding
 from decals.model import Decals
 from decals.orientation import Direction, tangents
-from decals.population import Sites, World
+from decals.population import Density, Mask, Sites, World
 from decals.relaxation import Relaxation
 from decals.sizing import covering_radii
 from decals.surface import Surface
@@ -29,12 +29,17 @@ _SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
 def seed(
     surfaces: Surface | Sequence[Surface],
     *,
-    count: int,
+    count: int | None = None,
+    spacing: float | None = None,
     seed: int = 0,
+    density: Density | None = None,
+    mask: Mask | None = None,
+    fixed: ArrayLike | None = None,
     direction: Direction = None,
     images: int = 1,
     weights: ArrayLike | None = None,
     progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
 ) -> Decals:
     """Cover surfaces with decals that lie evenly and leave no gap.
 
@@ -45,9 +50,13 @@ def seed(
     surfaces
         One surface, or several that are covered by one coat.
     count
-        How many decals, exactly.
+        How many decals, exactly, those on fixed places included.
+    spacing
+        In place of the count: distance of neighbours; as many as fit follow.
     seed
         From 0 upward; the same one gives the same decals.
+    density, mask, fixed
+        How densely decals lie, where they may lie, and places that are given: see `Relaxation`.
     direction
         Of the images' u axes: None (random), a vector, or a function of ``points[n, 3]`` to vectors.
     images
@@ -56,18 +65,23 @@ def seed(
         How often each image is chosen, ``float[images]``; equally often by default.
     progress
         Called with a stage in plain words and the fraction done.
+    cancel
+        Asked before every step whether to stop spreading; what has been reached is kept and covered.
 
     Raises
     ------
     InvalidSeeding
-        For a count, seed, direction, number of images or weights that make no sense, or nothing to lie on.
+        For a count, spacing, seed, density, mask, direction, number of images or weights that make no sense,
+        or nothing to lie on.
     """
     given = [surfaces] if isinstance(surfaces, Surface) else list(surfaces)
     odds = _odds(images, weights)
     tell = progress or (lambda stage, fraction: None)
-    relaxation = Relaxation(given, count=count, seed=seed)
-    relaxation.run(lambda stage, fraction: tell(stage, SPREADING * fraction))
-    if count == 0:
+    relaxation = Relaxation(
+        given, count=count, spacing=spacing, seed=seed, density=density, mask=mask, fixed=fixed
+    )
+    relaxation.run(lambda stage, fraction: tell(stage, SPREADING * fraction), cancel=cancel)
+    if relaxation.count == 0:
         return Decals.empty()
     tell("measuring sizes", SPREADING)
     radii = sizes(relaxation, seed=seed)
@@ -77,7 +91,7 @@ def seed(
         normals=relaxation.normals,
         tangents=tangents(relaxation.positions, relaxation.normals, direction, _stream(seed, _ANGLE_STREAM)),
         radii=radii.astype(np.float32),
-        images=_choose(odds, count, _stream(seed, _IMAGE_STREAM)),
+        images=_choose(odds, relaxation.count, _stream(seed, _IMAGE_STREAM)),
     )
 
 
@@ -96,14 +110,9 @@ def sizes(relaxation: Relaxation, *, seed: int = 0) -> NDArray[np.float64]:
 
 
 def visible(world: World, sites: Sites) -> Sites:
-    """Put points back onto their own surfaces and drop those that are hidden there."""
-    positions, normals = np.empty_like(sites.positions), np.empty_like(sites.normals)
-    shown = np.ones(len(sites), np.bool_)
-    for number, surface in enumerate(world.surfaces):
-        own = np.flatnonzero(sites.surface_ids == number)
-        positions[own], normals[own] = surface.project(sites.positions[own])
-        shown[own] = ~world.hidden(number, positions[own], normals[own])
-    return Sites(positions[shown], normals[shown], sites.surface_ids[shown])
+    """Put points back onto their own surfaces and drop those that may not lie there."""
+    settled, allowed = world.settle(sites)
+    return settled[np.flatnonzero(allowed)]
 
 
 def _odds(images: int, weights: ArrayLike | None) -> NDArray[np.float64]:

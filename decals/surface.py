@@ -38,8 +38,12 @@ class Surface(Protocol):
         """
         ...
 
-    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """Positions on the surface closest to the points, and the normals there."""
+    def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
+        """Positions on the surface closest to the points, and the normals there.
+
+        Who knows that the surface is no farther than some distance from each point says so, ``float[n]``,
+        and may be answered sooner; a wrong promise costs time alone.
+        """
         ...
 
     def normal(self, points: ArrayLike) -> Floats:

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
-import warp as wp
 
-from decals.particles import CLOSEST, ISOTROPY, repel
+from decals.model import FACING_LIMIT
+from decals.particles import CLOSEST, ISOTROPY
+from decals.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Repulsion
 from tests.oracles.repulsion import moves as expected_moves
 
-SPACING, CUTOFF, FACING_LIMIT, DAMPING, LONGEST = 0.3, 2.5, -0.25, 0.6, 0.3
+SPACING = 0.3
 
 
 def unit(vectors):
@@ -17,24 +18,23 @@ def sphere_points(count, seed, radius=1.0):
     return np.float32(radius) * normals, normals
 
 
-def step(positions, normals, *, exponent=12.0, spacing=SPACING):
-    arrays = [wp.array(rows, dtype=wp.vec3, device="cpu") for rows in (positions, normals)]
-    grid = wp.HashGrid(16, 16, 16, device="cpu")
-    grid.build(arrays[0], CUTOFF * spacing)
-    out = wp.zeros(len(positions), dtype=wp.vec3, device="cpu")
-    energies = wp.zeros(len(positions), dtype=wp.float32, device="cpu")
-    inputs = [grid.id, *arrays, spacing, CUTOFF, exponent, FACING_LIMIT, DAMPING, LONGEST]
-    wp.launch(repel, dim=len(positions), inputs=inputs, outputs=[out, energies], device="cpu")
-    return out.numpy(), energies.numpy()
+def step(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING):
+    sizes = np.broadcast_to(np.float32(spacing), len(positions)).copy()
+    repulsion = Repulsion(len(positions))
+    repulsion.relist(positions, normals, sizes)
+    found = repulsion.moves(positions, normals, sizes, exponent=exponent, stiffness=stiffness)
+    return found, repulsion.energies
 
 
-def oracle(positions, normals, *, exponent=12.0, spacing=SPACING):
+def oracle(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING):
     return expected_moves(
         positions,
         normals,
-        spacing=spacing,
+        np.broadcast_to(spacing, len(positions)),
         cutoff=CUTOFF,
         exponent=exponent,
+        core=CORE,
+        stiffness=stiffness,
         facing_limit=FACING_LIMIT,
         damping=DAMPING,
         longest=LONGEST,
@@ -43,12 +43,14 @@ def oracle(positions, normals, *, exponent=12.0, spacing=SPACING):
     )
 
 
-@pytest.mark.parametrize("exponent", [4.0, 12.0])
-@pytest.mark.parametrize("seed", range(3))
-def test_a_step_is_that_of_every_pair_by_itself(exponent, seed):
-    positions, normals = sphere_points(150, seed)
-    found, energies = step(positions, normals, exponent=exponent)
-    expected, expected_energies = oracle(positions, normals, exponent=exponent)
+@pytest.mark.parametrize(("exponent", "stiffness"), [(3.0, 0.0), (4.0, 300.0)])
+@pytest.mark.parametrize("varied", [False, True])
+def test_a_step_is_that_of_every_pair_by_itself(exponent, stiffness, varied):
+    positions, normals = sphere_points(150, seed=int(exponent))
+    spacing = SPACING * (1.0 + 0.3 * varied * positions[:, 2])
+    wish = {"exponent": exponent, "stiffness": stiffness, "spacing": spacing}
+    found, energies = step(positions, normals, **wish)
+    expected, expected_energies = oracle(positions, normals, **wish)
     assert np.allclose(found, expected, atol=2e-4 * SPACING)
     assert np.allclose(energies, expected_energies, rtol=1e-3)
 

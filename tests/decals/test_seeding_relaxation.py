@@ -3,10 +3,11 @@ import pytest
 
 from decals.errors import InvalidSeeding
 from decals.neighbours import FacingTree
+from decals.polishing import polish
 from decals.population import Sites, World, shares
-from decals.refilling import refill
+from decals.refilling import crowded, refill
 from decals.relaxation import Relaxation
-from tests.decals.meshes import box, plane, sphere
+from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.coats import nearest_facing, rho
 
 
@@ -32,6 +33,7 @@ def test_statistics_are_those_of_all_pairs():
     relaxation.run()
     found = relaxation.statistics()
     nearest = nearest_facing(relaxation.positions, relaxation.normals)
+    assert nearest.max() < 2.0 * found.ideal
     assert found.rho == pytest.approx(rho(relaxation.positions, relaxation.normals, 6.0), rel=1e-5)
     assert found.mean == pytest.approx(nearest.mean(), rel=1e-5)
     assert found.cv == pytest.approx(nearest.std() / nearest.mean(), rel=1e-4)
@@ -43,9 +45,10 @@ def test_relaxing_makes_even():
     before = relaxation.statistics()
     relaxation.run()
     after = relaxation.statistics()
-    assert before.rho < 0.3 < 0.87 < after.rho
-    assert after.cv < 0.03 < before.cv
-    assert after.cv6 < 0.03 < before.cv6
+    assert before.rho < 0.3 < 0.88 < after.rho
+    assert after.cv < 0.025 < before.cv
+    assert after.cv6 < 0.025 < before.cv6
+    assert after.ringed == 1.0
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
@@ -139,10 +142,153 @@ def test_crowded_particles_move_to_bare_places():
         np.tile(np.float32([0, 0, 1]), (3, 1)),
         np.zeros(3, np.int32),
     )
-    moved = refill(particles, scouts, spacing=1.0)
-    assert moved.positions.tolist() == [[9, 0, 0], *particles.positions[1:].tolist()]
+    energies = np.float32([9, 8, 1, 1])
+    movers = crowded(particles, energies, np.ones(4, bool))
+    assert movers.tolist() == [0]
+    assert crowded(particles, energies, np.arange(4) > 1).tolist() == []
+    found, which = refill(particles, movers, scouts, np.ones(3, np.float32))
+    assert which.tolist() == [0]
+    assert found.positions.tolist() == [[9, 0, 0], *particles.positions[1:].tolist()]
     elsewhere = Sites(scouts.positions, scouts.normals, np.ones(3, np.int32))
-    assert refill(particles, elsewhere, spacing=1.0) is particles
+    found, which = refill(particles, movers, elsewhere, np.ones(3, np.float32))
+    assert len(which) == 0
+    assert np.array_equal(found.positions, particles.positions)
+
+
+def test_polishing_parts_close_pairs_and_never_lets_the_least_distance_fall():
+    surface = box()
+    rough = Relaxation([surface], count=150, iterations=60)
+    while rough.steps < 12:
+        rough.step()
+    everybody = np.ones(150, bool)
+    sizes = rough.sizes_at(rough.positions)
+    sites, last = rough.sites, nearest_facing(rough.positions, rough.normals).min()
+    first = last
+    for number in range(15):
+        sites = polish(sites, sizes, everybody, rough.world.settle, rounds=1, seed=number)
+        least = nearest_facing(sites.positions, sites.normals).min()
+        assert least > last * (1 - 1e-6)
+        last = least
+    assert last > 1.05 * first
+    assert np.abs(surface.project(sites.positions)[0] - sites.positions).max() < 1e-6
+
+
+@pytest.mark.parametrize("count", [1000, 5000])
+def test_sharp_tips_and_thin_fins_are_seeded_evenly(count):
+    relaxation = Relaxation([star()], count=count)
+    relaxation.run()
+    found = relaxation.statistics()
+    assert found.rho > 0.85
+    assert found.cv < 0.035
+
+
+def test_the_energy_sinks_on_a_smooth_surface():
+    relaxation = Relaxation([sphere()], count=500, iterations=4000)
+    energies = []
+    for _ in range(60):
+        relaxation.step()
+        energies.append(float(relaxation.energies.sum(dtype=np.float64)))
+    assert energies[-1] < 0.8 * energies[0]
+    # the exponent grows by 0.00025 a step, and with it the energy of pairs nearer than a spacing
+    assert (np.diff(energies) < 1e-3 * energies[-1]).all()
+
+
+def test_a_spacing_in_place_of_a_count():
+    relaxation = Relaxation([sphere()], spacing=0.2, iterations=1)
+    assert relaxation.count == round(sphere().area * 2 / (np.sqrt(3) * 0.04))
+    assert relaxation.spacing == pytest.approx(0.2, rel=1e-3)
+    for wish in ({}, {"count": 3, "spacing": 1.0}, {"spacing": 0.0}, {"spacing": np.nan}):
+        with pytest.raises(InvalidSeeding, match="expected"):
+            Relaxation([sphere()], **wish)
+
+
+def test_density_decides_how_many_lie_where():
+    # over a unit sphere the integral of exp(z) between two heights is 2 pi times its difference
+    relaxation = Relaxation([sphere(level=5)], count=2000, density=lambda points: np.exp(points[:, 2]))
+    relaxation.run()
+    edges = np.linspace(-1, 1, 6)
+    counts = np.histogram(relaxation.positions[:, 2], bins=[-2, *edges[1:-1], 2])[0]
+    expected = 2000 * np.diff(np.exp(edges)) / (np.e - 1 / np.e)
+    assert np.abs(counts - expected).max() < 0.02 * 2000
+    assert counts == pytest.approx(expected, rel=0.05)
+    assert relaxation.statistics().rho > 0.8
+
+
+def test_density_may_jump():
+    jump = Relaxation([plane(2.0)], count=1000, density=lambda points: np.where(points[:, 0] > 0, 4.0, 1.0))
+    jump.run()
+    dense = jump.positions[:, 0] > 0
+    assert dense.sum() == pytest.approx(800, abs=40)
+    nearest = nearest_facing(jump.positions, jump.normals)
+    assert np.median(nearest[~dense]) == pytest.approx(2 * np.median(nearest[dense]), rel=0.1)
+
+
+def test_spacings_of_one_to_ten_in_one_population():
+    relaxation = Relaxation([sphere()], count=3000, density=lambda points: 10.0 ** (1.0 + points[:, 2]))
+    relaxation.run()
+    sizes = relaxation.sizes_at(relaxation.positions)
+    assert sizes.max() > 9 * sizes.min()
+    assert relaxation.statistics().rho > 0.8
+
+
+def test_surfaces_share_by_density():
+    pair = [sphere(), sphere(center=(5, 0, 0))]
+    relaxation = Relaxation(pair, count=300, density=lambda points: np.where(points[:, 0] > 2, 2.0, 1.0))
+    assert np.bincount(relaxation.surface_ids).tolist() == [100, 200]
+
+
+def test_a_mask_bars_places():
+    relaxation = Relaxation([sphere()], count=200, mask=lambda points: points[:, 2] > 0.2, iterations=60)
+    relaxation.run()
+    assert (relaxation.positions[:, 2] > 0.2).all()
+    assert relaxation.world.area == pytest.approx(0.4 * sphere().area, rel=0.02)
+    assert relaxation.statistics().rho > 0.6
+    with pytest.raises(InvalidSeeding, match="visible area"):
+        Relaxation([sphere()], count=5, mask=lambda points: points[:, 2] > 9)
+
+
+def test_fixed_particles_stay_and_keep_the_others_off():
+    fixed = np.float32([[0, 0, 1.2], [0.05, 0, 1.2], [4.0, 0, 0]])
+    balls = [sphere(), sphere(center=(5, 0, 0))]
+    relaxation = Relaxation(balls, count=200, fixed=fixed)
+    relaxation.run()
+    stays = relaxation.fixed
+    assert stays.sum() == 3
+    assert relaxation.count == 200
+    gaps = np.linalg.norm(relaxation.positions[stays][:, None] - fixed[None], axis=2).min(axis=0)
+    assert gaps == pytest.approx([0.2, 0.2, 0.0], abs=0.01)
+    assert np.bincount(relaxation.surface_ids).tolist() == [100, 100]
+    nearest = nearest_facing(relaxation.positions, relaxation.normals)
+    assert nearest[~stays].min() > 0.75 * relaxation.spacing
+    with pytest.raises(InvalidSeeding, match="at most the count"):
+        Relaxation(balls, count=2, fixed=fixed)
+
+
+@pytest.mark.parametrize(
+    ("wish", "says"),
+    [
+        ({"density": lambda points: points}, "density: expected shape"),
+        (
+            {"density": lambda points: points[:, 0] * 0},
+            "density: expected finite numbers, and densities above",
+        ),
+        ({"density": lambda points: points[:, 0] * np.nan}, "density: expected finite"),
+        ({"density": lambda points: "much"}, "density: expected numbers"),
+        ({"mask": lambda points: True}, "mask: expected shape"),
+    ],
+)
+def test_functions_that_answer_nonsense_are_refused(wish, says):
+    with pytest.raises(InvalidSeeding, match=says):
+        Relaxation([plane()], count=5, **wish)
+
+
+def test_relaxing_stops_when_told_to_or_even_enough():
+    stopped, early = Relaxation([sphere()], count=300), Relaxation([sphere()], count=300)
+    stopped.run(cancel=lambda: stopped.steps >= 7)
+    assert stopped.steps == 7
+    early.run(until=0.5)
+    assert 0 < early.steps < early.iterations
+    assert early.statistics().rho >= 0.5
 
 
 @pytest.mark.parametrize("skip_self", [False, True])

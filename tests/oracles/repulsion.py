@@ -4,13 +4,14 @@ import numpy as np
 
 
 def facing_weight(cosine, limit):
-    t = np.clip(0.5 + 2.0 * (cosine - limit), 0.0, 1.0)
+    t = np.clip(1.0 + 4.0 * (cosine - limit), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-def pair_energy(x, exponent, cutoff):
-    """x^-p, less its tangent at the cutoff."""
-    return np.where(
+def pair_energy(x, exponent, cutoff, core, stiffness):
+    """x^-p, less its tangent at the cutoff, and a spring within the core."""
+    spring = 0.5 * stiffness * max(core - x, 0.0) ** 2
+    return spring + np.where(
         x < cutoff,
         x**-exponent - cutoff**-exponent + exponent * cutoff ** (-exponent - 1) * (x - cutoff),
         0.0,
@@ -18,7 +19,19 @@ def pair_energy(x, exponent, cutoff):
 
 
 def moves(
-    positions, normals, *, spacing, cutoff, exponent, facing_limit, damping, longest, isotropy, closest
+    positions,
+    normals,
+    sizes,
+    *,
+    cutoff,
+    exponent,
+    core,
+    stiffness,
+    facing_limit,
+    damping,
+    longest,
+    isotropy,
+    closest,
 ):
     """Damped Newton move and energy of every particle, its neighbours at rest.
 
@@ -29,23 +42,25 @@ def moves(
     for i, (p, n) in enumerate(zip(positions, normals, strict=True)):
         force, curvature = np.zeros(3), np.zeros((3, 3))
         for j, q in enumerate(positions):
-            if j == i or np.linalg.norm(p - q) >= cutoff * spacing:
+            pair = 0.5 * (sizes[i] + sizes[j])
+            if j == i or np.linalg.norm(p - q) >= cutoff * pair:
                 continue
             weight = facing_weight(n @ normals[j], facing_limit)
-            x = max(np.linalg.norm(p - q) / spacing, closest)
+            x = max(np.linalg.norm(p - q) / pair, closest)
             step = 1e-5 * x
-            values = [pair_energy(x + k * step, exponent, cutoff) for k in (-1, 0, 1)]
+            values = [pair_energy(x + k * step, exponent, cutoff, core, stiffness) for k in (-1, 0, 1)]
             slope = (values[2] - values[0]) / (2 * step)
-            bend = exponent * (exponent + 1) * x ** (-exponent - 2)
+            bend = exponent * (exponent + 1) * x ** (-exponent - 2) + stiffness * (x < core)
             away = (p - q) / np.linalg.norm(p - q)
             away -= (away @ n) * n
-            force -= weight * slope * away
+            scale = pair / sizes[i]
+            force -= weight * scale * slope * away
             curvature += weight * bend * np.outer(away, away)
             energies[i] += weight * values[1]
         tangent = np.eye(3) - np.outer(n, n)
         curvature += isotropy * np.trace(curvature) * tangent
         if curvature.any():
-            move = damping * spacing * np.linalg.pinv(curvature, rcond=1e-6, hermitian=True) @ force
+            move = damping * sizes[i] * np.linalg.pinv(curvature, rcond=1e-6, hermitian=True) @ force
             size = np.linalg.norm(move)
-            result[i] = move * min(1.0, longest * spacing / size) if size > 0 else move
+            result[i] = move * min(1.0, longest * sizes[i] / size) if size > 0 else move
     return result, energies
