@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from .errors import UsageError
-from .help_texts import HELP
+from .help_texts import BENCH_TABLE, HELP
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -26,6 +26,10 @@ app = App(
 )
 for _name, _help in HELP.items():
     app.command(f"implicit_decals.apps.{_name}:{_name}", name=_name, help=_help)
+
+_bench = App(name="bench", help="Measure this machine.", help_format="plaintext")
+_bench.command("implicit_decals.apps.bench:table", name="table", help=BENCH_TABLE)
+app.command(_bench)
 
 
 def run(tokens: Sequence[str] | None = None) -> int:

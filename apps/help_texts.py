@@ -33,3 +33,11 @@ implicit-decals polygonize blob.json --cell-size 0.02 -o blob.obj
 """,
     "doctor": "Say what is here of what the project needs, and what to do about the rest.",
 }
+
+BENCH_TABLE = """Print the paper's figure 14 as this machine has it, beside the paper's numbers.
+
+For instance:
+
+implicit-decals bench table --size 800x600 --counts 100,1000 --models knot,spheres
+"""
+"""Of ``implicit-decals bench table``."""

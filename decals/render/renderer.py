@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -18,6 +19,7 @@ from decals.render.context import Context
 from decals.render.decal_data import DecalData
 from decals.render.decal_pass import DecalPass
 from decals.render.drawables import Drawable, drawable_for
+from decals.render.entry import Entry
 from decals.render.gbuffer import GBuffer
 from decals.render.kept import Kept
 from decals.render.light_pass import LightPass
@@ -162,6 +164,34 @@ class Renderer:
             uv=decal.pixels[..., 2:],
             color=color.pixels,
         )
+
+    def time_frame(
+        self,
+        scene: SceneLike,
+        *,
+        size: Size = (800, 600),
+        mapping: Mapping = Mapping.CORRECTED,
+        contact: Contact = Contact.PAPER,
+    ) -> float:
+        """Give the seconds that one picture takes to draw, one sample a pixel, without reading it back.
+
+        What a scene uploads is counted where it is drawn for the first time. Arguments and errors as for
+        `render`.
+        """
+        _check_size(size, 1)
+        with self.context.current():
+            self.context.gl.finish()
+            begin = time.perf_counter()
+            for _ in self._tiles(scene, size, 1, mapping, contact, buffers=False):
+                pass
+            self.context.gl.finish()
+            return time.perf_counter() - begin
+
+    @property
+    def entry(self) -> Entry:
+        """How passes over all pixels are run: as fragment or as compute shaders."""
+        with self.context.current():
+            return self.context.entry
 
     def _tiles(
         self,

@@ -1,0 +1,156 @@
+"""``implicit-decals bench table``: the paper's figure 14 on this machine, beside the paper's own numbers."""
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from decals.index import DecalIndex
+from decals.render import Renderer
+from decals.scene import DecalImage, Scene
+
+from .coats import even_coat
+from .errors import UsageError
+from .options import MAX_DECALS, check_count, parse_size
+from .paper import FIGURE_14, PaperRow
+from .progress_bars import progress_bars
+from .samples import SAMPLES, axes_of, sample
+from .views import Size, frame, parse_view
+from .warp_start import start_warp
+
+RUNS = 3
+"""Runs of which the median counts."""
+MODELS = "dragon,knot,horse,spheres"
+COUNTS = "100,1000,10000,100000"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes
+    ----------
+    model, decals
+        What was drawn.
+    nodes
+        Cells of the index.
+    build
+        Seconds to build it.
+    frame
+        Milliseconds to draw a picture, without reading it back.
+    memory
+        Bytes of records and index on the graphics card.
+    """
+
+    model: str
+    decals: int
+    nodes: int
+    build: float
+    frame: float
+    memory: int
+
+    @property
+    def paper(self) -> PaperRow | None:
+        """The paper's own line for this model and count."""
+        return FIGURE_14.get((self.model, self.decals))
+
+
+def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str = MODELS) -> None:
+    """Print the paper's figure 14 as this machine has it, beside the paper's numbers (GeForce 8800 Ultra).
+
+    Parameters
+    ----------
+    size
+        Width and height of the pictures in pixels.
+    counts
+        Numbers of decals, with commas between.
+    models
+        Samples, with commas between: creature, dragon, horse, knot, spheres.
+    """
+    pixels, numbers, names = parse_size(size), parse_counts(counts), parse_models(models)
+    start_warp()
+    with Renderer() as renderer:
+        with progress_bars() as progress:
+            rows = []
+            for step, name in enumerate(names):
+                progress("Measuring", step / len(names))
+                rows += measure(renderer, name, numbers, pixels)
+        Console().print(as_table(rows, f"{renderer.context.name}, {size}, {renderer.entry} shader"))
+
+
+def measure(renderer: Renderer, model: str, counts: Sequence[int], size: Size) -> list[Row]:
+    """Measure one model under each number of decals; medians of three runs."""
+    item = sample(model)
+    camera = frame([item], parse_view(None, axes_of(model)), size)
+    image = DecalImage.load("scale")
+    rows = []
+    for count in counts:
+        decals = even_coat([item.surface], count=count)
+        index = DecalIndex.of(decals)
+        build = _median(lambda decals=decals: _seconds(lambda: DecalIndex.of(decals)))  # type: ignore[misc]
+        scene = Scene(objects=(item,), camera=camera, decals=decals, images=(image,))
+        renderer.time_frame(scene, size=size)
+        rows.append(
+            Row(
+                model=model,
+                decals=count,
+                nodes=int((index.table.reshape(-1, 4)[:, 0] >= 0).sum()),
+                build=build,
+                frame=1e3 * _median(lambda scene=scene: renderer.time_frame(scene, size=size)),  # type: ignore[misc]
+                memory=index.nbytes + decals.packed().nbytes,
+            )
+        )
+    return rows
+
+
+def as_table(rows: Sequence[Row], title: str) -> Table:
+    """Lay the rows out beside the paper's."""
+    result = Table(title=title, caption="in brackets: the paper's figure 14", box=box.SIMPLE, padding=(0, 1))
+    for heading in ("model", "decals", "index nodes", "build, s", "ms/frame", "memory"):
+        result.add_column(heading, justify="left" if heading == "model" else "right", no_wrap=True)
+    for row in rows:
+        own = f"{row.nodes:,}", f"{row.build:.3f}", f"{row.frame:.1f}", _bytes(row.memory)
+        paper = row.paper
+        if paper is not None:
+            theirs = f"{paper.voxels:,}", f"{paper.build:.2f}", str(paper.frame), _bytes(paper.memory)
+            own = tuple(f"{a} ({b})" for a, b in zip(own, theirs, strict=True))  # type: ignore[assignment]
+        result.add_row(row.model, f"{row.decals:,}", *own)
+    return result
+
+
+def parse_counts(text: str) -> list[int]:
+    """Read numbers of decals such as ``"100,1000"``."""
+    try:
+        counts = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise UsageError(f"--counts: expected whole numbers such as 100,1000, got {text!r}") from None
+    for count in counts:
+        check_count("--counts", count, 1, MAX_DECALS)
+    return counts
+
+
+def parse_models(text: str) -> list[str]:
+    """Read samples such as ``"dragon,knot"``."""
+    names = text.split(",")
+    for name in names:
+        if name not in SAMPLES:
+            raise UsageError(f"--models: expected samples ({', '.join(SAMPLES)}), got {name!r}")
+    return names
+
+
+def _bytes(count: int) -> str:
+    return f"{count / 1024:.0f} KB" if count < 1 << 20 else f"{count / (1 << 20):.2f} MB"
+
+
+def _median(measure_once: Callable[[], float]) -> float:
+    return statistics.median(measure_once() for _ in range(RUNS))
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin
