@@ -9,7 +9,7 @@ import warp as wp
 from decals.contact import field_complement
 from decals.lookup import cell_range
 from decals.radial import are_stacked, plane_distance, power
-from decals.records import RECORD, RIM_RADIUS, apart, complement_of, rank_of, visible_radius, xyz
+from decals.records import RECORD, RIM_RADIUS, apart, complement_of, faces, rank_of, visible_radius, xyz
 from decals.stack import end_of_lower
 
 wp.set_module_options({"enable_backward": False})
@@ -121,7 +121,8 @@ def radial_complement(
 ) -> wp.float32:
     """E = 1 − F of a contact decal at q, stretched along the ray so that its rim lies where its cell ends.
 
-    A convex cell is left before the rim exactly by the planes to those that hold the ray's point on the rim.
+    A convex cell is left before the rim only through planes to those that hold the ray's point on the rim,
+    and these are in the index's list there.
     """
     rank = rank_of(owner, decals)
     centre = xyz(decals[RECORD * owner])
@@ -137,7 +138,7 @@ def radial_complement(
         for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
             if rank_of(ids[j], decals) != rank:
                 break
-            if ids[j] != owner and complement_of(edge, n_q, ids[j], decals) < 0.5:
+            if ids[j] != owner and faces(n_q, ids[j], decals):
                 if not stacked(owner, ids[j], decals):
                     other = visible_radius(ids[j], decals)
                     end = wp.min(end, plane_distance(ray, apart(owner, ids[j], decals), radius, other))

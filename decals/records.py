@@ -49,6 +49,13 @@ def facing_limit(packed_rank: wp.float32) -> wp.float32:
 
 
 @wp.func
+def faces(n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Whether a decal colours surface with this normal."""
+    facing = decals[RECORD * decal + 1]
+    return wp.dot(xyz(facing), n_q) > facing_limit(facing[3])
+
+
+@wp.func
 def complement_of(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
     """Complement e of a decal's field at q; NOWHERE where it is out of reach or faces away."""
     ball = decals[RECORD * decal]
@@ -56,8 +63,7 @@ def complement_of(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, decals: wp.array(dt
     z = wp.dot(w, w) / (ball[3] * ball[3])
     if z >= REACH_SQUARED:
         return NOWHERE
-    facing = decals[RECORD * decal + 1]
-    if wp.dot(xyz(facing), n_q) <= facing_limit(facing[3]):
+    if not faces(n_q, decal, decals):
         return NOWHERE
     return field_complement(z)
 

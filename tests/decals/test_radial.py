@@ -1,0 +1,190 @@
+"""Radial contact: never folds, squeezes within limits, leaves no gap, and is what float64 says."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from decals.contact import Contact
+from decals.evaluate import evaluate
+from decals.index import DecalIndex
+from decals.model import Decals
+from tests.decals.radial_rays import rims_of_points, slopes_of_rays
+from tests.oracles.contact import RIM
+
+LEAST = 0.21
+ERROR_LIMIT = 2e-5
+"""Largest accepted error of r, in rim radii."""
+SETS = 2000
+MEMBERS = 9
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def clusters(rng, *, ratio=20.0, flat=False):
+    """SETS sets of a decal and 1 to 8 neighbours anywhere in its reach, sizes to 20:1; far from each other.
+
+    Places that a set leaves empty hold tiny decals far away.
+    """
+    radii = np.exp(rng.uniform(-0.5, 0.5, (SETS, MEMBERS)) * np.log(ratio))
+    distance = (radii + radii[:, :1]) * rng.uniform(0, 1, (SETS, MEMBERS))
+    positions = unit(rng.normal(size=(SETS, MEMBERS, 3)) * [1, 1, 0 if flat else 1]) * distance[..., None]
+    positions[:, 0] = 0
+    unused = np.arange(MEMBERS) > rng.integers(1, MEMBERS, (SETS, 1))
+    positions[unused] = [0, 0, 30]
+    radii[unused] = 0.01
+    place = np.stack(np.unravel_index(np.arange(SETS), (13, 13, 13)), -1) * 100.0
+    positions = (positions + place[:, None]).reshape(-1, 3)
+    count = len(positions)
+    frame = np.tile([[0, 0, 1.0]], (count, 1)), np.tile([[1.0, 0, 0]], (count, 1))
+    return Decals(positions, *frame, radii.reshape(-1))
+
+
+def launch(kernel, count, decals, before, after):
+    inputs = [
+        wp.array(decals.packed(), dtype=wp.vec4, device="cpu"),
+        *DecalIndex.of(decals).on("cpu").arguments(),
+    ]
+    wp.launch(kernel, count, [*before, *inputs], after, device="cpu")
+    return [array.numpy() for array in after]
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_nothing_folds_on_a_million_rays(flat):
+    """Half of them in space and half in a plane: from every decal's own centre, past all its neighbours."""
+    rng = np.random.default_rng(1 + flat)
+    decals, count = clusters(rng, flat=flat), 500_000
+    owners = rng.integers(0, len(decals), count)
+    owners = np.where(decals.radii[owners] > 0.05, owners, owners // MEMBERS * MEMBERS)
+    rays = unit(rng.normal(size=(count, 3)) * [1, 1, 0 if flat else 1])
+    before = [wp.array(owners, dtype=wp.int32, device="cpu"), wp.array(rays, dtype=wp.vec3, device="cpu")]
+    after = [wp.zeros(count, dtype=wp.float32, device="cpu") for _ in range(2)]
+    least, most = launch(slopes_of_rays, count, decals, before, after)
+    print(f"slopes from {least.min():.3f} to {most.max():.3f}; {(most > 1.001).mean():.0%} of rays pushed")
+    assert least.min() > 0.5
+    assert most.max() < 5
+    assert (most > 1.5).mean() > 0.05
+
+
+def rims_in_float64(decals, points):
+    """Owners, rims and doubts by brute force over each point's own set, from the same float32 numbers."""
+    p = decals.positions.astype(float).reshape(SETS, MEMBERS, 3)
+    rho = decals.radii.astype(float).reshape(SETS, MEMBERS)
+    d = np.linalg.norm(p[:, :, None] - p[:, None], axis=3)
+    with np.errstate(all="ignore"):
+        plane = (d**2 + rho[:, :, None] ** 2 - rho[:, None] ** 2) / (2 * d)
+    pushes = (plane > LEAST * rho[:, :, None]) & (plane.swapaxes(1, 2) > LEAST * rho[:, None])
+    own = np.repeat(np.arange(SETS), len(points) // SETS)
+    p, rho, d, plane, pushes = (array[own] for array in (p, rho, d, plane, pushes))
+    w = points[:, None] - p
+    power = (w * w).sum(axis=2) - rho**2
+    cut = pushes & (power[:, None] < power[:, :, None])
+    shows = (power <= 0) & ~cut.any(axis=2)
+    owner = np.where(shows, rho + 1e-9 * np.arange(MEMBERS), np.inf).argmin(axis=1)
+    rows = np.arange(len(points))
+    x = np.linalg.norm(w[rows, owner], axis=1)
+    ray = w[rows, owner] / np.maximum(x, 1e-300)[:, None]
+    along = ((p - p[rows, owner][:, None]) * ray[:, None]).sum(axis=2)
+    with np.errstate(all="ignore"):
+        end = plane[rows, owner] * d[rows, owner] / along
+    end = np.where(pushes[rows, owner] & (along > 0), end, np.inf).min(axis=1)
+    rim = np.minimum(x / np.minimum(end, rho[rows, owner]), 1)
+    ordered = np.sort(np.where(power < rho**2, power, 1e9 * np.arange(1, MEMBERS + 1)), axis=1)
+    gaps = np.diff(ordered).min(axis=1) / rho.max(axis=1) ** 2
+    doubt = np.minimum(np.abs(power / rho**2).min(axis=1), gaps)
+    return np.where(shows.any(axis=1), own * MEMBERS + owner, -1), rim, doubt
+
+
+def test_a_million_points_against_float64():
+    rng = np.random.default_rng(3)
+    decals, worst, owned, sure = clusters(rng), 0.0, 0, 0
+    for _ in range(10):
+        which = np.repeat(np.arange(SETS) * MEMBERS, 50) + rng.integers(0, MEMBERS, SETS * 50)
+        which = np.where(decals.radii[which] > 0.05, which, which // MEMBERS * MEMBERS)
+        count = len(which)
+        far = np.where(rng.random(count) < 0.2, 10.0 ** rng.uniform(-6, 0, count), rng.uniform(0, 1.1, count))
+        points = (
+            decals.positions[which] + unit(rng.normal(size=(count, 3))) * (far * decals.radii[which])[:, None]
+        )
+        points = points.astype(np.float32)
+        before = [wp.array(points, dtype=wp.vec3, device="cpu"), int(Contact.RADIAL)]
+        after = [
+            wp.zeros(count, dtype=wp.int32, device="cpu"),
+            wp.zeros(count, dtype=wp.float32, device="cpu"),
+        ]
+        owner, rim = launch(rims_of_points, count, decals, before, after)
+        want_owner, want_rim, doubt = rims_in_float64(decals, points.astype(float))
+        assert np.isfinite(rim).all()
+        clear = doubt > 1e-4
+        assert np.array_equal(owner[clear], want_owner[clear])
+        both = (owner == want_owner) & (owner >= 0)
+        worst = max(worst, np.abs(rim - want_rim)[both].max())
+        owned, sure = owned + both.sum(), sure + clear.sum()
+    print(f"{worst:.2e} rim radii over {owned:,} owned points, {sure:,} clear")
+    assert owned > 800_000
+    assert sure > 900_000
+    assert worst <= ERROR_LIMIT
+
+
+def pair(distance, radius, other):
+    return Decals([[0, 0, 0], [distance, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [radius, other])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_two_decals_meet_on_their_rims_and_keep_their_centres(seed):
+    rng = np.random.default_rng(seed)
+    radius = np.exp(rng.uniform(-2, 2))
+    kept, kept_by_other = rng.uniform(0.22, 0.97, 2)  # shares of the radii up to the plane
+    chord = radius * np.sqrt(1 - kept**2)
+    other = chord / np.sqrt(1 - kept_by_other**2)
+    plane, distance = kept * radius, kept * radius + kept_by_other * other
+    height = chord * np.linspace(-0.95, 0.95, 9)
+    for side in (-1e-6, 1e-6):
+        points = np.column_stack([np.full(9, plane + side * distance), height, np.zeros(9)])
+        samples = evaluate(
+            pair(distance, radius, other), points, np.tile([0, 0, 1.0], (9, 1)), contact=Contact.RADIAL
+        )
+        assert samples.owner.tolist() == [int(side > 0)] * 9
+        assert samples.field == pytest.approx(0.5, abs=1e-4)
+    centres = evaluate(
+        pair(distance, radius, other),
+        [[0, 0, 0], [distance, 0, 0]],
+        [[0, 0, 1]] * 2,
+        contact=Contact.RADIAL,
+    )
+    assert centres.owner.tolist() == [0, 1]
+    assert centres.field.tolist() == [1, 1]
+
+
+def test_a_small_decal_deep_in_a_large_one_lies_over_it_whole():
+    decals = pair(0.5, 1.0, 0.1)
+    up = [[0, 0, 1]] * 3
+    samples = evaluate(decals, [[0.5, 0.09, 0], [0.5, 0.11, 0], [0.7, 0, 0]], up, contact=Contact.RADIAL)
+    assert samples.owner.tolist() == [1, 0, 0]
+    d = np.array([0.9, np.hypot(0.5, 0.11), 0.7]) * RIM
+    assert samples.field == pytest.approx((1 - d**2) ** 3, abs=1e-6)
+
+
+def test_equal_decals_on_one_point_show_the_first():
+    samples = evaluate(pair(0.0, 1.0, 1.0), [[0.5, 0, 0]], [[0, 0, 1]], contact=Contact.RADIAL)
+    assert samples.owner.tolist() == [0]
+
+
+def test_the_image_changes_little_between_neighbouring_points():
+    """No jump anywhere inside a region of one owner: behind smaller neighbours above all."""
+    rng = np.random.default_rng(9)
+    decals = clusters(rng, flat=True)[: MEMBERS * 400]
+    which = np.arange(400) * MEMBERS
+    step = 1e-3
+    points = decals.positions[which].repeat(200, axis=0).astype(float)
+    radius = decals.radii[which].repeat(200)[:, None]
+    points += unit(rng.normal(size=points.shape) * [1, 1, 0]) * rng.uniform(0.3, 1, (len(points), 1)) * radius
+    moved = points + unit(rng.normal(size=points.shape) * [1, 1, 0]) * step * radius
+    up = np.tile([[0, 0, 1.0]], (len(points), 1))
+    one, other = (evaluate(decals, p, up, contact=Contact.RADIAL) for p in (points, moved))
+    same = (one.owner == other.owner) & (one.owner == which.repeat(200))
+    change = np.linalg.norm(one.uv - other.uv, axis=1)[same] / step
+    print(f"{same.sum():,} pairs, largest change {change.max():.1f}")
+    assert same.sum() > 10_000
+    assert change.max() < 30
