@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from decals.contact import Contact
 from decals.errors import InvalidImage, InvalidPoints
-from decals.index import DecalIndex
+from decals.index import DecalIndex, DeviceIndex
 from decals.mapping import Mapping
 from decals.model import PLAIN, Decals
 from decals.sampling import color_points, sample_points
@@ -80,8 +80,7 @@ def evaluate(
     places, directions = _rows("points", points), _rows("normals", normals)
     if len(places) != len(directions):
         raise InvalidPoints(f"normals: expected one for each of {len(places)} points, got {len(directions)}")
-    if index is None:
-        index = DecalIndex.of(decals)
+    placed = DeviceIndex.of(decals, device) if index is None else index.on(device)
     count = len(places)
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
@@ -93,7 +92,7 @@ def evaluate(
         int(contact),
         decals.layered,
         wp.array(decals.packed(), dtype=wp.vec4, device=device),
-        *index.on(device).arguments(),
+        *placed.arguments(),
     ]
     wp.launch(sample_points, count, inputs, [owner, uv, field], device=device)
     color = None if images is None else _colors(decals, images, [*inputs, owner], device)

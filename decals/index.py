@@ -20,23 +20,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from decals.contact import REACH
-from decals.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, count_candidates, list_candidates
+from decals.index_build import build_index
+from decals.lookup import count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, Decals
-
-SLACK = 1e-5
-"""Relative growth of each ball, above the rounding of a float32 distance."""
-
-FINEST = 22
-"""Cells are at least the largest coordinate / 2²²: about the spacing of float32 numbers there."""
-
-_EMPTY = -1
-_CHUNK = 1 << 16
-_NEIGHBOURHOOD = np.stack(np.meshgrid(*[np.arange(3)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 Ints = NDArray[np.int32]
 Wide = NDArray[np.int64]
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -53,6 +42,13 @@ class DeviceIndex:
         """Arguments of the look-up functions, after the point."""
         return [self.level_count, self.levels, self.table, self.mask, self.ids]
 
+    @classmethod
+    def of(cls, decals: Decals, device: Any = None) -> Self:
+        """Index decals on a device, without a copy elsewhere."""
+        placed = _device_arrays(decals.positions, decals.influence, decals.ranks, device)
+        levels, table, ids = build_index(*placed)
+        return cls(len(levels), levels, table, len(table) // 4 - 1, ids)
+
 
 @dataclass(frozen=True, eq=False)
 class DecalIndex:
@@ -65,22 +61,8 @@ class DecalIndex:
     @classmethod
     def build(cls, positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike = DEFAULT_RANK) -> Self:
         """Index decals by position (float32[n, 3]), radius of influence (float32[n]) and rank (int32[n])."""
-        centres = np.asarray(positions, np.float64).reshape(-1, 3)
-        reach = np.asarray(influence, np.float64).reshape(-1) * (REACH * (1.0 + SLACK))
-        exponents = _exponents(centres, reach)
-        used, level = np.unique(exponents, return_inverse=True)
-        keys, owners = _entries(centres, reach, np.exp2(exponents), level)
-        rank = np.broadcast_to(np.asarray(ranks, np.int64), len(centres))
-        order = np.lexsort((rank[owners], *keys.T))
-        keys, owners = keys[order], owners[order]
-        starts = np.flatnonzero((np.diff(keys, axis=0, prepend=_EMPTY) != 0).any(axis=1))
-        ids, heads = _lists(owners, starts)
-        levels = np.zeros((len(used), 4), np.float32)
-        levels[:, 0] = np.exp2(-used)
-        levels[:, 1] = np.exp2(used)
-        levels[:, 2] = [rank[level == number].min() for number in range(len(used))]
-        levels[:, 3] = [rank[level == number].max() for number in range(len(used))]
-        return cls(levels, _hash_table(keys[starts], heads), ids)
+        arrays = build_index(*_device_arrays(positions, influence, ranks, "cpu"))
+        return cls(arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy())
 
     @classmethod
     def of(cls, decals: Decals) -> Self:
@@ -133,64 +115,12 @@ class DecalIndex:
         return offsets, found.numpy()
 
 
-def _exponents(centres: Doubles, reach: Doubles) -> Wide:
-    """Each decal's e with cell size 2^e in (ρ, 2ρ], or larger where float32 positions are coarser."""
-    _, by_size = np.frexp(reach)
-    _, by_place = np.frexp(np.abs(centres).max(axis=1, initial=0.0) + reach)
-    exponents: Wide = np.maximum(by_size, by_place - FINEST).astype(np.int64)
-    return exponents
-
-
-def _entries(centres: Doubles, reach: Doubles, size: Doubles, level: Wide) -> tuple[Wide, Ints]:
-    """Keys int64[m, 3] of all cells that the balls touch, and whose ball it is; ascending decals."""
-    keys, owners = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int32)]
-    for begin in range(0, len(centres), _CHUNK):
-        part = slice(begin, begin + _CHUNK)
-        middle, radius, width = centres[part, None], reach[part, None, None], size[part, None, None]
-        lowest = np.floor((middle - radius) / width)
-        cells = lowest + _NEIGHBOURHOOD
-        nearest = np.clip(middle, cells * width, (cells + 1.0) * width)
-        touched = ((nearest - middle) ** 2).sum(axis=2) <= radius[..., 0] ** 2
-        row, _ = np.nonzero(touched)
-        key = cells[touched].astype(np.int64) + int(HALF_RANGE)
-        key[:, 0] += level[part][row] << 24
-        keys.append(key)
-        owners.append((row + begin).astype(np.int32))
-    return np.concatenate(keys), np.concatenate(owners)
-
-
-def _lists(owners: Ints, starts: Wide) -> tuple[Ints, Wide]:
-    """Put a count before every list; where each list begins (its head)."""
-    counts = np.diff(starts, append=len(owners))
-    heads = starts + np.arange(len(starts))
-    ids = np.empty(len(owners) + len(starts), np.int32)
-    ids[heads] = counts
-    ids[np.arange(len(owners)) + np.repeat(np.arange(len(starts)), counts) + 1] = owners
-    return ids, heads
-
-
-def _hash_table(cells: Wide, heads: Wide) -> Ints:
-    """Place all cells at once: each takes the first free slot from its own on, as linear probing finds it."""
-    slots = 1 << (2 * len(cells)).bit_length()
-    occupant = np.full(slots, _EMPTY, np.int64)
-    pending = np.arange(len(cells))
-    place = _hash(cells) & (slots - 1)
-    while len(pending):
-        free = pending[occupant[place[pending]] == _EMPTY]
-        occupant[place[free]] = free
-        pending = pending[occupant[place[pending]] != pending]
-        place[pending] = (place[pending] + 1) & (slots - 1)
-    table = np.full((slots, 4), _EMPTY, np.int32)
-    full = occupant != _EMPTY
-    table[full, :3] = cells[occupant[full]]
-    table[full, 3] = heads[occupant[full]]
-    return table.reshape(-1)
-
-
-def _hash(cells: Wide) -> Wide:
-    """`cell_hash` of the look-up, for many cells."""
-    x, y, z = cells.astype(np.uint32).T
-    h = (x * np.uint32(MIX_X)) ^ (y * np.uint32(MIX_Y)) ^ (z * np.uint32(MIX_Z))
-    h = (h ^ (h >> np.uint32(15))) * np.uint32(MIX_ALL)
-    mixed: Wide = (h ^ (h >> np.uint32(13))).astype(np.int64)
-    return mixed
+def _device_arrays(positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike, device: Any) -> list[Any]:
+    centres = np.asarray(positions, np.float32).reshape(-1, 3)
+    order = np.broadcast_to(np.asarray(ranks, np.int32), len(centres))
+    reach = np.asarray(influence, np.float32).reshape(-1)
+    return [
+        wp.array(centres, dtype=wp.vec3, device=device),
+        wp.array(reach, dtype=wp.float32, device=device),
+        wp.array(order, dtype=wp.int32, device=device),
+    ]

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decals.contact import REACH
-from decals.index import DecalIndex
+from decals.index import DecalIndex, DeviceIndex
+from decals.model import Decals
 
 
 def near(rng, positions, influence, count):
@@ -182,3 +183,37 @@ def test_the_layout_is_the_documented_one():
     (row,) = np.flatnonzero((slots[:, :3] == key).all(axis=1))
     head = slots[row, 3]
     assert index.ids[head : head + 2].tolist() == [1, 0]
+
+
+def test_lists_are_in_drawing_order():
+    """Ascending by rank, then by number, within each level; levels know their lowest and highest rank."""
+    rng = np.random.default_rng(5)
+    positions, influence = rng.random((3000, 3)), rng.choice([0.05, 0.3], 3000)
+    ranks = rng.integers(0, 5, 3000)
+    index = DecalIndex.build(positions, influence, ranks)
+    head, lists = 0, 0
+    while head < len(index.ids):
+        here = index.ids[head + 1 : head + 1 + index.ids[head]]
+        assert here.tolist() == sorted(here, key=lambda i: (ranks[i], i))
+        head, lists = head + 1 + len(here), lists + 1
+    assert lists == (index.table.reshape(-1, 4)[:, 0] >= 0).sum()
+    assert index.levels[:, 2:].tolist() == [[0, 4]] * 2
+
+
+def test_hundreds_of_thousands_in_one_point():
+    index = DecalIndex.build(np.zeros((200_000, 3)), np.full(200_000, 0.7))
+    ids = index.candidates([[0.1, 0.1, 0.1]])[1]
+    assert np.array_equal(ids, np.arange(200_000))
+
+
+@pytest.mark.gpu
+def test_the_same_on_a_cuda_device():
+    rng = np.random.default_rng(6)
+    positions, influence = np.float32(rng.random((5000, 3))), np.float32(10.0 ** rng.uniform(-3, -0.5, 5000))
+    decals = Decals(positions, positions + 1, rng.normal(size=(5000, 3)), influence * 0.45)
+    there = DeviceIndex.of(decals, "cuda:0")
+    fetched = DecalIndex(there.levels.numpy(), there.table.numpy(), there.ids.numpy())
+    here = DecalIndex.of(decals)
+    points = near(rng, positions, influence, 2000)
+    for one, other in zip(fetched.candidates(points), here.candidates(points), strict=True):
+        assert np.array_equal(one, other)
