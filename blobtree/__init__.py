@@ -21,14 +21,17 @@ from .polygonize import Mesh, polygonize  # noqa: E402
 from .progress import Progress  # noqa: E402
 from .tape import Tape  # noqa: E402
 from .tree import (  # noqa: E402
+    Cone,
     Difference,
     Intersection,
     Node,
+    Offset,
     Point,
     Ricci,
     Segment,
     Sum,
     Transform,
+    Twist,
     Union,
 )
 
@@ -36,6 +39,7 @@ __all__ = [
     "ISO",
     "RIM",
     "BlobTreeError",
+    "Cone",
     "Difference",
     "Intersection",
     "InvalidFile",
@@ -44,6 +48,7 @@ __all__ = [
     "InvalidResolution",
     "Mesh",
     "Node",
+    "Offset",
     "Point",
     "Progress",
     "Ricci",
@@ -51,6 +56,7 @@ __all__ = [
     "Sum",
     "Tape",
     "Transform",
+    "Twist",
     "Union",
     "UntranslatableFunction",
     "from_json",

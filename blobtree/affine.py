@@ -22,6 +22,11 @@ def apply(matrix: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[n
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def mean_scale(matrix: NDArray[np.float64]) -> float:
+    """The factor by which `matrix` scales lengths on average: the cube root of what it does to volumes."""
+    return float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
+
+
 def uniform_scale(matrix: NDArray[np.float64]) -> float | None:
     """The factor by which `matrix` scales every length, None where it stretches directions differently."""
     linear = matrix[:3, :3]

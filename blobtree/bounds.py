@@ -1,13 +1,15 @@
 """Boxes outside of which a tree's field is exactly 0."""
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import affine
+from .kernels import RIM
 from .operators import DIFFERENCE, INTERSECTION, Operator
-from .program import PlacedPrimitive, Pop, Push, compile_program
+from .program import EnterWarp, LeaveWarp, PlacedPrimitive, Pop, Push, Run, compile_program
 
 if TYPE_CHECKING:
     from .tree import Node
@@ -23,30 +25,57 @@ def influence_bounds(root: "Node") -> tuple[NDArray[np.float32], NDArray[np.floa
     The tree's program, run over boxes in place of numbers. A tree that is empty everywhere has the box of
     its first primitive, so that there is always a place to look at.
     """
-    program = compile_program(root)
     box = EMPTY
     registers: dict[int, Box] = {}
-    for step in program:
+    fallback: Box | None = None
+    for step in compile_program(root):
         match step:
             case Push(register):
                 registers[register], box = box, EMPTY
             case Pop(register, operator, _, swapped):
                 left, right = (box, registers[register]) if swapped else (registers[register], box)
                 box = _combine(operator, left, right)
-            case _:
-                for placed in step.primitives:
-                    box = _combine(step.operator, box, primitive_box(placed))
-    if np.any(box[0] > box[1]):
-        box = primitive_box(next(step.primitives[0] for step in program if not isinstance(step, Push | Pop)))
+            case Run(primitives=primitives, operator=operator):
+                boxes = primitive_boxes(primitives)
+                fallback = fallback or (boxes[0][0], boxes[1][0])
+                box = _combine_all(operator, box, boxes)
+            case LeaveWarp(entry):
+                box = _warped(box, entry)
+                fallback = fallback and _warped(fallback, entry)
+    if np.any(box[0] > box[1]) and fallback is not None:
+        box = fallback
     lower, upper = (corner.astype(np.float32) for corner in box)
     return np.nextafter(lower, np.float32(-np.inf)), np.nextafter(upper, np.float32(np.inf))
 
 
-def primitive_box(placed: PlacedPrimitive) -> Box:
-    """Box of a ball swept over the primitive's skeleton, under its map."""
-    points = affine.apply(placed.matrix, placed.primitive.control_points)
-    margin = placed.primitive.influence * np.linalg.norm(placed.matrix[:3, :3], axis=1)
-    return points.min(axis=0) - margin, points.max(axis=0) + margin
+def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
+    """Boxes (n, 3), (n, 3) of balls swept over the primitives' skeletons, under their maps."""
+    points = np.array([placed.primitive.control_points for placed in primitives])
+    matrices = np.array([placed.placement.matrix for placed in primitives])
+    growth = np.array([placed.placement.growth for placed in primitives]) / RIM
+    influences = np.array([max(placed.primitive.influences) for placed in primitives]) + growth
+    placed_points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
+    margins = influences[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)
+    return placed_points.min(axis=1) - margins, placed_points.max(axis=1) + margins
+
+
+def _combine_all(operator: Operator, box: Box, boxes: Box) -> Box:
+    """A box combined with many, one after the other."""
+    if operator is DIFFERENCE:
+        return box
+    if operator is INTERSECTION:
+        return _combine(operator, box, (boxes[0].max(axis=0), boxes[1].min(axis=0)))
+    return _combine(operator, box, (boxes[0].min(axis=0), boxes[1].max(axis=0)))
+
+
+def _warped(box: Box, entry: EnterWarp) -> Box:
+    """The world's box around what a warp shows of `box`; an empty box stays empty."""
+    if np.any(box[0] > box[1]):
+        return box
+    lower, upper = entry.warp.box(*box, entry.parameters)
+    corners = np.array(list(product(*zip(lower, upper, strict=True))))
+    placed = affine.apply(entry.placement.matrix, corners)
+    return placed.min(axis=0), placed.max(axis=0)
 
 
 def _combine(operator: Operator, left: Box, right: Box) -> Box:

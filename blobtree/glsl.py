@@ -8,7 +8,7 @@ Whatever lies outside is refused with file and line, never guessed.
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,6 +54,22 @@ def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ())
     for function in functions:
         _collect(function, translated, frozenset(declarations))
     return HELPERS + "\n".join([*declarations.values(), "", *translated.values()])
+
+
+def translate_choice(chooser: Any, choices: Mapping[int, Any]) -> str:
+    """GLSL of `chooser`, which calls the one of `choices` that its first argument names, with the others.
+
+    The last choice is not asked for: one that does not occur never does.
+    """
+    translator = _Translator(chooser)
+    signature = translator.signature()
+    selector, *arguments = (spell(name) for name in translator.types)
+    calls = {code: f"{choice.key}({', '.join(arguments)})" for code, choice in choices.items()}
+    last = list(calls)[-1]
+    tests = [
+        f"    if ({selector} == {code}) {{ return {call}; }}" for code, call in calls.items() if code != last
+    ]
+    return "\n".join([signature + " {", *tests, f"    return {calls[last]};", "}", ""])
 
 
 def _collect(function: wp.Function, translated: dict[str, str], provided: frozenset[str]) -> None:

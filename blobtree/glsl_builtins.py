@@ -39,8 +39,13 @@ RESERVED_WORDS = frozenset(
     mat3 mat4 mediump namespace noinline noise noperspective out output packed partition patch precision
     public resource row_major sample sampler2D shared short sizeof smooth static struct subroutine superp
     switch template texture this true typedef uniform union unsigned using varying void volatile
+    abs acos all any asin atan ceil clamp cos cross degrees distance dot exp floor fract inverse length log
+    matrixCompMult max min mix mod normalize not pow radians reflect refract round sign sin smoothstep sqrt
+    step tan transpose trunc
     """.split()  # noqa: SIM905  (a list of words reads best as words)
 )
+
+"""What a variable may not be called: words of the language, and functions that it would hide."""
 
 HELPERS = """\
 vec2 wp_normalize(vec2 v) { float l = length(v); return l > 0.0 ? v / l : vec2(0.0); }

@@ -12,7 +12,18 @@ from .kernel_options import KERNEL_OPTIONS
 from .kernels import falloff, falloff_derivative, falloff_slope_bound
 from .operators import OPERATORS
 from .skeletons import SKELETONS
-from .tape import POP, POP_SWAPPED, PREFIX, PUSH, REGISTERS, STRETCHED
+from .tape import (
+    POP,
+    POP_SWAPPED,
+    PREFIX,
+    PUSH,
+    REGISTERS,
+    STRETCHED,
+    UNWARP,
+    WARP,
+    WARP_REGISTERS,
+)
+from .warps import WARPS
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -24,6 +35,16 @@ def closest(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
     for code in range(wp.static(len(SKELETONS))):
         if kind == code:
             result = wp.static(SKELETONS[code].closest)(q, tape, at)
+    return result
+
+
+@wp.func
+def slimmest(kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Smallest influence on a skeleton of any kind."""
+    result = float(0.0)
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            result = wp.static(SKELETONS[code].slimmest)(tape, at)
     return result
 
 
@@ -65,6 +86,36 @@ def slope(
 
 
 @wp.func
+def warp_forward(kind: wp.int32, q: wp.vec3, p: wp.vec4) -> wp.vec3:
+    """T(q) of any warp."""
+    result = wp.vec3()
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].forward)(q, p)
+    return result
+
+
+@wp.func
+def warp_pullback(kind: wp.int32, q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
+    """Jᵀ g of any warp."""
+    result = wp.vec3()
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].pullback)(q, g, p)
+    return result
+
+
+@wp.func
+def warp_stretch(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
+    """Bound on ‖J‖ of any warp over a ball."""
+    result = float(1.0)
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].stretch)(q, reach, p)
+    return result
+
+
+@wp.func
 def to_local(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """`q` in the space of the stretched primitive whose map starts at `at`."""
     x = wp.vec4(q[0], q[1], q[2], 1.0)
@@ -79,8 +130,9 @@ def squared_distance(q: wp.vec3, c: wp.vec4) -> wp.float32:
 
 
 # -- readings -----------------------------------------------------------------------------------------
-# leaf(q, c, reach, color): what a primitive with closest point c contributes at q
-# unstretch(f, tape, at):   that contribution, computed in the primitive's own space, in the world's
+# leaf(q, c, slim, reach, color)       what a primitive contributes: closest point c, influences from slim on
+# unstretch(f, tape, at)               that, computed behind the map at tape[at], as seen in front of it
+# unwarp(kind, f, q, reach, tape, at)  the same for a subtree behind a warp and the map at tape[at]
 # combine(operator, a, b, reach, parameter)
 
 
@@ -91,13 +143,21 @@ def value_empty() -> wp.float32:
 
 
 @wp.func
-def value_leaf(q: wp.vec3, c: wp.vec4, reach: wp.float32, color: wp.vec4) -> wp.float32:
+def value_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.float32:
     """Field of one primitive."""
     return falloff(squared_distance(q, c))
 
 
 @wp.func
 def value_unstretch(f: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """A value is the same in every space."""
+    return f
+
+
+@wp.func
+def value_unwarp(
+    kind: wp.int32, f: wp.float32, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.float32:
     """A value is the same in every space."""
     return f
 
@@ -117,16 +177,26 @@ def bound_empty() -> wp.vec2:
 
 
 @wp.func
-def bound_leaf(q: wp.vec3, c: wp.vec4, reach: wp.float32, color: wp.vec4) -> wp.vec2:
+def bound_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.vec2:
     """(value at q, bound on |∇f| over the ball of radius `reach` about q)."""
     z = squared_distance(q, c)
-    return wp.vec2(falloff(z), falloff_slope_bound(wp.sqrt(z), reach / c[3]) / c[3])
+    return wp.vec2(falloff(z), falloff_slope_bound(wp.sqrt(z), reach / slim) / slim)
 
 
 @wp.func
 def bound_unstretch(f: wp.vec2, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
     """Slopes grow by the largest stretch of the map."""
     return wp.vec2(f[0], f[1] * tape[at + 3][0])
+
+
+@wp.func
+def bound_unwarp(
+    kind: wp.int32, f: wp.vec2, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Slopes grow by the largest stretch of the warp behind the map."""
+    p = tape[at + 3]
+    stretch = warp_stretch(kind, to_local(q, tape, at), reach * p[0], p)
+    return wp.vec2(f[0], f[1] * p[0] * stretch)
 
 
 @wp.func
@@ -145,7 +215,7 @@ def vector_empty() -> wp.vec4:
 
 
 @wp.func
-def gradient_leaf(q: wp.vec3, c: wp.vec4, reach: wp.float32, color: wp.vec4) -> wp.vec4:
+def gradient_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.vec4:
     """(value, ∇f) of one primitive."""
     z = squared_distance(q, c)
     g = (q - wp.vec3(c[0], c[1], c[2])) * (2.0 * falloff_derivative(z) / (c[3] * c[3]))
@@ -160,6 +230,16 @@ def gradient_unstretch(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
 
 
 @wp.func
+def gradient_unwarp(
+    kind: wp.int32, f: wp.vec4, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec4:
+    """Gradients pull back by the warp's transposed Jacobian, then by the transposed map."""
+    p = tape[at + 3]
+    g = warp_pullback(kind, to_local(q, tape, at), wp.vec3(f[1], f[2], f[3]), p)
+    return gradient_unstretch(wp.vec4(f[0], g[0], g[1], g[2]), tape, at)
+
+
+@wp.func
 def gradient_combine(
     operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32
 ) -> wp.vec4:
@@ -170,13 +250,21 @@ def gradient_combine(
 
 
 @wp.func
-def color_leaf(q: wp.vec3, c: wp.vec4, reach: wp.float32, color: wp.vec4) -> wp.vec4:
+def color_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.vec4:
     """(value, red, green, blue) of one primitive."""
     return wp.vec4(falloff(squared_distance(q, c)), color[0], color[1], color[2])
 
 
 @wp.func
 def color_unstretch(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Colours are the same in every space."""
+    return f
+
+
+@wp.func
+def color_unwarp(
+    kind: wp.int32, f: wp.vec4, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec4:
     """Colours are the same in every space."""
     return f
 
@@ -207,20 +295,28 @@ class Reading:
 
     leaf: wp.Function
     unstretch: wp.Function
+    unwarp: wp.Function
     combine: wp.Function
     empty: wp.Function
     type: Any
 
 
-VALUE = Reading(value_leaf, value_unstretch, value_combine, value_empty, wp.float32)
-BOUND = Reading(bound_leaf, bound_unstretch, bound_combine, bound_empty, wp.vec2)
-GRADIENT = Reading(gradient_leaf, gradient_unstretch, gradient_combine, vector_empty, wp.vec4)
-COLOR = Reading(color_leaf, color_unstretch, color_combine, vector_empty, wp.vec4)
+VALUE = Reading(value_leaf, value_unstretch, value_unwarp, value_combine, value_empty, wp.float32)
+BOUND = Reading(bound_leaf, bound_unstretch, bound_unwarp, bound_combine, bound_empty, wp.vec2)
+GRADIENT = Reading(
+    gradient_leaf, gradient_unstretch, gradient_unwarp, gradient_combine, vector_empty, wp.vec4
+)
+COLOR = Reading(color_leaf, color_unstretch, color_unwarp, color_combine, vector_empty, wp.vec4)
+
+
+_Places = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
+_Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
 
 
 def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
     """The interpreter of one reading: (q, reach, tape, span), span being (first texel, one past the last)."""
-    leaf, unstretch, combine, empty = reading.leaf, reading.unstretch, reading.combine, reading.empty
+    leaf, combine, empty = reading.leaf, reading.combine, reading.empty
+    unstretch, unwarp = reading.unstretch, reading.unwarp
     contribution = reading.type
 
     @wp.func
@@ -229,6 +325,10 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
     ) -> contribution:
         accumulator = empty()
         registers = registers_type()
+        place = q
+        ball = reach
+        places = _Places()
+        balls = _Balls()
         at = span[0]
         while at < span[1]:
             header = tape[at]
@@ -240,26 +340,40 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
             if code >= STRETCHED:
                 kind = code - STRETCHED
                 for _i in range(count):
-                    local = to_local(q, tape, at)
+                    local = to_local(place, tape, at)
                     c = closest(kind, local, tape, at + PREFIX)
-                    next_at = at + PREFIX + stride(kind)
-                    f = unstretch(leaf(local, c, reach * tape[at + 3][0], tape[next_at - 1]), tape, at)
-                    accumulator = combine(operator, accumulator, f, reach, parameter)
-                    at = next_at
+                    slim = slimmest(kind, tape, at + PREFIX)
+                    end = at + PREFIX + stride(kind)
+                    f = unstretch(leaf(local, c, slim, ball * tape[at + 3][0], tape[end - 1]), tape, at)
+                    accumulator = combine(operator, accumulator, f, ball, parameter)
+                    at = end
             elif code >= 0:
                 for _i in range(count):
-                    c = closest(code, q, tape, at)
+                    c = closest(code, place, tape, at)
+                    slim = slimmest(code, tape, at)
                     at += stride(code)
-                    accumulator = combine(
-                        operator, accumulator, leaf(q, c, reach, tape[at - 1]), reach, parameter
-                    )
+                    f = leaf(place, c, slim, ball, tape[at - 1])
+                    accumulator = combine(operator, accumulator, f, ball, parameter)
             elif code == PUSH:
                 registers[count] = accumulator
                 accumulator = empty()
             elif code == POP:
-                accumulator = combine(operator, registers[count], accumulator, reach, parameter)
+                accumulator = combine(operator, registers[count], accumulator, ball, parameter)
             elif code == POP_SWAPPED:
-                accumulator = combine(operator, accumulator, registers[count], reach, parameter)
+                accumulator = combine(operator, accumulator, registers[count], ball, parameter)
+            elif code == WARP:
+                places[count] = place
+                balls[count] = ball
+                p = tape[at + 3]
+                local = to_local(place, tape, at)
+                ball = ball * p[0] * warp_stretch(operator, local, ball * p[0], p)
+                place = warp_forward(operator, local, p)
+                at += PREFIX
+            elif code == UNWARP:
+                place = places[count]
+                ball = balls[count]
+                accumulator = unwarp(operator, accumulator, place, ball, tape, at)
+                at += PREFIX
         return accumulator
 
     return interpret

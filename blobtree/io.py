@@ -19,7 +19,20 @@ import msgspec
 
 from .errors import BlobTreeError, InvalidFile
 from .traversal import postorder
-from .tree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Transform, Union
+from .tree import (
+    Cone,
+    Difference,
+    Intersection,
+    Node,
+    Offset,
+    Point,
+    Ricci,
+    Segment,
+    Sum,
+    Transform,
+    Twist,
+    Union,
+)
 from .validation import Matrix, Vector
 
 VERSION: Literal[1] = 1
@@ -48,6 +61,17 @@ class SegmentRecord(Record, frozen=True, tag="segment"):
     start: Vector
     end: Vector
     radius: float
+    color: Vector
+
+
+class ConeRecord(Record, frozen=True, tag="cone"):
+    """A round cone."""
+
+    node_type = Cone
+    start: Vector
+    end: Vector
+    radius: float
+    end_radius: float
     color: Vector
 
 
@@ -102,15 +126,36 @@ class TransformRecord(Record, frozen=True, tag="transform"):
     matrix: Matrix
 
 
+class OffsetRecord(Record, frozen=True, tag="offset"):
+    """A node with larger radii."""
+
+    node_type = Offset
+    references = ("child",)
+    child: int
+    distance: float
+
+
+class TwistRecord(Record, frozen=True, tag="twist"):
+    """A node turned about its z axis."""
+
+    node_type = Twist
+    references = ("child",)
+    child: int
+    degrees: float
+
+
 _AnyRecord = (
     PointRecord
     | SegmentRecord
+    | ConeRecord
     | SumRecord
     | RicciRecord
     | UnionRecord
     | IntersectionRecord
     | DifferenceRecord
     | TransformRecord
+    | OffsetRecord
+    | TwistRecord
 )
 _RECORD_OF: dict[type[Node], type[_AnyRecord]] = {record.node_type: record for record in _AnyRecord.__args__}
 

@@ -4,7 +4,7 @@ import hashlib
 import inspect
 from typing import Any
 
-from . import kernels, operators, skeletons
+from . import kernels, operators, skeletons, warps
 
 
 def _fingerprint() -> str:
@@ -14,7 +14,7 @@ def _fingerprint() -> str:
     does not see the functions that a kernel picks out of a table while it is compiled.
     """
     digest = hashlib.sha256()
-    for table in (kernels, operators, skeletons):
+    for table in (kernels, operators, skeletons, warps):
         digest.update(inspect.getsource(table).encode())
     return digest.hexdigest()
 

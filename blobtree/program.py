@@ -3,11 +3,12 @@
 A run folds primitives of one kind into the accumulator; a subtree that cannot be folded in directly gets an
 accumulator of its own (push) and is combined afterwards (pop). The subtree that needs most registers goes
 first, so a tree of n leaves needs at most log₂ n registers and a spine of any length needs none
-(Sethi & Ullman 1970).
+(Sethi & Ullman 1970). Affine maps and offsets fold into the primitives below them.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 
 from . import affine
 from .errors import InvalidNode
-from .operators import RICCI, SUM, Operator
+from .operators import DIFFERENCE, RICCI, SUM, Operator
 from .skeletons import Skeleton
 from .traversal import fold
+from .warps import SpaceWarp
 
 if TYPE_CHECKING:
-    from .tree import Combination, Node, Primitive
+    from .tree import Combination, Node, Primitive, Twist
 
 MOST_PRIMITIVES = 1 << 24
 """Beyond it a float32 cannot count the primitives of a run."""
@@ -29,12 +31,35 @@ SIMPLE = -1
 """Weight of a node that folds into the accumulator without one of its own."""
 
 
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a node stands: what the nodes above it do to it."""
+
+    matrix: NDArray[np.float64]
+    """From the node's space to the world's, or to that of the warp around it."""
+    growth: float = 0.0
+    """What offsets add to its radii, in its own units."""
+
+    @cached_property
+    def uniform_scale(self) -> float | None:
+        """The factor by which all lengths are scaled, None where directions differ."""
+        return affine.uniform_scale(self.matrix)
+
+    @property
+    def stretched(self) -> bool:
+        """Directions are scaled differently."""
+        return self.uniform_scale is None
+
+
+WORLD = Placement(np.eye(4))
+
+
 @dataclass(frozen=True)
 class PlacedPrimitive:
-    """A leaf under the product of the transforms above it."""
+    """A leaf and where it stands."""
 
     primitive: "Primitive"
-    matrix: NDArray[np.float64]
+    placement: Placement
 
 
 @dataclass(frozen=True)
@@ -71,7 +96,24 @@ class Pop:
     swapped: bool = False
 
 
-Instruction = Run | Push | Pop
+@dataclass(frozen=True)
+class EnterWarp:
+    """Look at what follows, up to LeaveWarp, through a map and a warp; the place is kept in `register`."""
+
+    warp: SpaceWarp
+    parameters: tuple[float, ...]
+    placement: Placement
+    register: int
+
+
+@dataclass(frozen=True)
+class LeaveWarp:
+    """Go back to the place that `entry` kept, and take the accumulator along."""
+
+    entry: EnterWarp
+
+
+Instruction = Run | Push | Pop | EnterWarp | LeaveWarp
 
 
 @dataclass(frozen=True)
@@ -79,10 +121,13 @@ class _Emit:
     """Still to do: fold `node` into the accumulator, registers from `register` on being free."""
 
     node: "Node"
-    matrix: NDArray[np.float64]
-    operator: Operator
-    parameter: float
-    register: int
+    placement: Placement
+    register: int = 0
+    warp_register: int = 0
+
+    def into(self, node: "Node", placement: Placement, *, deeper: int = 0) -> "_Emit":
+        """The same for a node below, `deeper` more registers being in use."""
+        return replace(self, node=node, placement=placement, register=self.register + deeper)
 
 
 def compile_program(root: "Node") -> list[Instruction]:
@@ -99,7 +144,7 @@ def compile_program(root: "Node") -> list[Instruction]:
 
     fold(root, weigh)
     program: list[Instruction] = []
-    pending: list[_Emit | Instruction] = [_Emit(root, np.eye(4), SUM, 0.0, register=0)]
+    pending: list[_Emit | Instruction] = [_Emit(root, WORLD)]
     while pending:
         step = pending.pop()
         if isinstance(step, _Emit):
@@ -111,20 +156,29 @@ def compile_program(root: "Node") -> list[Instruction]:
     return program
 
 
-def _count_primitives(_node: "Node", child_counts: list[int]) -> int:
-    """Leaves below a node, those of shared subtrees as often as they are used."""
-    return sum(child_counts) if child_counts else 1
-
-
 def registers_needed(program: list[Instruction]) -> int:
     """How many registers `program` uses."""
     return max((step.register + 1 for step in program if isinstance(step, Push)), default=0)
 
 
+def warp_registers_needed(program: list[Instruction]) -> int:
+    """How deep warps nest in `program`."""
+    return max((step.register + 1 for step in program if isinstance(step, EnterWarp)), default=0)
+
+
+def _count_primitives(_node: "Node", child_counts: list[int]) -> int:
+    """Leaves below a node, those of shared subtrees as often as they are used."""
+    return sum(child_counts) if child_counts else 1
+
+
 def _weight(node: "Node", child_weights: list[int]) -> int:
     """Registers that `node` needs, SIMPLE where it needs no accumulator of its own."""
+    from .tree import Twist
+
     if not child_weights:
         return SIMPLE
+    if isinstance(node, Twist):
+        return max(0, child_weights[0])
     if len(child_weights) == 1:
         return child_weights[0]
     heaviest, *others = sorted(child_weights, reverse=True)
@@ -132,55 +186,92 @@ def _weight(node: "Node", child_weights: list[int]) -> int:
 
 
 def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
-    """`step` in smaller steps."""
-    from .tree import Combination, Primitive
+    """`step`, whose node finds an empty accumulator, in smaller steps."""
+    from .tree import Combination, Primitive, Twist
 
-    node, matrix = _strip(step.node, step.matrix)
+    node, placement = _strip(step.node, step.placement)
     if isinstance(node, Primitive):
-        stretched = affine.uniform_scale(matrix) is None
-        placed = PlacedPrimitive(node, matrix)
-        yield Run(node.skeleton, stretched, step.operator, step.parameter, [placed])
+        yield from _runs([PlacedPrimitive(node, placement)], SUM, 0.0)
+    elif isinstance(node, Twist):
+        yield from _expand_warp(replace(step, node=node, placement=placement), node)
     elif isinstance(node, Combination):
         expand = _expand_commutative if node.operator.commutes else _expand_ordered
-        yield from expand(node, matrix, step.register, weights)
+        yield from expand(replace(step, node=node, placement=placement), node, weights)
+
+
+def _expand_warp(step: _Emit, node: "Twist") -> Iterator[_Emit | Instruction]:
+    """The child in a space of its own."""
+    outer = Placement(step.placement.matrix)
+    entry = EnterWarp(node.warp, node.parameters, outer, step.warp_register)
+    inner = _Emit(
+        node.child, Placement(np.eye(4), step.placement.growth), step.register, step.warp_register + 1
+    )
+    yield from (entry, inner, LeaveWarp(entry))
 
 
 def _expand_commutative(
-    node: "Combination", matrix: NDArray[np.float64], register: int, weights: dict[int, int]
+    step: _Emit, node: "Combination", weights: dict[int, int]
 ) -> Iterator[_Emit | Instruction]:
-    """Heaviest operand first; the others follow it into the accumulator."""
+    """Heaviest operand first; the primitives fold in at the end, kind by kind."""
+    from .tree import Primitive
+
     operator, parameter = _operation(node)
-    operands = sorted(_flatten(node, matrix), key=lambda operand: -weights[id(operand[0])])
-    (first, first_matrix), *others = operands
-    first_operator = operator if operator.starts_from_zero else SUM
-    yield _Emit(
-        first, first_matrix, first_operator, parameter if operator.starts_from_zero else 0.0, register
-    )
-    for operand, operand_matrix in others:
-        if weights[id(operand)] == SIMPLE:
-            yield _Emit(operand, operand_matrix, operator, parameter, register)
+    subtrees: list[tuple[Node, Placement]] = []
+    primitives: list[PlacedPrimitive] = []
+    for operand, placement in _flatten(node, step.placement):
+        if isinstance(operand, Primitive):
+            primitives.append(PlacedPrimitive(operand, placement))
         else:
-            yield Push(register)
-            yield _Emit(operand, operand_matrix, SUM, 0.0, register + 1)
-            yield Pop(register, operator, parameter)
+            subtrees.append((operand, placement))
+    subtrees.sort(key=lambda subtree: -weights[id(subtree[0])])
+    for number, (operand, placement) in enumerate(subtrees):
+        if number == 0:
+            yield step.into(operand, placement)
+        else:
+            yield Push(step.register)
+            yield step.into(operand, placement, deeper=1)
+            yield Pop(step.register, operator, parameter)
+    if not subtrees and not operator.starts_from_zero:
+        first, *primitives = primitives
+        yield from _runs([first], SUM, 0.0)
+    yield from _runs(primitives, operator, parameter)
 
 
 def _expand_ordered(
-    node: "Combination", matrix: NDArray[np.float64], register: int, weights: dict[int, int]
+    step: _Emit, node: "Combination", weights: dict[int, int]
 ) -> Iterator[_Emit | Instruction]:
     """Left operand first, unless the right one needs more registers."""
+    from .tree import Primitive
+
     operator, parameter = _operation(node)
     left, right = node.children
+    left_place = step.placement
+    right_place = replace(left_place, growth=-left_place.growth) if operator is DIFFERENCE else left_place
     if weights[id(right)] == SIMPLE:
-        yield _Emit(left, matrix, SUM, 0.0, register)
-        yield _Emit(right, matrix, operator, parameter, register)
+        leaf, placement = _strip(right, right_place)
+        assert isinstance(leaf, Primitive)
+        yield step.into(left, left_place)
+        yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameter)
         return
     swapped = weights[id(right)] > weights[id(left)]
-    first, second = (right, left) if swapped else (left, right)
-    yield _Emit(first, matrix, SUM, 0.0, register)
-    yield Push(register)
-    yield _Emit(second, matrix, SUM, 0.0, register + 1)
-    yield Pop(register, operator, parameter, swapped)
+    operands = [(left, left_place), (right, right_place)]
+    first, second = reversed(operands) if swapped else operands
+    yield step.into(*first)
+    yield Push(step.register)
+    yield step.into(*second, deeper=1)
+    yield Pop(step.register, operator, parameter, swapped)
+
+
+def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
+    """One run per kind of primitive, in the order in which the kinds first occur."""
+    runs: dict[tuple[str, bool], Run] = {}
+    for placed in primitives:
+        skeleton, stretched = placed.primitive.skeleton, placed.placement.stretched
+        key = skeleton.name, stretched
+        if key not in runs:
+            runs[key] = Run(skeleton, stretched, operator, parameter)
+        runs[key].primitives.append(placed)
+    yield from runs.values()
 
 
 def _operation(node: "Combination") -> tuple[Operator, float]:
@@ -190,30 +281,30 @@ def _operation(node: "Combination") -> tuple[Operator, float]:
     return node.operator, node.parameter
 
 
-def _strip(node: "Node", matrix: NDArray[np.float64]) -> tuple["Node", NDArray[np.float64]]:
-    """`node` without the transforms and one-operand combinations on top of it, and the map they leave."""
-    from .tree import Transform
+def _strip(node: "Node", placement: Placement) -> tuple["Node", Placement]:
+    """`node` without the maps, offsets and one-operand combinations above it, and where it stands."""
+    from .tree import Offset, Transform, Twist
 
-    while len(node.children) == 1:
+    while len(node.children) == 1 and not isinstance(node, Twist):
         if isinstance(node, Transform):
-            matrix = matrix @ affine.square(node.matrix)
+            matrix = affine.square(node.matrix)
+            growth = placement.growth / affine.mean_scale(matrix) if placement.growth else 0.0
+            placement = Placement(placement.matrix @ matrix, growth)
+        elif isinstance(node, Offset):
+            placement = replace(placement, growth=placement.growth + node.distance)
         (node,) = node.children
-    return node, matrix
+    return node, placement
 
 
-def _flatten(
-    root: "Combination", root_matrix: NDArray[np.float64]
-) -> Iterator[tuple["Node", NDArray[np.float64]]]:
+def _flatten(root: "Combination", place: Placement) -> Iterator[tuple["Node", Placement]]:
     """Operands of `root`, those of nested combinations by the same associative operator among them."""
     from .tree import Combination
 
     operation = _operation(root)
-    pending: list[tuple[Node, NDArray[np.float64]]] = [
-        (child, root_matrix) for child in reversed(root.children)
-    ]
+    pending: list[tuple[Node, Placement]] = [(child, place) for child in reversed(root.children)]
     while pending:
-        node, matrix = _strip(*pending.pop())
+        node, placement = _strip(*pending.pop())
         if isinstance(node, Combination) and _operation(node) == operation:
-            pending.extend((child, matrix) for child in reversed(node.children))
+            pending.extend((child, placement) for child in reversed(node.children))
         else:
-            yield node, matrix
+            yield node, placement

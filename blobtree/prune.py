@@ -8,12 +8,12 @@ value, gradient and colour as the whole one at every point of the cube.
 
 import warp as wp
 
-from .interpreter import closest, stride, to_local
+from .interpreter import closest, slimmest, stride, to_local, warp_forward, warp_stretch
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import falloff_range
 from .operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
 from .skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
-from .tape import POP, PREFIX, PUSH, REGISTERS, STRETCHED
+from .tape import POP, PREFIX, PUSH, REGISTERS, STRETCHED, UNWARP, WARP, WARP_REGISTERS
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -24,6 +24,9 @@ ROUNDING = wp.constant(2e-6)
 
 _Ranges = wp.types.matrix(shape=(REGISTERS, 2), dtype=wp.float32)
 _Starts = wp.types.vector(length=REGISTERS, dtype=wp.int32)
+_Places = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
+_Sides = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
+_OuterStarts = wp.types.vector(length=WARP_REGISTERS, dtype=wp.int32)
 
 
 @wp.func
@@ -45,7 +48,8 @@ def stretched_range(
     """The same for a primitive behind a map: the ball around the cube becomes a ball around its image."""
     local = to_local(center, tape, at)
     radius = half * HALF_DIAGONAL * tape[at + 3][0]
-    distances = squared_distances_to_ball(local, radius, closest(kind, local, tape, at + PREFIX))
+    c = closest(kind, local, tape, at + PREFIX)
+    distances = squared_distances_to_ball(local, radius, c, slimmest(kind, tape, at + PREFIX))
     return widened(falloff_range(distances[0], distances[1]))
 
 
@@ -110,6 +114,11 @@ def prune(
     peak = int(0)
     run_at = int(-1)
     run = wp.vec4()
+    place = center
+    side = half
+    places = _Places()
+    sides = _Sides()
+    outer_starts = _OuterStarts()
     at = span[0]
     while at < span[1]:
         header = tape[at]
@@ -128,9 +137,9 @@ def prune(
             for _i in range(count):
                 r = wp.vec2()
                 if stretched:
-                    r = stretched_range(kind, center, half, tape, at)
+                    r = stretched_range(kind, place, side, tape, at)
                 else:
-                    r = primitive_range(kind, center, half, tape, at)
+                    r = primitive_range(kind, place, side, tape, at)
                 choice = operator_choice(operator, accumulator, r)
                 if choice == KEEP_NONE:
                     end = accumulator_start
@@ -170,6 +179,37 @@ def prune(
             accumulator = wp.vec2(0.0, 0.0)
             accumulator_start = end
             run_at = -1
+        elif code == WARP:
+            p = tape[at + 3]
+            local = to_local(place, tape, at)
+            reach = side * HALF_DIAGONAL * p[0]
+            places[count] = place
+            sides[count] = side
+            outer_starts[count] = accumulator_start
+            place = warp_forward(operator, local, p)
+            side = reach * warp_stretch(operator, local, reach, p)
+            if write:
+                for k in range(PREFIX + 1):
+                    out[start + end + k] = tape[at - 1 + k]
+            end += PREFIX + 1
+            peak = wp.max(peak, end)
+            accumulator_start = end
+            run_at = -1
+            at += PREFIX
+        elif code == UNWARP:
+            place = places[count]
+            side = sides[count]
+            accumulator_start = outer_starts[count]
+            if accumulator[1] <= 0.0:
+                end = accumulator_start
+            else:
+                if write:
+                    for k in range(PREFIX + 1):
+                        out[start + end + k] = tape[at - 1 + k]
+                end += PREFIX + 1
+                peak = wp.max(peak, end)
+            run_at = -1
+            at += PREFIX
         else:
             kept = ranges[count]
             kept_start = starts[count]

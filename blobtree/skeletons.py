@@ -3,7 +3,8 @@
 A skeleton is one typed function `(q, tape, at) -> vec4(closest point, radius of influence there)` that reads
 its parameters from `tape[at:]`; polygonizer, tracer, particles and shaders all have it from this one table.
 The field of a primitive is g(|q − closest| / influence). Because the closest point minimises that ratio, its
-own motion does not enter the gradient (envelope theorem), so gradients are exact.
+own motion does not enter the gradient (envelope theorem), so gradients are exact; and the ratio changes by at
+most 1 / slimmest per unit, `slimmest(tape, at)` being the smallest influence anywhere on the skeleton.
 """
 
 import math
@@ -36,11 +37,57 @@ def closest_on_segment(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
 
 
 @wp.func
-def squared_distances_to_ball(center: wp.vec3, radius: wp.float32, c: wp.vec4) -> wp.vec2:
+def closest_on_cone(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (start, influence there); tape[at + 1] = (end − start, influence at the end).
+
+    With x along the axis and y beside it, (y² + (x − τ)²) / (s₀ + kτ)² is least at τ = x + k y² / (s₀ + k x);
+    behind the apex, where s₀ + k x ≤ 0, at the thicker end.
+    """
+    start = tape[at]
+    end = tape[at + 1]
+    ab = wp.vec3(end[0], end[1], end[2])
+    length = wp.length(ab)
+    t = float(0.0)
+    if length > 0.0:
+        axis = wp.normalize(ab)
+        w = q - wp.vec3(start[0], start[1], start[2])
+        x = wp.dot(axis, w)
+        k = (end[3] - start[3]) / length
+        s = start[3] + k * x
+        if s > 0.0:
+            t = wp.clamp((x + k * wp.max(wp.dot(w, w) - x * x, 0.0) / s) / length, 0.0, 1.0)
+        elif k > 0.0:
+            t = 1.0
+    elif end[3] > start[3]:
+        t = 1.0
+    return wp.vec4(
+        start[0] + t * end[0],
+        start[1] + t * end[1],
+        start[2] + t * end[2],
+        start[3] + t * (end[3] - start[3]),
+    )
+
+
+@wp.func
+def slimmest_of_one(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """The influence of a skeleton that has one."""
+    return tape[at][3]
+
+
+@wp.func
+def slimmest_of_cone(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """The influence at the thinner end."""
+    return wp.min(tape[at][3], tape[at + 1][3])
+
+
+@wp.func
+def squared_distances_to_ball(
+    center: wp.vec3, radius: wp.float32, c: wp.vec4, slimmest: wp.float32
+) -> wp.vec2:
     """Bounds on (|x − skeleton| / influence)² over a ball, c being the skeleton's answer at its center."""
-    distance = wp.length(center - wp.vec3(c[0], c[1], c[2]))
-    nearest = wp.max(distance - radius, 0.0) / c[3]
-    farthest = (distance + radius) / c[3]
+    distance = wp.length(center - wp.vec3(c[0], c[1], c[2])) / c[3]
+    nearest = wp.max(distance - radius / slimmest, 0.0)
+    farthest = distance + radius / slimmest
     return wp.vec2(nearest * nearest, farthest * farthest)
 
 
@@ -61,7 +108,15 @@ def box_to_point(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4
 @wp.func
 def box_to_segment(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
     """Bounds on (|x − segment| / influence)² over the ball around the cube center ± half."""
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, closest_on_segment(center, tape, at))
+    c = closest_on_segment(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, slimmest_of_one(tape, at))
+
+
+@wp.func
+def box_to_cone(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − axis| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_cone(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, slimmest_of_cone(tape, at))
 
 
 @dataclass(frozen=True)
@@ -70,13 +125,15 @@ class Skeleton:
 
     name: str
     closest: wp.Function
+    slimmest: wp.Function
     box_distances: wp.Function
     parameters: int
     """Texels (vec4) that the parameters take on the tape."""
 
 
-POINT = Skeleton("point", closest_on_point, box_to_point, parameters=1)
-SEGMENT = Skeleton("segment", closest_on_segment, box_to_segment, parameters=2)
+POINT = Skeleton("point", closest_on_point, slimmest_of_one, box_to_point, parameters=1)
+SEGMENT = Skeleton("segment", closest_on_segment, slimmest_of_one, box_to_segment, parameters=2)
+CONE = Skeleton("cone", closest_on_cone, slimmest_of_cone, box_to_cone, parameters=2)
 
-SKELETONS = (POINT, SEGMENT)
+SKELETONS = (POINT, SEGMENT, CONE)
 """Every kind; its place here is its code on the tape."""

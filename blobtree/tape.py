@@ -10,6 +10,9 @@ Layout, in texels (vec4 of float32):
       PUSH         register[count] = accumulator; accumulator = 0
       POP          accumulator = operator(register[count], accumulator)
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
+      WARP         before PREFIX texels: the rows of a world → local map, then (its largest stretch, and the
+                   warp's parameters); `operator` is the warp's code, `count` the register for the place
+      UNWARP       the same; ends what WARP began
 
 Everything of a primitive lies in one place, so a part of a tape is a tape.
 """
@@ -23,11 +26,23 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from . import affine
 from .errors import InvalidNode
+from .kernels import RIM
 from .operators import OPERATORS
-from .program import Instruction, PlacedPrimitive, Pop, Push, Run, compile_program, registers_needed
+from .program import (
+    EnterWarp,
+    Instruction,
+    LeaveWarp,
+    PlacedPrimitive,
+    Pop,
+    Push,
+    Run,
+    compile_program,
+    registers_needed,
+    warp_registers_needed,
+)
 from .skeletons import SKELETONS
+from .warps import WARPS
 
 if TYPE_CHECKING:
     from .tree import Node
@@ -35,10 +50,15 @@ if TYPE_CHECKING:
 PUSH = -1
 POP = -2
 POP_SWAPPED = -3
+WARP = -4
+UNWARP = -5
 STRETCHED = 1024
 PREFIX = 4
 REGISTERS = 24
 """Registers that the interpreters hold: enough for any tree of 2²⁴ leaves."""
+
+WARP_REGISTERS = 8
+"""How deep warps may nest."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +81,9 @@ class Tape:
     """Codes of the operators in use."""
     stretched: bool
     """Some primitive carries its own map."""
+    warps: tuple[int, ...] = ()
+    """Codes of the warps in use."""
+    warp_registers: int = 0
 
     def on(self, device: str | None = None) -> DeviceTape:
         """This tape on a Warp device, by default the current one."""
@@ -75,19 +98,23 @@ def _upload(tape: Tape, device: str) -> DeviceTape:
 def compile_tape(root: "Node") -> Tape:
     """The tape of the tree below `root`."""
     program = compile_program(root)
-    registers = registers_needed(program)
+    registers, warp_registers = registers_needed(program), warp_registers_needed(program)
     if registers > REGISTERS:
         raise InvalidNode(
             f"tree: needs {registers} registers, at most {REGISTERS} exist; group its operands otherwise"
         )
+    if warp_registers > WARP_REGISTERS:
+        raise InvalidNode(f"tree: warps nest {warp_registers} deep, at most {WARP_REGISTERS} may")
     runs = [step for step in program if isinstance(step, Run)]
-    operators = {OPERATORS.index(step.operator) for step in program if not isinstance(step, Push)}
+    operators = {OPERATORS.index(step.operator) for step in program if isinstance(step, Run | Pop)}
     return Tape(
         data=np.concatenate([texels for step in program for texels in _texels(step)]).astype(np.float32),
         registers=registers,
         skeletons=tuple(sorted({SKELETONS.index(run.skeleton) for run in runs})),
         operators=tuple(sorted(operators)),
         stretched=any(run.stretched for run in runs),
+        warps=tuple(sorted({WARPS.index(step.warp) for step in program if isinstance(step, EnterWarp)})),
+        warp_registers=warp_registers,
     )
 
 
@@ -100,27 +127,60 @@ def _texels(step: Instruction) -> Iterator[NDArray[np.float64]]:
             yield np.array(
                 [[POP_SWAPPED if swapped else POP, OPERATORS.index(operator), register, parameter]]
             )
+        case EnterWarp():
+            yield _warp_texels(WARP, step)
+        case LeaveWarp(entry):
+            yield _warp_texels(UNWARP, entry)
         case Run(skeleton, stretched, operator, parameter, primitives):
             code = SKELETONS.index(skeleton) + (STRETCHED if stretched else 0)
             yield np.array([[code, OPERATORS.index(operator), len(primitives), parameter]])
-            pack = _pack_stretched if stretched else _pack_similar
-            for placed in primitives:
-                yield from pack(placed)
-                yield np.array([[*placed.primitive.color, 1.0]])
+            yield _primitive_texels(primitives, stretched=stretched)
 
 
-def _pack_similar(placed: PlacedPrimitive) -> Iterator[NDArray[np.float64]]:
-    """A primitive whose map keeps shapes: the map folds into its parameters."""
-    primitive, matrix = placed.primitive, placed.matrix
-    scale = affine.uniform_scale(matrix)
-    assert scale is not None
-    yield primitive.texels(affine.apply(matrix, primitive.control_points), primitive.influence * scale)
+def _warp_texels(code: int, entry: EnterWarp) -> NDArray[np.float64]:
+    """Header, map and parameters of a warp."""
+    parameters = (*entry.parameters, 0.0, 0.0, 0.0)[:3]
+    header = [code, WARPS.index(entry.warp), entry.register, 0.0]
+    prefix = _map_texels(entry.placement.matrix)
+    prefix[-1, 1:] = parameters
+    return np.vstack([header, prefix])
 
 
-def _pack_stretched(placed: PlacedPrimitive) -> Iterator[NDArray[np.float64]]:
-    """A primitive whose map stretches it: points are taken to its own space instead."""
-    inverse = np.linalg.inv(placed.matrix)
+def _map_texels(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """PREFIX texels: the rows of the inverse of `matrix`, then (its largest stretch, 0, 0, 0)."""
+    inverse = np.linalg.inv(matrix)
     stretch = np.linalg.svd(inverse[:3, :3], compute_uv=False)[0]
-    yield inverse[:3].astype(np.float64)
-    yield np.array([[stretch, 0.0, 0.0, 0.0]])
-    yield placed.primitive.texels(placed.primitive.control_points, placed.primitive.influence)
+    return np.vstack([inverse[:3], [stretch, 0.0, 0.0, 0.0]])
+
+
+def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> NDArray[np.float64]:
+    """Parameters and colours of a run's primitives: all of them at once, for there may be a million.
+
+    Where the maps keep shapes they fold into the parameters; where they stretch them, each primitive carries
+    its map and points are taken to its own space instead.
+    """
+    first = primitives[0].primitive
+    grown = _grown_influences(primitives)
+    points = np.array([placed.primitive.control_points for placed in primitives])
+    if not stretched:
+        matrices = np.array([placed.placement.matrix for placed in primitives])
+        scales = np.array([placed.placement.uniform_scale for placed in primitives])
+        points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
+        grown = grown * scales[:, None]
+    parameters = first.texels(points, grown)
+    colors = np.array([[*placed.primitive.color, 1.0] for placed in primitives])[:, None]
+    parts = [parameters, colors]
+    if stretched:
+        parts.insert(0, np.array([_map_texels(placed.placement.matrix) for placed in primitives]))
+    return np.concatenate(parts, axis=1).reshape(-1, 4)
+
+
+def _grown_influences(primitives: list[PlacedPrimitive]) -> NDArray[np.float64]:
+    """Influences (n, k) of primitives under the offsets above them."""
+    influences = np.array([placed.primitive.influences for placed in primitives])
+    growth = np.array([placed.placement.growth for placed in primitives]) / RIM
+    grown: NDArray[np.float64] = influences + growth[:, None]
+    if (grown <= 0.0).any():
+        worst = primitives[int(np.argmin(grown.min(axis=1)))]
+        raise InvalidNode(f"offset: {worst.placement.growth:g} leaves nothing of {worst.primitive!r}")
+    return grown

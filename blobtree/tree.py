@@ -20,7 +20,7 @@ from .errors import InvalidNode
 from .evaluate import colors_at, gradients_at, values_at
 from .kernels import RIM
 from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
-from .skeletons import POINT, SEGMENT, Skeleton
+from .skeletons import CONE, POINT, SEGMENT, Skeleton
 from .tape import Tape, compile_tape
 from .validation import (
     Matrix,
@@ -31,8 +31,14 @@ from .validation import (
     finite_vector,
     positive_number,
 )
+from .warps import TWIST, SpaceWarp
+
+Floats = NDArray[np.float64]
 
 DEFAULT_COLOR: Vector = (0.8, 0.8, 0.8)
+
+SHORTEST_AXIS = 1e-12
+"""Squared length of an axis, over squared influence, below which a segment is a point."""
 
 LARGEST_EXPONENT = 100.0
 """Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
@@ -102,6 +108,14 @@ class Node:
             raise InvalidNode(f"factor: expected a scale other than 0, got {factor!r}")
         return self.transform(np.column_stack([np.diag(factors), np.zeros(3)]))
 
+    def twist(self, degrees: float) -> "Twist":
+        """This node turned about the z axis by `degrees` per unit of height."""
+        return Twist(self, degrees)
+
+    def offset(self, distance: float) -> "Offset":
+        """This node with every radius larger by `distance`."""
+        return Offset(self, distance)
+
     # -- asking -------------------------------------------------------------------------------------
 
     @cached_property
@@ -135,17 +149,21 @@ class Primitive(Node):
     color: Vector
 
     @property
-    def influence(self) -> float:
-        """Distance from the skeleton at which the field fades to 0."""
-        return self.radius / RIM
+    def influences(self) -> tuple[float, ...]:
+        """Distances from the skeleton at which the field fades to 0, one per radius of the primitive."""
+        return (self.radius / RIM,)
 
     @property
-    def control_points(self) -> NDArray[np.float64]:
-        """Points (k, 3) whose convex hull holds the skeleton."""
+    def control_points(self) -> tuple[Vector, ...]:
+        """Points whose convex hull holds the skeleton."""
         raise NotImplementedError
 
-    def texels(self, control_points: NDArray[np.float64], influence: float) -> NDArray[np.float64]:
-        """The skeleton's parameters (stride, 4) on the tape, its control points and influence being these."""
+    @staticmethod
+    def texels(points: Floats, influences: Floats) -> Floats:
+        """Parameters (n, ·, 4) on the tape, as `skeletons` describes them.
+
+        For n primitives with control points (n, k, 3) and influences (n, ·).
+        """
         raise NotImplementedError
 
 
@@ -169,13 +187,14 @@ class Point(Primitive):
         )
 
     @property
-    def control_points(self) -> NDArray[np.float64]:
-        """Points (k, 3) whose convex hull is the skeleton."""
-        return np.array([self.center])
+    def control_points(self) -> tuple[Vector, ...]:
+        """The centre."""
+        return (self.center,)
 
-    def texels(self, control_points: NDArray[np.float64], influence: float) -> NDArray[np.float64]:
-        """Parameters (stride, 4) as `skeletons` describes them."""
-        return np.array([[*control_points[0], influence]])
+    @staticmethod
+    def texels(points: Floats, influences: Floats) -> Floats:
+        """Centre and influence."""
+        return np.concatenate([points, influences[:, :, None]], axis=2)
 
 
 @dataclass(frozen=True)
@@ -200,19 +219,61 @@ class Segment(Primitive):
         )
 
     @property
-    def control_points(self) -> NDArray[np.float64]:
-        """Points (k, 3) whose convex hull is the skeleton."""
-        return np.array([self.start, self.end])
+    def control_points(self) -> tuple[Vector, ...]:
+        """Start and end."""
+        return (self.start, self.end)
 
-    def texels(self, control_points: NDArray[np.float64], influence: float) -> NDArray[np.float64]:
-        """Parameters (stride, 4) as `skeletons` describes them."""
-        start, end = control_points
-        axis = end - start
-        length_squared = float(axis @ axis)
-        shortest = 1e-12 * influence**2
-        return np.array(
-            [[*start, influence], [*axis, 1.0 / length_squared if length_squared > shortest else 0.0]]
+    @staticmethod
+    def texels(points: Floats, influences: Floats) -> Floats:
+        """Start and influence; axis and 1 / length²."""
+        axes = points[:, 1] - points[:, 0]
+        squares = (axes**2).sum(axis=1)
+        short = squares <= SHORTEST_AXIS * influences[:, 0] ** 2
+        inverses = np.where(short, 0.0, 1.0 / np.where(short, 1.0, squares))
+        return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, inverses)], axis=1)
+
+
+@dataclass(frozen=True)
+class Cone(Primitive):
+    """A round cone: the hull of a ball of `radius` at `start` and one of `end_radius` at `end`.
+
+    Where one ball holds the other, the larger ball alone.
+    """
+
+    skeleton = CONE
+
+    start: Vector
+    end: Vector
+    _: KW_ONLY
+    radius: float
+    end_radius: float
+    color: Vector = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        _settle(
+            self,
+            start=finite_vector("start", self.start),
+            end=finite_vector("end", self.end),
+            radius=positive_number("radius", self.radius),
+            end_radius=positive_number("end_radius", self.end_radius),
+            color=color_triple(self.color),
         )
+
+    @property
+    def influences(self) -> tuple[float, ...]:
+        """At the start and at the end."""
+        return (self.radius / RIM, self.end_radius / RIM)
+
+    @property
+    def control_points(self) -> tuple[Vector, ...]:
+        """Start and end."""
+        return (self.start, self.end)
+
+    @staticmethod
+    def texels(points: Floats, influences: Floats) -> Floats:
+        """Start and influence there; axis and influence at the end."""
+        axes = points[:, 1] - points[:, 0]
+        return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, influences[:, 1])], axis=1)
 
 
 class Combination(Node):
@@ -321,6 +382,56 @@ class Transform(Node):
     def children(self) -> tuple[Node, ...]:
         """What this node combines."""
         return (self.child,)
+
+
+@dataclass(frozen=True)
+class Offset(Node):
+    """`child` with every radius below it larger by `distance`, or smaller where that is negative.
+
+    For primitives, unions and intersections of them this is the surface at that distance; where fields blend
+    it is what the blend makes of the larger primitives. Tools of differences change the other way.
+    """
+
+    child: Node
+    distance: float
+
+    def __post_init__(self) -> None:
+        _nodes((self.child,))
+        _settle(self, distance=finite_number("distance", self.distance))
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """What this node combines."""
+        return (self.child,)
+
+
+@dataclass(frozen=True)
+class Twist(Node):
+    """`child` turned about the z axis, by `degrees` per unit of height, counter-clockwise seen from above."""
+
+    warp: ClassVar[SpaceWarp] = TWIST
+
+    child: Node
+    degrees: float
+
+    def __post_init__(self) -> None:
+        _nodes((self.child,))
+        _settle(self, degrees=finite_number("degrees", self.degrees))
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """What this node combines."""
+        return (self.child,)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """The turn per unit in radians."""
+        return (math.radians(self.degrees),)
+
+
+def _beside(vectors: Floats, numbers: Floats) -> Floats:
+    """`vectors` (n, 3) and `numbers` (n,) as texels (n, 4)."""
+    return np.column_stack([vectors, numbers])
 
 
 def _settle(node: Node, **fields: object) -> None:

@@ -1,9 +1,11 @@
 // The tape's interpreter, blobtree/interpreter.py in GLSL: one composition per reading. Defines:
-// INTERPRET, FIELD (its type), LEAF, UNSTRETCH, COMBINE, PRIMITIVE_COLOR (what LEAF gets for it).
+// INTERPRET, FIELD (its type), LEAF, UNSTRETCH, UNWARP, COMBINE, PRIMITIVE_COLOR (what LEAF gets for it).
 // Slots: the registers, and a case per instruction that occurs (decals/render/tape_shader.py).
 FIELD INTERPRET(vec3 q, float reach, sampler2D tape, ivec2 span) {
     FIELD accumulator = FIELD(0.0);
     //@ slot registers optional
+    vec3 place = q;
+    float ball = reach;
     int at = span.x;
     while (at < span.y) {
         vec4 header = tape_texel(tape, at);
@@ -13,6 +15,7 @@ FIELD INTERPRET(vec3 q, float reach, sampler2D tape, ivec2 span) {
         switch (int(header.x)) {
         //@ slot runs
         //@ slot stack optional
+        //@ slot warps optional
         }
     }
     return accumulator;
@@ -21,5 +24,6 @@ FIELD INTERPRET(vec3 q, float reach, sampler2D tape, ivec2 span) {
 #undef FIELD
 #undef LEAF
 #undef UNSTRETCH
+#undef UNWARP
 #undef COMBINE
 #undef PRIMITIVE_COLOR

@@ -4,12 +4,13 @@ An unused case costs as much as a used one on some drivers, and a compile takes 
 program per set of kinds, none per tree.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from blobtree.evaluate import field_bound, field_gradient
-from blobtree.glsl import translate_library
+from blobtree.glsl import translate_choice, translate_library
 from blobtree.interpreter import (
     BOUND,
     COLOR,
@@ -18,11 +19,15 @@ from blobtree.interpreter import (
     partials,
     slope,
     to_local,
+    warp_forward,
+    warp_pullback,
+    warp_stretch,
 )
 from blobtree.operators import OPERATORS
 from blobtree.skeletons import SKELETONS
-from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, Tape
+from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.trace import trace_ray
+from blobtree.warps import WARPS
 from implicit_decals.shaders import Source, compose
 
 _READINGS: dict[str, tuple[Reading, str]] = {
@@ -41,11 +46,20 @@ class Kinds:
     operators: tuple[int, ...]
     registers: int
     stretched: bool
+    warps: tuple[int, ...]
+    warp_registers: int
 
     @classmethod
     def of(cls, tape: Tape) -> "Kinds":
         """The kinds that `tape` uses."""
-        return cls(tape.skeletons, tape.operators, tape.registers, tape.stretched)
+        return cls(
+            tape.skeletons,
+            tape.operators,
+            tape.registers,
+            tape.stretched,
+            tape.warps,
+            tape.warp_registers,
+        )
 
 
 @lru_cache(maxsize=256)
@@ -64,42 +78,31 @@ def _library(kinds: Kinds) -> str:
     """Every typed function that the shader calls, from the sources that Warp runs."""
     readings = [reading for reading, _ in _READINGS.values()]
     functions = [
-        *(SKELETONS[code].closest for code in kinds.skeletons),
-        *(
-            function
-            for code in kinds.operators
-            for function in (OPERATORS[code].partials, OPERATORS[code].slope)
-        ),
-        *(
-            function
-            for reading in readings
-            for function in (reading.leaf, reading.unstretch, reading.combine)
-        ),
+        *(f for code in kinds.skeletons for f in (SKELETONS[code].closest, SKELETONS[code].slimmest)),
+        *(f for choices in _choices(kinds).values() for f in choices.values()),
+        *(f for reading in readings for f in (reading.leaf, reading.unstretch, reading.combine)),
+        *(reading.unwarp for reading in readings if kinds.warps),
         to_local,
         trace_ray,
     ]
-    return translate_library(functions, provided=[partials, slope, field_bound, field_gradient])
+    return translate_library(functions, provided=[*_choices(kinds), field_bound, field_gradient])
+
+
+def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
+    """The functions that choose by a code on the tape, and what each chooses among."""
+    choices: dict[Any, dict[int, Any]] = {
+        partials: {code: OPERATORS[code].partials for code in kinds.operators},
+        slope: {code: OPERATORS[code].slope for code in kinds.operators},
+        warp_forward: {code: WARPS[code].forward for code in kinds.warps},
+        warp_pullback: {code: WARPS[code].pullback for code in kinds.warps},
+        warp_stretch: {code: WARPS[code].stretch for code in kinds.warps},
+    }
+    return {chooser: among for chooser, among in choices.items() if among}
 
 
 def _dispatch(kinds: Kinds) -> str:
-    """`partials` and `slope` of any operator in use."""
-    partials_cases = _cases(kinds.operators, [OPERATORS[code].partials.key for code in kinds.operators])
-    slope_cases = _cases(kinds.operators, [OPERATORS[code].slope.key for code in kinds.operators])
-    return f"""\
-vec3 partials(int operator_, float a, float b, float parameter) {{
-    {partials_cases.format(arguments="a, b, parameter")}
-}}
-float slope(int operator_, float slope_a, float slope_b, float max_a, float max_b, float parameter) {{
-    {slope_cases.format(arguments="slope_a, slope_b, max_a, max_b, parameter")}
-}}
-"""
-
-
-def _cases(codes: Sequence[int], functions: Sequence[str]) -> str:
-    """A choice among `functions` by operator; the last needs no test."""
-    *tested, last = zip(codes, functions, strict=True)
-    choices = [f"if (operator_ == {code}) return {function}({{arguments}});" for code, function in tested]
-    return "\n    ".join([*choices, f"return {last[1]}({{arguments}});"])
+    """Those functions, each knowing the kinds in use alone."""
+    return "\n".join(translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
 
 
 def _interpreter(name: str, reading: Reading, glsl_type: str, kinds: Kinds) -> Source:
@@ -112,13 +115,20 @@ def _interpreter(name: str, reading: Reading, glsl_type: str, kinds: Kinds) -> S
             "FIELD": glsl_type,
             "LEAF": reading.leaf.key,
             "UNSTRETCH": reading.unstretch.key,
+            "UNWARP": reading.unwarp.key,
             "COMBINE": reading.combine.key,
             "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)" if reading is COLOR else "vec4(0.0)",
         },
         slots={
-            "registers": "".join(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
+            "registers": "".join(
+                [
+                    *(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
+                    *(f"vec4 w{i} = vec4(0.0);\n" for i in range(kinds.warp_registers)),
+                ]
+            ),
             "runs": "".join(_run_cases(kinds)),
             "stack": _stack_cases(kinds.registers) if kinds.registers else "",
+            "warps": _warp_cases(kinds.warp_registers) if kinds.warps else "",
         },
     )
 
@@ -127,11 +137,12 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
     """A loop per kind of skeleton, so that the kind is not asked for inside it."""
     for code in kinds.skeletons:
         skeleton = SKELETONS[code]
-        yield _RUN.format(code=code, closest=skeleton.closest.key, stride=skeleton.parameters + 1)
+        names = {"closest": skeleton.closest.key, "slimmest": skeleton.slimmest.key}
+        yield _RUN.format(code=code, stride=skeleton.parameters + 1, **names)
         if kinds.stretched:
             yield _STRETCHED_RUN.format(
                 code=code + STRETCHED,
-                closest=skeleton.closest.key,
+                **names,
                 stride=skeleton.parameters + PREFIX + 1,
                 prefix=PREFIX,
             )
@@ -140,9 +151,11 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
 _RUN = """\
 case {code}:
     for (int i = 0; i < count; i++) {{
-        vec4 c = {closest}(q, tape, at);
+        vec4 c = {closest}(place, tape, at);
+        float slim = {slimmest}(tape, at);
         at += {stride};
-        accumulator = COMBINE(operator_, accumulator, LEAF(q, c, reach, PRIMITIVE_COLOR), reach, header.w);
+        FIELD field = LEAF(place, c, slim, ball, PRIMITIVE_COLOR);
+        accumulator = COMBINE(operator_, accumulator, field, ball, header.w);
     }}
     break;
 """
@@ -151,11 +164,12 @@ _STRETCHED_RUN = """\
 case {code}:
     for (int i = 0; i < count; i++) {{
         int map = at;
-        vec3 local = to_local(q, tape, map);
+        vec3 local = to_local(place, tape, map);
         vec4 c = {closest}(local, tape, map + {prefix});
+        float slim = {slimmest}(tape, map + {prefix});
         at += {stride};
-        FIELD field = LEAF(local, c, reach * tape_texel(tape, map + {prefix} - 1).x, PRIMITIVE_COLOR);
-        accumulator = COMBINE(operator_, accumulator, UNSTRETCH(field, tape, map), reach, header.w);
+        FIELD field = LEAF(local, c, slim, ball * tape_texel(tape, map + {prefix} - 1).x, PRIMITIVE_COLOR);
+        accumulator = COMBINE(operator_, accumulator, UNSTRETCH(field, tape, map), ball, header.w);
     }}
     break;
 """
@@ -175,8 +189,34 @@ case {POP_SWAPPED}: {{
     FIELD kept = r0;
     switch (count) {{ {load} }}
     accumulator = int(header.x) == {POP}
-        ? COMBINE(operator_, kept, accumulator, reach, header.w)
-        : COMBINE(operator_, accumulator, kept, reach, header.w);
+        ? COMBINE(operator_, kept, accumulator, ball, header.w)
+        : COMBINE(operator_, accumulator, kept, ball, header.w);
+    break;
+}}
+"""
+
+
+def _warp_cases(registers: int) -> str:
+    """Entering keeps the place and the ball's radius; leaving returns to them and takes the field along."""
+    store = " ".join(f"case {i}: w{i} = vec4(place, ball); break;" for i in range(registers))
+    load = " ".join(f"case {i}: kept = w{i}; break;" for i in range(registers))
+    return f"""\
+case {WARP}: {{
+    switch (count) {{ {store} }}
+    vec4 p = tape_texel(tape, at + {PREFIX} - 1);
+    vec3 local = to_local(place, tape, at);
+    ball *= p.x * warp_stretch(operator_, local, ball * p.x, p);
+    place = warp_forward(operator_, local, p);
+    at += {PREFIX};
+    break;
+}}
+case {UNWARP}: {{
+    vec4 kept = w0;
+    switch (count) {{ {load} }}
+    place = kept.xyz;
+    ball = kept.w;
+    accumulator = UNWARP(operator_, accumulator, place, ball, tape, at);
+    at += {PREFIX};
     break;
 }}
 """

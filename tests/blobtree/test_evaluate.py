@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blobtree import InvalidPoints, Node, Point, Segment
+from blobtree import InvalidPoints, Node, Point, Segment, Transform
 from blobtree.evaluate import bounds_at, colors_at, gradients_at, values_at
 from blobtree.traversal import postorder
 from tests.blobtree.trees import KINDS, points_around, random_trees
@@ -33,7 +33,7 @@ def test_the_random_trees_hold_every_kind_of_node_and_stretches_among_them() -> 
     assert sum(tree.tape.stretched for tree in TREES) > 50
     assert max(tree.tape.registers for tree in TREES) >= 3
     determinants = [np.linalg.det(np.array(node.matrix)[:, :3]) for tree in TREES
-                    for node in postorder(tree) if isinstance(node, KINDS[-1])]  # fmt: skip
+                    for node in postorder(tree) if isinstance(node, Transform)]  # fmt: skip
     assert min(determinants) < 0.0 < max(determinants)
 
 
@@ -68,7 +68,7 @@ def test_colours_follow_the_field(start: int) -> None:
         sure = (field.margin > AWAY) & (field.value > 0.01)
         np.testing.assert_allclose(tree.colors(points)[sure], field.color[sure], atol=2e-4)
         compared += int(sure.sum())
-    assert compared > 0.4 * 40 * POINTS
+    assert compared > 0.3 * 40 * POINTS
 
 
 def test_colours_of_plain_blends() -> None:

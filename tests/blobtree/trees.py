@@ -7,10 +7,23 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from blobtree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Transform, Union
+from blobtree import (
+    Cone,
+    Difference,
+    Intersection,
+    Node,
+    Offset,
+    Point,
+    Ricci,
+    Segment,
+    Sum,
+    Transform,
+    Twist,
+    Union,
+)
 from blobtree.validation import Vector
 
-KINDS = (Point, Segment, Sum, Ricci, Union, Intersection, Difference, Transform)
+KINDS = (Point, Segment, Cone, Sum, Ricci, Union, Intersection, Difference, Transform, Offset, Twist)
 
 
 def triple(array: NDArray[np.floating]) -> Vector:
@@ -25,7 +38,10 @@ def random_leaf(rng: np.random.Generator) -> Node:
     if rng.random() < 0.5:
         return Point(triple(start), radius=radius, color=color)
     end = start + rng.uniform(-0.8, 0.8, 3) * (rng.random() < 0.95)  # now and then of no length
-    return Segment(triple(start), triple(end), radius=radius, color=color)
+    if rng.random() < 0.5:
+        return Segment(triple(start), triple(end), radius=radius, color=color)
+    end_radius = float(rng.uniform(0.2, 0.7))  # now and then one end holds the other
+    return Cone(triple(start), triple(end), radius=radius, end_radius=end_radius, color=color)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:
@@ -34,7 +50,10 @@ def random_transform(rng: np.random.Generator, node: Node) -> Node:
     factors = rng.uniform(0.7, 1.4, 3) * rng.choice([-1.0, 1.0], 3)
     if rng.random() < 0.4:
         factors = np.full(3, factors[0])
-    return turned.scale(factors).translate(rng.uniform(-0.3, 0.3, 3))
+    placed = turned.scale(factors).translate(rng.uniform(-0.3, 0.3, 3))
+    if rng.random() < 0.3:
+        return placed.twist(float(rng.uniform(-60.0, 60.0)))
+    return placed.offset(float(rng.uniform(-0.03, 0.05))) if rng.random() < 0.3 else placed
 
 
 def random_tree(rng: np.random.Generator, depth: int = 4) -> Node:

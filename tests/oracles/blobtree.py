@@ -5,14 +5,27 @@ these are aⁿ and bⁿ over a common divisor, and union and intersection choose
 fold does not matter, save on exact ties of a union or an intersection. A difference has an order of its own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Transform, Union
+from blobtree import (
+    Cone,
+    Difference,
+    Intersection,
+    Node,
+    Offset,
+    Point,
+    Ricci,
+    Segment,
+    Sum,
+    Transform,
+    Twist,
+    Union,
+)
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +49,12 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return _leaf(q - np.array(center), radius, color)
         case Segment(start=start, end=end, radius=radius, color=color):
             return _leaf(q - _closest_on_segment(q, np.array(start), np.array(end)), radius, color)
+        case Cone(color=color):
+            return _leaf_at(_least_ratio(q, node), color)
+        case Twist(child=child, degrees=degrees):
+            return evaluate(child, _turned(q, -np.radians(degrees) * q[:, 2]))
+        case Offset(child=child, distance=distance):
+            return evaluate(grown(child, distance), q)
         case Transform(child=child, matrix=matrix):
             linear, offset = np.array(matrix)[:, :3], np.array(matrix)[:, 3]
             return evaluate(child, np.linalg.solve(linear, (q - offset).T).T)
@@ -65,12 +84,57 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
     return np.stack(sides, axis=1)
 
 
+def grown(node: Node, distance: float) -> Node:
+    """`node` with every radius larger by `distance`, those of tools smaller."""
+    match node:
+        case Point() | Segment():
+            return replace(node, radius=node.radius + distance)
+        case Cone():
+            return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
+        case Offset(child=child, distance=more):
+            return grown(child, distance + more)
+        case Transform(child=child, matrix=matrix):
+            volume = abs(np.linalg.det(np.array(matrix)[:, :3]))
+            return Transform(grown(child, distance / float(np.cbrt(volume))), matrix)
+        case Twist(child=child):
+            return replace(node, child=grown(child, distance))
+        case Difference(solid=solid, tool=tool):
+            return Difference(grown(solid, distance), grown(tool, -distance))
+        case Sum() | Union() | Intersection() | Ricci():
+            return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
+    raise TypeError(type(node))
+
+
+def _turned(q: Floats, angle: Floats) -> Floats:
+    x, y, z = q.T
+    return np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, z], axis=1)
+
+
+def _least_ratio(q: Floats, cone: Cone) -> Floats:
+    """Least |q − c(t)| / influence(t) over the balls along the axis, by ternary search."""
+
+    def ratio(t: Floats) -> Floats:
+        center = (1.0 - t)[:, None] * np.array(cone.start) + t[:, None] * np.array(cone.end)
+        influence = ((1.0 - t) * cone.radius + t * cone.end_radius) / RIM
+        distance: Floats = np.linalg.norm(q - center, axis=1) / influence
+        return distance
+
+    low, high = np.zeros(len(q)), np.ones(len(q))
+    for _ in range(42):
+        third = (high - low) / 3.0
+        falls = ratio(low + third) >= ratio(high - third)
+        low, high = np.where(falls, low + third, low), np.where(falls, high, high - third)
+    return np.minimum(ratio(0.5 * (low + high)), np.minimum(ratio(np.zeros(len(q))), ratio(np.ones(len(q)))))
+
+
+def _leaf_at(ratio: Floats, color: Any) -> Field:
+    count = len(ratio)
+    value = np.maximum(1.0 - ratio**2, 0.0) ** 3
+    return Field(value, np.tile(np.array(color), (count, 1)), np.full(count, np.inf))
+
+
 def _leaf(offset: Floats, radius: float, color: Any) -> Field:
-    squared = (offset**2).sum(axis=1) * (RIM / radius) ** 2
-    count = len(offset)
-    return Field(
-        np.maximum(1.0 - squared, 0.0) ** 3, np.tile(np.array(color), (count, 1)), np.full(count, np.inf)
-    )
+    return _leaf_at(np.linalg.norm(offset, axis=1) * RIM / radius, color)
 
 
 def _closest_on_segment(q: Floats, start: Floats, end: Floats) -> Floats:
