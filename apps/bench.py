@@ -89,7 +89,7 @@ def measure(renderer: Renderer, model: str, counts: Sequence[int], size: Size) -
     image = DecalImage.load("scale")
     rows = []
     for count in counts:
-        decals = even_coat([item.surface], count=count)
+        decals = even_coat(item.surface, count=count)
         index = DecalIndex.of(decals)
         build = _median(lambda decals=decals: _seconds(lambda: DecalIndex.of(decals)))  # type: ignore[misc]
         scene = Scene(objects=(item,), camera=camera, decals=decals, images=(image,))

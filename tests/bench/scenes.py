@@ -14,6 +14,6 @@ def bench_scene(model: str, count: int, size: tuple[int, int], *, image: str = "
     return Scene(
         objects=(item,),
         camera=camera,
-        decals=even_coat([item.surface], count=count),
+        decals=even_coat(item.surface, count=count),
         images=(DecalImage.load(image),),
     )

@@ -29,7 +29,7 @@ def gl() -> Iterator[moderngl.Context]:
 def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context) -> None:
     ring = torus()
     item = MeshObject("ring", ring.vertices, ring.faces)
-    decals = even_coat([item.surface], count=100)
+    decals = even_coat(item.surface, count=100)
     white = DecalImage("white", np.full((4, 4, 4), 255, np.uint8))
     camera = view_of(decals, ring).camera
     path = tmp_path / "ring.npz"
@@ -46,6 +46,6 @@ def test_even_coats_cover_equally() -> None:
         "ring", *(getattr(torus(rows=48, columns=24), name) for name in ("vertices", "faces"))
     ).surface
     for count in (50, 800):
-        coat = even_coat([surface], count=count)
+        coat = even_coat(surface, count=count)
         assert len(coat) == count
         assert np.pi * (coat.radii.astype(float) ** 2).sum() == pytest.approx(1.6 * surface.area, rel=0.01)
