@@ -31,7 +31,7 @@ _COMPONENTS = {
     "ivec3": "int",
     "ivec4": "int",
 }
-_SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x")}
+_SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x"), "ivec4_sampler": ("ivec4", "")}
 
 
 def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ()) -> str:

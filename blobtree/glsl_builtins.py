@@ -28,7 +28,7 @@ _TYPES: dict[object, str] = {
     wp.vec3i: "ivec3",
     wp.vec4i: "ivec4",
 }
-_ARRAYS: dict[object, str] = {wp.vec4: "sampler2D", wp.int32: "isampler2D"}
+_ARRAYS: dict[object, str] = {wp.vec4: "sampler2D", wp.int32: "isampler2D", wp.vec4i: "ivec4_sampler"}
 
 CASTS = {"float": "float", "int": "int", "bool": "bool"}
 
@@ -51,9 +51,13 @@ HELPERS = """\
 vec2 wp_normalize(vec2 v) { float l = length(v); return l > 0.0 ? v / l : vec2(0.0); }
 vec3 wp_normalize(vec3 v) { float l = length(v); return l > 0.0 ? v / l : vec3(0.0); }
 vec4 wp_normalize(vec4 v) { float l = length(v); return l > 0.0 ? v / l : vec4(0.0); }
+#define ivec4_sampler isampler2D
 
 """
-"""Warp normalises the zero vector to zero; GLSL leaves it undefined."""
+"""Warp normalises the zero vector to zero; GLSL leaves it undefined.
+
+Its one type for textures of whole numbers has two names here: elements are an int, or an ivec4.
+"""
 
 
 def type_name(hint: object) -> str | None:

@@ -48,7 +48,7 @@ def in_cell(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.bool:
@@ -74,7 +74,7 @@ def cell_owner(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.int32:
@@ -115,7 +115,7 @@ def radial_complement(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.float32:

@@ -5,7 +5,7 @@ radius ρ = REACH·s touches, on the one level whose cells are larger than ρ an
 cells. A look-up reads one cell per level. Three flat arrays go to the device:
 
     levels  float32[l, 4]   per level: (cells per unit length, cell size, lowest rank, highest rank)
-    table   int32[4 · 2^k]  slots of an open-addressing hash table: (x + level·2²⁴, y, z, head), x < 0: empty
+    table   int32[2^k, 4]   slots of an open-addressing hash table: (x + level·2²⁴, y, z, head), x < 0: empty
     ids     int32[m]        lists: ids[head] is a count, that many decal numbers follow, in
                             the order in which they are drawn (decals/stack.py)
 
@@ -47,7 +47,7 @@ class DeviceIndex:
         """Index decals on a device, without a copy elsewhere."""
         placed = _device_arrays(decals.positions, decals.influence, decals.ranks, device)
         levels, table, ids = build_index(*placed)
-        return cls(len(levels), levels, table, len(table) // 4 - 1, ids)
+        return cls(len(levels), levels, table, len(table) - 1, ids)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class DecalIndex:
     @property
     def mask(self) -> int:
         """Number of slots − 1; a power of two − 1."""
-        return len(self.table) // 4 - 1
+        return len(self.table) - 1
 
     @property
     def nbytes(self) -> int:
@@ -89,7 +89,7 @@ class DecalIndex:
         return DeviceIndex(
             self.level_count,
             wp.array(self.levels, dtype=wp.vec4, device=device),
-            wp.array(self.table, dtype=wp.int32, device=device),
+            wp.array(self.table, dtype=wp.vec4i, device=device),
             self.mask,
             wp.array(self.ids, dtype=wp.int32, device=device),
         )

@@ -36,8 +36,9 @@ class _Builder:
 
     def build(self) -> IndexArrays:
         if not self.count:
-            empty = self.filled(4, EMPTY)
-            return IndexArrays(wp.zeros(0, dtype=wp.vec4, device=self.device), empty, self.whole(0))
+            return IndexArrays(
+                wp.zeros(0, dtype=wp.vec4, device=self.device), self.empty_table(1), self.whole(0)
+            )
         order = self.drawing_order()
         exponents, counts, ends = (self.whole(self.count) for _ in range(3))
         lowest = self.filled(EXPONENTS, NOTHING.max)
@@ -84,7 +85,7 @@ class _Builder:
         ids = self.whole(entries + cells)
         self.launch(kernels.write_lists, entries, [slots, owners, sizes, numbers], [heads, ids])
         size = table_size(cells)
-        table, taken = self.filled(4 * size, EMPTY), self.filled(size, 0)
+        table, taken = self.empty_table(size), self.filled(size, 0)
         self.launch(kernels.fill_table, scratch, [claims, keys, heads, size - 1], [taken, table])
         return table, ids
 
@@ -93,6 +94,9 @@ class _Builder:
 
     def whole(self, count: int) -> Any:
         return wp.empty(count, dtype=wp.int32, device=self.device)
+
+    def empty_table(self, slots: int) -> Any:
+        return wp.full(slots, wp.vec4i(EMPTY), dtype=wp.vec4i, device=self.device)
 
     def filled(self, count: int, value: int) -> Any:
         return wp.full(count, value, dtype=wp.int32, device=self.device)

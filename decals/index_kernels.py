@@ -144,7 +144,7 @@ def fill_table(
     heads: wp.array(dtype=wp.int32),
     mask: wp.int32,
     taken: wp.array(dtype=wp.int32),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
 ):
     """Put every cell into the final table: the first free slot from its own on."""
     i = wp.tid()
@@ -154,7 +154,4 @@ def fill_table(
     slot = first_slot(key, mask)
     while wp.atomic_cas(taken, slot, 0, 1) != 0:
         slot = (slot + 1) & mask
-    table[4 * slot] = key[0]
-    table[4 * slot + 1] = key[1]
-    table[4 * slot + 2] = key[2]
-    table[4 * slot + 3] = heads[i]
+    table[slot] = wp.vec4i(key[0], key[1], key[2], heads[i])

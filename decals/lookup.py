@@ -36,7 +36,7 @@ def cell_range(
     q: wp.vec3,
     level: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.vec2i:
@@ -49,11 +49,12 @@ def cell_range(
     y = cell_coordinate(q[1], cells_per_unit)
     z = cell_coordinate(q[2], cells_per_unit)
     slot = int(cell_hash(x, y, z) & wp.uint32(mask))
-    while table[4 * slot] >= 0:
-        if table[4 * slot] == x and table[4 * slot + 1] == y and table[4 * slot + 2] == z:
-            head = table[4 * slot + 3]
-            return wp.vec2i(head + 1, head + 1 + ids[head])
+    entry = table[slot]
+    while entry[0] >= 0:
+        if entry[0] == x and entry[1] == y and entry[2] == z:
+            return wp.vec2i(entry[3] + 1, entry[3] + 1 + ids[entry[3]])
         slot = (slot + 1) & mask
+        entry = table[slot]
     return wp.vec2i(0, 0)
 
 
@@ -62,7 +63,7 @@ def count_candidates(
     points: wp.array(dtype=wp.vec3),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
     counts: wp.array(dtype=wp.int32),
@@ -81,7 +82,7 @@ def list_candidates(
     points: wp.array(dtype=wp.vec3),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
     offsets: wp.array(dtype=wp.int32),

@@ -38,7 +38,7 @@ def owner_below(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.int32:
@@ -96,7 +96,7 @@ def owner_at(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.int32:
@@ -114,7 +114,7 @@ def pushed_complement(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.float32:
@@ -155,7 +155,7 @@ def complement_at(
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.float32:

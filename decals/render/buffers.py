@@ -3,6 +3,7 @@
 Element ``i`` lies at ``ivec2(i & 1023, i >> 10)``: the form into which `blobtree.glsl` translates arrays.
 """
 
+import math
 from typing import Any
 
 import moderngl
@@ -14,11 +15,15 @@ from decals.render.context import Context
 WIDTH = 1024
 """Texels in a row."""
 
-_KINDS = {np.dtype(np.float32): (4, "f4"), np.dtype(np.int32): (1, "i4")}
+_KINDS = {
+    (np.dtype(np.float32), (4,)): "f4",
+    (np.dtype(np.int32), ()): "i4",
+    (np.dtype(np.int32), (4,)): "i4",
+}
 
 
 class DataTexture:
-    """A ``float32[n, 4]`` or ``int32[n]`` array as a texture.
+    """A ``float32[n, 4]``, ``int32[n]`` or ``int32[n, 4]`` array as a texture.
 
     Parameters
     ----------
@@ -46,13 +51,12 @@ class DataTexture:
             (WIDTH, rows), components, _rows(array, rows, components), dtype=dtype
         )
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._components = components
+        self._shape, self._kind = array.shape[1:], array.dtype
 
     def read(self) -> NDArray[Any]:
         """Read the array back: the same shape, type and bits."""
-        kind = np.float32 if self._components == 4 else np.int32
-        flat = np.frombuffer(self.texture.read(), kind)[: self.count * self._components]
-        return flat.reshape(-1, 4) if self._components == 4 else flat
+        flat = np.frombuffer(self.texture.read(), self._kind)
+        return flat[: self.count * math.prod(self._shape)].reshape(-1, *self._shape)
 
     def use(self, unit: int) -> None:
         """Bind the texture to a unit."""
@@ -64,10 +68,13 @@ class DataTexture:
 
 
 def _kind(array: NDArray[Any]) -> tuple[int, str]:
-    components, dtype = _KINDS.get(array.dtype, (0, ""))
-    if array.shape[1:] != ((4,) if components == 4 else ()) or not components:
-        raise ValueError(f"expected float32[n, 4] or int32[n], got {array.dtype}{list(array.shape)}")
-    return components, dtype
+    """Components of a texel, and their type as moderngl names it."""
+    kind = _KINDS.get((array.dtype, array.shape[1:]))
+    if kind is None or not array.ndim:
+        raise ValueError(
+            f"expected float32[n, 4], int32[n] or int32[n, 4], got {array.dtype}{list(array.shape)}"
+        )
+    return math.prod(array.shape[1:]), kind
 
 
 def _rows(array: NDArray[Any], rows: int, components: int) -> NDArray[Any]:

@@ -45,6 +45,12 @@ def entry(ids: wp.array(dtype=wp.int32), i: wp.int32) -> wp.int32:
 
 
 @wp.func
+def slot(table: wp.array(dtype=wp.vec4i), i: wp.int32) -> wp.int32:
+    key = table[i]
+    return key[3] + table[i + 1][0]
+
+
+@wp.func
 def reserved(sample: wp.float32, input: wp.vec3) -> wp.float32:
     filter = sample * 2.0
     half = filter + input[1]

@@ -36,7 +36,7 @@ def fetch(name: str, glsl_type: str) -> str:
 
 def rows(array: NDArray[Any]) -> NDArray[Any]:
     """`array` as a data texture takes it: int32[n], or float32[n, 4] padded with zeros."""
-    if array.dtype.kind in "iu" and array.ndim == 1:
+    if array.dtype.kind in "iu" and array.shape[1:] in ((), (4,)):
         return array.astype(np.int32)
     columns = array.reshape(len(array), -1).astype(np.float32)
     return np.pad(columns, ((0, 0), (0, 4 - columns.shape[1])))
@@ -86,7 +86,7 @@ def through_glsl(
     for name, hint in typed.parameters.items():
         glsl_type = str(type_name(hint))
         if isinstance(hint, wp.array):
-            uniforms.append(f"uniform {glsl_type} x_{name};")
+            uniforms.append(f"uniform {glsl_type.replace('ivec4_sampler', 'isampler2D')} x_{name};")
             expressions.append(f"x_{name}")
         else:
             uniforms.append(

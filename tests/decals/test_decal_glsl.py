@@ -44,7 +44,7 @@ def through_glsl(context) -> Callable[..., np.ndarray]:
         count = len(rows[0])
         images = dict(zip("abc", rows, strict=False))
         if index is not None:
-            images |= {"levels": index.levels, "table": index.table[:, None], "ids": index.ids[:, None]}
+            images |= {"levels": index.levels, "table": index.table, "ids": index.ids[:, None]}
             if "mask" in program:
                 program["mask"] = index.mask
         made = [program, gl.texture((WIDTH, height(count)), 4, dtype="f4")]
@@ -198,7 +198,7 @@ def lookups(
     cells: wp.array(dtype=wp.vec3i),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.int32),
+    table: wp.array(dtype=wp.vec4i),
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
     result: wp.array(dtype=wp.vec3),

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import Node, Point, Segment
@@ -29,7 +28,7 @@ from decals.render.renderer import Renderer
 from decals.render.tape_shader import Kinds, _dispatch, tracing_shader
 from decals.render.tree import TreeDrawable
 from tests.blobtree.trees import points_around, random_trees
-from tests.blobtree.warp_functions import TypedFunction, call, typed_functions
+from tests.blobtree.warp_functions import TypedFunction, call, element, numpy_type, typed_functions
 from tests.decals.glsl_functions import run_program, through_glsl
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
@@ -232,7 +231,9 @@ def arguments_of(typed: TypedFunction) -> dict[str, Array]:
         known |= {"n_p": normal, "n_q": np.where(opposite[:, None], -other, other)}
     drawn = {name: known[name] if name in known else draws[name](rng, COUNT) for name in typed.parameters}
     whole_names = {
-        name for name, hint in typed.parameters.items() if "int32" in repr(hint) or hint is wp.bool
+        name
+        for name, hint in typed.parameters.items()
+        if numpy_type(element(hint))[0] in (np.int32, np.bool_)
     }
     arrays = {
         name: np.asarray(v, np.int32 if name in whole_names else np.float32) for name, v in drawn.items()
