@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import RIM, Node, Point, Segment
+from blobtree import RIM, InvalidNode, Node, Point, Segment
 from blobtree.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
 from blobtree.skeletons import POINT, SEGMENT, SKELETONS
-from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, Tape
+from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from tests.blobtree.trees import random_trees
 
 CODES = {skeleton: code for code, skeleton in enumerate(SKELETONS)}
@@ -28,6 +28,8 @@ def instructions(tape: Tape) -> list[tuple[int, int, int, float]]:
             stretched = code >= STRETCHED
             skeleton = SKELETONS[int(code) - STRETCHED * stretched]
             at += int(count) * (PREFIX * stretched + skeleton.parameters + 1)
+        elif code in (WARP, UNWARP):
+            at += PREFIX
     assert at == len(tape.data)
     return found
 
@@ -89,7 +91,10 @@ def test_a_tape_says_what_it_holds(tree: Node) -> None:
     found = instructions(tape)
     runs = [header for header in found if header[0] >= 0]
     assert set(tape.skeletons) == {code % STRETCHED for code, *_ in runs}
-    assert set(tape.operators) == {operator for code, operator, *_ in found if code != PUSH}
+    combines = [header for header in found if header[0] not in (PUSH, WARP, UNWARP)]
+    assert set(tape.operators) == {operator for _, operator, *_ in combines}
+    assert set(tape.warps) == {kind for code, kind, *_ in found if code == WARP}
+    assert tape.warp_registers == max((count + 1 for code, _, count, _ in found if code == WARP), default=0)
     assert tape.stretched == any(code >= STRETCHED for code, *_ in runs)
     assert tape.registers == max((count + 1 for code, _, count, _ in found if code == PUSH), default=0)
     assert all(parameter > 1.0 for _, operator, _, parameter in runs if OPERATORS[operator] is RICCI)
@@ -100,3 +105,28 @@ def test_a_tape_on_a_device_is_the_same_tape() -> None:
     uploaded = (BALL + BONE).tape.on("cpu")
     np.testing.assert_array_equal(uploaded.data.numpy(), (BALL + BONE).tape.data)
     assert uploaded.data.dtype == wp.vec4
+
+
+def test_a_twist_stands_around_its_child() -> None:
+    tape = (BALL.twist(90.0).translate((0, 0, 5)) | BONE).tape
+    assert [code for code, *_ in instructions(tape)] == [WARP, CODES[POINT], UNWARP, CODES[SEGMENT]]
+    np.testing.assert_allclose(tape.data[1:4], [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -5]])
+    np.testing.assert_allclose(tape.data[4], [1, np.pi / 2, 0, 0], rtol=1e-6)
+    assert tape.warps == (0,)
+    assert tape.warp_registers == 1
+
+
+def test_warps_nested_too_deep_are_refused() -> None:
+    tree: Node = BALL
+    for _ in range(9):
+        tree = tree.twist(1.0)
+    with pytest.raises(InvalidNode, match="nest 9 deep, at most 8"):
+        _ = tree.tape
+
+
+def test_an_offset_folds_into_the_radii_and_shrinks_tools() -> None:
+    solid, tool = (BALL - Point((1, 2, 3.5), radius=0.3)).scale(2.0).offset(0.1).tape.data[[1, 4], 3]
+    assert solid * RIM == pytest.approx(2.0 * 0.5 + 0.1, rel=1e-6)
+    assert tool * RIM == pytest.approx(2.0 * 0.3 - 0.1, rel=1e-6)
+    with pytest.raises(InvalidNode, match="leaves nothing of Point"):
+        _ = BALL.offset(-0.6).tape
