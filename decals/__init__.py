@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         NoGraphics,
     )
     from .evaluate import Samples, evaluate
+    from .fields import gradient_of
     from .images import BUILTIN_IMAGES, generate_image, load_image
     from .implicit_surface import ImplicitSurface
     from .index import DecalIndex
@@ -29,10 +30,12 @@ if TYPE_CHECKING:
     from .mesh_file import read_mesh
     from .mesh_surface import MeshSurface
     from .model import Decals, Interaction
+    from .orientation import Orientation
     from .relaxation import Relaxation
     from .scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
     from .scene_file import load_scene, save_scene
     from .seeding import seed
+    from .sizing import Sizing
     from .surface import Surface
 
 __all__ = [
@@ -55,15 +58,18 @@ __all__ = [
     "MeshObject",
     "MeshSurface",
     "NoGraphics",
+    "Orientation",
     "Relaxation",
     "Samples",
     "Scene",
+    "Sizing",
     "Surface",
     "TreeObject",
     "bounds_of",
     "cover",
     "evaluate",
     "generate_image",
+    "gradient_of",
     "load_image",
     "load_scene",
     "read_mesh",
@@ -86,6 +92,7 @@ _HOMES = {
         "NoGraphics",
     ),
     "evaluate": ("Samples", "evaluate"),
+    "fields": ("gradient_of",),
     "images": ("BUILTIN_IMAGES", "generate_image", "load_image"),
     "implicit_surface": ("ImplicitSurface",),
     "index": ("DecalIndex",),
@@ -93,10 +100,12 @@ _HOMES = {
     "mesh_file": ("read_mesh",),
     "mesh_surface": ("MeshSurface",),
     "model": ("Decals", "Interaction"),
+    "orientation": ("Orientation",),
     "relaxation": ("Relaxation",),
     "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
     "scene_file": ("load_scene", "save_scene"),
     "seeding": ("seed",),
+    "sizing": ("Sizing",),
     "surface": ("Surface",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -12,6 +12,9 @@ from decals.surface import Floats
 Indices = NDArray[np.int64]
 Distances = NDArray[np.float64]
 
+ALONE = 4000
+"""Fewest points for which more than one thread is started."""
+
 WIDENING = (4, 16, 64, 256)
 """How many neighbours are looked at, in turn, by the points that found too few facing ones among fewer."""
 
@@ -64,7 +67,8 @@ class FacingTree:
     ) -> tuple[Distances, Indices]:
         """Sort the facing ones to the front of the `width` nearest."""
         distances, indices = (
-            array.reshape(len(points), width) for array in self._tree.query(points, k=np.arange(1, width + 1))
+            array.reshape(len(points), width)
+            for array in self._tree.query(points, k=np.arange(1, width + 1), workers=_workers(len(points)))
         )
         facing = np.einsum("nki,ni->nk", self._normals[indices], normals) > FACING_LIMIT
         if own is not None:
@@ -74,3 +78,7 @@ class FacingTree:
         distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
         indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
         return distances, indices
+
+
+def _workers(points: int) -> int:
+    return -1 if points >= ALONE else 1

@@ -1,15 +1,28 @@
 """Which way the images of decals point."""
 
 from collections.abc import Callable
+from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidSeeding
+from decals.fields import curvature_directions, smooth_crosses
 from decals.surface import Floats, unit_rows
 
-Direction = ArrayLike | Callable[[Floats], ArrayLike] | None
-"""None (random), one vector for all decals, or a function of ``points[n, 3]`` to ``vectors[n, 3]``."""
+
+class Orientation(Enum):
+    """Directions that follow the surface itself."""
+
+    CURVATURE = "curvature"
+    """Along the principal curvature of larger magnitude: around a limb."""
+    CROSS = "cross"
+    """Like `CURVATURE`, but smooth: up to quarter turns, neighbours agree."""
+
+
+Direction = ArrayLike | Callable[[Floats], ArrayLike] | Orientation | None
+"""None (random), one vector for all decals, a function of ``points[n, 3]`` to ``vectors[n, 3]`` (as
+`gradient_of` makes them), or an `Orientation`."""
 
 VANISHING = 1e-3
 """A direction whose tangential part is below this share of its length has none."""
@@ -26,7 +39,10 @@ def tangents(positions: Floats, normals: Floats, direction: Direction, seed: int
     if direction is None:
         angles = np.random.default_rng(seed).random((len(normals), 1)) * (2.0 * np.pi)
         return unit_rows(np.cos(angles) * stable + np.sin(angles) * np.cross(wide, stable))
-    vectors = _directions(direction, positions)
+    if isinstance(direction, Orientation):
+        vectors = _along_surface(direction, positions, normals)
+    else:
+        vectors = _directions(direction, positions)
     tangential = vectors - np.einsum("ni,ni->n", vectors, wide)[:, None] * wide
     gone = np.linalg.norm(tangential, axis=1) <= VANISHING * np.linalg.norm(vectors, axis=1)
     return unit_rows(np.where(gone[:, None], stable, tangential))
@@ -37,6 +53,16 @@ def _stable_tangents(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     axes = np.where(np.abs(normals[:, :1]) > 0.8, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
     tangents: NDArray[np.float64] = axes - np.einsum("ni,ni->n", axes, normals)[:, None] * normals
     return tangents
+
+
+def _along_surface(orientation: Orientation, positions: Floats, normals: Floats) -> NDArray[np.float64]:
+    """Directions that the surface gives, signs and quarter turns aside."""
+    if len(positions) == 0:
+        return np.zeros((0, 3))
+    curved = curvature_directions(positions, normals)
+    if orientation is Orientation.CURVATURE:
+        return curved
+    return smooth_crosses(positions, normals, curved)
 
 
 def _directions(

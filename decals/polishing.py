@@ -10,13 +10,13 @@ from decals.neighbours import FacingTree
 from decals.population import Sites
 from decals.surface import Flags, Floats
 
-CLOSE = 0.9
+CLOSE = 0.89
 """A particle is too close to its neighbour below this many spacings."""
 
-TRIALS = 24
-"""Places tried for each particle in each round."""
+TRIALS, BUDGET = 24, 1000
+"""Places tried in each round: for each particle at least so many, and for all together."""
 
-REACH = (0.05, 0.7)
+REACH = (0.03, 0.9)
 """Shortest and longest way to a trial, in spacings."""
 
 ALONE = 2.5
@@ -28,7 +28,10 @@ GAIN = 1.001
 MIXED = 7
 """Nearest particles looked at where spacings vary, itself included: the nearest need not be the closest."""
 
-GIVE_UP = 5
+LOOK_ROUND = 5
+"""Rounds after which all particles are looked at, and not those alone that were close before."""
+
+GIVE_UP = 12
 """Rounds without any move after which the search ends."""
 
 Settle = Callable[[Sites], tuple[Sites, Flags]]
@@ -36,7 +39,14 @@ Settle = Callable[[Sites], tuple[Sites, Flags]]
 
 
 def polish(
-    particles: Sites, sizes: Floats, movable: Flags, settle: Settle, *, rounds: int, seed: int
+    particles: Sites,
+    sizes: Floats,
+    movable: Flags,
+    settle: Settle,
+    *,
+    rounds: int,
+    seed: int,
+    close: float = CLOSE,
 ) -> Sites:
     """Move particles that are too close to a neighbour to the loneliest of some places around them.
 
@@ -45,17 +55,23 @@ def polish(
     """
     rng = np.random.default_rng(seed)
     idle = 0
-    for _ in range(rounds):
+    watched = np.arange(len(particles))
+    for turn in range(rounds):
+        if turn % LOOK_ROUND == 0:  # who got close to somebody on the move may have to move instead
+            watched = np.arange(len(particles))
         tree = FacingTree(particles.positions, particles.normals)
-        nearest = _closeness(tree, sizes, particles, np.arange(len(particles)))
-        movers = _movers(particles, nearest, sizes, movable, rng)
+        nearest = _closeness(tree, sizes, particles[watched], watched)
+        pairs, nearest = watched[nearest < close], nearest[nearest < close]
+        watched = pairs
+        movers, nearest = _movers(particles, pairs[movable[pairs]], nearest[movable[pairs]], sizes, rng)
         if len(movers) == 0 or idle == GIVE_UP:
             break
-        trials, allowed = settle(_around(particles, movers, sizes, rng))
-        own = np.repeat(movers, TRIALS)
+        tries = max(TRIALS, BUDGET // len(movers))
+        own = np.repeat(movers, tries)
+        trials, allowed = settle(_around(particles, own, sizes, rng))
         distances = np.where(allowed, _closeness(tree, sizes, trials, own), -1.0)
-        best = distances.reshape(-1, TRIALS).argmax(axis=1) + TRIALS * np.arange(len(movers))
-        better = distances[best] > GAIN * nearest[movers]
+        best = distances.reshape(-1, tries).argmax(axis=1) + tries * np.arange(len(movers))
+        better = distances[best] > GAIN * nearest
         idle = 0 if better.any() else idle + 1
         positions, normals = particles.positions.copy(), particles.normals.copy()
         positions[movers[better]] = trials.positions[best[better]]
@@ -65,27 +81,30 @@ def polish(
 
 
 def _movers(
-    particles: Sites, nearest: NDArray[np.float64], sizes: Floats, movable: Flags, rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """Particles too close to another, the closest first, none near another of them."""
-    close = np.flatnonzero(movable & (nearest < CLOSE))
-    close = close[np.argsort(nearest[close] + 1e-3 * rng.random(len(close)), kind="stable")]
+    particles: Sites,
+    close: NDArray[np.int64],
+    nearest: NDArray[np.float64],
+    sizes: Floats,
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Choose among the close ones the closest, none near another of them; their closeness comes along."""
+    order = np.argsort(nearest + 1e-3 * rng.random(len(close)), kind="stable")
+    close, nearest = close[order], nearest[order]
     if len(close) == 0:
-        return close
+        return close, nearest
     positions = particles.positions[close]
     free = np.ones(len(close), np.bool_)
     chosen: list[int] = []
     near = cKDTree(positions).query_ball_point(positions, ALONE * sizes[close])
     for row, others in enumerate(near):
         if free[row]:
-            chosen.append(int(close[row]))
+            chosen.append(row)
             free[others] = False
-    return np.array(chosen, np.int64)
+    return close[chosen], nearest[chosen]
 
 
-def _around(particles: Sites, movers: NDArray[np.int64], sizes: Floats, rng: np.random.Generator) -> Sites:
-    """Random places near the particles, at all scales within reach."""
-    rows = np.repeat(movers, TRIALS)
+def _around(particles: Sites, rows: NDArray[np.int64], sizes: Floats, rng: np.random.Generator) -> Sites:
+    """One random place near each of the particles, at all scales within reach."""
     ways = rng.normal(size=(len(rows), 3))
     low, high = np.log(REACH)
     lengths = sizes[rows, None] * np.exp(rng.uniform(low, high, (len(rows), 1)))

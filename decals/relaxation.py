@@ -1,16 +1,17 @@
 """Particles that repel each other on surfaces until they lie evenly."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
 from decals.errors import InvalidSeeding
-from decals.model import FACING_LIMIT
+from decals.evenness import Spacing, evenness, ideal_spacing
+from decals.local_relaxation import relax_near
+from decals.moving import moved
 from decals.neighbours import FacingTree
-from decals.polishing import polish
+from decals.polishing import CLOSE, polish
 from decals.population import Density, Mask, Sites, World, shares
 from decals.refilling import crowded, refill
 from decals.repulsion import Repulsion
@@ -34,40 +35,8 @@ SCOUTS_PER_MOVER, SCOUTS_PER_PARTICLE = 200, 4
 POLISHING = 60
 """Rounds at most that part the last close pairs."""
 
-BEYOND = 2.0
-"""Particles farther than this many spacings are no neighbours when evenness is measured."""
-
-
-@dataclass(frozen=True)
-class Spacing:
-    """How evenly particles lie.
-
-    Distances are straight, in units of the spacing wished for there, between particles within two spacings
-    that face the same way: their normals' cosine is above `FACING_LIMIT`, the rule by which decals act.
-    A particle alone on its side of a thin part has no such neighbour; what it lacks is left out.
-
-    Attributes
-    ----------
-    ideal
-        Distance of neighbours if the visible area were one hexagonal tiling, sqrt(2 A / (sqrt(3) N)).
-    mean
-        Mean distance to the nearest neighbour.
-    rho
-        Least distance over the ideal one; 1 is the unreachable best (Lagae and Dutré 2008).
-    cv
-        Coefficient of variation of the distance to the nearest neighbour.
-    cv6
-        Coefficient of variation of the mean distance to six neighbours.
-    ringed
-        Part of the particles that have six neighbours: the others lie on rims, tips and thin parts.
-    """
-
-    ideal: float
-    mean: float
-    rho: float
-    cv: float
-    cv6: float
-    ringed: float = 1.0
+CHECKS = 10
+"""Steps after which it is measured whether the particles lie evenly enough."""
 
 
 class Relaxation:
@@ -142,7 +111,7 @@ class Relaxation:
         self._fixed: Flags = (np.arange(count) < len(placed))[order]
         self._sites = joined[order]
         self._refills = {int(part * iterations) for part in np.arange(*REFILLS)} - {0}
-        self._repulsion = Repulsion(count, device=device)
+        self._repulsion: Repulsion | None = None
         self._sizes = self.sizes_at(self.positions)
 
     @property
@@ -178,7 +147,7 @@ class Relaxation:
     @property
     def energies(self) -> Floats:
         """How crowded each particle was at the last step: its energy there, ``float32[n]``."""
-        return self._repulsion.energies
+        return np.zeros(self.count, np.float32) if self._repulsion is None else self._repulsion.energies
 
     @property
     def finished(self) -> bool:
@@ -204,36 +173,96 @@ class Relaxation:
         progress
             Called with a stage in plain words and the fraction done.
         until
-            Stop as soon as rho has come up to this; it is measured at every tenth step.
+            The rho that is enough: measured at every tenth step, and nothing is polished beyond it.
         cancel
             Asked before every step whether to stop; the particles stay as they are then.
         """
         while not self.finished and not (cancel is not None and cancel()):
-            self.step()
+            self._advance()
+            if self.finished:
+                self.polish(close=CLOSE if until is None else min(CLOSE, until))
             if progress is not None:
                 progress("spreading seeds", self.steps / self.iterations)
-            if until is not None and self.steps % 10 == 0 and self.statistics().rho >= until:
+            if until is not None and self.steps % CHECKS == 0 and self.statistics().rho >= until:
                 break
 
     def step(self) -> None:
         """Move every particle once against its neighbours, and now and then some to bare places."""
+        self._advance()
+        if self.steps == self.iterations:
+            self.polish()
+
+    def _advance(self) -> None:
         self.steps += 1
         if self.count < 2:
             return
         if self.steps in self._refills:
             self._refill()
         self._push()
-        if self.steps == self.iterations:
-            self.polish()
 
-    def polish(self, rounds: int = POLISHING) -> None:
-        """Part the pairs that are still too close by trial, as long as that helps."""
+    def polish(self, rounds: int = POLISHING, *, close: float = CLOSE) -> None:
+        """Part the pairs that are still closer than so many spacings by trial, as long as that helps."""
         if self.count < 2:
             return
         self._sites = polish(
-            self._sites, self._sizes, ~self._fixed, self.world.settle, rounds=rounds, seed=self._seed
+            self._sites,
+            self.sizes_at(self.positions),
+            ~self._fixed,
+            self.world.settle,
+            rounds=rounds,
+            seed=self._seed,
+            close=close,
         )
-        self._repulsion.forget()
+        self._repulsion = None
+
+    def insert(self, point: ArrayLike, *, fixed: bool = False) -> int:
+        """Add a particle near the point and relax those around it; its number comes back.
+
+        The spacing stays as it was, and so do all particles farther away.
+
+        Raises
+        ------
+        InvalidSeeding
+            If the surface closest to the point is barred there.
+        """
+        site = _placed(self.world, np.reshape(np.asarray(point, dtype=np.float32), (1, -1)))
+        if not self.world.settle(site)[1].all():
+            raise InvalidSeeding(f"expected a place that is neither hidden nor masked, got {point!r:.60}")
+        row = int(np.searchsorted(self.surface_ids, site.surface_ids[0], side="right"))
+        self._sites = Sites.joined([self._sites[:row], site, self._sites[row:]])
+        self._fixed = np.insert(self._fixed, row, fixed)
+        self._relax_near(self.positions[row])
+        return row
+
+    def remove(self, number: int) -> None:
+        """Take a particle away and let those around it close the gap.
+
+        Raises
+        ------
+        InvalidSeeding
+            If there is no particle of that number.
+        """
+        if not 0 <= number < self.count:
+            raise InvalidSeeding(f"number: expected a particle from 0 to {self.count - 1}, got {number}")
+        place = self.positions[number]
+        self._sites = Sites.joined([self._sites[:number], self._sites[number + 1 :]])
+        self._fixed = np.delete(self._fixed, number)
+        self._relax_near(place)
+
+    def _relax_near(self, place: Floats) -> None:
+        self._repulsion = None
+        self._sizes = self.sizes_at(self.positions)
+        if self.count > 1:
+            self._sites = relax_near(
+                self.world,
+                self._sites,
+                ~self._fixed,
+                self._sizes,
+                place,
+                exponent=EXPONENTS[1],
+                stiffness=STIFFNESS,
+                device=self._device,
+            )
 
     def statistics(self) -> Spacing:
         """How evenly the particles lie now."""
@@ -253,8 +282,8 @@ class Relaxation:
             return
         most = min(SCOUTS_PER_PARTICLE * self.count, SCOUTS_PER_MOVER * len(movers) + 1000)
         scouts = self.world.sample(shares(self.world.masses, most), stream=1000 + self.steps)
-        self._sites, moved = refill(self._sites, movers, scouts, self.sizes_at(scouts.positions))
-        if len(moved):
+        self._sites, which = refill(self._sites, movers, scouts, self.sizes_at(scouts.positions))
+        if len(which) and self._repulsion is not None:
             self._repulsion.forget()
 
     def _push(self) -> None:
@@ -262,55 +291,16 @@ class Relaxation:
         part = min(self.steps / self.iterations, 1.0)
         exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
         stiffness = STIFFNESS * float(np.interp(part, HARDENING, (0.0, 1.0)))
-        if self._repulsion.stale:
+        repulsion = self._repulsion or Repulsion(self.count, device=self._device)
+        if repulsion.stale:
             self._sizes = self.sizes_at(self.positions)
-            self._repulsion.relist(self.positions, self.normals, self._sizes)
-        moves = self._repulsion.moves(
+            repulsion.relist(self.positions, self.normals, self._sizes)
+        moves = repulsion.moves(
             self.positions, self.normals, self._sizes, exponent=exponent, stiffness=stiffness
         )
+        self._repulsion = repulsion
         moves[self._fixed] = 0.0
         self._sites = moved(self.world, self._sites, moves, self._sizes)
-
-
-def moved(world: World, sites: Sites, moves: Floats, sizes: Floats) -> Sites:
-    """Sites after the moves, put back onto their surfaces; who would turn away or be barred stays."""
-    lengths = np.sqrt(np.einsum("ni,ni->n", moves, moves))
-    wished = Sites(sites.positions + moves, sites.normals, sites.surface_ids)
-    # a particle on its surface that moves by some length is no farther than that from the surface
-    found, allowed = world.settle(wished, within=np.float32(1.01) * lengths + np.float32(1e-4) * sizes)
-    allowed &= np.einsum("ni,ni->n", found.normals, sites.normals) > FACING_LIMIT
-    allowed &= lengths > 0.0
-    return Sites(
-        np.where(allowed[:, None], found.positions, sites.positions),
-        np.where(allowed[:, None], found.normals, sites.normals),
-        sites.surface_ids,
-    )
-
-
-def evenness(distances: NDArray[np.float64], spacing: float) -> Spacing:
-    """Figures of the distances of each particle to its six nearest neighbours, ``[n, 6]``, ascending."""
-    near = np.where(distances <= BEYOND * spacing, distances, np.inf)
-    nearest, six = near[:, 0], near.mean(axis=1)
-    nearest, six = nearest[np.isfinite(nearest)], six[np.isfinite(six)]
-    if len(nearest) == 0:
-        return Spacing(spacing, np.inf, np.inf, 0.0, 0.0, 0.0)
-    return Spacing(
-        ideal=spacing,
-        mean=float(nearest.mean()),
-        rho=float(nearest.min()) / spacing,
-        cv=_variation(nearest),
-        cv6=_variation(six),
-        ringed=len(six) / len(distances),
-    )
-
-
-def ideal_spacing(area: float, count: int) -> float:
-    """Distance of neighbours in the hexagonal tiling of an area by so many points."""
-    return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * max(count, 1))))
-
-
-def _variation(values: NDArray[np.float64]) -> float:
-    return float(values.std() / values.mean()) if len(values) and values.mean() > 0 else 0.0
 
 
 def _nobody() -> Sites:

@@ -11,7 +11,7 @@ from decals.model import Decals
 from decals.orientation import Direction, tangents
 from decals.population import Density, Mask, Sites, World
 from decals.relaxation import Relaxation
-from decals.sizing import covering_radii
+from decals.sizing import Sizing, covering_radii, delaunay_radii, touching_radii
 from decals.surface import Surface
 
 SAMPLES = 64
@@ -35,6 +35,8 @@ def seed(
     density: Density | None = None,
     mask: Mask | None = None,
     fixed: ArrayLike | None = None,
+    sizing: Sizing = Sizing.COVERING,
+    factor: float = 1.0,
     direction: Direction = None,
     images: int = 1,
     weights: ArrayLike | None = None,
@@ -57,8 +59,13 @@ def seed(
         From 0 upward; the same one gives the same decals.
     density, mask, fixed
         How densely decals lie, where they may lie, and places that are given: see `Relaxation`.
+    sizing
+        What decides how large decals are.
+    factor
+        Times that.
     direction
-        Of the images' u axes: None (random), a vector, or a function of ``points[n, 3]`` to vectors.
+        Of the images' u axes: None (random), a vector, a function of ``points[n, 3]`` to vectors, or an
+        `Orientation`.
     images
         How many images there are to choose from.
     weights
@@ -71,11 +78,13 @@ def seed(
     Raises
     ------
     InvalidSeeding
-        For a count, spacing, seed, density, mask, direction, number of images or weights that make no sense,
-        or nothing to lie on.
+        For a count, spacing, seed, density, mask, factor, direction, number of images or weights that make no
+        sense, or nothing to lie on.
     """
     given = [surfaces] if isinstance(surfaces, Surface) else list(surfaces)
     odds = _odds(images, weights)
+    if not (np.isfinite(factor) and factor > 0):
+        raise InvalidSeeding(f"factor: expected a number above 0, got {factor!r}")
     tell = progress or (lambda stage, fraction: None)
     relaxation = Relaxation(
         given, count=count, spacing=spacing, seed=seed, density=density, mask=mask, fixed=fixed
@@ -84,7 +93,7 @@ def seed(
     if relaxation.count == 0:
         return Decals.empty()
     tell("measuring sizes", SPREADING)
-    radii = sizes(relaxation, seed=seed)
+    radii = factor * sizes(relaxation, sizing, seed=seed)
     tell("measuring sizes", 1.0)
     return Decals(
         positions=relaxation.positions,
@@ -95,15 +104,19 @@ def seed(
     )
 
 
-def sizes(relaxation: Relaxation, *, seed: int = 0) -> NDArray[np.float64]:
-    """Radii at which decals on the relaxed particles leave no gap, ``float64[n]``.
+def sizes(relaxation: Relaxation, sizing: Sizing = Sizing.COVERING, *, seed: int = 0) -> NDArray[np.float64]:
+    """Radii of decals on the relaxed particles, ``float64[n]``; by default they leave no gap.
 
     A surface too small for a share of the particles counts for nothing.
     """
     world = relaxation.world
+    if sizing is Sizing.TOUCHING:
+        return touching_radii(relaxation.sites)
     counts = np.bincount(relaxation.surface_ids, minlength=len(world.surfaces))
     each = max(SAMPLES, FEWEST_SAMPLES // max(relaxation.count, 1))
     samples = world.sample(counts * each, stream=_SAMPLE_STREAM)
+    if sizing is Sizing.DELAUNAY:
+        return delaunay_radii(relaxation.sites, samples)
     return covering_radii(
         relaxation.sites, samples, lambda sites: visible(world, sites), _stream(seed, _TRIAL_STREAM)
     )

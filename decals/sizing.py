@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.kernels import RIM as FIELD_RIM
 from decals.neighbours import FacingTree
 from decals.population import Sites
 
@@ -32,6 +34,18 @@ TRIALS = 6
 
 SHRINK = (1.0, 0.6, 0.3, 0.15)
 """Distance of the trials in each round, in mean distances of the samples."""
+
+
+class Sizing(Enum):
+    """Rules for the radii of decals."""
+
+    COVERING = "covering"
+    """Least radii that leave no gap."""
+    TOUCHING = "touching"
+    """Half the distance to the nearest neighbour: none reaches into another."""
+    DELAUNAY = "delaunay"
+    """The paper's: the field ends at the farthest Delaunay neighbour; leaves small gaps."""
+
 
 Project = Callable[[Sites], Sites]
 """Puts points back onto their own surfaces, dropping those that are hidden there."""
@@ -80,6 +94,35 @@ def covering_radii(decals: Sites, samples: Sites, project: Project, seed: int) -
         found = found.joined(_measure(tree, project(_around(found.sites, shrink * pitch, rng))))
         _grow(radii, found, limits)
     return (1.0 + MARGIN) * _without_zeros(radii, tree, decals)
+
+
+def touching_radii(decals: Sites) -> NDArray[np.float64]:
+    """Half the distance to the nearest decal that faces the same way; the median where there is none."""
+    tree = FacingTree(decals.positions, decals.normals)
+    nearest = tree.nearest(decals.positions, decals.normals, skip_self=True)[0][:, 0]
+    return _filled(0.5 * nearest)
+
+
+def delaunay_radii(decals: Sites, samples: Sites) -> NDArray[np.float64]:
+    """Radii of the paper's rule (its section 3.4): influence as far as the farthest Delaunay neighbour.
+
+    Two decals are neighbours in the surface's own Delaunay triangulation where their Voronoi cells meet:
+    where samples are nearest to the one and next nearest to the other.
+    """
+    found = _measure(FacingTree(decals.positions, decals.normals), samples)
+    pairs = found.decals[(found.decals[:, :2] >= 0).all(axis=1), :2]
+    one, other = decals.positions[pairs[:, 0]], decals.positions[pairs[:, 1]]
+    lengths = np.linalg.norm(one.astype(np.float64) - other, axis=1)
+    farthest = np.full(len(decals), -np.inf)
+    for side in (0, 1):
+        np.maximum.at(farthest, pairs[:, side], lengths)
+    return float(FIELD_RIM) * _filled(farthest)
+
+
+def _filled(radii: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give rows that are not finite and above zero the median of the others, or 1."""
+    known = np.isfinite(radii) & (radii > 0)
+    return np.where(known, radii, float(np.median(radii[known])) if known.any() else 1.0)
 
 
 @dataclass(frozen=True)

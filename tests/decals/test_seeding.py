@@ -9,6 +9,7 @@ from decals.errors import InvalidSeeding
 from decals.implicit_surface import ImplicitSurface
 from decals.mesh_surface import MeshSurface
 from decals.seeding import seed
+from decals.sizing import Sizing
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.coats import covered, rho
 
@@ -154,6 +155,29 @@ def test_images_lie_along_a_direction():
     assert np.abs(np.einsum("ni,ni->n", decals.tangents, decals.normals)).max() < 1e-5
 
 
+def test_sizes_follow_their_rule():
+    covering, touching, paper = (seed(sphere(), count=200, sizing=rule).radii for rule in Sizing)
+    assert covering.min() > touching.max()
+    # the farthest Delaunay neighbour is up to half as far again as the nearest one
+    assert 1.0 < np.median(paper) / (2 * 0.4542 * np.median(touching)) < 1.5
+    assert np.allclose(seed(sphere(), count=200, factor=0.5).radii, 0.5 * covering, rtol=1e-6)
+
+
+def test_spreading_that_is_cancelled_is_covered_all_the_same():
+    asked = []
+    decals = seed(sphere(), count=100, cancel=lambda: len(asked) > 3 or asked.append(0) is not None)
+    assert len(asked) == 4
+    assert is_bare(decals, sphere()) == 0
+
+
+def test_seeds_spread_by_density_and_spacing_around_fixed_ones():
+    fixed = np.float32([[0, 0, 1]])
+    decals = seed(sphere(), spacing=0.3, density=lambda points: np.exp(points[:, 0]), fixed=fixed)
+    assert np.linalg.norm(decals.positions - fixed, axis=1).min() < 1e-3
+    assert (decals.positions[:, 0] > 0).sum() > 1.5 * (decals.positions[:, 0] < 0).sum()
+    assert is_bare(decals, sphere()) == 0
+
+
 def test_progress_runs_from_start_to_end():
     heard = []
     seed(plane(), count=20, progress=lambda stage, fraction: heard.append((stage, fraction)))
@@ -171,6 +195,7 @@ def test_progress_runs_from_start_to_end():
         ({"count": 2.5}, "count: expected a whole number"),
         ({"count": True}, "count: expected a whole number"),
         ({"count": 5, "seed": -3}, "seed: expected at least 0"),
+        ({"count": 5, "factor": 0.0}, "factor: expected"),
         ({"count": 5, "images": 0}, "images: expected"),
         ({"count": 5, "images": 2, "weights": [1]}, "weights: expected shape"),
         ({"count": 5, "images": 2, "weights": [1, -1]}, "weights: expected finite"),

@@ -291,6 +291,44 @@ def test_relaxing_stops_when_told_to_or_even_enough():
     assert early.statistics().rho >= 0.5
 
 
+def test_one_more_particle_and_one_less_change_the_neighbourhood_alone():
+    relaxation = Relaxation([sphere(), plane(1.0)], count=600)
+    relaxation.run()
+    before = relaxation.positions.copy()
+    row = relaxation.insert((0, 0, 1.1))
+    assert relaxation.count == 601
+    others = np.delete(relaxation.positions, row, axis=0)
+    far = np.linalg.norm(before - [0, 0, 1], axis=1) > 5 * relaxation.spacing
+    assert np.array_equal(others[far], before[far])
+    assert np.linalg.norm(relaxation.positions[row] - [0, 0, 1]) < relaxation.spacing
+    assert relaxation.statistics().rho > 0.75
+    relaxation.remove(row)
+    assert relaxation.count == 600
+    assert relaxation.statistics().rho > 0.8
+    relaxation.step()
+    assert np.array_equal(relaxation.surface_ids, np.sort(relaxation.surface_ids))
+    row = relaxation.insert((1.0, 0, 0), fixed=True)
+    assert np.linalg.norm(relaxation.positions[row] - [1, 0, 0]) < 0.01
+    for number in (-1, 601):
+        with pytest.raises(InvalidSeeding, match="expected a particle"):
+            relaxation.remove(number)
+
+
+def test_nobody_is_inserted_where_nobody_may_lie():
+    relaxation = Relaxation([sphere()], count=5, mask=lambda points: points[:, 2] > 0)
+    with pytest.raises(InvalidSeeding, match="neither hidden nor masked"):
+        relaxation.insert((0, 0, -1))
+
+
+def test_from_nobody_to_nobody():
+    relaxation = Relaxation([plane()], count=0)
+    relaxation.insert((0, 0, 0))
+    relaxation.insert((0.1, 0, 0))
+    relaxation.remove(0)
+    relaxation.remove(0)
+    assert relaxation.count == 0
+
+
 @pytest.mark.parametrize("skip_self", [False, True])
 def test_nearest_facing_neighbours_are_those_of_all_pairs(skip_self):
     rng = np.random.default_rng(0)

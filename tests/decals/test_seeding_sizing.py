@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from decals.orientation import tangents
+from decals.fields import gradient_of
+from decals.orientation import Orientation, tangents
 from decals.population import Sites
-from decals.sizing import MARGIN, covering_radii
+from decals.sizing import MARGIN, covering_radii, delaunay_radii, touching_radii
 from tests.decals.meshes import plane
 
 
@@ -95,3 +96,69 @@ def test_no_decals_have_no_tangents():
     none = np.zeros((0, 3), np.float32)
     for direction in (None, (1, 0, 0), lambda points: points):
         assert tangents(none, none, direction, seed=0).shape == (0, 3)
+
+
+def torus():
+    """Points and normals of a torus, and the way around its tube."""
+    angles = np.random.default_rng(0).uniform(0, 2 * np.pi, (1500, 2))
+    (a, b) = angles.T
+    normals = np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+    around = np.stack([-np.cos(a) * np.sin(b), -np.sin(a) * np.sin(b), np.cos(b)], axis=1)
+    ring = np.stack([np.cos(a), np.sin(a), 0 * a], axis=1)
+    return (ring + 0.3 * normals).astype(np.float32), normals.astype(np.float32), around
+
+
+def test_tangents_follow_the_curvature_around_a_tube():
+    positions, normals, around = torus()
+    found = tangents(positions, normals, Orientation.CURVATURE, seed=0)
+    assert is_tangent(found, normals)
+    assert np.quantile(np.abs(np.einsum("ni,ni->n", found, around)), 0.1) > 0.97
+
+
+def test_a_cross_field_agrees_with_its_neighbours_up_to_quarter_turns():
+    positions, normals, around = torus()
+    found = tangents(positions, normals, Orientation.CROSS, seed=0)
+    assert is_tangent(found, normals)
+    turned = np.arccos(np.clip(np.einsum("ni,ni->n", found, around), -1, 1)) % (np.pi / 2)
+    assert np.quantile(np.minimum(turned, np.pi / 2 - turned), 0.95) < np.radians(20)
+
+
+def test_tangents_follow_a_gradient():
+    normals = normals_like(200)
+    found = tangents(normals, normals, gradient_of(lambda points: points[:, 2] ** 3), seed=0)
+    assert is_tangent(found, normals)
+    away = np.abs(normals[:, 2]) > 0.1
+    assert np.allclose(found[away], tangents(normals, normals, (0, 0, 1), seed=0)[away], atol=1e-3)
+
+
+@pytest.mark.parametrize("orientation", Orientation)
+def test_few_decals_have_tangents_too(orientation):
+    for count in (0, 1, 2):
+        normals = np.tile(np.float32([0, 0, 1]), (count, 1))
+        places = np.arange(3 * count).reshape(-1, 3).astype(np.float32)
+        found = tangents(places, normals, orientation, seed=0)
+        assert found.shape == (count, 3)
+        assert count == 0 or is_tangent(found, normals)
+
+
+def test_touching_decals_share_half_the_gap():
+    radii = touching_radii(flat([[0, 0, 0], [1, 0, 0], [3, 0, 0]]))
+    assert radii.tolist() == [0.5, 0.5, 1.0]
+    assert touching_radii(flat([[0, 0, 0]])).tolist() == [1.0]
+
+
+def test_the_papers_rule_reaches_to_the_farthest_delaunay_neighbour():
+    points = np.random.default_rng(4).uniform(-0.5, 0.5, (60, 3)) * [1, 1, 0]
+    surface = plane(1.0)
+    samples = Sites(*surface.sample(60_000, 1), np.zeros(60_000, np.int32))
+    found = delaunay_radii(flat(points), samples) / np.sqrt(1 - 2 ** (-1 / 3))
+    # brute force: pairs of points that own neighbouring pixels of a fine picture
+    places = (np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, 500)] * 2, indexing="ij"), -1)).reshape(-1, 2)
+    owner = np.linalg.norm(places[:, None] - points[None, :, :2], axis=2).argmin(axis=1).reshape(500, 500)
+    expected = np.zeros(60)
+    for one, other in ((owner[1:], owner[:-1]), (owner[:, 1:], owner[:, :-1])):
+        gaps = np.linalg.norm(points[one] - points[other], axis=-1)
+        np.maximum.at(expected, one.ravel(), gaps.ravel())
+        np.maximum.at(expected, other.ravel(), gaps.ravel())
+    assert (np.abs(found - expected) < 1e-5).mean() > 0.85
+    assert (found < expected + 1e-5).mean() > 0.95

@@ -1,0 +1,219 @@
+"""How evenly seeds lie and what they cost, beside every Python package that samples meshes and is installed.
+
+``python -m tests.bench.seeds [--quick] [--json PATH] [--counts 1000,10000] [--models sphere,dragon]``
+
+Packages that are not installed are listed as absent. All are measured alike: distances between points within
+two ideal spacings that face the same way, ideal by the number of points that the package returned. They
+sample the mesh, or a fine mesh of the tree; so do we, the tree itself.
+"""
+
+import argparse
+import json
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from blobtree import Node, Point, polygonize
+from decals.errors import InvalidSeeding
+from decals.evenness import Spacing, evenness, ideal_spacing
+from decals.implicit_surface import ImplicitSurface
+from decals.mesh_surface import MeshSurface
+from decals.neighbours import FacingTree
+from decals.relaxation import Relaxation
+from implicit_decals.apps.errors import UsageError
+from implicit_decals.apps.knot import torus_knot
+from implicit_decals.apps.samples import sample_mesh
+from tests.bench.seed_packages import PACKAGES
+
+COUNTS = (1_000, 10_000, 100_000)
+SCHEDULES = (20, 30, 45, 70, 150)
+"""Lengths of our schedule; the last is the default."""
+
+REPEATS = {1_000: 5, 10_000: 3}
+"""How often each figure is taken, once for other counts; medians are shown."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """One row of the table."""
+
+    count: int
+    spacing: Spacing
+    seconds: float
+
+
+def bumpy() -> Node:
+    """Make a ball with twenty-four bumps."""
+    ways = np.random.default_rng(0).normal(size=(24, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    tree: Node = Point((0, 0, 0), radius=1.0)
+    for way in 0.95 * ways:
+        tree = tree + Point(tuple(way), radius=0.3)
+    return tree
+
+
+def meshed(tree: Node) -> MeshSurface:
+    mesh = polygonize(tree, resolution=160)
+    return MeshSurface(mesh.vertices, mesh.faces)
+
+
+def _tree_model(*trees: Node):
+    return [ImplicitSurface(tree) for tree in trees], [meshed(tree) for tree in trees]
+
+
+def _mesh_model(vertices, faces):
+    surface = MeshSurface(vertices, faces)
+    return [surface], [surface]
+
+
+MODELS: dict[str, Callable] = {
+    "bumpy": lambda: _tree_model(bumpy()),
+    "sphere": lambda: _tree_model(Point((0, 0, 0), radius=1.0)),
+    "touching": lambda: _tree_model(Point((-1, 0, 0), radius=1.0), Point((1, 0, 0), radius=1.0)),
+    "knot": lambda: _mesh_model(*torus_knot(along=1042)),
+    "dragon": lambda: _mesh_model(*sample_mesh("dragon")),
+    "horse": lambda: _mesh_model(*sample_mesh("horse")),
+}
+
+
+@cache
+def model(name: str):
+    """Make our surfaces and the meshes for others."""
+    return MODELS[name]()
+
+
+def joined(meshes: list[MeshSurface]):
+    """All meshes as one: vertices and faces."""
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=False)]
+    return np.concatenate([mesh.vertices for mesh in meshes]).astype(float), np.concatenate(faces)
+
+
+def measure(surface: MeshSurface, points) -> Spacing:
+    """Evenness of any points on a mesh."""
+    positions, normals = surface.project(points)
+    distances, _ = FacingTree(positions, normals).nearest(positions, normals, count=6, skip_self=True)
+    return evenness(distances, ideal_spacing(surface.area, len(positions)))
+
+
+def timed(work: Callable, repeats: int):
+    """Last answer and median time of a piece of work."""
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        answer = work()
+        seconds.append(time.perf_counter() - start)
+    return answer, statistics.median(seconds)
+
+
+def ours(surfaces, count: int, iterations: int, repeats: int, device: str) -> Figures:
+    """Run our own relaxation."""
+
+    def work() -> Relaxation:
+        relaxation = Relaxation(surfaces, count=count, iterations=iterations, device=device)
+        relaxation.run()
+        return relaxation
+
+    relaxation, seconds = timed(work, repeats)
+    return Figures(relaxation.count, relaxation.statistics(), seconds)
+
+
+def theirs(sampler: Callable, meshes, count: int, repeats: int) -> Figures:
+    """Run a package."""
+    vertices, faces = joined(meshes)
+    points, seconds = timed(lambda: sampler(vertices, faces, count), repeats)
+    return Figures(len(points), measure(MeshSurface(vertices, faces), points), seconds)
+
+
+def speedup(own: list[Figures], others: list[Figures]) -> float | None:
+    """Time of the most even package over our shortest one that is as even."""
+    if not others:
+        return None
+    best = max(others, key=lambda figures: figures.spacing.rho)
+    enough = [figures.seconds for figures in own if figures.spacing.rho >= best.spacing.rho]
+    return best.seconds / min(enough) if enough else 0.0
+
+
+def show(name: str, figures: Figures) -> None:
+    found = figures.spacing
+    print(
+        f"  {name:34s} {figures.count:7d} {found.rho:7.3f} {100 * found.cv:7.2f} {100 * found.cv6:7.2f}"
+        f" {100 * found.ringed:7.1f} {figures.seconds:9.3f}",
+        flush=True,
+    )
+
+
+def bench(
+    names: list[str], counts: list[int], *, device: str, quick: bool, packages: bool
+) -> dict[str, float]:
+    """Print the table and return its figures."""
+    present = {name: make() for name, make in PACKAGES.items()} if packages else {}
+    for name, found in present.items():
+        print(f"{name}: {found.version if found else 'absent'}")
+    figures: dict[str, float] = {}
+    for count in counts:
+        repeats, ratios = (1 if quick else REPEATS.get(count, 1)), []
+        for name in names:
+            try:
+                surfaces, meshes = model(name)
+            except UsageError as error:
+                print(f"{name}: absent ({error})")
+                continue
+            print(f"{name}, {count}\n  {'':34s}   count     rho   cv %  cv6 %  ringed %   seconds")
+            ours(surfaces, min(count, 200), 2, 1, device)  # compile kernels
+            schedules = SCHEDULES[1::3] if quick else SCHEDULES
+            own = [ours(surfaces, count, length, repeats, device) for length in schedules]
+            for length, row in zip(schedules, own, strict=True):
+                show(f"implicit-decals, {length} steps", row)
+            others = []
+            for package in filter(None, present.values()):
+                try:
+                    others.append(theirs(package.sample, meshes, count, repeats))
+                    show(package.title, others[-1])
+                except (RuntimeError, ValueError, MemoryError, InvalidSeeding) as error:
+                    print(f"  {package.title:34s} failed: {' '.join(str(error).split())[:60]}")
+            last = own[-1]
+            figures |= {
+                f"rho_{name}_{count}": last.spacing.rho,
+                f"cv_{name}_{count}": last.spacing.cv,
+                f"cv6_{name}_{count}": last.spacing.cv6,
+                f"s_{name}_{count}": last.seconds,
+            }
+            ratios.append(speedup(own, others))
+        known = [ratio for ratio in ratios if ratio is not None]
+        if known:
+            figures[f"speedup_{count}"] = statistics.median(known)
+            print(
+                f"the most even package's time over ours to its rho, {count}: {statistics.median(known):.1f}"
+            )
+    return figures
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="fewer models and 1,000 seeds, within a minute")
+    parser.add_argument("--json", type=Path, help="also write the figures there")
+    parser.add_argument("--counts", help="numbers of seeds, with commas between")
+    parser.add_argument("--models", help=f"some of {', '.join(MODELS)}, with commas between")
+    parser.add_argument("--device", default="cpu", help="Warp device of our own")
+    parser.add_argument("--alone", action="store_true", help="leave the packages out")
+    wish = parser.parse_args()
+    names = wish.models.split(",") if wish.models else ["bumpy", "knot"] if wish.quick else list(MODELS)
+    counts = [int(text) for text in wish.counts.split(",")] if wish.counts else list(COUNTS)
+    if wish.quick and not wish.counts:
+        counts = [1000]
+    print(f"{' '.join(sys.argv)}\n{platform.platform()}, Python {platform.python_version()}, {wish.device}")
+    figures = bench(names, counts, device=wish.device, quick=wish.quick, packages=not wish.alone)
+    if wish.json:
+        wish.json.write_text(json.dumps(figures, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
