@@ -23,6 +23,16 @@ implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json 
 
 implicit-decals render dragon.json --size 2400x1800 -o large.png
 """,
+    "seed": """Spread seeds over models and write the decals that lie on them.
+
+Several models keep their own coordinates; where they touch, seeds push each other.
+
+For instance:
+
+implicit-decals seed knot --count 2000 -o seeds.json
+
+implicit-decals seed bunny.ply --spacing 0.02 --sizing touching --along curvature -o seeds.csv
+""",
     "polygonize": """Write an implicit model's surface as a triangle mesh.
 
 For instance:

@@ -29,6 +29,9 @@ HARDENING = (0.5, 0.8)
 REFILLS = (0.1, 0.8, 0.05)
 """First and last part of the schedule at which crowded particles move to bare places, and the step."""
 
+RARELY = 6
+"""Steps at least between two such times, for the moved to find their rest."""
+
 SCOUTS_PER_MOVER, SCOUTS_PER_PARTICLE = 200, 4
 """Samples among which bare places are found: so many for each that must move, at most so many for each."""
 
@@ -110,7 +113,8 @@ class Relaxation:
         order = np.argsort(joined.surface_ids, kind="stable")
         self._fixed: Flags = (np.arange(count) < len(placed))[order]
         self._sites = joined[order]
-        self._refills = {int(part * iterations) for part in np.arange(*REFILLS)} - {0}
+        first, last, step = (int(part * iterations) for part in REFILLS)
+        self._refills = set(range(max(first, 1), last + 1, max(step, RARELY)))
         self._repulsion: Repulsion | None = None
         self._sizes = self.sizes_at(self.positions)
 

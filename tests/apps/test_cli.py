@@ -48,7 +48,7 @@ def test_version(capsys: Capture) -> None:
 def test_help_names_the_commands_and_their_options(capsys: Capture) -> None:
     assert run(["--help"]) == 0
     listing = capsys.readouterr().out
-    assert all(name in listing for name in ("demo", "render", "polygonize", "doctor"))
+    assert all(name in listing for name in ("demo", "render", "seed", "polygonize", "doctor"))
     assert run(["render", "--help"]) == 0
     page = capsys.readouterr().out
     options = (
@@ -62,6 +62,42 @@ def test_help_names_the_commands_and_their_options(capsys: Capture) -> None:
         "implicit-decals render knot",
     )
     assert all(option in page for option in options)
+
+
+def test_seeds_as_rows_and_as_arrays(folder: Path) -> None:
+    wish = ["seed", "spheres", "--count", "25", "--images", "3", "--seed", "4"]
+    assert run([*wish, "-o", "seeds.json"]) == 0
+    assert run([*wish, "-o", "seeds.csv"]) == 0
+    arrays = json.loads((folder / "seeds.json").read_text())
+    assert [len(arrays[name]) for name in ("positions", "normals", "tangents", "radii", "images")] == [25] * 5
+    header, *rows = (folder / "seeds.csv").read_text().splitlines()
+    assert header == "x,y,z,nx,ny,nz,tx,ty,tz,radius,image"
+    table = np.array([row.split(",") for row in rows], float)
+    assert np.allclose(table[:, :3], arrays["positions"], rtol=1e-6)
+    assert table[:, 10].tolist() == arrays["images"]
+
+
+def test_seeds_by_spacing_and_rule(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    rules = ["--spacing", "0.2", "--sizing", "touching", "--along", "cross", "--factor", "0.5"]
+    assert run(["seed", "ball.ply", *rules, "-o", "seeds.json"]) == 0
+    radii = np.array(json.loads((folder / "seeds.json").read_text())["radii"])
+    assert len(radii) == pytest.approx(np.pi / (0.2**2 * np.sqrt(0.75)), abs=3)
+    assert np.median(radii) == pytest.approx(0.25 * 0.2, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("wish", "says"),
+    [
+        (["--count", "5", "--spacing", "0.1", "-o", "a.json"], "--count or --spacing"),
+        (["--count", "-1", "-o", "a.json"], "--count: expected"),
+        (["--spacing", "0", "-o", "a.json"], "spacing: expected a length above 0"),
+        (["-o", "a.png"], "expected an output file"),
+    ],
+)
+def test_seeds_that_cannot_be(folder: Path, capsys: Capture, wish: list[str], says: str) -> None:
+    assert run(["seed", "spheres", *wish]) == 2
+    assert says in capsys.readouterr().err
 
 
 def test_render_a_mesh_and_a_blob_together(folder: Path, capsys: Capture) -> None:

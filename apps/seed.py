@@ -1,0 +1,111 @@
+"""``implicit-decals seed``: where decals would lie, as data."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from blobtree.io import write_atomically
+from decals.model import Decals
+from decals.orientation import Orientation
+from decals.scene import Scene
+from decals.seeding import seed as seed_decals
+from decals.sizing import Sizing
+
+from .errors import UsageError
+from .models import load_models
+from .options import MAX_DECALS, MAX_SEED, check_count
+from .output import check_output
+from .progress_bars import progress_bars
+from .warp_start import start_warp
+
+COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
+SUFFIXES = (".json", ".csv")
+
+
+def seed(
+    model: Annotated[list[str], Parameter(negative=())],
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    count: Annotated[int | None, Parameter(show_default=False)] = None,
+    spacing: Annotated[float | None, Parameter(show_default=False)] = None,
+    sizing: Sizing = Sizing.COVERING,
+    factor: float = 1.0,
+    along: Annotated[Orientation | None, Parameter(show_default=False)] = None,
+    images: int = 1,
+    seed: int = 0,
+) -> None:
+    """Spread seeds over models and write the decals that lie on them.
+
+    Several models keep their own coordinates; where they touch, seeds push each other.
+
+    Parameters
+    ----------
+    model
+        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, or samples (creature, dragon, horse, knot,
+        spheres).
+    output
+        The decals: json, an object of arrays, or csv, a row for each.
+    count
+        How many. Default: 500.
+    spacing
+        Distance of neighbours in the models' units, in place of the count.
+    sizing
+        How large decals are: covering leaves no gap, touching no overlap, delaunay is the paper's rule.
+    factor
+        Radii times this.
+    along
+        Where images point: curvature, or cross for a smooth field of quarter turns. Default: at random.
+    images
+        How many images decals choose among at random.
+    seed
+        The same number gives the same decals.
+    """
+    if count is not None and spacing is not None:
+        raise UsageError("expected --count or --spacing, got both; leave one of them out")
+    if count is None and spacing is None:
+        count = 500
+    if count is not None:
+        check_count("--count", count, 0, MAX_DECALS)
+    check_count("--images", images, 1, MAX_DECALS)
+    check_count("--seed", seed, 0, MAX_SEED)
+    check_output(output, SUFFIXES)
+    start_warp()
+    objects = load_models(model)
+    if isinstance(objects, Scene):
+        raise UsageError("a saved scene brings its own decals; seed its models instead")
+    with progress_bars() as progress:
+        decals = seed_decals(
+            [item.surface for item in objects],
+            count=count,
+            spacing=spacing,
+            sizing=sizing,
+            factor=factor,
+            direction=along,
+            images=images,
+            seed=seed,
+            progress=progress,
+        )
+    write_decals(decals, output)
+
+
+def write_decals(decals: Decals, path: Path) -> None:
+    """Write where decals lie as the kind of file that the extension names."""
+    arrays = [
+        decals.positions,
+        decals.normals,
+        decals.tangents,
+        decals.radii[:, None],
+        decals.images[:, None],
+    ]
+    if path.suffix.lower() == ".csv":
+        rows = np.hstack([array.astype(object) for array in arrays])
+        lines = [",".join(COLUMNS), *(",".join(map(str, row)) for row in rows)]
+        text = "\n".join(lines) + "\n"
+    else:
+        names = ("positions", "normals", "tangents", "radii", "images")
+        text = json.dumps({name: getattr(decals, name).tolist() for name in names}) + "\n"
+    write_atomically(path, text.encode())
