@@ -1,7 +1,7 @@
 """What the implicit engine costs: ``python -m tests.bench.blobtree [--json PATH] [--quick]``.
 
-The scene: N points of influence s = 0.6 N^(−1/3), uniform in the unit cube, summed; (R + 1)³ samples. Times
-are medians of whole pipelines in process, from the nodes to the triangles, compiles excluded. The rival stamps
+The scene: N points of influence s = 0.6 N^(−1/3), uniform in the unit cube, summed; (R + 1)³ samples.
+Times are medians of whole pipelines in process, nodes to triangles, compiles excluded. The rival stamps
 each point's box with NumPy and contours with vtkFlyingEdges3D: it can only sum points, and it is fast.
 """
 
@@ -189,9 +189,7 @@ def main() -> None:
     for name, number in figures.items():
         print(f"  {name:20} {number:12.6g}")
     print(f"Others, quoted: {PEERS}.")
-    print(
-        "Not measured: quality_cost (there is no plain marching cubes on these cells), remesh_ms (no local edits yet)."
-    )
+    print("Not there: quality_cost (no plain marching cubes on these cells), remesh_ms (no local edits yet).")
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 
