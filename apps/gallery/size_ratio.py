@@ -1,0 +1,34 @@
+"""A large decal among small ones, in the contact modes paper, smooth and radial."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from decals.contact import Contact
+from decals.model import Decals
+from decals.scene import Scene
+
+from .panels import Panel, main
+from .stage import checker, plane, straight_down
+
+
+def panels() -> Sequence[Panel]:
+    """Press small decals into the rim of a large one."""
+    angles = np.arange(9) * (2 * np.pi / 9)
+    around = (
+        np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * (0.45 + 0.04 * np.arange(9))[:, None]
+    )
+    positions = np.concatenate([np.zeros((1, 3)), around]).astype(np.float32)
+    count = len(positions)
+    decals = Decals(
+        positions=positions,
+        normals=np.tile(np.float32([0, 0, 1]), (count, 1)),
+        tangents=np.tile(np.float32([1, 0, 0]), (count, 1)),
+        radii=np.array([0.85, *(0.10 + 0.012 * np.arange(9))], np.float32),
+    )
+    scene = Scene(objects=(plane(),), camera=straight_down(), images=(checker(10),), decals=decals)
+    return [Panel(scene, contact=mode) for mode in Contact]
+
+
+if __name__ == "__main__":
+    main(panels)
