@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .camera import Camera
     from .contact import Contact
     from .cover import cover
+    from .editor import DecalEditor
     from .errors import (
         DecalsError,
         InvalidDecals,
@@ -42,6 +43,7 @@ __all__ = [
     "BUILTIN_IMAGES",
     "Camera",
     "Contact",
+    "DecalEditor",
     "DecalImage",
     "DecalIndex",
     "Decals",
@@ -81,6 +83,7 @@ _HOMES = {
     "camera": ("Camera",),
     "contact": ("Contact",),
     "cover": ("cover",),
+    "editor": ("DecalEditor",),
     "errors": (
         "DecalsError",
         "InvalidDecals",

@@ -28,7 +28,8 @@ LEVEL_SHIFT = 24
 EMPTY = -1
 
 HALF_OF_CELLS = wp.constant(wp.float64(HALF_RANGE))
-GROWTH = wp.constant(wp.float64(REACH * (1.0 + SLACK)))
+REACH_WITH_SLACK = REACH * (1.0 + SLACK)
+GROWTH = wp.constant(wp.float64(REACH_WITH_SLACK))
 ZERO = wp.constant(wp.float64(0.0))
 ONE = wp.constant(wp.float64(1.0))
 HALF = wp.constant(wp.float64(0.5))

@@ -58,6 +58,17 @@ class DataTexture:
         flat = np.frombuffer(self.texture.read(), self._kind)
         return flat[: self.count * math.prod(self._shape)].reshape(-1, *self._shape)
 
+    def write(self, first: int, array: NDArray[Any]) -> None:
+        """Write over the elements from ``first`` on: their bytes alone go to the card."""
+        done = 0
+        while done < len(array):
+            x, y = (first + done) % WIDTH, (first + done) // WIDTH
+            left = len(array) - done
+            width, height = (WIDTH, left // WIDTH) if x == 0 and left >= WIDTH else (min(WIDTH - x, left), 1)
+            part = np.ascontiguousarray(array[done : done + width * height], self._kind)
+            self.texture.write(part, viewport=(x, y, width, height))
+            done += width * height
+
     def use(self, unit: int) -> None:
         """Bind the texture to a unit."""
         self.texture.use(unit)

@@ -5,6 +5,7 @@ from functools import cache
 from blobtree.glsl import translate_library
 from blobtree.kernels import RIM
 from decals.contact import Contact
+from decals.editor import DecalEditor
 from decals.index import DecalIndex
 from decals.mapping import tangent_coordinates
 from decals.model import Decals
@@ -22,16 +23,44 @@ FUNCTIONS = (owner_at, owner_below, number_below, complement_at, uv_at, tangent_
 class DecalData:
     """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
 
-    def __init__(self, context: Context, decals: Decals) -> None:
-        index = DecalIndex.of(decals)
+    def __init__(self, context: Context, decals: Decals | DecalEditor) -> None:
+        self._context = context
+        if isinstance(decals, DecalEditor):
+            decals.take_changes()
+            arrays, index = decals.arrays, decals.index
+        else:
+            index = DecalIndex.of(decals)
+            arrays = {
+                "decal_records": decals.packed(),
+                "index_levels": index.levels,
+                "index_table": index.table,
+                "index_ids": index.ids,
+            }
+        self._textures = {name: DataTexture(context, array) for name, array in arrays.items()}
+        self._describe(decals, index)
+
+    def _describe(self, decals: Decals | DecalEditor, index: DecalIndex) -> None:
         self.layered = decals.layered
-        self._textures = {
-            "decal_records": DataTexture(context, decals.packed()),
-            "index_levels": DataTexture(context, index.levels),
-            "index_table": DataTexture(context, index.table),
-            "index_ids": DataTexture(context, index.ids),
-        }
         self._numbers = {"index_level_count": index.level_count, "index_mask": index.mask}
+
+    def update(self, editor: DecalEditor) -> int:
+        """Bring over what an editor changed since the last time; the number of bytes that went to the card.
+
+        These must be the data of the same editor, from the beginning.
+        """
+        sent = 0
+        for name, ranges in editor.take_changes().items():
+            array = editor.arrays[name]
+            if self._textures[name].count != len(array):
+                self._textures[name].release()
+                self._textures[name] = DataTexture(self._context, array)
+                sent += array.nbytes
+                continue
+            for first, end in ranges:
+                self._textures[name].write(first, array[first:end])
+                sent += array[first:end].nbytes
+        self._describe(editor, editor.index)
+        return sent
 
     def use(self, program: Program, first_unit: int) -> None:
         """Bind everything for a program, textures from a unit on."""
