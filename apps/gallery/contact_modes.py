@@ -25,8 +25,8 @@ def crowd(radius: float) -> Scene:
     count = len(positions)
     decals = Decals(
         positions=positions,
-        normals=np.tile(np.float32([0, 0, 1]), (count, 1)),
-        tangents=np.tile(np.float32([1, 0, 0]), (count, 1)),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
+        tangents=np.tile(np.array([1, 0, 0], np.float32), (count, 1)),
         radii=np.full(count, radius, np.float32),
     )
     return Scene(objects=(plane(),), camera=straight_down(), images=(checker(6),), decals=decals)

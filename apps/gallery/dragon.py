@@ -60,7 +60,7 @@ def _over(item: SceneObject, places: NDArray[np.float32], radius: float, *, imag
         radii=np.full(count, radius, np.float32),
         images=np.full(count, image, np.int32),
         interactions=np.full(count, Interaction.OVERLAP, np.int32),
-        tints=np.tile(np.float32(_IVORY if image == PLAIN else (1, 1, 1)), (count, 1)),
+        tints=np.tile(np.array(_IVORY if image == PLAIN else (1, 1, 1), np.float32), (count, 1)),
     )
 
 

@@ -43,8 +43,8 @@ def _lattice(side: int, step: float, *, z_turn: float) -> Decals:
     count = side * side
     return Decals(
         positions=np.column_stack([x, y, np.zeros(count)]).astype(np.float32),
-        normals=np.tile(np.float32([0, 0, 1]), (count, 1)),
-        tangents=np.tile(np.float32([np.cos(z_turn), np.sin(z_turn), 0]), (count, 1)),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
+        tangents=np.tile(np.array([np.cos(z_turn), np.sin(z_turn), 0], np.float32), (count, 1)),
         radii=np.full(count, 0.72 * step, np.float32),
     )
 

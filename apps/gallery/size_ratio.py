@@ -22,8 +22,8 @@ def panels() -> Sequence[Panel]:
     count = len(positions)
     decals = Decals(
         positions=positions,
-        normals=np.tile(np.float32([0, 0, 1]), (count, 1)),
-        tangents=np.tile(np.float32([1, 0, 0]), (count, 1)),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
+        tangents=np.tile(np.array([1, 0, 0], np.float32), (count, 1)),
         radii=np.array([0.85, *(0.10 + 0.012 * np.arange(9))], np.float32),
     )
     scene = Scene(objects=(plane(),), camera=straight_down(), images=(checker(10),), decals=decals)

@@ -1,11 +1,15 @@
 """What the examples share: simple meshes, test images and cameras."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from decals.camera import Camera, Vector
 from decals.mesh_file import MeshArrays
 from decals.scene import DecalImage, MeshObject
+
+Floats = NDArray[np.floating[Any]]
 
 CLAY = (0.74, 0.71, 0.66)
 
@@ -18,7 +22,8 @@ def plane(half: float = 1.0) -> MeshObject:
 
 def box(half: float = 0.8) -> MeshArrays:
     """Make a cube whose edges are sharp: each face has its own corners."""
-    vertices, faces = [], []
+    vertices: list[Floats] = []
+    faces: list[list[int]] = []
     for axis in range(3):
         for side in (-1.0, 1.0):
             u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
@@ -46,7 +51,8 @@ def plate(hole: float = 0.3, *, half: float = 1.0, thickness: float = 0.3, aroun
         (outer, low, inner, low),
         (inner, low, inner, top),
     ]
-    vertices, faces = [], []
+    vertices: list[Floats] = []
+    faces: list[list[int]] = []
     for first, z_first, second, z_second in strips:
         base = sum(len(part) for part in vertices)
         for points, z in ((first, z_first), (second, z_second)):
