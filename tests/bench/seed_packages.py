@@ -62,7 +62,7 @@ def _libigl(module: Any) -> Callable[[Any, Any, int], Any]:
     def sample(vertices, faces, count):
         corners = vertices[faces]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        radius = 0.82 * np.sqrt(0.5 * area.sum() * 2 / (np.sqrt(3) * count))  # fills to about the count
+        radius = 0.752 * np.sqrt(0.5 * area.sum() * 2 / (np.sqrt(3) * count))  # fills to about the count
         return module.blue_noise(vertices, faces.astype(np.int64), radius)[2]
 
     return sample
