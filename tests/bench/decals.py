@@ -19,10 +19,12 @@ import numpy as np
 import warp as wp
 
 from decals.contact import Contact
+from decals.editor import DecalEditor
 from decals.index import DecalIndex
 from decals.mapping import Mapping
 from decals.model import Decals
 from decals.render import Renderer
+from decals.render.decal_data import DecalData
 from decals.scene import Scene
 from tests.bench.scenes import bench_scene
 from tests.decals import test_contact, test_mapping, test_radial
@@ -65,6 +67,20 @@ def index(decals: Decals) -> Figures:
     """Seconds to index 100,000 decals on the processor."""
     DecalIndex.of(decals)
     return {"index_100k_s": median_seconds(lambda: DecalIndex.of(decals))}
+
+
+def edits(decals: Decals) -> Figures:
+    """Median milliseconds to move one decal of 100,000: records, index, and what goes to the card."""
+    editor, times, sent = DecalEditor(decals), [], []
+    with Renderer() as renderer, renderer.context.current():
+        data = DecalData(renderer.context, editor)
+        for number in range(0, len(decals), len(decals) // 100):
+            begin = time.perf_counter()
+            editor.change(number, positions=editor[number].positions * np.float32(1.0001))
+            sent.append(data.update(editor))
+            times.append(time.perf_counter() - begin)
+        data.release()
+    return {"edit_100k_ms": 1e3 * statistics.median(times), "edit_100k_bytes": statistics.median(sent)}
 
 
 def contact(points: int) -> Figures:
@@ -143,6 +159,7 @@ def measure(*, quick: bool) -> Figures:
     parts: list[Callable[[], Figures]] = [
         lambda: frames(size, few, many),
         lambda: index(many.decals),
+        lambda: edits(many.decals),
         lambda: contact(samples),
         lambda: folds(samples),
         lambda: mapping(some),
