@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .seeding import seed
     from .sizing import Sizing
     from .surface import Surface
+    from .vertex_density import vertex_density
 
 __all__ = [
     "BUILTIN_IMAGES",
@@ -77,6 +78,7 @@ __all__ = [
     "read_mesh",
     "save_scene",
     "seed",
+    "vertex_density",
 ]
 
 _HOMES = {
@@ -110,6 +112,7 @@ _HOMES = {
     "seeding": ("seed",),
     "sizing": ("Sizing",),
     "surface": ("Surface",),
+    "vertex_density": ("vertex_density",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

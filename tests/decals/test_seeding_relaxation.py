@@ -7,6 +7,7 @@ from decals.polishing import polish
 from decals.population import Sites, World, shares
 from decals.refilling import crowded, refill
 from decals.relaxation import Relaxation
+from decals.vertex_density import vertex_density
 from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.coats import nearest_facing, rho
 
@@ -212,6 +213,20 @@ def test_density_decides_how_many_lie_where():
     assert np.abs(counts - expected).max() < 0.02 * 2000
     assert counts == pytest.approx(expected, rel=0.05)
     assert relaxation.statistics().rho > 0.8
+
+
+def test_density_on_vertices():
+    ball = sphere()
+    density = vertex_density(ball.vertices, np.where(ball.vertices[:, 2] > 0, 3.0, 1.0))
+    assert density(ball.vertices) == pytest.approx(np.where(ball.vertices[:, 2] > 0, 3.0, 1.0))
+    middles = ball.vertices[ball.faces].mean(axis=1)
+    assert ((density(middles) >= 1.0 - 1e-9) & (density(middles) <= 3.0 + 1e-9)).all()
+    relaxation = Relaxation([ball], count=400, density=density, iterations=80)
+    relaxation.run()
+    assert (relaxation.positions[:, 2] > 0).sum() == pytest.approx(300, abs=12)
+    for values in ([1.0], np.zeros(len(ball.vertices)), np.full(len(ball.vertices), np.nan)):
+        with pytest.raises(InvalidSeeding, match="values: expected"):
+            vertex_density(ball.vertices, values)
 
 
 def test_density_may_jump():
