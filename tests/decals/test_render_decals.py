@@ -102,6 +102,33 @@ def test_every_pixel_of_every_contact_mode(renderer: Renderer, contact: Contact,
     assert compare(view, buffers, Mapping.CORRECTED, contact).any()
 
 
+@pytest.mark.slow
+def test_every_pixel_of_two_hundred_random_scenes(renderer: Renderer) -> None:
+    """Sizes over three decades, any interaction, layer, contact and mapping, on one torus."""
+    shape = torus()
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        contact, mapping = list(Contact)[seed % 3], list(Mapping)[seed // 3 % 2]
+        radii = (0.001, 1.0) if seed % 4 == 0 else (0.05, 0.5)
+        decals = scattered(shape, int(rng.integers(1, 70)), seed, radii=radii)
+        view = view_of(in_layers(decals, seed) if seed % 2 else decals, shape)
+        buffers = renderer.buffers(view, size=(48, 36), mapping=mapping, contact=contact)
+        compare(view, buffers, mapping, contact)
+
+
+@pytest.mark.slow
+def test_no_pixel_flickers_on_an_orbit(renderer: Renderer) -> None:
+    """The topmost decal at every point seen from 360 sides is the oracle's, which knows of no camera."""
+    shape = torus()
+    view = view_of(in_layers(scattered(shape, 60, 10, radii=(0.1, 0.5)), 10), shape)
+    for degrees in range(360):
+        angle = np.radians(degrees)
+        direction = (float(np.cos(angle)), float(np.sin(angle)), 0.8)
+        camera = Camera.fitting(shape.vertices, direction=direction, up=(0, 0, 1))
+        turned = View((shape,), camera, view.decals, view.images)
+        compare(view, renderer.buffers(turned, size=(48, 36)), Mapping.CORRECTED)
+
+
 @pytest.mark.parametrize("count", [64, 500])
 def test_pixels_under_many_decals_have_all_their_colours(renderer: Renderer, count: int) -> None:
     """A wall under translucent plain decals: the light of one colour, composed by hand."""
