@@ -35,6 +35,15 @@ DecalHit decal_hit(int owner, vec3 q, vec3 n) {
 
 // The topmost decal.
 DecalHit decal_at(vec3 q, vec3 n) {
+    if (decal_sheet) {
+        vec2 found = sheet_at(q, n, decal_contact, decal_records,
+            index_level_count, index_levels, index_table, index_mask, index_ids);
+        int owner = int(found.x);
+        if (owner < 0) {
+            return DecalHit(-1, 0.0, vec2(0.0));
+        }
+        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.y, decal_mapping, decal_records));
+    }
     return decal_hit(owner_at(q, n, decal_contact, decal_layered, decal_records,
         index_level_count, index_levels, index_table, index_mask, index_ids), q, n);
 }

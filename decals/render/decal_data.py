@@ -14,9 +14,10 @@ from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import Program
 from decals.render.tile import set_uniform
+from decals.sheet import sheet_at
 from decals.stack import number_below
 
-FUNCTIONS = (owner_at, owner_below, number_below, complement_at, uv_at, tangent_coordinates)
+FUNCTIONS = (sheet_at, owner_at, owner_below, number_below, complement_at, uv_at, tangent_coordinates)
 """What ``shaders/decals.glsl`` calls."""
 
 
@@ -83,5 +84,6 @@ def library(contact: Contact, *, layered: bool) -> str:
         f"const float RIM = {float(RIM)!r};\n"
         f"const int decal_contact = {int(contact)};\n"
         f"const bool decal_layered = {str(layered).lower()};\n"
+        f"const bool decal_sheet = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )
     return constants + translate_library(FUNCTIONS)

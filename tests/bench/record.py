@@ -123,11 +123,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench.record", description=__doc__)
     parser.add_argument("model", help="dragon, horse or knot")
     parser.add_argument("--decals", type=int, default=10_000)
+    parser.add_argument("--seeded", action="store_true", help="decals.seed, in place of a quick even coat")
     parser.add_argument("--size", default="1600x1200")
     parser.add_argument("path", type=Path)
     options = parser.parse_args()
     width, height = (int(part) for part in options.size.split("x"))
-    record(bench_scene(options.model, options.decals, (width, height)), (width, height), options.path)
+    size = width, height
+    record(bench_scene(options.model, options.decals, size, seeded=options.seeded), size, options.path)
 
 
 if __name__ == "__main__":

@@ -2,18 +2,24 @@
 
 from decals.camera import Camera
 from decals.scene import DecalImage, Scene
+from decals.seeding import seed
 from implicit_decals.apps.coats import even_coat
 from implicit_decals.apps.samples import axes_of, sample
 from implicit_decals.apps.views import frame, parse_view
 
 
-def bench_scene(model: str, count: int, size: tuple[int, int], *, image: str = "scale") -> Scene:
-    """Make a sample under `count` decals, seen so that it fills a picture of this size."""
+def bench_scene(
+    model: str, count: int, size: tuple[int, int], *, image: str = "scale", seeded: bool = False
+) -> Scene:
+    """Make a sample under `count` decals, seen so that it fills a picture of this size.
+
+    With `seeded`, the decals are those of `decals.seed`, as people have them.
+    """
     item = sample(model)
     camera: Camera = frame([item], parse_view(None, axes_of(model)), size)
     return Scene(
         objects=(item,),
         camera=camera,
-        decals=even_coat(item.surface, count=count),
+        decals=seed(item.surface, count=count) if seeded else even_coat(item.surface, count=count),
         images=(DecalImage.load(image),),
     )

@@ -1,0 +1,74 @@
+"""One walk of the index finds what two find: owner and deformation where all decals are in contact."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from decals.contact import Contact
+from decals.index import DecalIndex
+from decals.model import Decals
+from decals.ownership import complement_at, owner_at
+from decals.sheet import sheet_at
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def both_ways(
+    points: wp.array(dtype=wp.vec3),
+    contact: wp.int32,
+    decals: wp.array(dtype=wp.vec4),
+    level_count: wp.int32,
+    levels: wp.array(dtype=wp.vec4),
+    table: wp.array(dtype=wp.vec4i),
+    mask: wp.int32,
+    ids: wp.array(dtype=wp.int32),
+    once: wp.array(dtype=wp.vec2),
+    twice: wp.array(dtype=wp.vec2),
+):
+    i = wp.tid()
+    q = points[i]
+    up = wp.vec3(0.0, 0.0, 1.0)
+    once[i] = sheet_at(q, up, contact, decals, level_count, levels, table, mask, ids)
+    owner = owner_at(q, up, contact, False, decals, level_count, levels, table, mask, ids)
+    e = wp.float32(0.0)
+    if owner >= 0:
+        e = complement_at(q, up, owner, contact, False, decals, level_count, levels, table, mask, ids)
+    twice[i] = wp.vec2(float(owner), e)
+
+
+def flat(rng, count, side, radii, *, copies=1):
+    """Decals in the xy plane, each of them several times on its place."""
+    positions = np.repeat(np.column_stack([rng.uniform(-side, side, (count, 2)), np.zeros(count)]), copies, 0)
+    many = len(positions)
+    frame = np.tile([[0, 0, 1.0]], (many, 1)), np.tile([[1.0, 0, 0]], (many, 1))
+    return Decals(positions, *frame, np.repeat(np.exp(rng.uniform(*np.log(radii), count)), copies))
+
+
+@pytest.mark.parametrize("contact", [Contact.PAPER, Contact.SMOOTH])
+@pytest.mark.parametrize(
+    ("count", "side", "radii", "copies"),
+    [
+        (1, 1, (1, 1.1), 1),
+        (60, 2, (0.3, 0.5), 1),
+        (400, 2, (0.05, 0.6), 1),
+        (40, 2, (0.3, 0.6), 2),
+        (90, 0.2, (0.3, 0.6), 1),
+    ],
+)
+def test_once_is_twice(contact, count, side, radii, copies):
+    rng = np.random.default_rng(count)
+    decals = flat(rng, count, side, radii, copies=copies)
+    points = np.column_stack([rng.uniform(-side, side, (20_000, 2)), np.zeros(20_000)]).astype(np.float32)
+    points[: len(decals)] = decals.positions[: len(points)]
+    inputs = [
+        wp.array(points, dtype=wp.vec3, device="cpu"),
+        int(contact),
+        wp.array(decals.packed(), dtype=wp.vec4, device="cpu"),
+        *DecalIndex.of(decals).on("cpu").arguments(),
+    ]
+    once, twice = (wp.zeros(len(points), dtype=wp.vec2, device="cpu") for _ in range(2))
+    wp.launch(both_ways, len(points), inputs, [once, twice], device="cpu")
+    assert (twice.numpy()[:, 0] >= 0).any()
+    np.testing.assert_array_equal(once.numpy()[:, 0], twice.numpy()[:, 0])
+    np.testing.assert_allclose(once.numpy()[:, 1], twice.numpy()[:, 1], rtol=2e-6, atol=2e-7)
