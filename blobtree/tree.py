@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from .bounds import influence_bounds
 from .errors import InvalidNode
 from .evaluate import colors_at, gradients_at, values_at
+from .interval import range_over
 from .kernels import RIM
 from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
+from .outline import outline
 from .skeletons import CONE, POINT, SEGMENT, Skeleton
 from .tape import Tape, compile_tape
 from .validation import (
@@ -131,6 +133,13 @@ class Node:
     def __call__(self, points: ArrayLike) -> NDArray[np.float32]:
         """Field values (n,) at `points` (n, 3)."""
         return values_at(self.tape, points)
+
+    def interval(self, lower: ArrayLike, upper: ArrayLike) -> tuple[float, float]:
+        """Numbers that the field is never below and never above in the box between two corners (3,)."""
+        return range_over(self.tape, lower, upper)
+
+    def __str__(self) -> str:
+        return outline(self)
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float32]:
         """Exact field gradients (n, 3) at `points` (n, 3)."""
