@@ -7,6 +7,7 @@ from decals.contact import Contact
 from decals.errors import InvalidImage
 from decals.evaluate import evaluate
 from decals.model import Decals, Interaction, linear_light
+from tests.oracles.contact import RIM
 from tests.oracles.decals import colors_at, decals_at
 
 TIE = 1e-4
@@ -102,6 +103,25 @@ def test_only_contact_decals_of_one_layer_push_each_other():
             seen = evaluate(other, [[-0.3, 0, 0]], UP, contact=contact)
             assert seen.owner.tolist() == [0]
             assert seen.uv[0, 0] == pytest.approx(0.35, abs=1e-6)
+
+
+@pytest.mark.parametrize("overlap", [1.5, 2.0])
+def test_images_are_stretched_where_three_meet_in_the_papers_mode_alone(overlap):
+    """From a centre of a hexagonal tiling straight to a corner: least image per way, 1 if undeformed."""
+    angles = np.radians(np.arange(30, 390, 60))
+    around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
+    radius = overlap * RIM
+    decals = Decals(np.vstack([np.zeros(3), around]), **frame(7)).replace(radii=[radius] * 7)
+    way = np.linspace(0, 0.577, 1000)
+    points = way[:, None] * np.array([1.0, 0, 0])
+    least = {}
+    for contact in MODES:
+        samples = evaluate(decals, points, UP * 1000, contact=contact)
+        assert (samples.owner == 0).all()
+        rims = 2 * np.linalg.norm(samples.uv - 0.5, axis=1)
+        least[contact] = np.diff(rims).min() / (way[1] / radius)
+    assert least[Contact.PAPER] < 0.05
+    assert min(least[Contact.SMOOTH], least[Contact.RADIAL]) > 0.95
 
 
 def test_overlapping_decals_show_whole():
