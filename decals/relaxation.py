@@ -17,7 +17,7 @@ from decals.refilling import crowded, refill
 from decals.repulsion import Repulsion
 from decals.surface import Flags, Floats, Surface, as_points
 
-EXPONENTS = (3.0, 4.0)
+EXPONENTS = (2.0, 3.0)
 """Power law of the repulsion at the first and the last step."""
 
 STIFFNESS = 300.0

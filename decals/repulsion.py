@@ -26,7 +26,7 @@ DRIFTERS = 0.02
 ROOM = 40
 """Most neighbours of a particle."""
 
-CORE = 0.935
+CORE = 0.93
 """Distance below which the spring pushes, in spacings."""
 
 DAMPING = 0.6
