@@ -46,6 +46,11 @@ def polygonize(
         raise UsageError(f"expected a BlobTree in JSON or a sample (creature, spheres), {model!r} is none")
     with progress_bars() as progress:
         mesh = blobtree.polygonize(loaded.tree, resolution=resolution, cell_size=cell_size, progress=progress)
+        if len(mesh.faces) == 0:
+            raise UsageError(
+                f"{model!r} shows no surface in cells of this size: its parts may be smaller, or cut each "
+                "other away; take a higher --resolution"
+            )
         write_mesh(output, mesh)
 
 

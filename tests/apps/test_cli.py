@@ -299,6 +299,15 @@ def test_bad_models(bad: Callable[..., str], name: str, content: bytes, message:
     assert message in bad("render", name, "-o", "a.png")
 
 
+def test_a_tree_without_a_surface_is_no_mesh(folder: Path, capfd: Capture) -> None:
+    apart = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
+    blobtree.save(apart, folder / "nothing.json")
+    assert run(["polygonize", "nothing.json", "-o", "a.ply"]) == 2
+    lines = capfd.readouterr().err.strip().splitlines()
+    assert lines[-1].startswith("error: 'nothing.json' shows no surface")
+    assert not (folder / "a.ply").exists()
+
+
 def test_a_scene_brings_its_own_decals(bad: Callable[..., str], folder: Path) -> None:
     blob = TreeObject("blob", Point((0, 0, 0), radius=1))
     save_scene(Scene(objects=(blob,), camera=Camera((0, 0, 5))), folder / "s.json")
