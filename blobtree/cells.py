@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from .errors import InvalidResolution
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .launch import launch
@@ -32,6 +33,9 @@ SURELY_INSIDE = -2
 
 KEY_DIGITS = 10
 """Levels that a key has room for: 4¹⁰ blocks along a side."""
+
+MOST_BLOCKS = 1 << 21
+"""Blocks of a level, at most; a mesh in as many takes a few gigabytes, and 3000 cells span a ball."""
 
 Ints = NDArray[np.int32]
 Floats = NDArray[np.float32]
@@ -177,7 +181,13 @@ def build_cells(
     *,
     device: str | None = None,
 ) -> SparseCells:
-    """The sparse cells of a tape, level by level."""
+    """The sparse cells of a tape, level by level.
+
+    Raises
+    ------
+    InvalidResolution
+        The surface crosses more than MOST_BLOCKS blocks of a level.
+    """
     place = str(wp.get_device(device))
     lower, upper = (corner.astype(np.float64) for corner in bounds)
     depth = _depth(lower, upper, cell_size)
@@ -214,6 +224,11 @@ def _refine(level: Level, origin: wp.vec3, size: float, pad: float, device: str)
     launch(_measure, count, geometry, [measured], device)
     smallest, largest, texels, _ = measured.numpy().T
     chosen = np.flatnonzero((smallest <= ISO) & (largest >= ISO)).astype(np.int32)
+    if len(chosen) > MOST_BLOCKS:
+        raise InvalidResolution(
+            f"the surface crosses {len(chosen):,} blocks of {BRANCHING}³ cells, at most {MOST_BLOCKS:,} "
+            "are made; take larger cells"
+        )
     children = np.where(smallest > ISO, SURELY_INSIDE, SURELY_OUTSIDE).astype(np.int32)
     children[chosen] = np.arange(len(chosen))
     needed = texels[chosen].astype(np.int64) + 1

@@ -177,6 +177,7 @@ def test_the_same_call_gives_the_same_mesh() -> None:
         ({"cell_size": float("inf")}, "cell_size: expected a finite size above 0, got inf"),
         ({"cell_size": 1e-12}, "take larger cells"),
         ({"resolution": 10**9}, "take larger cells"),
+        ({"resolution": 20_000}, "take larger cells"),
     ],
 )
 def test_senseless_sizes_are_refused(options: dict[str, float], message: str) -> None:
