@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree.launch import launch
 from decals.errors import InvalidMesh
 from decals.mesh_queries import closest_points, first_hits, inside_flags
+from decals.model import LARGEST
 from decals.surface import Flags, Floats, as_points, as_rays, frozen
 
 Faces = NDArray[np.int32]
@@ -28,14 +29,14 @@ class MeshSurface:
     Parameters
     ----------
     vertices
-        ``float[n, 3]``, finite.
+        ``float[n, 3]``, finite and within ±LARGEST.
     faces
         ``int[m, 3]``, indices into the vertices, counter-clockwise seen from outside.
 
     Raises
     ------
     InvalidMesh
-        For wrong shapes, NaN or infinite vertices, indices out of range, no faces, no area.
+        For wrong shapes, NaN, infinite or huge vertices, indices out of range, no faces, no area.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
@@ -169,7 +170,8 @@ def _shared(rows: Floats) -> wp.array[wp.vec3]:
 
 def _as_vertices(vertices: ArrayLike) -> Floats:
     try:
-        array = np.array(vertices, dtype=np.float32, order="C")
+        with np.errstate(over="ignore"):  # what overflows is refused below
+            array = np.array(vertices, dtype=np.float32, order="C")
     except (TypeError, ValueError) as error:
         raise InvalidMesh(
             f"vertices: expected numbers of shape [n, 3], got {type(vertices).__name__}"
@@ -180,6 +182,12 @@ def _as_vertices(vertices: ArrayLike) -> Floats:
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise InvalidMesh(
             f"vertices: expected finite numbers, got {array[row]} in row {row}; repair the mesh"
+        )
+    if np.abs(array).max() > LARGEST:
+        row = int(np.abs(array).max(axis=1).argmax())
+        raise InvalidMesh(
+            f"vertices: expected coordinates within ±{LARGEST:g}, got {array[row]} in row {row}; "
+            "rescale the model"
         )
     return array
 

@@ -45,6 +45,7 @@ SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""
 
 Triple = tuple[float, float, float]
+Whole = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]
 SampleLoader = Callable[[str], MeshArrays]
 """Gives the vertices and faces of a sample mesh by its name."""
 
@@ -88,10 +89,10 @@ class _DecalRecord(Struct, forbid_unknown_fields=True):
     normal: Triple
     tangent: Triple
     radius: float
-    image: Annotated[int, Meta(ge=PLAIN)] = 0
+    image: Annotated[int, Meta(ge=PLAIN, le=2**31 - 1)] = 0
     spill: bool = False
     interaction: Literal["independent", "contact", "overlap"] | UnsetType = UNSET
-    layer: int | UnsetType = UNSET
+    layer: Whole | UnsetType = UNSET
     tint: Triple | UnsetType = UNSET
     opacity: float | UnsetType = UNSET
 
@@ -324,9 +325,8 @@ def _given(value: Any, default: Any) -> Any:
     return default if value is UNSET else value
 
 
-def _whole(values: Iterable[int]) -> Any:
-    """Give whole numbers of any size, which `Decals` checks."""
-    return np.array(list(values), np.int64)
+def _whole(values: Iterable[int]) -> NDArray[np.int32]:
+    return np.array(list(values), np.int32)
 
 
 def _rows(array: NDArray[np.float64]) -> list[Any]:
@@ -342,13 +342,18 @@ def _decimals(array: NDArray[np.float32]) -> NDArray[np.float64]:
 def _decals(records: list[_DecalRecord]) -> Decals:
     if not records:
         return Decals.empty()
+    with np.errstate(over="ignore"):  # what overflows float32 is refused as infinite
+        return _checked_decals(records)
+
+
+def _checked_decals(records: list[_DecalRecord]) -> Decals:
     try:
         return Decals(
             positions=np.array([record.position for record in records], np.float32),
             normals=np.array([record.normal for record in records], np.float32),
             tangents=np.array([record.tangent for record in records], np.float32),
             radii=np.array([record.radius for record in records], np.float32),
-            images=np.array([record.image for record in records], np.int32),
+            images=_whole(record.image for record in records),
             spill=np.array([record.spill for record in records], np.bool_),
             interactions=_whole(_INTERACTIONS[_given(r.interaction, "contact")] for r in records),
             layers=_whole(_given(record.layer, 0) for record in records),

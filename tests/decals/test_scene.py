@@ -202,6 +202,11 @@ def _broken(change: str, value: object) -> bytes:
         ("decals.3.radius", None, r"\$\.decals\[3\]\.radius"),
         ("decals.3.normal", [0.0, 0.0, 0.0], "normals"),
         ("decals.3.image", -2, r"\$\.decals\[3\]\.image"),
+        ("decals.3.image", 2**31, r"\$\.decals\[3\]\.image"),
+        ("decals.3.image", 2**64, r"\$\.decals\[3\]\.image"),
+        ("decals.3.layer", 2**64, r"\$\.decals\[3\]\.layer"),
+        ("decals.3.position", [1e39, 0.0, 0.0], "positions"),
+        ("decals.3.radius", 1e308, "radii"),
         ("decals.3.interaction", "stick", r"\$\.decals\[3\]\.interaction"),
         ("decals.3.layer", 1.5, r"\$\.decals\[3\]\.layer"),
         ("decals.3.layer", 10**9, "layers"),
@@ -255,6 +260,10 @@ def test_scene_refuses_decals_without_their_image() -> None:
 def test_objects_are_checked() -> None:
     with pytest.raises(InvalidMesh, match="finite"):
         MeshObject("m", CORNERS * np.float32(np.nan), FACES)
+    with pytest.raises(InvalidMesh, match="rescale"):
+        MeshObject("m", CORNERS * np.float32(1e20), FACES)
+    with pytest.raises(InvalidMesh, match="finite"):
+        MeshObject("m", CORNERS.astype(np.float64) * 1e300, FACES)
     with pytest.raises(InvalidMesh, match="area"):
         MeshObject("m", CORNERS * 0, FACES)
     with pytest.raises(InvalidScene, match="BlobTree"):
