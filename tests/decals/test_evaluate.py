@@ -140,6 +140,12 @@ def test_ties_go_to_the_lowest_number_and_show_the_rim():
     assert samples.field == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("radii", [(0.1, 2.0), (2.0, 0.1)])
+def test_ties_between_unlike_sizes_go_to_the_lowest_number_too(radii):
+    decals = Decals([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, radii)
+    assert evaluate(decals, [[0, 0, 0]], [[0, 0, 1]]).owner.tolist() == [0]
+
+
 def test_index_and_brute_force_agree_to_the_bit():
     """One cell that holds everything gives what the index gives: culling changes nothing."""
     rng = np.random.default_rng(11)

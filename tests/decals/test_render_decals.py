@@ -273,6 +273,19 @@ def test_a_fine_pattern_averages_to_grey(renderer: Renderer, pixels: int) -> Non
     np.testing.assert_allclose(fine.astype(int), flat, atol=3)
 
 
+@pytest.mark.parametrize(("block", "spread"), [(2, (0, 8)), (8, (60, 128))])
+def test_images_are_read_at_the_size_of_a_pixel(
+    renderer: Renderer, block: int, spread: tuple[float, float]
+) -> None:
+    """Squares of half a pixel a side leave nothing; those of two pixels a side stay black and white."""
+    board = np.zeros((256, 256, 4), np.uint8)
+    board[..., 3] = 255
+    board[((np.indices((256, 256)) // block).sum(axis=0) % 2).astype(bool), :3] = 255
+    seen = renderer.render(wall(board), size=(61, 61), samples=1)[16:45, 16:45, 0].astype(float)
+    print(block, seen.std())
+    assert spread[0] <= seen.std() <= spread[1]
+
+
 def test_an_opaque_decal_looks_like_an_object_of_its_colour(renderer: Renderer) -> None:
     image = np.full((4, 4, 4), 255, np.uint8)
     image[..., :3] = 200, 90, 40

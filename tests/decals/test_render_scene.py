@@ -16,7 +16,6 @@ from decals.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.seeding import seed
 from tests.decals.shapes import torus
 from tests.decals.test_render_decals import compare
-from tests.oracles.decals import decals_at
 from tests.oracles.raster import edges
 
 SIZE = (96, 72)
@@ -87,14 +86,15 @@ def test_a_mesh_of_the_tree_shows_the_same_decals(renderer: Renderer, both: Scen
     mesh = polygonize(TREE, resolution=96)
     traced = framed(TreeObject("blob", TREE), decals=both.decals)
     meshed = traced.replace(objects=[MeshObject("blob", mesh.vertices, mesh.faces)])
-    first, second = (renderer.buffers(scene, size=SIZE) for scene in (traced, meshed))
-    inside = (first.object_id == 0) & (second.object_id == 0)
-    steady = decals_at(both.decals, first.position[inside], first.normal[inside]).doubt > 0.05
-    same = (first.owner == second.owner)[inside]
-    assert steady.mean() > 0.5
-    assert same[steady].mean() > 0.995
-    error = np.abs(first.uv - second.uv)[inside].max(axis=-1)
-    assert np.quantile(error[steady & same], 0.98) < 0.02
+    first, second = (renderer.buffers(scene, size=(320, 240)) for scene in (traced, meshed))
+    assert ((first.object_id == 0) != (second.object_id == 0)).mean() < 1e-3
+    inside = (first.object_id == 0) & (second.object_id == 0) & ~edges(first.object_id == 0)
+    assert inside.mean() > 0.2
+    same = inside & (first.owner == second.owner)
+    assert same.sum() > 0.998 * inside.sum()
+    error = np.abs(first.uv - second.uv)[same].max(axis=-1)
+    assert np.quantile(error, 0.98) < 0.006
+    assert np.quantile(error, 0.999) < 0.02
 
 
 def test_pictures(renderer: Renderer, both: Scene) -> None:
