@@ -1,7 +1,7 @@
 """Where all decals are contact decals of one layer: owner and deformation in one walk of the index.
 
 The walk that finds the owner keeps the complements that it meets, so that no second one is needed to know the
-neighbours' pushes. Shaders keep them in three vectors, which are registers; an indexed array would be memory.
+neighbours' pushes. Shaders keep them in two vectors, which are registers; an indexed array would be memory.
 """
 
 # mypy: ignore-errors
@@ -16,7 +16,7 @@ from decals.records import complement_of
 
 wp.set_module_options({"enable_backward": False})
 
-KEPT = 12
+KEPT = 8
 """Complements that are kept; where more decals act, the index is walked a second time."""
 
 
@@ -59,14 +59,12 @@ def sheet_at(
     count = wp.int32(0)
     a = wp.vec4(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
     b = wp.vec4(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
-    c = wp.vec4(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
     for level in range(level_count):
         span = cell_range(q, level, levels, table, mask, ids)
         for j in range(span[0], span[1]):
             decal = ids[j]
             e = complement_of(q, n_q, decal, decals)
             if e < 1.0:
-                c = wp.vec4(b[3], c[0], c[1], c[2])
                 b = wp.vec4(a[3], b[0], b[1], b[2])
                 a = wp.vec4(e, a[0], a[1], a[2])
                 count += 1
@@ -87,7 +85,6 @@ def sheet_at(
     push = wp.float32(0.0)
     push = add_pushes(push, a, least, contact)
     push = add_pushes(push, b, least, contact)
-    push = add_pushes(push, c, least, contact)
     if ties > 1:  # on a line of contact
         push = 1.0
     return wp.vec2(float(owner), contact_complement(least, push))
