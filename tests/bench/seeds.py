@@ -43,6 +43,10 @@ REPEATS = {1_000: 5, 10_000: 3}
 """How often each figure is taken, once for other counts; medians are shown."""
 
 
+EQUAL = 0.01
+"""Packages whose rho differs by less are as even; the fastest of the most even ones is the rival."""
+
+
 @dataclass(frozen=True)
 class Figures:
     """One row of the table."""
@@ -182,10 +186,13 @@ def bench(
                 f"s_{name}_{count}": last.seconds,
             }
             if others:
-                best = max(others, key=lambda row: row.spacing.rho)
-                met = ours(surfaces, count, HURRY, repeats, device, until=best.spacing.rho)
+                most = max(row.spacing.rho for row in others)
+                best = min(
+                    (row for row in others if row.spacing.rho > most - EQUAL), key=lambda row: row.seconds
+                )
+                met = ours(surfaces, count, HURRY, repeats, device, until=most)
                 show("implicit-decals, as even as the best", met)
-                ratios.append(best.seconds / met.seconds if met.spacing.rho >= best.spacing.rho else 0.0)
+                ratios.append(best.seconds / met.seconds if met.spacing.rho >= most else 0.0)
         if ratios:
             figures[f"speedup_{count}"] = statistics.median(ratios)
             print(f"time of the most even package over ours, {count}: {figures[f'speedup_{count}']:.1f}")
