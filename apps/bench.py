@@ -24,6 +24,7 @@ from .warp_start import start_warp
 
 RUNS = 3
 """Runs of which the median counts."""
+_WIDTH = 100  # columns below which numbers would be cut off
 MODELS = "dragon,knot,horse,spheres"
 COUNTS = "100,1000,10000,100000"
 
@@ -79,7 +80,9 @@ def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str = MODELS
             for step, name in enumerate(names):
                 progress("Measuring", step / len(names))
                 rows += measure(renderer, name, numbers, pixels)
-        Console().print(as_table(rows, f"{renderer.context.name}, {size}, {renderer.entry} shader"))
+        Console(width=max(Console().width, _WIDTH)).print(
+            as_table(rows, f"{renderer.context.name}, {size}, {renderer.entry} shader")
+        )
 
 
 def measure(renderer: Renderer, model: str, counts: Sequence[int], size: Size) -> list[Row]:
