@@ -8,10 +8,11 @@ value, gradient and colour as the whole one at every point of the cube.
 
 import warp as wp
 
-from .interpreter import closest, slimmest, stride, to_local, warp_forward, warp_stretch
+from .dispatch import closest, slimmest, stride, warp_forward, warp_stretch
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import falloff_range
 from .operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
+from .readings import to_local
 from .skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
 from .tape import POP, PREFIX, PUSH, REGISTERS, STRETCHED, UNWARP, WARP, WARP_REGISTERS
 

@@ -9,21 +9,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from blobtree.dispatch import partials, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.evaluate import field_bound, field_gradient
 from blobtree.glsl import translate_choice, translate_library
-from blobtree.interpreter import (
-    BOUND,
-    COLOR,
-    GRADIENT,
-    Reading,
-    partials,
-    slope,
-    to_local,
-    warp_forward,
-    warp_pullback,
-    warp_stretch,
-)
 from blobtree.operators import OPERATORS
+from blobtree.readings import BOUND, COLOR, GRADIENT, Reading, to_local
 from blobtree.skeletons import SKELETONS
 from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.trace import trace_ray

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import Node, Point, Segment
+from blobtree.dispatch import partials, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.evaluate import bounds_at, colors_at, gradients_at
 from blobtree.glsl import translate_library
-from blobtree.interpreter import partials, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.operators import OPERATORS
 from blobtree.skeletons import SKELETONS
 from blobtree.trace import trace
@@ -41,7 +41,8 @@ TEXELS = 4096
 DECALS = 300
 
 MODULES = (
-    "blobtree.kernels", "blobtree.skeletons", "blobtree.operators", "blobtree.interpreter", "blobtree.trace",
+    "blobtree.kernels", "blobtree.skeletons", "blobtree.operators", "blobtree.dispatch",
+    "blobtree.readings", "blobtree.trace",
     "blobtree.warps",
     "decals.contact", "decals.mapping", "decals.lookup", "decals.radial", "decals.records", "decals.stack",
     "decals.cells", "decals.ownership",
