@@ -3,11 +3,7 @@
 The pipeline: tree → program → tape → value, gradient, colour → rays (`trace`) and triangles (`polygonize`).
 """
 
-import warp as wp
-
-wp.config.log_level = wp.LOG_WARNING
-
-from .errors import (  # noqa: E402  (Warp must be told to be quiet before the first kernel is made)
+from .errors import (
     BlobTreeError,
     InvalidFile,
     InvalidNode,
@@ -15,12 +11,12 @@ from .errors import (  # noqa: E402  (Warp must be told to be quiet before the f
     InvalidResolution,
     UntranslatableFunction,
 )
-from .io import from_json, load, save, to_json  # noqa: E402
-from .kernels import ISO, RIM  # noqa: E402
-from .polygonize import Mesh, polygonize  # noqa: E402
-from .progress import Progress  # noqa: E402
-from .tape import Tape  # noqa: E402
-from .tree import (  # noqa: E402
+from .io import from_json, load, save, to_json
+from .kernels import ISO, RIM
+from .polygonize import Mesh, polygonize
+from .progress import Progress
+from .tape import Tape
+from .tree import (
     Cone,
     Difference,
     Intersection,

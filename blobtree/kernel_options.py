@@ -4,7 +4,11 @@ import hashlib
 import inspect
 from typing import Any
 
+import warp as wp
+
 from . import kernels, operators, skeletons, warps
+
+wp.config.log_level = wp.LOG_WARNING  # no banner when Warp starts, no line per compiled module
 
 
 def _fingerprint() -> str:
