@@ -14,17 +14,15 @@ from .errors import (
 from .io import from_json, load, save, to_json
 from .kernels import ISO, RIM
 from .polygonize import Mesh, polygonize
+from .primitives import Cone, Point, Segment
 from .progress import Progress
 from .tape import Tape
 from .tree import (
-    Cone,
     Difference,
     Intersection,
     Node,
     Offset,
-    Point,
     Ricci,
-    Segment,
     Sum,
     Transform,
     Twist,

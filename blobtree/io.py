@@ -18,16 +18,14 @@ from typing import ClassVar, Literal
 import msgspec
 
 from .errors import BlobTreeError, InvalidFile
+from .primitives import Cone, Point, Segment
 from .traversal import postorder
 from .tree import (
-    Cone,
     Difference,
     Intersection,
     Node,
     Offset,
-    Point,
     Ricci,
-    Segment,
     Sum,
     Transform,
     Twist,

@@ -22,7 +22,8 @@ from .traversal import fold
 from .warps import SpaceWarp
 
 if TYPE_CHECKING:
-    from .tree import Combination, Node, Primitive, Twist
+    from .primitives import Primitive
+    from .tree import Combination, Node, Twist
 
 MOST_PRIMITIVES = 1 << 24
 """Beyond it a float32 cannot count the primitives of a run."""
@@ -187,7 +188,8 @@ def _weight(node: "Node", child_weights: list[int]) -> int:
 
 def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
     """`step`, whose node finds an empty accumulator, in smaller steps."""
-    from .tree import Combination, Primitive, Twist
+    from .primitives import Primitive
+    from .tree import Combination, Twist
 
     node, placement = _strip(step.node, step.placement)
     if isinstance(node, Primitive):
@@ -213,7 +215,7 @@ def _expand_commutative(
     step: _Emit, node: "Combination", weights: dict[int, int]
 ) -> Iterator[_Emit | Instruction]:
     """Heaviest operand first; the primitives fold in at the end, kind by kind."""
-    from .tree import Primitive
+    from .primitives import Primitive
 
     operator, parameter = _operation(node)
     subtrees: list[tuple[Node, Placement]] = []
@@ -241,7 +243,7 @@ def _expand_ordered(
     step: _Emit, node: "Combination", weights: dict[int, int]
 ) -> Iterator[_Emit | Instruction]:
     """Left operand first, unless the right one needs more registers."""
-    from .tree import Primitive
+    from .primitives import Primitive
 
     operator, parameter = _operation(node)
     left, right = node.children

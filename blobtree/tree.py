@@ -8,7 +8,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
@@ -19,28 +19,17 @@ from .bounds import influence_bounds
 from .errors import InvalidNode
 from .evaluate import colors_at, gradients_at, values_at
 from .interval import range_over
-from .kernels import RIM
 from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from .outline import outline
-from .skeletons import CONE, POINT, SEGMENT, Skeleton
 from .tape import Tape, compile_tape
 from .validation import (
     Matrix,
-    Vector,
     affine_matrix,
-    color_triple,
     finite_number,
     finite_vector,
-    positive_number,
+    settle,
 )
 from .warps import TWIST, SpaceWarp
-
-Floats = NDArray[np.float64]
-
-DEFAULT_COLOR: Vector = (0.8, 0.8, 0.8)
-
-SHORTEST_AXIS = 1e-12
-"""Squared length of an axis, over squared influence, below which a segment is a point."""
 
 LARGEST_EXPONENT = 100.0
 """Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
@@ -150,141 +139,6 @@ class Node:
         return colors_at(self.tape, points)
 
 
-class Primitive(Node):
-    """A skeleton with a radius and a colour: a leaf of the tree."""
-
-    skeleton: ClassVar[Skeleton]
-    radius: float
-    color: Vector
-
-    @property
-    def influences(self) -> tuple[float, ...]:
-        """Distances from the skeleton at which the field fades to 0, one per radius of the primitive."""
-        return (self.radius / RIM,)
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """Points whose convex hull holds the skeleton."""
-        raise NotImplementedError
-
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Parameters (n, ·, 4) on the tape, as `skeletons` describes them.
-
-        For n primitives with control points (n, k, 3) and influences (n, ·).
-        """
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Point(Primitive):
-    """A ball of `radius` around `center`."""
-
-    skeleton = POINT
-
-    center: Vector
-    _: KW_ONLY
-    radius: float
-    color: Vector = DEFAULT_COLOR
-
-    def __post_init__(self) -> None:
-        _settle(
-            self,
-            center=finite_vector("center", self.center),
-            radius=positive_number("radius", self.radius),
-            color=color_triple(self.color),
-        )
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """The centre."""
-        return (self.center,)
-
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Centre and influence."""
-        return np.concatenate([points, influences[:, :, None]], axis=2)
-
-
-@dataclass(frozen=True)
-class Segment(Primitive):
-    """A capsule of `radius` around the straight line from `start` to `end`; equal ends make a ball."""
-
-    skeleton = SEGMENT
-
-    start: Vector
-    end: Vector
-    _: KW_ONLY
-    radius: float
-    color: Vector = DEFAULT_COLOR
-
-    def __post_init__(self) -> None:
-        _settle(
-            self,
-            start=finite_vector("start", self.start),
-            end=finite_vector("end", self.end),
-            radius=positive_number("radius", self.radius),
-            color=color_triple(self.color),
-        )
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """Start and end."""
-        return (self.start, self.end)
-
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Start and influence; axis and 1 / length²."""
-        axes = points[:, 1] - points[:, 0]
-        squares = (axes**2).sum(axis=1)
-        short = squares <= SHORTEST_AXIS * influences[:, 0] ** 2
-        inverses = np.where(short, 0.0, 1.0 / np.where(short, 1.0, squares))
-        return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, inverses)], axis=1)
-
-
-@dataclass(frozen=True)
-class Cone(Primitive):
-    """A round cone: the hull of a ball of `radius` at `start` and one of `end_radius` at `end`.
-
-    Where one ball holds the other, the larger ball alone.
-    """
-
-    skeleton = CONE
-
-    start: Vector
-    end: Vector
-    _: KW_ONLY
-    radius: float
-    end_radius: float
-    color: Vector = DEFAULT_COLOR
-
-    def __post_init__(self) -> None:
-        _settle(
-            self,
-            start=finite_vector("start", self.start),
-            end=finite_vector("end", self.end),
-            radius=positive_number("radius", self.radius),
-            end_radius=positive_number("end_radius", self.end_radius),
-            color=color_triple(self.color),
-        )
-
-    @property
-    def influences(self) -> tuple[float, ...]:
-        """At the start and at the end."""
-        return (self.radius / RIM, self.end_radius / RIM)
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """Start and end."""
-        return (self.start, self.end)
-
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Start and influence there; axis and influence at the end."""
-        axes = points[:, 1] - points[:, 0]
-        return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, influences[:, 1])], axis=1)
-
-
 class Combination(Node):
     """An operator folded over its operands from left to right."""
 
@@ -303,7 +157,7 @@ class AssociativeCombination(Combination):
     operands: tuple[Node, ...]
 
     def __post_init__(self) -> None:
-        _settle(self, operands=_nodes(self.operands))
+        settle(self, operands=_nodes(self.operands))
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -347,7 +201,7 @@ class Ricci(AssociativeCombination):
             raise InvalidNode(
                 f"exponent: expected 1 to {LARGEST_EXPONENT:g}, got {exponent!r}; for more use a union"
             )
-        _settle(self, exponent=exponent)
+        settle(self, exponent=exponent)
 
     @property
     def parameter(self) -> float:
@@ -385,7 +239,7 @@ class Transform(Node):
 
     def __post_init__(self) -> None:
         _nodes((self.child,))
-        _settle(self, matrix=affine_matrix(self.matrix))
+        settle(self, matrix=affine_matrix(self.matrix))
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -406,7 +260,7 @@ class Offset(Node):
 
     def __post_init__(self) -> None:
         _nodes((self.child,))
-        _settle(self, distance=finite_number("distance", self.distance))
+        settle(self, distance=finite_number("distance", self.distance))
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -425,7 +279,7 @@ class Twist(Node):
 
     def __post_init__(self) -> None:
         _nodes((self.child,))
-        _settle(self, degrees=finite_number("degrees", self.degrees))
+        settle(self, degrees=finite_number("degrees", self.degrees))
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -436,17 +290,6 @@ class Twist(Node):
     def parameters(self) -> tuple[float, ...]:
         """The turn per unit in radians."""
         return (math.radians(self.degrees),)
-
-
-def _beside(vectors: Floats, numbers: Floats) -> Floats:
-    """`vectors` (n, 3) and `numbers` (n,) as texels (n, 4)."""
-    return np.column_stack([vectors, numbers])
-
-
-def _settle(node: Node, **fields: object) -> None:
-    """Put checked values into a frozen node while it is being made."""
-    for name, value in fields.items():
-        object.__setattr__(node, name, value)
 
 
 def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:

@@ -97,3 +97,9 @@ def point_array(points: ArrayLike) -> NDArray[np.float32]:
             "drop those points first"
         )
     return np.ascontiguousarray(array)
+
+
+def settle(node: object, **fields: object) -> None:
+    """Put checked values into a frozen node while it is being made."""
+    for name, value in fields.items():
+        object.__setattr__(node, name, value)
