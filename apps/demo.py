@@ -10,7 +10,7 @@ from decals.render import Renderer
 
 from .errors import UsageError
 from .hatching import hatching, mosaic
-from .options import MAX_SAMPLES, TILE, check_count, parse_size
+from .options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
 from .output import check_output, write_picture
 from .progress_bars import progress_bars
 from .spanning import spanning
@@ -23,7 +23,7 @@ def demo(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out"),
     size: str = "1200x900",
-    samples: int = 2,
+    samples: Whole = 2,
 ) -> None:
     """Draw three pictures that show what this is about.
 

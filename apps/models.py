@@ -7,6 +7,7 @@ from pathlib import Path
 from blobtree import BlobTreeError, from_json
 from decals.errors import DecalsError
 from decals.mesh_file import read_mesh
+from decals.paths import is_file
 from decals.scene import MeshObject, Scene, SceneObject, TreeObject
 from decals.scene_file import is_scene, load_scene
 
@@ -34,7 +35,7 @@ def _load(model: str) -> SceneObject | Scene:
     if model in SAMPLES:
         return sample(model)
     path = Path(model)
-    if not path.is_file():
+    if not is_file(path):
         raise UsageError(
             f"expected a mesh file, a BlobTree or scene in JSON, or a sample ({', '.join(SAMPLES)}); "
             f"found no file {model!r}"

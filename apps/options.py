@@ -1,6 +1,10 @@
 """Command-line values and the ranges that they must lie in."""
 
 import re
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from cyclopts import Parameter, Token
 
 from .errors import UsageError
 from .views import Size
@@ -12,6 +16,20 @@ TILE = 768
 """Most samples that are drawn at once, per axis: a command must be interruptible within seconds."""
 MAX_DECALS = 1_000_000
 MAX_SEED = 2**32 - 1
+
+
+def _whole(_type: Any, tokens: Sequence[Token]) -> int:
+    """Read a whole number; a fraction is no way to write one, though Python would round it."""
+    text = tokens[0].value
+    if not re.fullmatch(r"[+-]?\d+(_\d+)*", text.strip()):
+        raise ValueError(f"expected a whole number, got {text!r}")
+    return int(text)
+
+
+Whole = Annotated[int, Parameter(converter=_whole)]
+"""A whole number on the command line."""
+OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=False)]
+"""One that need not be given."""
 
 
 def parse_size(text: str) -> Size:

@@ -13,6 +13,7 @@ from decals.scene import TreeObject
 
 from .errors import UsageError
 from .models import load_model
+from .options import OptionalWhole
 from .output import MESH_SUFFIXES, check_output, replacing
 from .progress_bars import progress_bars
 from .warp_start import start_warp
@@ -23,7 +24,7 @@ def polygonize(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    resolution: Annotated[int | None, Parameter(show_default=False)] = None,
+    resolution: OptionalWhole = None,
     cell_size: Annotated[float | None, Parameter(show_default=False)] = None,
 ) -> None:
     """Write an implicit model's surface as a triangle mesh.

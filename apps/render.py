@@ -15,7 +15,16 @@ from decals.seeding import seed as seed_decals
 
 from .errors import UsageError
 from .models import load_models
-from .options import MAX_DECALS, MAX_SAMPLES, MAX_SEED, TILE, check_count, parse_size
+from .options import (
+    MAX_DECALS,
+    MAX_SAMPLES,
+    MAX_SEED,
+    TILE,
+    OptionalWhole,
+    Whole,
+    check_count,
+    parse_size,
+)
 from .output import PICTURE_SUFFIXES, check_output, write_picture
 from .progress_bars import progress_bars
 from .samples import axes_of
@@ -31,13 +40,13 @@ def render(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    decals: Annotated[int | None, Parameter(show_default=False)] = None,
+    decals: OptionalWhole = None,
     image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     camera: str | None = None,
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x900",
-    samples: int = 2,
-    seed: Annotated[int | None, Parameter(show_default=False)] = None,
+    samples: Whole = 2,
+    seed: OptionalWhole = None,
     save: Path | None = None,
 ) -> None:
     """Cover models with one coat of decals and draw a picture.

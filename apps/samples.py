@@ -5,9 +5,6 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 
-import pyvista as pv
-from pyvista import examples
-
 from blobtree import Node
 from decals.mesh_file import MeshArrays, surface_triangles
 from decals.scene import MeshObject, SceneObject, TreeObject
@@ -22,13 +19,15 @@ from .views import UPRIGHT, Axes
 _DATA = "https://github.com/pyvista/vtk-data"
 
 
-def _download(name: str, download: Callable[[], pv.PolyData]) -> MeshArrays:
+def _download(name: str) -> MeshArrays:
     """Get a mesh through pyvista: from its cache, from ``PYVISTA_DATA``, or from the internet."""
     logging.getLogger("pooch").setLevel(logging.WARNING)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about a PYVISTA_DATA that is no folder; what counts is the mesh
-            surface = download()
+            from pyvista import examples  # it looks at PYVISTA_DATA when it is imported
+
+            surface = getattr(examples, f"download_{name}")()
     except Exception as error:  # no network, no permission, a broken cache: all end here
         reason = type(error).__name__
         raise UsageError(
@@ -39,8 +38,8 @@ def _download(name: str, download: Callable[[], pv.PolyData]) -> MeshArrays:
 
 
 _MESHES: dict[str, Callable[[], MeshArrays]] = {
-    "dragon": partial(_download, "dragon", lambda: examples.download_dragon()),
-    "horse": partial(_download, "horse", lambda: examples.download_horse()),
+    "dragon": partial(_download, "dragon"),
+    "horse": partial(_download, "horse"),
     "knot": torus_knot,
 }
 _TREES: dict[str, Callable[[], Node]] = {"creature": creature, "spheres": spheres}

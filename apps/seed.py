@@ -16,7 +16,7 @@ from decals.sizing import Sizing
 
 from .errors import UsageError
 from .models import load_models
-from .options import MAX_DECALS, MAX_SEED, check_count
+from .options import MAX_DECALS, MAX_SEED, OptionalWhole, Whole, check_count
 from .output import check_output
 from .progress_bars import progress_bars
 from .warp_start import start_warp
@@ -30,13 +30,13 @@ def seed(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    count: Annotated[int | None, Parameter(show_default=False)] = None,
+    count: OptionalWhole = None,
     spacing: Annotated[float | None, Parameter(show_default=False)] = None,
     sizing: Sizing = Sizing.COVERING,
     factor: float = 1.0,
     along: Annotated[Orientation | None, Parameter(show_default=False)] = None,
-    images: int = 1,
-    seed: int = 0,
+    images: Whole = 1,
+    seed: Whole = 0,
 ) -> None:
     """Spread seeds over models and write the decals that lie on them.
 

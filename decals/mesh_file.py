@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from .errors import InvalidMesh
+from .paths import is_file
 from .ply import Polygons, read_ply
 
 MeshArrays = tuple[NDArray[np.float32], NDArray[np.int32]]
@@ -39,7 +40,7 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
         If the file is missing, of an unknown kind, unreadable, or holds no faces or wrong indices.
     """
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     if path.suffix.lower() == ".ply":
         return triangles(*read_ply(path), name=str(path))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from ..errors import InvalidImage
+from ..paths import is_file
 from .builtin import BUILTIN_IMAGES, generate_image, is_builtin
 
 MAX_IMAGE_EDGE = 8192
@@ -43,7 +44,7 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
 
 def read_image(path: Path) -> NDArray[np.uint8]:
     """Read a picture of any mode (grey, palette, 16 bit, with or without alpha) as uint8[h, w, 4]."""
-    if not path.is_file():
+    if not is_file(path):
         raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_DO_THIS}")
     try:
         with warnings.catch_warnings(), Image.open(path) as picture:

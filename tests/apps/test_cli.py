@@ -1,4 +1,7 @@
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -334,6 +337,28 @@ def test_a_sample_that_cannot_be_downloaded(bad: Callable[..., str], monkeypatch
     line = bad("render", "dragon", "-o", "a.png")
     assert "PYVISTA_DATA" in line
     assert "internet" in line
+
+
+@pytest.mark.parametrize("number", ["1.9", "1e3", "many", ""])
+def test_a_fraction_is_no_count(bad: Callable[..., str], number: str) -> None:
+    assert "whole number" in bad("render", "knot", "-o", "a.png", f"--decals={number}")
+
+
+def test_a_path_that_no_file_can_have(bad: Callable[..., str]) -> None:
+    assert "found no file" in bad("render", "a" * 5000 + ".ply", "-o", "a.png")
+
+
+def test_a_wrong_data_folder_is_not_spoken_of_where_no_sample_is_fetched(tmp_path: Path) -> None:
+    program = "from implicit_decals.apps.samples import sample; sample('knot')"
+    environment = {**os.environ, "PYVISTA_DATA": str(tmp_path / "missing")}
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "PYVISTA_DATA" not in result.stderr
 
 
 def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> None:

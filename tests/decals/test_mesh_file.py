@@ -159,6 +159,12 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
             read_mesh(path)
 
 
+@pytest.mark.parametrize("name", ["a" * 5000 + ".ply", "a\0b.ply"])
+def test_a_path_that_no_file_can_have(name: str) -> None:
+    with pytest.raises(InvalidMesh, match="found none"):
+        read_mesh(name)
+
+
 def test_a_volume_mesh_gives_its_boundary(tmp_path: Path) -> None:
     pv.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid().save(tmp_path / "a.vtu")
     assert _area(tmp_path / "a.vtu") == pytest.approx(24.0)
