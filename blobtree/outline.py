@@ -1,10 +1,14 @@
 """A tree as indented text, one node a line."""
 
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from .identity import own_parameters
 
 if TYPE_CHECKING:
     from .tree import Node
+
+DEEPEST_INDENT = 32
+"""Levels that indentation shows; below them a number does, or a deep tree would be megabytes of blanks."""
 
 
 def outline(root: "Node") -> str:
@@ -13,18 +17,17 @@ def outline(root: "Node") -> str:
     pending: list[tuple[Node, int]] = [(root, 0)]
     while pending:
         node, depth = pending.pop()
-        lines.append("  " * depth + _line(node))
+        lines.append(_indent(depth) + _line(node))
         pending.extend((child, depth + 1) for child in reversed(node.children))
     return "\n".join(lines)
 
 
+def _indent(depth: int) -> str:
+    """What stands before a node `depth` levels below the root."""
+    return "  " * min(depth, DEEPEST_INDENT) + (f"[{depth}] " if depth > DEEPEST_INDENT else "")
+
+
 def _line(node: "Node") -> str:
     """The node's name and its own parameters, other nodes left out."""
-    own = {field.name: getattr(node, field.name) for field in fields(node)}  # type: ignore[arg-type]
-    held = set(map(id, node.children))
-    shown = [f"{name}={value!r}" for name, value in own.items() if not _holds_nodes(value, held)]
+    shown = [f"{name}={value!r}" for name, value in own_parameters(node).items()]
     return f"{type(node).__name__}({', '.join(shown)})"
-
-
-def _holds_nodes(value: Any, held: set[int]) -> bool:
-    return id(value) in held or (isinstance(value, tuple) and any(id(item) in held for item in value))

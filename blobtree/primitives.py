@@ -45,7 +45,7 @@ class Primitive(Node):
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Point(Primitive):
     """A ball of `radius` around `center`."""
 
@@ -75,7 +75,7 @@ class Point(Primitive):
         return np.concatenate([points, influences[:, :, None]], axis=2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Segment(Primitive):
     """A capsule of `radius` around the straight line from `start` to `end`; equal ends make a ball."""
 
@@ -111,7 +111,7 @@ class Segment(Primitive):
         return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, inverses)], axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cone(Primitive):
     """A round cone: the hull of a ball of `radius` at `start` and one of `end_radius` at `end`.
 

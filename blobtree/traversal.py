@@ -9,8 +9,11 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 
-def postorder(root: "Node") -> list["Node"]:
-    """Every distinct node object below and including `root`, children before parents."""
+def postorder(root: "Node", *, into: Callable[["Node"], bool] = lambda _node: True) -> list["Node"]:
+    """Every distinct node object below and including `root`, children before parents.
+
+    What lies below a node for which `into` is False is left out, unless it is reached by another way.
+    """
     order: list[Node] = []
     seen: set[int] = set()
     pending: list[tuple[Node, bool]] = [(root, False)]
@@ -21,7 +24,8 @@ def postorder(root: "Node") -> list["Node"]:
         elif id(node) not in seen:
             seen.add(id(node))
             pending.append((node, True))
-            pending.extend((child, False) for child in reversed(node.children))
+            if into(node):
+                pending.extend((child, False) for child in reversed(node.children))
     return order
 
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .bounds import influence_bounds
 from .errors import InvalidNode
 from .evaluate import colors_at, gradients_at, values_at
+from .identity import equal, from_records, hash_of, text_of, to_records
 from .interval import range_over
 from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from .outline import outline
@@ -38,13 +39,37 @@ LARGEST_EXPONENT = 100.0
 class Node:
     """Part of a BlobTree: a field that is 0 far away and larger than ISO inside.
 
-    Every node is a value: it never changes, and equal nodes compare equal.
+    Every node is a value: it never changes, and equal nodes compare equal. All that Python asks of a value is
+    answered here, for a tree of any depth; so a kind of node is a dataclass with `eq=False, repr=False`.
     """
 
     @property
     def children(self) -> tuple["Node", ...]:
         """The nodes that this one combines, none for a primitive."""
         return ()
+
+    # -- being a value ------------------------------------------------------------------------------
+
+    def __eq__(self, other: object) -> bool:
+        return equal(self, other) if isinstance(other, Node) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash_of(self)
+
+    def __repr__(self) -> str:
+        return text_of(self)
+
+    def __str__(self) -> str:
+        return outline(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return from_records, (to_records(self),)
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Self:
+        return self
 
     # -- combining ----------------------------------------------------------------------------------
 
@@ -127,9 +152,6 @@ class Node:
         """Numbers that the field is never below and never above in the box between two corners (3,)."""
         return range_over(self.tape, lower, upper)
 
-    def __str__(self) -> str:
-        return outline(self)
-
     def gradient(self, points: ArrayLike) -> NDArray[np.float32]:
         """Exact field gradients (n, 3) at `points` (n, 3)."""
         return gradients_at(self.tape, points)[:, 1:]
@@ -150,7 +172,7 @@ class Combination(Node):
         return 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class AssociativeCombination(Combination):
     """A combination of any number of `operands`, nested alike or not."""
 
@@ -165,28 +187,28 @@ class AssociativeCombination(Combination):
         return self.operands
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sum(AssociativeCombination):
     """Smooth blend F = Σ fᵢ."""
 
     operator = SUM
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Union(AssociativeCombination):
     """Sharp union F = max fᵢ."""
 
     operator = UNION
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Intersection(AssociativeCombination):
     """Sharp intersection F = min fᵢ."""
 
     operator = INTERSECTION
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ricci(AssociativeCombination):
     """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): `exponent` 1 is the sum, a large one nears the union."""
 
@@ -209,7 +231,7 @@ class Ricci(AssociativeCombination):
         return self.exponent
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Difference(Combination):
     """`solid` without `tool`: F = min(f, 1 − g) while f ≤ 1, see `operators.difference_partials`."""
 
@@ -227,7 +249,7 @@ class Difference(Combination):
         return (self.solid, self.tool)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Transform(Node):
     """`child` under an affine map whose 3×4 `matrix` takes the child's points (columns) to this node's space.
 
@@ -247,7 +269,7 @@ class Transform(Node):
         return (self.child,)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Offset(Node):
     """`child` with every radius below it larger by `distance`, or smaller where that is negative.
 
@@ -268,7 +290,7 @@ class Offset(Node):
         return (self.child,)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Twist(Node):
     """`child` turned about the z axis, by `degrees` per unit of height, counter-clockwise seen from above."""
 
