@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .errors import InvalidScene
+from .viewpoint import Bounds, Floats, Rays
 
 Vector = tuple[float, float, float]
-Bounds = tuple[ArrayLike, ArrayLike]
-Floats = NDArray[np.float64]
 
 NEAR_OVER_FAR = 1e-4
 """The near plane comes no closer than this fraction of the far one, for the depth buffer's sake."""
@@ -23,25 +22,6 @@ DIRECTION = (0.35, 0.25, 1.0)
 """Where pictures are taken from, unless somebody says otherwise: from the model toward the eye."""
 PARALLEL = 1e-9
 """Sine below which two directions count as parallel."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rays:
-    """The rays through an image's pixels: ``origin + t·(corner + x·right + y·up)``.
-
-    ``(x, y)`` is the place in pixels from the image's lower left corner, so a pixel's centre lies at half
-    integers, as in ``gl_FragCoord``. Directions are not unit: their component along the view is 1.
-    """
-
-    origin: Floats
-    corner: Floats
-    right: Floats
-    up: Floats
-
-    def directions(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Give the directions at places in pixels, shape ``[..., 3]``."""
-        px, py = np.asarray(x, np.float64)[..., None], np.asarray(y, np.float64)[..., None]
-        return np.asarray(self.corner + px * self.right + py * self.up)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +103,10 @@ class Camera:
         if far <= 0.0:  # all of it lies behind: any range is right
             far = self.distance
         return max(float(depth.min()) * 0.99, far * NEAR_OVER_FAR), far
+
+    def clip_matrix(self, size: tuple[int, int], bounds: Bounds) -> Floats:
+        """World to clip space, ``float64[4, 4]``, for a picture of this size of what is in a box."""
+        return self.projection(size[0] / size[1], *self.clip_range(bounds)) @ self.view()
 
     def rays(self, width: int, height: int) -> Rays:
         """Give the rays through the pixels of an image of this size."""

@@ -17,8 +17,7 @@ float noise(vec2 pixel) {
 }
 
 float openness(sampler2D g_position_, ivec2 texel, vec3 q, vec3 n, vec3 ray) {
-    float depth = dot(q - eye.xyz, ray) / dot(ray, ray);
-    float reach = min(ambient_radius / (depth * length(ray_right.xyz)), float(ambient_limit));
+    float reach = min(ambient_radius / (ray_spread(q, ray) * length(ray_right.xyz)), float(ambient_limit));
     float turn = 6.2831853 * noise(vec2(texel + tile_corner));
     float hidden = 0.0;
     for (int i = 0; i < TAPS; i++) {

@@ -13,4 +13,5 @@ void main() {
     int corner = CORNERS[gl_VertexID];
     vec3 choice = vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
     gl_Position = view_projection * vec4(mix(box_lower, box_upper, choice), 1.0);
+    gl_Position.z = min(gl_Position.z, gl_Position.w);  // a far plane before the back of the box must not clip it
 }

@@ -1,15 +1,28 @@
 // The camera of this tile: clip space, and the ray through every pixel.
 layout(std140) uniform CameraBlock {
     mat4 view_projection;
-    vec4 eye;         // xyz
-    vec4 ray_corner;  // xyz: direction through the tile's lower left corner; its part along the view is 1
-    vec4 ray_right;   // xyz: what one pixel to the right adds to it
-    vec4 ray_up;      // xyz: what one pixel up adds to it
+    vec4 eye;         // xyz: where the ray through the tile's lower left corner begins; w: 1 in perspective, 0 parallel
+    vec4 ray_corner;  // xyz: that ray's direction; in perspective its part along the view is 1, else it is unit
+    vec4 ray_right;   // xyz: what one pixel to the right adds, to the direction in perspective, else to the origin
+    vec4 ray_up;      // xyz: the same for one pixel up
 };
 
-// Direction, not unit, from the eye through a place in pixels such as gl_FragCoord.xy.
+// What the way to a place in pixels, such as gl_FragCoord.xy, adds.
+vec3 ray_step(vec2 pixel) {
+    return pixel.x * ray_right.xyz + pixel.y * ray_up.xyz;
+}
+
+vec3 ray_origin(vec2 pixel) {
+    return eye.w > 0.0 ? eye.xyz : eye.xyz + ray_step(pixel);
+}
+
 vec3 ray_direction(vec2 pixel) {
-    return ray_corner.xyz + pixel.x * ray_right.xyz + pixel.y * ray_up.xyz;
+    return eye.w > 0.0 ? ray_corner.xyz + pixel.x * ray_right.xyz + pixel.y * ray_up.xyz : ray_corner.xyz;
+}
+
+// How many times ray_right a point on a ray moves by from pixel to pixel, across the ray.
+float ray_spread(vec3 position, vec3 ray) {
+    return eye.w > 0.0 ? dot(position - eye.xyz, ray) / dot(ray, ray) : 1.0;
 }
 
 // What gl_FragDepth must be at a point, equal to what a rasterised triangle there gets.

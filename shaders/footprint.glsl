@@ -8,5 +8,5 @@ vec3 surface_step(vec3 q, vec3 n, vec3 ray, vec3 step_) {
     float slope = dot(n, ray);
     float least = MOST_GRAZING * length(ray);
     slope = slope < 0.0 ? min(slope, -least) : max(slope, least);
-    return dot(q - eye.xyz, ray) / dot(ray, ray) * (step_ - ray * (dot(n, step_) / slope));
+    return ray_spread(q, ray) * (step_ - ray * (dot(n, step_) / slope));
 }

@@ -26,13 +26,18 @@ vec4 field_gradient(vec3 q, sampler2D tape_, ivec2 span) {
 
 void main() {
     vec3 direction = normalize(ray_direction(gl_FragCoord.xy));
-    vec3 hit = trace_ray(eye.xyz, direction, grid_lower, block_size, grid_depth, tolerance, tape, nodes);
+    vec3 origin = ray_origin(gl_FragCoord.xy);
+    vec3 hit = trace_ray(origin, direction, grid_lower, block_size, grid_depth, tolerance, tape, nodes);
     if (hit.x < 0.0) {
         discard;
     }
     ivec2 span = ivec2(hit.yz);
-    vec3 position = eye.xyz + direction * hit.x;
+    vec3 position = origin + direction * hit.x;
+    float depth = window_depth(position);
+    if (depth < 0.0 || depth > 1.0) {
+        discard;  // a clipping plane hides it
+    }
     vec3 normal = -field_gradient(position, tape, span).yzw;
     write_surface(position, normal, interpret_color(position, 0.0, tape, span).yzw);
-    gl_FragDepth = window_depth(position);
+    gl_FragDepth = depth;
 }

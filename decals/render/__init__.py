@@ -5,13 +5,15 @@
 
 from decals.contact import Contact
 from decals.mapping import Mapping
+from decals.render.canvas import Buffers
 from decals.render.context import Context
 from decals.render.drawables import register
 from decals.render.mesh import MeshDrawable
-from decals.render.renderer import Buffers, Renderer, Size
+from decals.render.renderer import Renderer
 from decals.render.resolve import STUDIO, TRANSPARENT, Background
 from decals.render.scene_like import SceneLike
 from decals.render.shortcuts import render, render_buffers
+from decals.render.targets import Size
 from decals.render.tree import TreeDrawable
 from decals.scene import MeshObject, TreeObject
 

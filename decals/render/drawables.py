@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from decals.camera import Bounds
 from decals.errors import InvalidScene
 from decals.render.context import Context
 from decals.render.tile import Tile
+from decals.viewpoint import Bounds
 
 
 class Drawable(Protocol):

@@ -5,9 +5,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from decals.camera import Bounds
 from decals.render.context import Context
 from decals.render.tile import Tile, attach_camera, set_uniform
+from decals.viewpoint import Bounds
 from implicit_decals.shaders import compose
 
 

@@ -6,62 +6,39 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.camera import Bounds
 from decals.contact import Contact
 from decals.errors import InvalidScene
 from decals.mapping import Mapping
+from decals.render.canvas import BufferCanvas, Buffers, Canvas
 from decals.render.context import Context
 from decals.render.decal_data import DecalData
-from decals.render.decal_pass import DecalPass
 from decals.render.drawables import Drawable, drawable_for
 from decals.render.entry import Entry
-from decals.render.gbuffer import GBuffer
 from decals.render.kept import Kept
-from decals.render.light_pass import LightPass
-from decals.render.resolve import STUDIO, Background, ResolvePass
+from decals.render.resolve import STUDIO, Background
 from decals.render.scene_like import SceneLike
+from decals.render.targets import Size, Targets
 from decals.render.textures import ImageArray
-from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Tile, largest_tile, tiles
-
-Floats = NDArray[np.float32]
-Size = tuple[int, int]
+from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Rectangle, Tile, largest_tile, tiles
+from decals.viewpoint import Bounds, Viewpoint
 
 AMBIENT_RADIUS = 0.1
 """How far away surroundings may be to keep light out, relative to the scene's diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
-class Buffers:
-    """What lies behind every pixel of a picture; row 0 is at the top.
+class _Uploaded:
+    """A scene on the graphics card."""
 
-    Attributes
-    ----------
-    position, normal
-        float32[h, w, 3], zero in the background; normals are unit and smooth.
-    object_id
-        int32[h, w], the object's index in the scene, -1 in the background.
-    owner
-        int32[h, w], the decal's index, -1 for none.
-    field
-        float32[h, w], the owner's field F after contact, ½ on its rim; zero without an owner.
-    uv
-        float32[h, w, 2], the owner's image coordinates, v upward; zero without an owner.
-    color
-        uint8[h, w, 4], what `Renderer.render` gives with one sample.
-    """
-
-    position: Floats
-    normal: Floats
-    object_id: NDArray[np.int32]
-    owner: NDArray[np.int32]
-    uv: Floats
-    field: Floats
-    color: NDArray[np.uint8]
+    drawables: list[Drawable]
+    decals: DecalData | None
+    images: ImageArray | None
+    bounds: Bounds
 
 
 class Renderer:
@@ -90,7 +67,7 @@ class Renderer:
         self._drawables: Kept[Drawable] = Kept()
         self._decals: Kept[DecalData] = Kept()
         self._images: Kept[ImageArray] = Kept()
-        self._targets: _Targets | None = None
+        self._targets: dict[bool, Targets] = {}
         with self.context.current():
             self._camera = CameraBuffer(self.context)
 
@@ -103,6 +80,7 @@ class Renderer:
         background: Background = STUDIO,
         mapping: Mapping = Mapping.CORRECTED,
         contact: Contact = Contact.PAPER,
+        viewpoint: Viewpoint | None = None,
     ) -> NDArray[np.uint8]:
         """Draw a scene.
 
@@ -120,6 +98,8 @@ class Renderer:
             How images are laid onto curved surface.
         contact
             How contact decals push each other.
+        viewpoint
+            Where the picture is taken from, if not by the scene's camera.
 
         Returns
         -------
@@ -132,11 +112,11 @@ class Renderer:
             The scene holds an object of unknown kind, or size or samples are none.
         """
         _check_size(size, samples)
-        picture = _Picture(size, 4, np.uint8)
-        for tile, targets in self._tiles(scene, size, samples, mapping, contact, buffers=False):
+        canvas = Canvas(size, 4, np.uint8)
+        for tile, targets in self._tiles(scene, viewpoint, size, samples, mapping, contact):
             light = targets.light_pass.light
-            picture.place(targets.resolve.pixels(light, tile, samples, background), tile, samples)
-        return picture.pixels
+            canvas.place(targets.resolve.pixels(light, tile, samples, background), tile, samples)
+        return canvas.pixels
 
     def buffers(
         self,
@@ -145,25 +125,65 @@ class Renderer:
         size: Size = (800, 600),
         mapping: Mapping = Mapping.CORRECTED,
         contact: Contact = Contact.PAPER,
+        viewpoint: Viewpoint | None = None,
     ) -> Buffers:
         """Give what lies behind every pixel's centre; arguments and errors as for `render`."""
         _check_size(size, 1)
-        color = _Picture(size, 4, np.uint8)
-        position, normal, decal = (_Picture(size, 4, np.float32) for _ in range(3))
-        for tile, targets in self._tiles(scene, size, 1, mapping, contact, buffers=True):
-            color.place(targets.resolve.pixels(targets.light_pass.light, tile, 1, STUDIO), tile)
-            position.place(targets.gbuffer.read_position(tile), tile)
-            normal.place(targets.gbuffer.read_normal(tile), tile)
-            decal.place(targets.decal_pass.read_decal(tile), tile)
-        return Buffers(
-            position=position.pixels[..., :3],
-            normal=normal.pixels[..., :3],
-            object_id=position.pixels[..., 3].astype(np.int32) - 1,
-            owner=decal.pixels[..., 0].astype(np.int32),
-            field=decal.pixels[..., 1],
-            uv=decal.pixels[..., 2:],
-            color=color.pixels,
-        )
+        canvas = BufferCanvas(size)
+        for tile, targets in self._tiles(scene, viewpoint, size, 1, mapping, contact, buffers=True):
+            canvas.place(targets, tile)
+        return canvas.buffers
+
+    def buffers_at(
+        self,
+        scene: SceneLike,
+        x: int,
+        y: int,
+        *,
+        size: Size = (800, 600),
+        mapping: Mapping = Mapping.CORRECTED,
+        contact: Contact = Contact.PAPER,
+        viewpoint: Viewpoint | None = None,
+    ) -> Buffers:
+        """Give what lies behind one pixel of a picture, arrays of 1 × 1; nothing else is drawn.
+
+        ``(x, y)`` counts from the lower left corner; other arguments and errors are those of `buffers`.
+        (Its colour knows no surroundings that keep light out.)
+        """
+        _check_size(size, 1)
+        with self.context.current():
+            uploaded = self._upload(scene)
+            picture = Picture.of(viewpoint or scene.camera, size, uploaded.bounds)
+            tile = picture.part(Rectangle(x, y, 1, 1))
+            targets = self._targets_for((1, 1), buffers=True)
+            self._draw_tile(uploaded, tile, targets, mapping, contact)
+            canvas = BufferCanvas((1, 1))
+            canvas.place(targets, Tile(picture, 0, 0, 1, 1, Rectangle(0, 0, 1, 1)))
+            return canvas.buffers
+
+    def draw(
+        self,
+        scene: SceneLike,
+        *,
+        size: Size,
+        samples: int = 1,
+        mapping: Mapping = Mapping.CORRECTED,
+        contact: Contact = Contact.PAPER,
+        viewpoint: Viewpoint | None = None,
+    ) -> Targets:
+        """Draw a scene at once, without tiles, and leave it on the graphics card.
+
+        Light and depth of all samples are in the targets until something else is drawn. The context must be
+        current. Arguments and errors as for `render`.
+        """
+        _check_size(size, samples)
+        uploaded = self._upload(scene)
+        full = size[0] * samples, size[1] * samples
+        targets = self._targets_for(full, buffers=False)
+        tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
+        self._draw_tile(uploaded, tile, targets, mapping, contact)
+        self._sweep()
+        return targets
 
     def time_frame(
         self,
@@ -182,7 +202,7 @@ class Renderer:
         with self.context.current():
             self.context.gl.finish()
             begin = time.perf_counter()
-            for _ in self._tiles(scene, size, 1, mapping, contact, buffers=False):
+            for _ in self._tiles(scene, None, size, 1, mapping, contact):
                 pass
             self.context.gl.finish()
             return time.perf_counter() - begin
@@ -196,31 +216,44 @@ class Renderer:
     def _tiles(
         self,
         scene: SceneLike,
+        viewpoint: Viewpoint | None,
         size: Size,
         samples: int,
         mapping: Mapping,
         contact: Contact,
         *,
-        buffers: bool,
-    ) -> Iterator[tuple[Tile, _Targets]]:
+        buffers: bool = False,
+    ) -> Iterator[tuple[Tile, Targets]]:
         """Draw tile after tile; the targets hold a tile until the next is asked for."""
         with self.context.current():
-            drawables = [self._drawable(thing) for thing in scene.objects]
-            data, images = self._uploads(scene)
-            bounds = _union([drawable.bounds for drawable in drawables])
-            clip_range = scene.camera.clip_range(bounds)
-            ambient_radius = AMBIENT_RADIUS * _diagonal(bounds)
+            uploaded = self._upload(scene)
+            full = size[0] * samples, size[1] * samples
+            picture = Picture.of(viewpoint or scene.camera, full, uploaded.bounds)
             targets = self._targets_for(largest_tile(size, samples, limit=self._max_tile), buffers=buffers)
-            for tile in tiles(scene.camera, size, samples, clip_range, limit=self._max_tile):
-                self._camera.use(tile)
-                targets.gbuffer.begin(tile.width, tile.height)
-                for object_id, drawable in enumerate(drawables):
-                    drawable.draw(object_id, tile)
-                targets.decal_pass.draw(targets.gbuffer, tile, data, images, mapping, contact)
-                targets.light_pass.draw(targets.gbuffer, targets.decal_pass.paint, tile, ambient_radius)
+            for tile in tiles(picture, samples, limit=self._max_tile):
+                self._draw_tile(uploaded, tile, targets, mapping, contact)
                 yield tile, targets
-            for kept in (self._drawables, self._decals, self._images):
-                kept.sweep()
+            self._sweep()
+
+    def _draw_tile(
+        self, uploaded: _Uploaded, tile: Tile, targets: Targets, mapping: Mapping, contact: Contact
+    ) -> None:
+        self._camera.use(tile)
+        targets.gbuffer.begin(tile.width, tile.height)
+        for object_id, drawable in enumerate(uploaded.drawables):
+            drawable.draw(object_id, tile)
+        targets.decal_pass.draw(targets.gbuffer, tile, uploaded.decals, uploaded.images, mapping, contact)
+        radius = AMBIENT_RADIUS * _diagonal(uploaded.bounds)
+        targets.light_pass.draw(targets.gbuffer, targets.decal_pass.paint, tile, radius)
+
+    def _upload(self, scene: SceneLike) -> _Uploaded:
+        drawables = [self._drawable(thing) for thing in scene.objects]
+        bounds = _union([drawable.bounds for drawable in drawables])
+        return _Uploaded(drawables, *self._uploads(scene), bounds)
+
+    def _sweep(self) -> None:
+        for kept in (self._drawables, self._decals, self._images):
+            kept.sweep()
 
     def _drawable(self, thing: object) -> Drawable:
         return self._drawables.get(lambda: drawable_for(self.context, thing), thing)
@@ -232,20 +265,21 @@ class Renderer:
         images = self._images.get(lambda: ImageArray(self.context, pixels), *pixels)
         return self._decals.get(lambda: DecalData(self.context, scene.decals), scene.decals), images
 
-    def _targets_for(self, size: Size, *, buffers: bool) -> _Targets:
-        """Give targets of a size; those of the last picture if they fit exactly."""
-        if self._targets is None or (self._targets.gbuffer.size, self._targets.buffers) != (size, buffers):
-            if self._targets is not None:
-                self._targets.release()
-            self._targets = _Targets(self.context, size, buffers=buffers)
-        return self._targets
+    def _targets_for(self, size: Size, *, buffers: bool) -> Targets:
+        """Give targets of a size; those of the last picture of this kind if they fit exactly."""
+        targets = self._targets.get(buffers)
+        if targets is None or targets.gbuffer.size != size:
+            if targets is not None:
+                targets.release()
+            targets = self._targets[buffers] = Targets(self.context, size, buffers=buffers)
+        return targets
 
     def release(self) -> None:
         """Give everything back. Calling twice is harmless."""
         with self.context.current():
-            if self._targets is not None:
-                self._targets.release()
-                self._targets = None
+            for targets in self._targets.values():
+                targets.release()
+            self._targets.clear()
             for kept in (self._drawables, self._decals, self._images):
                 kept.release()
             self._camera.release()
@@ -259,35 +293,6 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.release()
-
-
-class _Targets:
-    """What one tile is drawn into."""
-
-    def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
-        self.buffers = buffers
-        self.gbuffer = GBuffer(context, size)
-        self.decal_pass = DecalPass(context, size, buffers=buffers)
-        self.light_pass = LightPass(context, size)
-        self.resolve = ResolvePass(context, size)
-
-    def release(self) -> None:
-        self.gbuffer.release()
-        self.decal_pass.release()
-        self.light_pass.release()
-        self.resolve.release()
-
-
-class _Picture:
-    """A picture put together from tiles, which count rows from below."""
-
-    def __init__(self, size: Size, channels: int, dtype: type[np.generic]) -> None:
-        self.pixels: NDArray[Any] = np.zeros((size[1], size[0], channels), dtype)
-
-    def place(self, block: NDArray[Any], tile: Tile, samples: int = 1) -> None:
-        left, bottom = tile.inner.x // samples, tile.inner.y // samples
-        height, width = block.shape[:2]
-        self.pixels[::-1][bottom : bottom + height, left : left + width] = block
 
 
 def _union(boxes: Sequence[Bounds]) -> Bounds:

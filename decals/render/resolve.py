@@ -59,7 +59,7 @@ class ResolvePass:
         set_uniform(self._program, "samples", samples)
         set_uniform(self._program, "first", (inner.x - tile.x, inner.y - tile.y))
         set_uniform(self._program, "first_row", inner.y / samples)
-        set_uniform(self._program, "rows", tile.picture[1] / samples)
+        set_uniform(self._program, "rows", tile.picture.size[1] / samples)
         set_uniform(self._program, "background_top", background.top)
         set_uniform(self._program, "background_bottom", background.bottom)
         self._array.render(vertices=3)

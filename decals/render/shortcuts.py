@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.render.renderer import Buffers, Renderer
+from decals.render.canvas import Buffers
+from decals.render.renderer import Renderer
 from decals.render.scene_like import SceneLike
 
 

@@ -8,9 +8,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.camera import Camera
 from decals.render.context import Context
 from decals.render.entry import Program
+from decals.viewpoint import Bounds, Floats, Rays, Viewpoint
 
 Compiled = TypeVar("Compiled", bound=Program)
 
@@ -33,59 +33,70 @@ class Rectangle:
 
 
 @dataclass(frozen=True, slots=True)
+class Picture:
+    """How a whole picture sees the world: its size in samples, clip space, and the rays of the samples."""
+
+    size: tuple[int, int]
+    matrix: Floats
+    rays: Rays
+
+    @classmethod
+    def of(cls, viewpoint: Viewpoint, size: tuple[int, int], bounds: Bounds) -> Self:
+        """Give what a viewpoint sees in a picture of this size, in samples, of what is in a box."""
+        return cls(size, viewpoint.clip_matrix(size, bounds), viewpoint.rays(*size))
+
+    def whole(self) -> "Tile":
+        """Give a single tile."""
+        return self.part(Rectangle(0, 0, *self.size))
+
+    def part(self, inner: Rectangle) -> "Tile":
+        """Give a rectangle as a tile without margins."""
+        return Tile(self, inner.x, inner.y, inner.width, inner.height, inner)
+
+
+@dataclass(frozen=True, slots=True)
 class Tile:
     """A rectangle of a picture's samples, counted from the picture's lower left corner.
 
     All of it is drawn; of that, the inner rectangle (in the same coordinates) becomes pixels.
     """
 
-    camera: Camera
-    picture: tuple[int, int]
+    picture: Picture
     x: int
     y: int
     width: int
     height: int
-    inner: "Rectangle"
-    near: float
-    far: float
+    inner: Rectangle
 
     def matrix(self) -> NDArray[np.float64]:
         """World to this tile's clip space, acting on columns."""
-        width, height = self.picture
+        width, height = self.picture.size
         crop = np.eye(4)
         crop[0, 0], crop[1, 1] = width / self.width, height / self.height
         crop[0, 3] = (width - 2 * self.x) / self.width - 1
         crop[1, 3] = (height - 2 * self.y) / self.height - 1
-        projection = self.camera.projection(width / height, self.near, self.far)
-        return np.asarray(crop @ projection @ self.camera.view())
+        return np.asarray(crop @ self.picture.matrix)
 
     def block(self) -> bytes:
         """Give the contents of ``CameraBlock`` in ``shaders/camera.glsl`` (std140)."""
-        rays = self.camera.rays(*self.picture)
-        corner = rays.corner + self.x * rays.right + self.y * rays.up
+        rays = self.picture.rays
         rows = np.zeros((8, 4), np.float32)
         rows[:4] = self.matrix().T
-        rows[4:, :3] = rays.origin, corner, rays.right, rays.up
+        rows[4:, :3] = rays.origins(self.x, self.y), rays.directions(self.x, self.y), rays.right, rays.up
+        rows[4, 3] = not rays.parallel
         return rows.tobytes()
 
 
-def tiles(
-    camera: Camera,
-    size: tuple[int, int],
-    samples: int,
-    clip_range: tuple[float, float],
-    *,
-    limit: int = MAX_TILE,
-) -> Iterator[Tile]:
-    """Cut a picture of ``size`` pixels with ``samples`` per axis; no tile cuts through a pixel."""
-    width, height = size[0] * samples, size[1] * samples
+def tiles(picture: Picture, samples: int, *, limit: int = MAX_TILE) -> Iterator[Tile]:
+    """Cut a picture with ``samples`` per axis of a pixel; no tile cuts through a pixel."""
+    width, height = picture.size
     step = _step(samples, limit)
     for y in range(0, height, step):
         for x in range(0, width, step):
             inner = Rectangle(x, y, min(step, width - x), min(step, height - y))
             left, right = max(x - MARGIN, 0), min(x + inner.width + MARGIN, width)
             low, high = max(y - MARGIN, 0), min(y + inner.height + MARGIN, height)
-            yield Tile(camera, (width, height), left, low, right - left, high - low, inner, *clip_range)
+            yield Tile(picture, left, low, right - left, high - low, inner)
 
 
 def largest_tile(size: tuple[int, int], samples: int, *, limit: int = MAX_TILE) -> tuple[int, int]:

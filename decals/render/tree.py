@@ -6,11 +6,11 @@ import moderngl
 
 from blobtree import Node
 from blobtree.trace import tracing_cells
-from decals.camera import Bounds
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.tape_shader import Kinds, tracing_shader
 from decals.render.tile import Tile, attach_camera, set_uniform
+from decals.viewpoint import Bounds
 from implicit_decals.shaders import compose
 
 BOX_VERTICES = 36

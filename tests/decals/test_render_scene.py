@@ -14,6 +14,7 @@ from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers,
 from decals.render.context import Context
 from decals.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.seeding import seed
+from decals.viewpoint import Projection
 from tests.decals.shapes import torus
 from tests.decals.test_render_decals import compare
 from tests.oracles.raster import edges
@@ -160,3 +161,54 @@ def test_tiles_send_the_same_rays(
 def test_impossible_sizes_are_refused(renderer: Renderer, both: Scene, size: Any, samples: int) -> None:
     with pytest.raises(ValueError, match="a picture needs a width"):
         renderer.render(both, size=size, samples=samples)
+
+
+def parallel_view(scene: Scene) -> Projection:
+    """The scene's camera without perspective, near and far planes around everything."""
+    low, high = np.array(scene.bounds, np.float64)
+    reach = float(np.linalg.norm(high - low))
+    distance = scene.camera.distance
+    scale = np.diag([1.5 / reach * SIZE[1] / SIZE[0], 1.5 / reach, -1 / reach, 1.0])
+    scale[2, 3] = -distance / reach
+    return Projection(scale @ scene.camera.view())
+
+
+def test_a_parallel_projection_shows_the_same_surface(renderer: Renderer, both: Scene) -> None:
+    view = parallel_view(both)
+    buffers = renderer.buffers(both, size=SIZE, viewpoint=view)
+    assert set(np.unique(buffers.object_id)) == {-1, 0, 1}
+    seen = buffers.object_id >= 0
+    y, x = np.nonzero(seen)
+    clip = np.c_[buffers.position[seen], np.ones(len(x))] @ view.matrix.T
+    np.testing.assert_allclose((clip[:, 0] + 1) / 2 * SIZE[0], x + 0.5, atol=0.01)
+    np.testing.assert_allclose((clip[:, 1] + 1) / 2 * SIZE[1], SIZE[1] - y - 0.5, atol=0.01)
+    on_tree = buffers.object_id == 0
+    assert np.abs(TREE(buffers.position[on_tree]) - 0.5).max() < 1e-3
+    assert compare(both, buffers, Mapping.CORRECTED).mean() > 0.99
+
+
+def test_a_near_plane_cuts_meshes_and_trees(renderer: Renderer, both: Scene) -> None:
+    whole = parallel_view(both)
+    cut = whole.matrix.copy()
+    cut[2] = 2 * cut[2] - [0, 0, 0, 1]  # the near plane now stands in the middle
+    before, after = (renderer.buffers(both, size=SIZE, viewpoint=Projection(m)) for m in (whole.matrix, cut))
+    for number in (0, 1):
+        depths = [
+            buffers.position[buffers.object_id == number] @ cut[2, :3] + cut[2, 3]
+            for buffers in (before, after)
+        ]
+        assert depths[0].min() < -1.1
+        assert depths[1].min() > -1.001
+
+
+def test_one_pixel_alone_is_that_of_the_whole_picture(renderer: Renderer, both: Scene) -> None:
+    whole = renderer.buffers(both, size=SIZE)
+    rng = np.random.default_rng(0)
+    for x, y in rng.integers(0, SIZE, (40, 2)).tolist():
+        one = renderer.buffers_at(both, x, SIZE[1] - 1 - y, size=SIZE)
+        if edges(whole.object_id)[y, x]:
+            continue
+        assert one.object_id[0, 0] == whole.object_id[y, x]
+        np.testing.assert_allclose(one.position[0, 0], whole.position[y, x], atol=2e-4)
+        if whole.field[y, x] > 0.52:
+            assert one.owner[0, 0] == whole.owner[y, x]

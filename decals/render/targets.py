@@ -1,0 +1,27 @@
+"""What one tile is drawn into."""
+
+from decals.render.context import Context
+from decals.render.decal_pass import DecalPass
+from decals.render.gbuffer import GBuffer
+from decals.render.light_pass import LightPass
+from decals.render.resolve import ResolvePass
+
+Size = tuple[int, int]
+
+
+class Targets:
+    """The targets of all passes, for tiles up to a size."""
+
+    def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
+        self.buffers = buffers
+        self.gbuffer = GBuffer(context, size)
+        self.decal_pass = DecalPass(context, size, buffers=buffers)
+        self.light_pass = LightPass(context, size)
+        self.resolve = ResolvePass(context, size)
+
+    def release(self) -> None:
+        """Give the memory back."""
+        self.gbuffer.release()
+        self.decal_pass.release()
+        self.light_pass.release()
+        self.resolve.release()
