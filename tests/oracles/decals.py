@@ -142,6 +142,7 @@ class _Scene:
         with np.errstate(all="ignore"):
             plane = (distance**2 + radii[:, None] ** 2 - radii[None] ** 2) / (2 * distance)
             keeps = plane / radii[:, None]
+            share = plane * distance
         stacked = ~((keeps > LEAST) & (keeps.T > LEAST))
         squared, facing = self.squared[:, members], self.facing[:, members]
         power = (squared / RIM**2 - 1) * radii**2
@@ -157,7 +158,7 @@ class _Scene:
         ray = w / np.maximum(x, 1e-300)[:, None]
         ahead = np.einsum("ma,mna->mn", ray, apart[owner])
         blocks = facing & ~stacked[owner] & (ahead > 0)
-        end = np.where(blocks, (plane * distance)[owner] / np.where(ahead > 0, ahead, 1), np.inf).min(axis=1)
+        end = np.where(blocks, share[owner] / np.where(ahead > 0, ahead, 1), np.inf).min(axis=1)
         z = (np.minimum(x / np.minimum(end, radii[owner]), 1) * RIM) ** 2
         near = inside | (np.abs(power) < 1e-3 * radii**2)
         sizes = np.where(near[:, None] & near[:, :, None], radii**2 + (radii**2)[:, None], 1e-300)

@@ -1,0 +1,79 @@
+"""The whole decal function against float64 on adversarial points: a million in every mode here, 10⁸ on a GPU.
+
+The float64 kernel that can answer so many is itself held against the NumPy oracle.
+"""
+
+import numpy as np
+import pytest
+
+from decals.contact import REACH, Contact
+from decals.mapping import Mapping
+from tests.bench.parity import LIMITS, Chunk, parity
+from tests.bench.parity_worlds import make_world
+from tests.oracles.contact import rim_distance
+from tests.oracles.decals import decals_at
+
+DOUBT = 1e-9
+"""Relative change up to which two float64 oracles may see different owners."""
+
+
+@pytest.mark.parametrize("layered", [False, True])
+@pytest.mark.parametrize("contact", Contact)
+def test_the_two_oracles_agree(contact, layered):
+    """On 17,000 points in each mode, 100,000 in all; without neighbours beyond REACH, and with all."""
+    world = make_world(7, layered=layered)
+    chunk = Chunk(world, 17_000, 7 + contact, "cpu")
+    points, normals = chunk.points.numpy(), chunk.normals.numpy().astype(float)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    mapping = Mapping.CHORD if layered else Mapping.CORRECTED
+    reach = 1.0 if contact == Contact.RADIAL else REACH
+    owner, complement, place, doubt, edge = (a.numpy() for a in chunk.wanted(contact, mapping, reach=reach))
+    owned = 0
+    for number, rows in by_set(chunk.sets.numpy()):
+        first = number * world.members
+        want = decals_at(
+            world.decals[first : first + world.members],
+            points[rows],
+            normals[rows],
+            corrected=mapping == Mapping.CORRECTED,
+            reach=reach,
+            contact=contact.name.lower(),
+        )
+        seen = np.where(want.owner >= 0, want.owner + first, -1)
+        clear = (doubt[rows] > DOUBT) & (edge[rows] > DOUBT)
+        assert np.array_equal(owner[rows][clear], seen[clear])
+        both = clear & (seen >= 0)
+        rim = rim_distance(complement[rows][both])
+        assert np.abs(rim - rim_distance(1 - want.field[both])).max(initial=0) < 1e-7  # 1 − F cancels
+        assert np.abs(place[rows, :2] - want.uv)[both & (want.stretch < 100)].max(initial=0) < 1e-7
+        owned += both.sum()
+    assert owned > 10_000
+
+
+def by_set(sets):
+    """Rows of each set."""
+    order = np.argsort(sets, kind="stable")
+    starts = np.flatnonzero(np.diff(sets[order], prepend=-1))
+    return zip(sets[order][starts], np.split(order, starts[1:]), strict=True)
+
+
+def check(found, samples):
+    print(found)
+    assert found["points"] == samples
+    assert found["owned"] > 0.8 * samples
+    assert found["unclear"] < 0.2 * samples
+    for name, most in LIMITS.items():
+        assert found[name] <= most, name
+
+
+@pytest.mark.parametrize("layered", [False, True])
+@pytest.mark.parametrize("contact", Contact)
+def test_half_a_million_points_in_a_sheet_and_in_layers(contact, layered):
+    check(parity(contact, layered=layered, samples=500_000, device="cpu", chunk=125_000), 500_000)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("layered", [False, True])
+@pytest.mark.parametrize("contact", Contact)
+def test_a_hundred_million_points_on_a_cuda_device(contact, layered):
+    check(parity(contact, layered=layered, samples=100_000_000, device="cuda:0"), 100_000_000)

@@ -1,0 +1,325 @@
+"""The oracle of `tests/oracles/decals.py` a second time, as a float64 Warp kernel, for 10⁸ points.
+
+It stands on the paper and the design alone and shares no function with the implementation. Decals come in
+sets of equal size that do not reach each other; a point is held against the members of its own set, by
+brute force. `tests/decals/test_parity.py` holds it against the NumPy oracle.
+
+Variables that a loop changes begin as literals: one that begins as a Warp constant would change the constant.
+"""
+
+# ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
+# mypy: ignore-errors
+
+import math
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+RIM = wp.constant(wp.float64(math.sqrt(1 - 0.5 ** (1 / 3))))
+ZERO = wp.constant(wp.float64(0.0))
+HALF = wp.constant(wp.float64(0.5))
+ONE = wp.constant(wp.float64(1.0))
+TWO = wp.constant(wp.float64(2.0))
+FOUR = wp.constant(wp.float64(4.0))
+THIRD = wp.constant(wp.float64(1.0 / 3.0))
+FACING_LIMIT = wp.constant(wp.float64(-0.25))
+KEPT_LEAST = wp.constant(wp.float64(0.21))
+TINY = wp.constant(wp.float64(1e-300))
+NEARLY = wp.constant(wp.float64(1e-3))
+FLAT = wp.constant(wp.float64(1e-4))
+CONTACT = wp.constant(1)
+SMOOTH = wp.constant(1)
+RADIAL = wp.constant(2)
+
+
+@wp.struct
+class Members:
+    """Decals: `size` of them a set; rank = 4 layer + interaction, lowest layer 0."""
+
+    size: wp.int32
+    positions: wp.array(dtype=wp.vec3)
+    normals: wp.array(dtype=wp.vec3)
+    tangents: wp.array(dtype=wp.vec3)
+    radii: wp.array(dtype=wp.float32)
+    spill: wp.array(dtype=wp.int32)
+    ranks: wp.array(dtype=wp.int32)
+
+
+@wp.struct
+class Answer:
+    """Owner or −1; E = 1 − F; doubt: smallest relative change that changes the owner; edge: that of a cut."""
+
+    owner: wp.int32
+    complement: wp.float64
+    doubt: wp.float64
+    edge: wp.float64
+
+
+@wp.func
+def wide(v: wp.vec3) -> wp.vec3d:
+    return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+
+
+@wp.func
+def log_one_plus(x: wp.float64) -> wp.float64:
+    """Kahan's log1p."""
+    u = ONE + x
+    if u == ONE:
+        return x
+    return wp.log(u) * x / (u - ONE)
+
+
+@wp.func
+def complement(squared: wp.float64) -> wp.float64:
+    """e = 1 − (1 − d²)³."""
+    t = wp.min(squared, ONE)
+    return t * (wp.float64(3.0) - wp.float64(3.0) * t + t * t)
+
+
+@wp.func
+def rim_of(e: wp.float64) -> wp.float64:
+    """r / r_h."""
+    c = wp.pow(ONE - e, THIRD)
+    return wp.sqrt(e / (ONE + c + c * c)) / RIM
+
+
+@wp.func
+def relative(q: wp.vec3d, i: wp.int32, these: Members) -> wp.float64:
+    """|q − p|² / s²."""
+    w = q - wide(these.positions[i])
+    s = wp.float64(these.radii[i]) / RIM
+    return wp.dot(w, w) / (s * s)
+
+
+@wp.func
+def facing(n: wp.vec3d, i: wp.int32, these: Members) -> wp.bool:
+    return these.spill[i] != 0 or wp.dot(n, wide(these.normals[i])) > FACING_LIMIT
+
+
+@wp.func
+def top_rank(q: wp.vec3d, n: wp.vec3d, first: wp.int32, these: Members) -> wp.int32:
+    """Highest rank of which something shows; −1 outside all rims."""
+    top = wp.int32(-1)
+    for i in range(first, first + these.size):
+        if facing(n, i, these) and complement(relative(q, i, these)) <= HALF:
+            top = wp.max(top, these.ranks[i])
+    return top
+
+
+@wp.func
+def doubt_of_rims(q: wp.vec3d, n: wp.vec3d, first: wp.int32, these: Members) -> wp.float64:
+    """How near q lies to any rim, or to the limit of facing of what reaches it."""
+    doubt = wp.float64(4.0)
+    for i in range(first, first + these.size):
+        squared = relative(q, i, these)
+        if facing(n, i, these):
+            doubt = wp.min(doubt, wp.abs(wp.sqrt(squared) / RIM - ONE))
+        if squared < ONE and these.spill[i] == 0:
+            doubt = wp.min(doubt, wp.abs(wp.dot(n, wide(these.normals[i])) - FACING_LIMIT))
+    return doubt
+
+
+@wp.func
+def sheet(
+    q: wp.vec3d,
+    n: wp.vec3d,
+    first: wp.int32,
+    rank: wp.int32,
+    contact: wp.int32,
+    reach: wp.float64,
+    these: Members,
+) -> Answer:
+    """Equation 5, repaired, over the decals of one rank; those beyond reach influence radii do not push."""
+    owner = wp.int32(-1)
+    least = wp.float64(4.0)
+    second = wp.float64(4.0)
+    edge = wp.float64(4.0)
+    for i in range(first, first + these.size):
+        if these.ranks[i] == rank and facing(n, i, these):
+            squared = relative(q, i, these)
+            edge = wp.min(edge, wp.abs(wp.sqrt(squared) / reach - ONE))
+            second = wp.min(second, wp.max(least, squared))
+            if squared < least:
+                owner = i
+            least = wp.min(least, squared)
+    own = complement(least)
+    kept = wp.float64(1.0)
+    for i in range(first, first + these.size):
+        if i != owner and these.ranks[i] == rank and facing(n, i, these):
+            squared = relative(q, i, these)
+            e = complement(squared)
+            if squared < reach * reach and e + own < ONE:
+                factor = wp.float64(0.0)
+                if e > own:
+                    w = (e - own) / (ONE - TWO * own)
+                    factor = ONE - wp.exp(log_one_plus(-w) / own)
+                kept = wp.min(kept, factor) if contact == SMOOTH else kept * factor
+    return Answer(owner, own + (HALF - own) * (ONE - kept), wp.sqrt(second / wp.max(least, TINY)) - ONE, edge)
+
+
+@wp.func
+def power(q: wp.vec3d, i: wp.int32, these: Members) -> wp.float64:
+    w = q - wide(these.positions[i])
+    r = wp.float64(these.radii[i])
+    return wp.dot(w, w) - r * r
+
+
+@wp.func
+def kept_share(i: wp.int32, j: wp.int32, these: Members) -> wp.float64:
+    """Share of its radius that i keeps before the radical plane to j; at most 0 where they are concentric."""
+    apart = wide(these.positions[j]) - wide(these.positions[i])
+    a = wp.float64(these.radii[i])
+    b = wp.float64(these.radii[j])
+    d = wp.length(apart)
+    if d == ZERO:
+        return ZERO
+    return (d * d + a * a - b * b) / (TWO * d * a)
+
+
+@wp.func
+def lie_over(i: wp.int32, j: wp.int32, these: Members) -> wp.bool:
+    return kept_share(i, j, these) <= KEPT_LEAST or kept_share(j, i, these) <= KEPT_LEAST
+
+
+@wp.func
+def doubt_of_pair(own: wp.float64, other: wp.float64, i: wp.int32, j: wp.int32, these: Members) -> wp.float64:
+    """How little parts the powers of two decals at hand, and whether they push or lie over each other."""
+    a = wp.float64(these.radii[i]) * wp.float64(these.radii[i])
+    b = wp.float64(these.radii[j]) * wp.float64(these.radii[j])
+    if own > NEARLY * a or other > NEARLY * b:
+        return FOUR
+    push = wp.min(kept_share(i, j, these), kept_share(j, i, these)) - KEPT_LEAST
+    return wp.min(wp.abs(other - own) / (a + b), wp.abs(push))
+
+
+@wp.func
+def convex(q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, these: Members) -> Answer:
+    """Radial contact: the uppermost cell that holds q, and how far along the ray to its end q lies."""
+    owner = wp.int32(-1)
+    doubt = wp.float64(4.0)
+    smallest = wp.float64(1e300)
+    for i in range(first, first + these.size):
+        if these.ranks[i] == rank and facing(n, i, these):
+            own = power(q, i, these)
+            r = wp.float64(these.radii[i])
+            inside = bool(own <= ZERO)
+            for j in range(first, first + these.size):
+                if j != i and these.ranks[j] == rank and facing(n, j, these):
+                    doubt = wp.min(doubt, doubt_of_pair(own, power(q, j, these), i, j, these))
+                    if power(q, j, these) < own:
+                        if not lie_over(i, j, these):
+                            inside = False
+            if inside and r < smallest:  # of equal ones the first stays
+                smallest = r
+                owner = i
+    if owner < 0:
+        return Answer(owner, ONE, doubt, FOUR)
+    w = q - wide(these.positions[owner])
+    x = wp.length(w)
+    end = wp.float64(these.radii[owner])
+    for j in range(first, first + these.size):
+        if j != owner and these.ranks[j] == rank and facing(n, j, these):
+            apart = wide(these.positions[j]) - wide(these.positions[owner])
+            ahead = wp.dot(w, apart) / wp.max(x, TINY)
+            if ahead > ZERO:
+                if not lie_over(owner, j, these):
+                    r = wp.float64(these.radii[owner])
+                    end = wp.min(end, kept_share(owner, j, these) * r * wp.length(apart) / ahead)
+    share = wp.min(x / end, ONE) * RIM
+    return Answer(owner, complement(share * share), doubt, FOUR)
+
+
+@wp.func
+def bent(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec3d:
+    """The arc from n_p to n_q unrolled, and the chord's shadow scaled for the change of curvature."""
+    height_p = wp.dot(w, n_p)
+    height_q = wp.dot(w, n_q)
+    shadow = w - height_p * n_p
+    toward = n_q - wp.dot(n_p, n_q) * n_p
+    sine = wp.length(toward)
+    half = wp.max(HALF * wp.atan2(sine, wp.dot(n_p, n_q)), wp.float64(1e-12))
+    if sine <= FLAT:
+        return shadow
+    toward = toward / sine
+    bow = wp.sin(half)
+    radius = (height_q - height_p) / (FOUR * bow * bow)
+    unrolled = radius * (TWO * half - wp.sin(TWO * half))
+    sideways = wp.dot(shadow, toward) / wp.max(wp.dot(shadow, shadow), TINY)
+    tighter = -(height_p + height_q) * half * half / bow * HALF * sideways
+    return shadow * (ONE + wp.clamp(tighter, -HALF, HALF)) + unrolled * toward
+
+
+@wp.func
+def place(
+    q: wp.vec3d, n: wp.vec3d, i: wp.int32, e: wp.float64, corrected: wp.bool, these: Members
+) -> wp.vec3d:
+    """Image coordinates of q in decal i, and |q − p| over the offset's length in the tangent plane."""
+    normal = wide(these.normals[i])
+    tangent = wide(these.tangents[i])
+    w = q - wide(these.positions[i])
+    m = w
+    if corrected:
+        m = bent(w, normal, n)
+    x = wp.dot(m, tangent)
+    y = wp.dot(m, wp.cross(normal, tangent))
+    length = wp.max(wp.sqrt(x * x + y * y), TINY)
+    r = HALF * rim_of(e) / length
+    return wp.vec3d(HALF + r * x, HALF + r * y, wp.length(w) / length)
+
+
+@wp.func
+def doubted(answer: Answer, doubt: wp.float64) -> Answer:
+    return Answer(answer.owner, answer.complement, wp.min(answer.doubt, doubt), answer.edge)
+
+
+@wp.func
+def topmost(
+    q: wp.vec3d, n: wp.vec3d, group: wp.int32, contact: wp.int32, reach: wp.float64, these: Members
+) -> Answer:
+    """What the topmost decal of a set shows at q, with unit normal n."""
+    first = group * these.size
+    rank = top_rank(q, n, first, these)
+    if rank < 0:
+        return Answer(-1, ONE, doubt_of_rims(q, n, first, these), FOUR)
+    if (rank & 3) == CONTACT:
+        if contact == RADIAL:
+            return doubted(convex(q, n, first, rank, these), doubt_of_rims(q, n, first, these))
+        return doubted(sheet(q, n, first, rank, contact, reach, these), doubt_of_rims(q, n, first, these))
+    owner = wp.int32(-1)
+    e = wp.float64(1.0)
+    for i in range(first, first + these.size):
+        if these.ranks[i] == rank and facing(n, i, these):
+            if complement(relative(q, i, these)) <= HALF:
+                owner = i
+                e = complement(relative(q, i, these))
+    return Answer(owner, e, doubt_of_rims(q, n, first, these), FOUR)
+
+
+@wp.kernel
+def answer_points(
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    sets: wp.array(dtype=wp.int32),
+    contact: wp.int32,
+    corrected: wp.bool,
+    reach: wp.float64,
+    these: Members,
+    owners: wp.array(dtype=wp.int32),
+    complements: wp.array(dtype=wp.float64),
+    places: wp.array(dtype=wp.vec3d),
+    doubts: wp.array(dtype=wp.float64),
+    edges: wp.array(dtype=wp.float64),
+):
+    """Owner, E, (uv, stretch), doubt and edge (a neighbour's distance from reach) of points in sets."""
+    i = wp.tid()
+    q = wide(points[i])
+    n = wp.normalize(wide(normals[i]))
+    found = topmost(q, n, sets[i], contact, reach, these)
+    owners[i] = found.owner
+    complements[i] = found.complement
+    doubts[i] = found.doubt
+    edges[i] = found.edge
+    places[i] = wp.vec3d(ZERO, ZERO, ONE)
+    if found.owner >= 0:
+        places[i] = place(q, n, found.owner, found.complement, corrected, these)
