@@ -1,12 +1,13 @@
-"""Editing one decal among many: records and index change by their own bytes, in memory and on the card.
+"""Editing some decals among many: records and index change by their own bytes, in memory and on the card.
 
     editor = DecalEditor(decals)
     number = editor.add(one)                       one: Decals of length 1
     editor.change(number, positions=[[1, 2, 3]])   move, resize, re-layer, ...
     editor.delete(number)
-    editor.take_changes()                          {"index_ids": [(first, past last), ...], ...}
+    editor.changes(since=version)                  {"index_ids": [(first, past last), ...], ...}
 
-Look-ups give exactly what an index that is built anew would give. Numbers stay: a deleted decal leaves a gap.
+Look-ups give exactly what an index that is built anew would give. Numbers stay: a deleted decal leaves a gap,
+which `put` alone fills again.
 """
 
 import math
@@ -20,12 +21,13 @@ from decals import edit_kernels as kernels
 from decals.errors import InvalidDecals
 from decals.index import DecalIndex
 from decals.index_cells import FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
-from decals.model import RECORD, Decals, Interaction
+from decals.journal import Journal, Range
+from decals.model import RECORD, Decals
+from decals.rows import DecalRows, as_numbers, with_spare
 
-Range = tuple[int, int]
 MOST_LEVELS = 128
-SPARE = 1024
-"""Least spare rows of an array; arrays grow by half."""
+FEW = 64
+"""So many decals are always put into the index one by one."""
 
 RECORDS, LEVELS, TABLE, IDS = "decal_records", "index_levels", "index_table", "index_ids"
 ROOMS = "rooms"
@@ -48,45 +50,47 @@ class DecalEditor:
     """
 
     def __init__(self, decals: Decals) -> None:
-        self._first = decals
-        self._changed: dict[int, Decals | None] = {}
-        self._count = len(decals)
+        self._rows = DecalRows(decals)
         self.arrays: dict[str, NDArray[Any]] = {}
-        self._dirty: dict[str, list[Range]] = {}
+        self._journal = Journal()
         self._shared: dict[str, Any] = {}
         self._state, self._wp_state = _shared(np.zeros(4, np.int32), wp.int32)
         self._ranges, self._wp_ranges = _shared(np.zeros((NEIGHBOURHOOD, 2), np.int32), wp.vec2i)
         self._slots, self._wp_slots = _shared(np.zeros(NEIGHBOURHOOD, np.int32), wp.int32)
-        self._put(RECORDS, _with_spare(decals.packed()))
+        self._put(RECORDS, with_spare(decals.packed()))
         self._rebuild()
-        self._dirty.clear()
 
     # -- what there is ----------------------------------------------------------------------------------
 
+    def __len__(self) -> int:
+        return self._rows.count
+
     def __getitem__(self, number: int) -> Decals:
         """Give one decal, as `Decals` of length 1."""
-        known = self._changed.get(number)
-        if number not in self._changed and 0 <= number < len(self._first):
-            known = self._first[number : number + 1]
-        if known is None:
-            raise InvalidDecals(f"expected the number of a decal, got {number}; it was deleted or never was")
-        return known
+        return self._rows.take(number)
+
+    def take(self, numbers: ArrayLike) -> Decals:
+        """Give the decals of these numbers, in their order."""
+        return self._rows.take(numbers)
+
+    def has(self, numbers: ArrayLike) -> NDArray[np.bool_]:
+        """Whether there is a decal of each of these numbers, ``bool[n]``."""
+        return self._rows.there(numbers)
 
     @property
     def numbers(self) -> NDArray[np.int64]:
         """Numbers of the decals that there are, ascending."""
-        there = np.ones(self._count, np.bool_)
-        there[[number for number, decal in self._changed.items() if decal is None]] = False
-        return np.flatnonzero(there)
+        return self._rows.numbers
+
+    @property
+    def next_number(self) -> int:
+        """Number of the next decal that is added."""
+        return self._rows.end
 
     @property
     def decals(self) -> Decals:
         """All decals, in the order of `numbers`."""
-        news = [decal for _, decal in sorted(self._changed.items()) if decal is not None]
-        rows = [number for number, decal in sorted(self._changed.items()) if decal is not None]
-        kept = np.setdiff1d(np.arange(len(self._first)), list(self._changed))
-        order = np.argsort(np.concatenate([kept, rows]), kind="stable")
-        return Decals.concatenate([self._first[kept], *news])[order.astype(np.intp)]
+        return self._rows.take(self.numbers)
 
     @property
     def level_count(self) -> int:
@@ -95,9 +99,8 @@ class DecalEditor:
 
     @property
     def layered(self) -> bool:
-        """Whether decals lie over each other, or did."""
-        ranks = self.arrays[LEVELS][: self.level_count, 2:].astype(np.int64)
-        return bool((ranks != ranks.max(initial=0)).any() or (ranks & 3 != Interaction.CONTACT).any())
+        """Whether decals lie over each other, as `Decals.layered`."""
+        return self._rows.layered
 
     @property
     def index(self) -> DecalIndex:
@@ -109,12 +112,8 @@ class DecalEditor:
     def add(self, one: Decals) -> int:
         """Add a decal on top of those of its rank; its number."""
         _check_one(one)
-        number = self._count
-        records = self.arrays[RECORDS]
-        if RECORD * (number + 1) > len(records):
-            self._put(RECORDS, _with_spare(records))
-        self._count += 1
-        self._insert(number, one)
+        number = self.next_number
+        self.put([number], one)
         return number
 
     def change(self, number: int, **arrays: ArrayLike) -> None:
@@ -125,51 +124,105 @@ class DecalEditor:
         InvalidDecals
             No such decal, or values that are none; nothing changes then.
         """
-        before = self[number]
-        after = before.replace(**arrays)
+        after = self[number].replace(**arrays)
         _check_one(after)
-        self._remove(number)
-        self._insert(number, after)
+        self.put([number], after)
 
-    def delete(self, number: int) -> None:
-        """Delete a decal; its number is not used again."""
-        self[number]
-        self._remove(number)
-        self._changed[number] = None
+    def delete(self, numbers: ArrayLike) -> None:
+        """Delete decals; `add` does not use their numbers again.
 
-    def take_changes(self) -> dict[str, list[Range]]:
-        """Rows of each array that changed since the last call: disjoint (first, past last), ascending."""
-        changes = {name: _merged(ranges) for name, ranges in self._dirty.items()}
-        self._dirty = {}
-        return changes
+        Raises
+        ------
+        InvalidDecals
+            One of them is not there; nothing changes then.
+        """
+        rows = self._rows.check(numbers)
+        many = self._are_many(rows)
+        if not many:
+            for number in rows.tolist():
+                self._take_out(number)
+        self._rows.drop(rows)
+        if many:
+            self._rebuild()
+
+    def put(self, numbers: ArrayLike, decals: Decals) -> None:
+        """Give these numbers these decals, whether they had one before, were deleted, or are new.
+
+        Raises
+        ------
+        InvalidDecals
+            Not a decal for each number, a number twice, one below 0, or one far beyond the last; nothing
+            changes then.
+        """
+        rows = self._checked(numbers, decals)
+        many = self._are_many(rows)
+        if not many:
+            for number in rows[self._rows.there(rows)].tolist():
+                self._take_out(number)
+        self._write_records(rows, decals)
+        self._rows.put(rows, decals)
+        done = many or all(map(self._put_in, rows.tolist(), decals.ranks.tolist()))
+        if many or not done:
+            self._rebuild()
+
+    @property
+    def version(self) -> int:
+        """Counts the changes of arrays; see `changes`."""
+        return self._journal.version
+
+    def changes(self, since: int) -> dict[str, list[Range]]:
+        """Rows of each array that changed since a version: disjoint (first, past last), ascending."""
+        known = self._journal.since(since)
+        return {name: [(0, len(array))] for name, array in self.arrays.items()} if known is None else known
 
     # -- how --------------------------------------------------------------------------------------------
 
-    def _remove(self, number: int) -> None:
+    def _checked(self, numbers: ArrayLike, decals: Decals) -> NDArray[np.int64]:
+        rows = as_numbers(numbers)
+        if len(rows) != len(decals):
+            raise InvalidDecals(f"expected a decal for each of {len(rows)} numbers, got {len(decals)}")
+        if len(np.unique(rows)) < len(rows):
+            raise InvalidDecals(f"expected each number once, got {rows.tolist()!s:.80}; drop the repeats")
+        most = self.next_number + len(rows)
+        wrong = rows[(rows < 0) | (rows >= most)]
+        if len(wrong):
+            raise InvalidDecals(f"expected numbers from 0 to {most - 1}, got {wrong[0]}")
+        return rows
+
+    def _are_many(self, rows: NDArray[np.int64]) -> bool:
+        """Whether a new index costs less than one change after another."""
+        return len(rows) > max(FEW, len(self) // 8)
+
+    def _take_out(self, number: int) -> None:
         exponent = self._exponent(number)
         arrays = [self._shared[name] for name in (RECORDS, TABLE, IDS)]
         where = [number, exponent, self._level_of[exponent]]
         wp.launch(kernels.take_out, 1, [*where, *arrays, self._wp_state, self._wp_ranges], device="cpu")
         self._note()
 
-    def _insert(self, number: int, one: Decals) -> None:
-        first = RECORD * number
-        self.arrays[RECORDS][first : first + RECORD] = one.packed()
-        self._mark(RECORDS, (first, first + RECORD))
-        self._changed[number] = one
+    def _write_records(self, rows: NDArray[np.int64], decals: Decals) -> None:
+        end = RECORD * (int(rows.max(initial=-1)) + 1)
+        if end > len(self.arrays[RECORDS]):
+            self._put(RECORDS, with_spare(self.arrays[RECORDS], end))
+        self.arrays[RECORDS].reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
+        for first, last in _runs(rows):
+            self._journal.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
+
+    def _put_in(self, number: int, rank: int) -> bool:
+        """Put a decal into the lists of the index; False where they have no room for it."""
         exponent = self._exponent(number)
-        self._widen(exponent, float(one.ranks[0]))
+        self._widen(exponent, float(rank))
         arrays = [self._shared[name] for name in (RECORDS, TABLE, ROOMS, IDS)]
         where = [number, exponent, self._level_of[exponent]]
         inputs = [*where, *arrays, self._wp_state, self._wp_ranges, self._wp_slots]
         wp.launch(kernels.put_in, 1, inputs, device="cpu")
         if not self._state[3]:
-            self._rebuild()
-            return
+            return False
         for slot in self._slots[: self._state[2]].tolist():
             if slot >= 0:
-                self._mark(TABLE, (slot, slot + 1))
+                self._journal.add(TABLE, (slot, slot + 1))
         self._note()
+        return True
 
     def _widen(self, exponent: int, rank: float) -> None:
         """Make sure of a level for this size that knows of this rank."""
@@ -181,7 +234,7 @@ class DecalEditor:
         elif levels[level, 2] <= rank <= levels[level, 3]:
             return
         levels[level, 2:] = min(levels[level, 2], rank), max(levels[level, 3], rank)
-        self._mark(LEVELS, (level, level + 1))
+        self._journal.add(LEVELS, (level, level + 1))
 
     def _exponent(self, number: int) -> int:
         """As `index_cells.cell_exponent`, from the record."""
@@ -210,19 +263,16 @@ class DecalEditor:
         self._state[:2] = len(ids), len(full)
         self._put(LEVELS, levels)
         self._put(TABLE, table)
-        self._put(IDS, _with_spare(ids))
+        self._put(IDS, with_spare(ids))
         _, self._shared[ROOMS] = _shared(rooms, wp.int32)
 
     def _put(self, name: str, array: NDArray[Any]) -> None:
         self.arrays[name], self._shared[name] = _shared(array, _TYPES[name])
-        self._dirty[name] = [(0, len(array))]
-
-    def _mark(self, name: str, rows: Range) -> None:
-        self._dirty.setdefault(name, []).append(rows)
+        self._journal.add(name, (0, len(array)), new=True)
 
     def _note(self) -> None:
         for first, end in self._ranges[: self._state[2]].tolist():
-            self._mark(IDS, (first, end))
+            self._journal.add(IDS, (first, end))
 
 
 def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:
@@ -231,24 +281,15 @@ def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:
     return held, wp.array(held, dtype=dtype, device="cpu", copy=False)
 
 
-def _with_spare(array: NDArray[Any]) -> NDArray[Any]:
-    """Copy an array to one with spare rows."""
-    grown = np.zeros((len(array) + max(SPARE, len(array) // 2), *array.shape[1:]), array.dtype)
-    grown[: len(array)] = array
-    return grown
-
-
-def _merged(ranges: list[Range]) -> list[Range]:
-    """Bring overlapping ranges together."""
-    result: list[Range] = []
-    for first, end in sorted(ranges):
-        if result and first <= result[-1][1]:
-            result[-1] = result[-1][0], max(end, result[-1][1])
-        else:
-            result.append((first, end))
-    return result
+def _runs(rows: NDArray[np.int64]) -> list[Range]:
+    """First and last number of each run of numbers that follow each other."""
+    ordered = np.sort(rows)
+    breaks = np.flatnonzero(np.diff(ordered) > 1)
+    firsts = ordered[np.concatenate([[0], breaks + 1])] if len(ordered) else ordered
+    lasts = ordered[np.concatenate([breaks, [-1]])] if len(ordered) else ordered
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
 def _check_one(one: Decals) -> None:
     if len(one) != 1:
-        raise InvalidDecals(f"expected one decal, got {len(one)}; edit them one by one")
+        raise InvalidDecals(f"expected one decal, got {len(one)}; `put` takes several")

@@ -9,6 +9,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from decals.contact import Contact
+from decals.editor import RECORDS, DecalEditor
 from decals.errors import InvalidImage, InvalidPoints
 from decals.index import DecalIndex, DeviceIndex
 from decals.mapping import Mapping
@@ -40,7 +41,7 @@ class Samples:
 
 
 def evaluate(
-    decals: Decals,
+    decals: Decals | DecalEditor,
     points: ArrayLike,
     normals: ArrayLike,
     *,
@@ -54,8 +55,8 @@ def evaluate(
 
     Parameters
     ----------
-    decals : Decals
-        n decals.
+    decals : Decals or DecalEditor
+        n decals; those of an editor are told by their numbers.
     points, normals : float32[m, 3]
         Surface points and the surface's geometric normals there, of any length. A point that is not finite
         has no owner.
@@ -64,7 +65,7 @@ def evaluate(
     contact : Contact, optional
         How contact decals push each other.
     index : DecalIndex, optional
-        The index of these very decals; built where not given.
+        The index of these very decals; built where not given. An editor brings its own.
     images : sequence of uint8[h, w, 4], optional
         sRGB images with alpha, of any sizes; with them, colours are found too.
     device : optional
@@ -80,7 +81,7 @@ def evaluate(
     places, directions = _rows("points", points), _rows("normals", normals)
     if len(places) != len(directions):
         raise InvalidPoints(f"normals: expected one for each of {len(places)} points, got {len(directions)}")
-    placed = DeviceIndex.of(decals, device) if index is None else index.on(device)
+    records, placed = _placed(decals, index, device)
     count = len(places)
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
@@ -91,7 +92,7 @@ def evaluate(
         int(mapping),
         int(contact),
         decals.layered,
-        wp.array(decals.packed(), dtype=wp.vec4, device=device),
+        wp.array(records, dtype=wp.vec4, device=device),
         *placed.arguments(),
     ]
     wp.launch(sample_points, count, inputs, [owner, uv, field], device=device)
@@ -99,8 +100,20 @@ def evaluate(
     return Samples(owner.numpy(), uv.numpy(), field.numpy(), color)
 
 
-def _colors(decals: Decals, images: Sequence[RGBA], inputs: list[Any], device: Any) -> NDArray[np.float32]:
-    needed = int(decals.images.max(initial=PLAIN)) + 1
+def _placed(
+    decals: Decals | DecalEditor, index: DecalIndex | None, device: Any
+) -> tuple[NDArray[np.float32], DeviceIndex]:
+    """Records and index of decals."""
+    if isinstance(decals, DecalEditor):
+        return decals.arrays[RECORDS], decals.index.on(device)
+    return decals.packed(), DeviceIndex.of(decals, device) if index is None else index.on(device)
+
+
+def _colors(
+    decals: Decals | DecalEditor, images: Sequence[RGBA], inputs: list[Any], device: Any
+) -> NDArray[np.float32]:
+    shown = decals.decals if isinstance(decals, DecalEditor) else decals
+    needed = int(shown.images.max(initial=PLAIN)) + 1
     if len(images) < needed:
         raise InvalidImage(
             f"images: expected {needed} or more, got {len(images)}; decals show them by number"

@@ -26,8 +26,9 @@ class DecalData:
 
     def __init__(self, context: Context, decals: Decals | DecalEditor) -> None:
         self._context = context
+        self._version = 0
         if isinstance(decals, DecalEditor):
-            decals.take_changes()
+            self._version = decals.version
             arrays, index = decals.arrays, decals.index
         else:
             index = DecalIndex.of(decals)
@@ -47,10 +48,10 @@ class DecalData:
     def update(self, editor: DecalEditor) -> int:
         """Bring over what an editor changed since the last time; the number of bytes that went to the card.
 
-        These must be the data of the same editor, from the beginning.
+        These must be the data of the same editor; any number of them may follow one.
         """
-        sent = 0
-        for name, ranges in editor.take_changes().items():
+        sent, since, self._version = 0, self._version, editor.version
+        for name, ranges in editor.changes(since).items():
             array = editor.arrays[name]
             if self._textures[name].count != len(array):
                 self._textures[name].release()

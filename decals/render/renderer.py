@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.contact import Contact
+from decals.editor import DecalEditor
 from decals.errors import InvalidScene
 from decals.mapping import Mapping
 from decals.render.canvas import BufferCanvas, Buffers, Canvas
@@ -263,7 +264,11 @@ class Renderer:
             return None, None
         pixels = [image.pixels for image in scene.images]
         images = self._images.get(lambda: ImageArray(self.context, pixels), *pixels)
-        return self._decals.get(lambda: DecalData(self.context, scene.decals), scene.decals), images
+        decals = scene.decals
+        data = self._decals.get(lambda: DecalData(self.context, decals), decals)
+        if isinstance(decals, DecalEditor):
+            data.update(decals)
+        return data, images
 
     def _targets_for(self, size: Size, *, buffers: bool) -> Targets:
         """Give targets of a size; those of the last picture of this kind if they fit exactly."""

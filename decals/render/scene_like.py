@@ -1,4 +1,7 @@
-"""What is read of a scene; `decals.scene.Scene` is one."""
+"""What is read of a scene; `decals.scene.Scene` is one.
+
+Its decals may be a `DecalEditor`: then what was edited since the last picture alone goes to the card.
+"""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -7,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.camera import Camera
+from decals.editor import DecalEditor
 from decals.model import Decals
 
 
@@ -23,7 +27,7 @@ class SceneLike(Protocol):
     @property
     def objects(self) -> Sequence[object]: ...  # noqa: D102
     @property
-    def decals(self) -> Decals: ...  # noqa: D102
+    def decals(self) -> Decals | DecalEditor: ...  # noqa: D102
     @property
     def images(self) -> Sequence[ImageLike]: ...  # noqa: D102
     @property

@@ -12,6 +12,7 @@ from decals.editor import IDS, RECORDS, TABLE, DecalEditor
 from decals.errors import InvalidDecals
 from decals.evaluate import evaluate
 from decals.index import DecalIndex
+from decals.journal import Journal
 from decals.model import Decals
 
 
@@ -106,7 +107,8 @@ def test_changes_are_all_that_changed():
     """A copy that is kept up by the changes alone is the same as the arrays, after every edit."""
     rng = np.random.default_rng(2)
     editor = DecalEditor(some(rng, 300))
-    assert editor.take_changes() == {}
+    version = editor.version
+    assert editor.changes(version) == {}
     copies = {name: array.copy() for name, array in editor.arrays.items()}
     for step in range(600):
         number = int(rng.choice(editor.numbers))
@@ -116,7 +118,8 @@ def test_changes_are_all_that_changed():
             editor.delete(number)
         else:
             editor.change(number, positions=rng.normal(size=(1, 3)), radii=[rng.uniform(0.01, 1)])
-        for name, ranges in editor.take_changes().items():
+        changes, version = editor.changes(version), editor.version
+        for name, ranges in changes.items():
             array = editor.arrays[name]
             if copies[name].shape != array.shape:
                 assert ranges == [(0, len(array))]
@@ -135,9 +138,9 @@ def test_one_edit_among_a_hundred_thousand_costs_its_own_bytes():
     seconds, touched = [], 0
     for step in range(60):
         place = n[step : step + 1] * 1.0001
-        start = time.perf_counter()
+        start, version = time.perf_counter(), editor.version
         editor.change(step * 7, positions=place)
-        changes = editor.take_changes()
+        changes = editor.changes(version)
         seconds.append(time.perf_counter() - start)
         rows = {name: sum(end - first for first, end in ranges) for name, ranges in changes.items()}
         touched = max(touched, rows[IDS] + 4 * rows[RECORDS] + 4 * rows.get(TABLE, 0))
@@ -160,3 +163,92 @@ def test_refuses_what_is_no_decal_and_stays_as_it_was():
         editor.add(some(np.random.default_rng(4), 2))
     assert editor.numbers.tolist() == [0, 2]
     check(editor, np.zeros((1, 3), np.float32))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32), count=st.integers(0, 300), steps=st.integers(1, 6))
+def test_many_at_once_look_like_a_fresh_build(seed, count, steps):
+    """Whether few or many are put or deleted: what there is, and what look-ups give, is as told."""
+    rng = np.random.default_rng(seed)
+    editor = DecalEditor(some(rng, count))
+    for _ in range(steps):
+        known = {int(number): editor[number] for number in editor.numbers}
+        chosen = rng.permutation(editor.next_number)[: int(rng.integers(0, 200))]
+        if rng.random() < 0.4:
+            gone = chosen[editor.has(chosen)]
+            editor.delete(gone)
+            known = {number: one for number, one in known.items() if number not in gone}
+        else:
+            fresh = editor.next_number + np.arange(rng.integers(0, 3))
+            numbers = np.concatenate([chosen, fresh])
+            news = some(rng, len(numbers))
+            editor.put(numbers, news)
+            known.update({int(number): news[row : row + 1] for row, number in enumerate(numbers)})
+        assert editor.numbers.tolist() == sorted(known)
+        assert len(editor) == len(known)
+        there = Decals.concatenate([known[number] for number in sorted(known)])
+        assert editor.decals.packed().tobytes() == there.packed().tobytes()
+        assert editor.layered == there.layered
+    check(editor, rng.normal(size=(100, 3)).astype(np.float32))
+
+
+def test_numbers_that_cannot_be_put():
+    editor = DecalEditor(some(np.random.default_rng(4), 3))
+    two = some(np.random.default_rng(5), 2)
+    for numbers, message in (
+        ([0], "expected a decal for each of 1 numbers, got 2"),
+        ([1, 1], "expected each number once"),
+        ([0, -1], "got -1"),
+        ([0, 5], "expected numbers from 0 to 4, got 5"),
+        ([0.5, 1.5], "expected numbers of decals"),
+    ):
+        with pytest.raises(InvalidDecals, match=message):
+            editor.put(numbers, two)
+    for numbers in ([0, 0], [0, 3]):
+        with pytest.raises(InvalidDecals):
+            editor.delete(numbers)
+    assert editor.numbers.tolist() == [0, 1, 2]
+    editor.put([3, 4], two)
+    assert editor.next_number == 5
+
+
+def test_deleted_numbers_can_be_filled_again():
+    first = some(np.random.default_rng(6), 5)
+    editor = DecalEditor(first)
+    editor.delete(2)
+    assert editor.add(some(np.random.default_rng(7), 1)) == 5
+    editor.delete(5)
+    editor.put([2], first[2:3])
+    assert editor.numbers.tolist() == [0, 1, 2, 3, 4]
+    assert editor.decals.packed().tobytes() == first.packed().tobytes()
+
+
+def test_an_editor_is_evaluated_by_its_numbers():
+    rng = np.random.default_rng(8)
+    first = some(rng, 50)
+    editor = DecalEditor(first)
+    editor.delete([0, 7, 9])
+    points = rng.normal(size=(500, 3)).astype(np.float32)
+    images = [np.full((2, 2, 4), 255, np.uint8)]
+    expected = evaluate(editor.decals, points, points, images=images)
+    found = evaluate(editor, points, points, images=images)
+    assert (found.owner >= 0).any()
+    np.testing.assert_array_equal(
+        found.owner, np.where(expected.owner < 0, -1, editor.numbers[expected.owner])
+    )
+    for name in ("uv", "field", "color"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+
+
+def test_a_journal_forgets_what_is_long_ago():
+    journal = Journal(most=3)
+    journal.add("a", (0, 10))
+    journal.add("a", (1, 3))
+    assert journal.since(0) == {"a": [(0, 10)]}
+    journal.add("b", (4, 6))
+    journal.add("b", (5, 8))
+    assert journal.since(0) is None
+    assert journal.since(1) == {"a": [(1, 3)], "b": [(4, 8)]}
+    journal.add("b", (0, 2), new=True)
+    assert journal.since(3) == {"b": [(0, 2)]}
+    assert journal.since(journal.version) == {}
