@@ -1,6 +1,9 @@
 """The benchmark of decals measures what it says, in small."""
 
-from tests.bench import decals as bench
+import numpy as np
+
+from tests.bench import decal_figures as bench
+from tests.bench import decal_index, decals
 
 
 def test_errors_and_folds() -> None:
@@ -11,7 +14,20 @@ def test_errors_and_folds() -> None:
 
 
 def test_what_is_missing_is_said() -> None:
-    text = bench.report({"index_100k_s": 0.25, "slope_most": 4.7})
-    assert "index_100k_s                     0.25  ≤ 0.5" in text
-    assert "frame_100k_over_100      not measured" in text
+    text = decals.report({"index_100k_s": 0.25, "slope_most": 4.7}, "a machine")
+    assert "index_100k_s                         0.25  ≤ 0.5" in text
+    assert "frame_100k_over_100          not measured" in text
     assert "slope_most" in text
+
+
+def test_the_coats_of_the_index_leave_no_gap() -> None:
+    """Every place of the sphere lies within the rim of some decal, and of few."""
+    coat = decal_index.coat(2000)
+    rng = np.random.default_rng(0)
+    places = rng.normal(size=(4000, 3))
+    places /= np.linalg.norm(places, axis=1, keepdims=True)
+    near = np.linalg.norm(places[:, None] - coat.positions, axis=2) < coat.radii
+    assert near.any(axis=1).all()
+    assert near.sum(axis=1).mean() < 3
+    mixed = decal_index.coat(2000, spread=0.5).radii
+    assert 5 < mixed.max() / mixed.min() <= 10.1

@@ -1,0 +1,146 @@
+"""What `tests/bench/decals.py` measures with graphics: frames, edits, exactness of contact and mapping."""
+
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+import warp as wp
+
+from decals.contact import Contact
+from decals.editor import DecalEditor
+from decals.index import DecalIndex
+from decals.mapping import Mapping
+from decals.model import Decals
+from decals.render import Renderer
+from decals.render.decal_data import DecalData
+from decals.scene import Scene
+from tests.bench.scenes import bench_scene
+from tests.decals import test_contact, test_mapping, test_radial
+
+RUNS = 3
+FOLD_SLACK = 0.0
+"""A ray folds where the image coordinate falls along it."""
+
+Figures = dict[str, float]
+
+
+def frames(size: tuple[int, int], few: Scene, many: Scene) -> Figures:
+    """Time of a frame under 100,000 decals over that under 100, at equal coverage."""
+    assert (len(few.decals), len(many.decals)) == (100, 100_000)
+    times: dict[int, list[float]] = {100: [], 100_000: []}
+    with Renderer() as renderer:
+        for run in range(RUNS + 1):
+            for scene in (few, many):
+                renderer.time_frame(scene, size=size)  # uploads: the renderer forgets what a picture lacks
+                seconds = renderer.time_frame(scene, size=size)
+                if run:
+                    times[len(scene.decals)].append(seconds)
+    return {"frame_100k_over_100": statistics.median(times[100_000]) / statistics.median(times[100])}
+
+
+def index(decals: Decals) -> Figures:
+    """Seconds to index 100,000 decals on the processor."""
+    DecalIndex.of(decals)
+    return {"index_100k_s": median_seconds(lambda: DecalIndex.of(decals))}
+
+
+def edits(decals: Decals) -> Figures:
+    """Median milliseconds to move one decal of 100,000: records, index, and what goes to the card."""
+    editor, times, sent = DecalEditor(decals), [], []
+    with Renderer() as renderer, renderer.context.current():
+        data = DecalData(renderer.context, editor)
+        for number in range(0, len(decals), len(decals) // 100):
+            begin = time.perf_counter()
+            editor.change(number, positions=editor[number].positions * np.float32(1.0001))
+            sent.append(data.update(editor))
+            times.append(time.perf_counter() - begin)
+        data.release()
+    return {"edit_100k_ms": 1e3 * statistics.median(times), "edit_100k_bytes": statistics.median(sent)}
+
+
+def contact(points: int) -> Figures:
+    """Largest error of r, in rim radii, over adversarial points in both pushing modes."""
+    rng, worst = np.random.default_rng(0), 0.0
+    for make in test_contact.SETS:
+        for count in (2, 3, 6):
+            arrays = [a.astype(np.float32) for a in make(rng, (points // len(test_contact.SETS) // 3, count))]
+            for mode in (Contact.PAPER, Contact.SMOOTH):
+                owner, rims = test_contact.rims_through_warp(*arrays, mode)
+                expected_owner, expected = test_contact.rims_in_float64(*arrays, mode)
+                both = (owner >= 0) & (expected_owner >= 0)
+                worst = max(worst, float(np.abs(rims - expected)[both].max()))
+    return {"contact_error_rh": worst}
+
+
+def folds(rays: int) -> Figures:
+    """Rays on which radial contact folds: 1 to 8 neighbours, sizes to 20:1, half of them in a plane."""
+    total, slopes = 0, []
+    for flat in (False, True):
+        rng = np.random.default_rng(flat)
+        decals = test_radial.clusters(rng, flat=flat)
+        owners = rng.integers(0, len(decals), rays // 2)
+        owners = np.where(
+            decals.radii[owners] > 0.05, owners, owners // test_radial.MEMBERS * test_radial.MEMBERS
+        )
+        away = test_radial.unit(rng.normal(size=(rays // 2, 3)) * [1, 1, 0 if flat else 1])
+        before = [wp.array(owners, dtype=wp.int32, device="cpu"), wp.array(away, dtype=wp.vec3, device="cpu")]
+        after = [wp.zeros(rays // 2, dtype=wp.float32, device="cpu") for _ in range(2)]
+        least, most = test_radial.launch(test_radial.slopes_of_rays, rays // 2, decals, before, after)
+        total += int((least < FOLD_SLACK).sum())
+        slopes += [least.min(), most.max()]
+    return {"folds_radial": total, "slope_least": float(min(slopes)), "slope_most": float(max(slopes))}
+
+
+def mapping(points: int) -> Figures:
+    """RMS error of the maps against log maps, over the radius of a decal: 0.5 on torus and ellipsoid."""
+    figures = {}
+    surfaces: dict[str, tuple[Callable[..., object], Callable[..., object]]] = {
+        "torus": (test_mapping.torus_points, test_mapping.torus_gradient),
+        "ellipsoid": (test_mapping.ellipsoid_points, test_mapping.ellipsoid_gradient),
+    }
+    samples = {
+        name: test_mapping.discs(np.random.default_rng(3), where, gradient, points)
+        for name, (where, gradient) in surfaces.items()
+    }
+    samples["sphere"] = test_mapping.sphere(np.random.default_rng(3), points)
+    for name, (w, n_p, n_q, log) in samples.items():
+        radius = test_mapping.DECAL if name != "sphere" else np.linalg.norm(log, axis=1).max()
+        corrected, chord = (test_mapping.mapped(w, n_p, n_q, mode) for mode in reversed(Mapping))
+        length = np.linalg.norm(w, axis=1, keepdims=True)
+        for suffix, offset in (
+            ("", corrected),
+            ("_drawn", length * test_mapping.unit(corrected)),
+            ("_chord", length * test_mapping.unit(chord)),
+        ):
+            error = ((offset - log) ** 2).sum(axis=1)
+            figures[f"map_{name}{suffix}"] = float(np.sqrt(error.mean()) / radius)
+    return figures
+
+
+def median_seconds(work: Callable[[], object]) -> float:
+    """Median time of a few runs."""
+    times = []
+    for _ in range(RUNS):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def measure(*, quick: bool) -> Figures:
+    """Measure everything; quickly, in smaller samples and pictures."""
+    size, samples, some = ((320, 240), 100_000, 1000) if quick else ((800, 600), 1_000_000, 4000)
+    few, many = (bench_scene("knot", count, size) for count in (100, 100_000))
+    parts: list[Callable[[], Figures]] = [
+        lambda: frames(size, few, many),
+        lambda: index(many.decals),
+        lambda: edits(many.decals),
+        lambda: contact(samples),
+        lambda: folds(samples),
+        lambda: mapping(some),
+    ]
+    figures: Figures = {}
+    for part in parts:
+        figures |= part()
+    return figures
