@@ -4,5 +4,5 @@ in vec3 normal;
 in vec3 color;
 
 void main() {
-    write_surface(position, normal, color, gl_FrontFacing);
+    write_surface(surface_at(position, normal, color, gl_FrontFacing));
 }

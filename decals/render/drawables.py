@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 from decals.errors import InvalidScene
 from decals.render.context import Context
+from decals.render.gbuffer import GBuffer
 from decals.render.tile import Tile
 from decals.viewpoint import Bounds
 
@@ -17,11 +18,18 @@ class Drawable(Protocol):
         """Box around everything that `draw` can draw."""
         ...
 
-    def draw(self, object_id: int, tile: Tile) -> None:
-        """Write the object through ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth.
+    @property
+    def rasterised(self) -> bool:
+        """Whether `draw` goes through the depth test; what does not is drawn after all that does."""
+        ...
+
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer) -> None:
+        """Put the object into the G-buffer wherever it is nearer than what is there.
 
         The tile's camera is bound already (`decals.render.tile.attach_camera`), depth test and targets are
-        set. Other state that is changed here is put back.
+        set. What is rasterised writes through ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth;
+        the rest writes to the textures and leaves the depth alone (`GBuffer.complete_depth` adds it where
+        somebody asks for it). Other state that is changed here is put back.
         """
         ...
 

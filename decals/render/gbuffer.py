@@ -5,7 +5,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.render.context import Context
-from decals.render.tile import Tile, read_floats
+from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
+from implicit_decals.shaders import compose
 
 
 class GBuffer:
@@ -28,6 +29,9 @@ class GBuffer:
         for texture in (self.position, self.normal, self.color):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._framebuffer = context.gl.framebuffer([self.position, self.normal, self.color], self.depth)
+        self._depth_alone = context.gl.framebuffer([], self.depth)
+        self._depth_program = attach_camera(context.program(compose("screen.vert"), compose("depth.frag")))
+        self._screen = context.gl.vertex_array(self._depth_program, [])
         self._gl = context.gl
 
     def begin(self, width: int, height: int) -> None:
@@ -37,6 +41,19 @@ class GBuffer:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
         self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+
+    def complete_depth(self, width: int, height: int) -> None:
+        """Give the surface that is no rasterised object's its depth too, in the lower left part of this size.
+
+        Only who goes on with the depth buffer needs it: in the other targets such surface is whole.
+        """
+        self._depth_alone.use()
+        self._depth_alone.viewport = (0, 0, width, height)
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "<"
+        self.position.use(0)
+        set_uniform(self._depth_program, "g_position", 0)
+        self._screen.render(vertices=3)
 
     def read_position(self, tile: Tile) -> NDArray[np.float32]:
         """Read position and object id + 1, ``float32[h, w, 4]``, the lowest row first."""
@@ -51,5 +68,6 @@ class GBuffer:
 
     def release(self) -> None:
         """Give the memory back."""
-        for resource in (self._framebuffer, self.position, self.normal, self.color, self.depth):
+        framebuffers = self._framebuffer, self._depth_alone
+        for resource in (self._screen, *framebuffers, self.position, self.normal, self.color, self.depth):
             resource.release()

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.render.context import Context
+from decals.render.gbuffer import GBuffer
 from decals.render.tile import Tile, attach_camera, set_uniform
 from decals.viewpoint import Bounds
 from implicit_decals.shaders import compose
@@ -40,7 +41,12 @@ class MeshDrawable:
         """Box around the vertices."""
         return self._bounds
 
-    def draw(self, object_id: int, tile: Tile) -> None:
+    @property
+    def rasterised(self) -> bool:
+        """Always."""
+        return True
+
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer) -> None:
         """Rasterise the faces, both sides."""
         set_uniform(self._program, "object_id", object_id)
         self._array.render()

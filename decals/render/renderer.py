@@ -183,6 +183,8 @@ class Renderer:
         targets = self._targets_for(full, buffers=False)
         tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
         self._draw_tile(uploaded, tile, targets, mapping, contact)
+        if not all(drawable.rasterised for drawable in uploaded.drawables):
+            targets.gbuffer.complete_depth(tile.width, tile.height)
         self._sweep()
         return targets
 
@@ -241,8 +243,10 @@ class Renderer:
     ) -> None:
         self._camera.use(tile)
         targets.gbuffer.begin(tile.width, tile.height)
-        for object_id, drawable in enumerate(uploaded.drawables):
-            drawable.draw(object_id, tile)
+        for object_id, drawable in sorted(
+            enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised
+        ):
+            drawable.draw(object_id, tile, targets.gbuffer)
         targets.decal_pass.draw(targets.gbuffer, tile, uploaded.decals, uploaded.images, mapping, contact)
         radius = AMBIENT_RADIUS * _diagonal(uploaded.bounds)
         targets.light_pass.draw(targets.gbuffer, targets.decal_pass.paint, tile, radius)

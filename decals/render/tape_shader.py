@@ -18,6 +18,7 @@ from blobtree.skeletons import SKELETONS
 from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.trace import trace_ray
 from blobtree.warps import WARPS
+from decals.render.entry import GROUP, Entry
 from implicit_decals.shaders import Source, compose
 
 _READINGS: dict[str, tuple[Reading, str]] = {
@@ -53,15 +54,19 @@ class Kinds:
 
 
 @lru_cache(maxsize=256)
-def tracing_shader(kinds: Kinds) -> Source:
-    """``trace.frag`` with the cases of `kinds`."""
+def tracing_shader(kinds: Kinds, entry: Entry = Entry.FRAGMENT) -> Source:
+    """``trace.frag`` or ``trace.comp`` with the cases of `kinds`."""
     readings = [
         _interpreter(name, reading, glsl_type, kinds) for name, (reading, glsl_type) in _READINGS.items()
     ]
-    return compose(
-        "trace.frag",
-        slots={"library": _library(kinds), "dispatch": _dispatch(kinds), "readings": _joined(readings)},
-    )
+    slots: dict[str, str | Source] = {
+        "library": _library(kinds),
+        "dispatch": _dispatch(kinds),
+        "readings": _joined(readings),
+    }
+    if entry is Entry.COMPUTE:
+        return compose("trace.comp", slots=slots, defines={"GROUP": GROUP}, version="430 core")
+    return compose("trace.frag", slots=slots)
 
 
 def _library(kinds: Kinds) -> str:

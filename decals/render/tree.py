@@ -3,18 +3,25 @@
 from typing import Protocol
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from blobtree import Node
 from blobtree.trace import tracing_cells
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
+from decals.render.entry import GROUP, Entry, Program
+from decals.render.gbuffer import GBuffer
 from decals.render.tape_shader import Kinds, tracing_shader
-from decals.render.tile import Tile, attach_camera, set_uniform
+from decals.render.tile import Rectangle, Tile, attach_camera, set_uniform
 from decals.viewpoint import Bounds
 from implicit_decals.shaders import compose
 
 BOX_VERTICES = 36
 """Corners of the triangles that ``box.vert`` makes."""
+
+POSITION, NORMAL, COLOR = range(3)
+"""Image units of ``trace.comp``."""
 
 
 class TreeLike(Protocol):
@@ -25,13 +32,16 @@ class TreeLike(Protocol):
 
 
 class TreeDrawable:
-    """A tree's tracing cells on the graphics card."""
+    """A tree's tracing cells on the graphics card.
+
+    The rays are sent by a fragment shader on the back of the tree's box, or by a compute shader, as the
+    context runs its passes over all pixels.
+    """
 
     def __init__(self, context: Context, thing: TreeLike) -> None:
         tree = thing.tree
         cells = tracing_cells(tree)
         self._bounds = tree.bounds
-        self._gl = context.gl
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.nodes))
         self._uniforms: dict[str, object] = {
             "tape": 0,
@@ -40,25 +50,48 @@ class TreeDrawable:
             "block_size": cells.block_size,
             "grid_depth": cells.depth,
             "tolerance": cells.tolerance,
-            "box_lower": tuple(self._bounds[0].tolist()),
-            "box_upper": tuple(self._bounds[1].tolist()),
         }
-        self._program = attach_camera(
-            context.program(compose("box.vert"), tracing_shader(Kinds.of(tree.tape)))
-        )
-        self._array = context.gl.vertex_array(self._program, [])
+        tracer = _ComputeTracer if context.entry is Entry.COMPUTE else _FragmentTracer
+        self._tracer: _FragmentTracer | _ComputeTracer = tracer(context, Kinds.of(tree.tape), tree.bounds)
 
     @property
     def bounds(self) -> Bounds:
         """The tree's box of influence."""
         return self._bounds
 
-    def draw(self, object_id: int, tile: Tile) -> None:
-        """Trace the rays of all pixels on which the back of the box falls."""
+    @property
+    def rasterised(self) -> bool:
+        """Where a fragment shader sends the rays."""
+        return isinstance(self._tracer, _FragmentTracer)
+
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer) -> None:
+        """Trace the rays of all pixels on which the box falls."""
         for unit, texture in enumerate(self._textures):
             texture.use(unit)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
-            set_uniform(self._program, name, value)
+            set_uniform(self._tracer.program, name, value)
+        self._tracer.run(tile, gbuffer)
+
+    def release(self) -> None:
+        """Give the memory back."""
+        for resource in (self._tracer, *self._textures):
+            resource.release()
+
+
+class _FragmentTracer:
+    """A ray for every pixel on which the back of the box falls."""
+
+    def __init__(self, context: Context, kinds: Kinds, bounds: Bounds) -> None:
+        self.program: Program = attach_camera(
+            context.program(compose("box.vert"), tracing_shader(kinds, Entry.FRAGMENT))
+        )
+        self._array = context.gl.vertex_array(self.program, [])
+        self._box = {"box_lower": bounds[0], "box_upper": bounds[1]}
+        self._gl = context.gl
+
+    def run(self, tile: Tile, gbuffer: GBuffer) -> None:
+        for name, corner in self._box.items():
+            set_uniform(self.program, name, tuple(np.asarray(corner).tolist()))
         self._gl.enable(moderngl.CULL_FACE)
         self._gl.cull_face = "front"
         self._array.render(vertices=BOX_VERTICES)
@@ -66,6 +99,46 @@ class TreeDrawable:
         self._gl.disable(moderngl.CULL_FACE)
 
     def release(self) -> None:
-        """Give the memory back."""
-        for resource in (self._array, *self._textures):
-            resource.release()
+        self._array.release()
+
+
+class _ComputeTracer:
+    """An invocation for every pixel of the rectangle around the box."""
+
+    def __init__(self, context: Context, kinds: Kinds, bounds: Bounds) -> None:
+        self.program: moderngl.ComputeShader = attach_camera(
+            context.compute_program(tracing_shader(kinds, Entry.COMPUTE))
+        )
+        self._bounds = bounds
+        self._gl = context.gl
+
+    def run(self, tile: Tile, gbuffer: GBuffer) -> None:
+        part = covered(self._bounds, tile)
+        if part.width == 0 or part.height == 0:
+            return
+        set_uniform(self.program, "rectangle", (part.x, part.y, part.width, part.height))
+        gbuffer.position.bind_to_image(POSITION, read=True, write=True)
+        gbuffer.normal.bind_to_image(NORMAL, read=False, write=True)
+        gbuffer.color.bind_to_image(COLOR, read=False, write=True)
+        self._gl.memory_barrier()
+        self.program.run(-(-part.width // GROUP), -(-part.height // GROUP))
+        self._gl.memory_barrier()
+
+    def release(self) -> None:
+        """Nothing but the program was made."""
+
+
+def covered(bounds: Bounds, tile: Tile) -> Rectangle:
+    """The samples of a tile, counted from its own corner, on which a box may fall."""
+    size = np.array([tile.width, tile.height])
+    choices = np.indices((2, 2, 2)).reshape(3, 8).T == 1
+    corners = np.where(choices, *np.asarray(bounds, np.float64)[::-1])
+    clip = np.column_stack([corners, np.ones(8)]) @ tile.matrix().T
+    low, high = np.zeros(2), size.astype(np.float64)
+    if (clip[:, 3] > 0.0).all():  # a box that reaches behind the eye may fall anywhere
+        places: NDArray[np.float64] = (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * size
+        low = np.clip(np.floor(places.min(axis=0)) - 1.0, 0.0, size)
+        high = np.clip(np.ceil(places.max(axis=0)) + 1.0, 0.0, size)
+    x, y = (int(corner) for corner in low)
+    width, height = (int(length) for length in high - low)
+    return Rectangle(x, y, width, height)

@@ -1,0 +1,11 @@
+// The depth of what the G-buffer shows, for objects that could not write their own.
+//@ include camera.glsl
+uniform sampler2D g_position;
+
+void main() {
+    vec4 position = texelFetch(g_position, ivec2(gl_FragCoord.xy), 0);
+    if (position.w <= 0.0) {
+        discard;
+    }
+    gl_FragDepth = window_depth(position.xyz);
+}

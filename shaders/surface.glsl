@@ -1,0 +1,16 @@
+// What is visible at a pixel, as the G-buffer holds it: see gbuffer.glsl.
+//@ include color.glsl
+uniform int object_id;  // index in the scene
+
+struct Surface {
+    vec4 position;  // xyz, object_id + 1; w = 0 is background
+    vec4 normal;    // xyz: unit (zero where a mesh's cancel), smooth; w: 1 where the outside is seen, else -1
+    vec4 color;     // rgb: linear light
+};
+
+Surface surface_at(vec3 position, vec3 normal, vec3 srgb, bool outside) {
+    return Surface(
+        vec4(position, float(object_id + 1)),
+        vec4(normal / max(length(normal), 1e-30), outside ? 1.0 : -1.0),
+        vec4(to_linear(srgb), 1.0));
+}

@@ -1,0 +1,26 @@
+// The same object as trace.frag draws as a compute shader, for GLSL 4.30 on: an invocation for every pixel of its
+// box's rectangle. No compute shader writes a depth buffer, so positions tell what lies nearer.
+layout(local_size_x = GROUP, local_size_y = GROUP) in;
+//@ include trace.glsl
+uniform ivec4 rectangle;  // lower left corner, size
+
+layout(binding = 0, rgba32f) uniform image2D g_position;
+layout(binding = 1) writeonly uniform image2D g_normal;
+layout(binding = 2) writeonly uniform image2D g_color;
+
+void main() {
+    ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(place, rectangle.zw))) {
+        return;
+    }
+    ivec2 texel = rectangle.xy + place;
+    Hit hit = trace_pixel(vec2(texel) + 0.5);
+    vec4 before = imageLoad(g_position, texel);
+    if (hit.distance < 0.0 || (before.w > 0.0 && dot(before.xyz - hit.position, hit.direction) <= 0.0)) {
+        return;
+    }
+    Surface surface = surface_of(hit);
+    imageStore(g_position, texel, surface.position);
+    imageStore(g_normal, texel, surface.normal);
+    imageStore(g_color, texel, surface.color);
+}

@@ -1,0 +1,51 @@
+// What the ray through a pixel sees of an implicit object (blobtree/trace.py); body of trace.frag and trace.comp.
+//@ include camera.glsl
+//@ include surface.glsl
+// blobtree.trace.TracingCells
+uniform sampler2D tape;
+uniform isampler2D nodes;
+uniform vec3 grid_lower;
+uniform float block_size;
+uniform int grid_depth;
+uniform float tolerance;
+
+vec4 tape_texel(sampler2D data, int i) {
+    return texelFetch(data, ivec2(i & 1023, i >> 10), 0);
+}
+
+//@ slot library
+//@ slot dispatch
+//@ slot readings
+
+vec2 field_bound(vec3 q, float reach, sampler2D tape_, ivec2 span) {
+    return interpret_bound(q, reach, tape_, span);
+}
+
+vec4 field_gradient(vec3 q, sampler2D tape_, ivec2 span) {
+    return interpret_gradient(q, 0.0, tape_, span);
+}
+
+// What the ray through a place in pixels, such as gl_FragCoord.xy, comes to.
+struct Hit {
+    float distance;  // along the ray, below 0 for a miss
+    vec3 direction;  // unit
+    vec3 position;
+    ivec2 span;      // of the tape that holds there
+};
+
+Hit trace_pixel(vec2 pixel) {
+    vec3 origin = ray_origin(pixel);
+    vec3 direction = normalize(ray_direction(pixel));
+    vec3 hit = trace_ray(origin, direction, grid_lower, block_size, grid_depth, tolerance, tape, nodes);
+    vec3 position = origin + direction * hit.x;
+    float depth = window_depth(position);
+    if (depth < 0.0 || depth > 1.0) {
+        hit.x = -1.0;  // a clipping plane hides it
+    }
+    return Hit(hit.x, direction, position, ivec2(hit.yz));
+}
+
+Surface surface_of(Hit hit) {
+    vec3 normal = -field_gradient(hit.position, tape, hit.span).yzw;
+    return surface_at(hit.position, normal, interpret_color(hit.position, 0.0, tape, hit.span).yzw, true);
+}
