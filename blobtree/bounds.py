@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from . import affine
 from .kernels import RIM
-from .operators import DIFFERENCE, INTERSECTION, Operator
+from .operators import Operator, Reach
 from .program import EnterWarp, LeaveWarp, PlacedPrimitive, Pop, Push, Run, compile_program
 
 if TYPE_CHECKING:
@@ -61,9 +61,9 @@ def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
 
 def _combine_all(operator: Operator, box: Box, boxes: Box) -> Box:
     """A box combined with many, one after the other."""
-    if operator is DIFFERENCE:
+    if operator.reach is Reach.LEFT:
         return box
-    if operator is INTERSECTION:
+    if operator.reach is Reach.COMMON:
         return _combine(operator, box, (boxes[0].max(axis=0), boxes[1].min(axis=0)))
     return _combine(operator, box, (boxes[0].min(axis=0), boxes[1].max(axis=0)))
 
@@ -80,8 +80,8 @@ def _warped(box: Box, entry: EnterWarp) -> Box:
 
 def _combine(operator: Operator, left: Box, right: Box) -> Box:
     """Where the combination of two fields can differ from 0."""
-    if operator is DIFFERENCE:
+    if operator.reach is Reach.LEFT:
         return left
-    if operator is INTERSECTION:
+    if operator.reach is Reach.COMMON:
         return np.maximum(left[0], right[0]), np.minimum(left[1], right[1])
     return np.minimum(left[0], right[0]), np.maximum(left[1], right[1])

@@ -19,6 +19,7 @@ from .kernels import ISO
 from .launch import launch
 from .prune import prune
 from .tape import Tape
+from .vocabulary import Vocabulary
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -167,6 +168,8 @@ class SparseCells:
     levels: tuple[Level, ...]
     """From the root, a single block, to the finest."""
     device: str
+    vocabulary: Vocabulary
+    """What the codes on the blocks' tapes stand for."""
 
     @property
     def leaves(self) -> Level:
@@ -203,8 +206,8 @@ def build_cells(
     levels = [level]
     for remaining in reversed(range(depth)):
         size = cell_size * BRANCHING ** (remaining + 1)
-        levels.append(_refine(levels[-1], origin, size, pad, place))
-    return SparseCells(lower, cell_size, BRANCHING**depth, tuple(levels), place)
+        levels.append(_refine(levels[-1], origin, size, pad, place, tape.vocabulary))
+    return SparseCells(lower, cell_size, BRANCHING**depth, tuple(levels), place, tape.vocabulary)
 
 
 def _depth(lower: NDArray[np.float64], upper: NDArray[np.float64], cell_size: float) -> int:
@@ -216,12 +219,14 @@ def _depth(lower: NDArray[np.float64], upper: NDArray[np.float64], cell_size: fl
     return depth
 
 
-def _refine(level: Level, origin: wp.vec3, size: float, pad: float, device: str) -> Level:
+def _refine(
+    level: Level, origin: wp.vec3, size: float, pad: float, device: str, vocabulary: Vocabulary
+) -> Level:
     """The children, of side `size`, of a level's blocks that the surface may cross."""
     count = len(level) * CHILDREN
     measured: wp.array[Any] = wp.empty(count, dtype=wp.vec4, device=device)
     geometry = [level.blocks, level.spans, level.tape, origin, size, pad]
-    launch(_measure, count, geometry, [measured], device)
+    launch(vocabulary.kernel(_measure), count, geometry, [measured], device)
     smallest, largest, texels, _ = measured.numpy().T
     chosen = np.flatnonzero((smallest <= ISO) & (largest >= ISO)).astype(np.int32)
     if len(chosen) > MOST_BLOCKS:
@@ -237,7 +242,7 @@ def _refine(level: Level, origin: wp.vec3, size: float, pad: float, device: str)
     spans: wp.array[Any] = wp.empty(len(chosen), dtype=wp.vec2i, device=device)
     tape: wp.array[Any] = wp.empty(int(needed.sum()), dtype=wp.vec4, device=device)
     launch(
-        _write,
+        vocabulary.kernel(_write),
         len(chosen),
         [
             wp.array(chosen, dtype=wp.int32, device=device),

@@ -112,6 +112,6 @@ def _launch(
     uploaded = tape.on()
     out: wp.array[Any] = wp.empty(len(points), dtype=dtype)
     inputs = [wp.array(points, dtype=wp.vec3), *extra, uploaded.data, uploaded.span]
-    wp.launch(kernel, dim=len(points), inputs=inputs, outputs=[out])
+    wp.launch(tape.vocabulary.kernel(kernel), dim=len(points), inputs=inputs, outputs=[out])
     result: NDArray[np.float32] = out.numpy()
     return result

@@ -42,6 +42,6 @@ def range_over(tape: Tape, lower: ArrayLike, upper: ArrayLike) -> tuple[float, f
     uploaded = tape.on("cpu")
     out = wp.empty(1, dtype=wp.vec4, device="cpu")
     inputs = [wp.vec3(*center), half + pad, uploaded.data, uploaded.span]
-    wp.launch(_range, dim=1, inputs=inputs, outputs=[out], device="cpu")
+    wp.launch(tape.vocabulary.kernel(_range), dim=1, inputs=inputs, outputs=[out], device="cpu")
     smallest, largest, _, _ = out.numpy()[0].tolist()
     return smallest, largest

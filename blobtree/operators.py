@@ -17,6 +17,7 @@ Every operator here gives its first operand back where the second is exactly 0, 
 """
 
 from dataclasses import dataclass
+from enum import Enum
 
 import warp as wp
 
@@ -213,7 +214,15 @@ def difference_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     return KEEP_BOTH
 
 
-@dataclass(frozen=True)
+class Reach(Enum):
+    """Where F(a, b) may differ from 0."""
+
+    EITHER = "where a or b does"
+    LEFT = "where a does; b cuts it away"
+    COMMON = "where a and b do"
+
+
+@dataclass(frozen=True, eq=False)
 class Operator:
     """One row of the table: an operator's name, its functions and its algebra."""
 
@@ -226,6 +235,9 @@ class Operator:
     """Operands may change places and nest in any way."""
     starts_from_zero: bool = True
     """F(0, b) = b, so that a fold may start from the empty field."""
+    reach: Reach = Reach.EITHER
+    digest: str = ""
+    """Of the sources of a user's operator."""
 
 
 SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice)
@@ -238,6 +250,7 @@ INTERSECTION = Operator(
     intersection_range,
     intersection_choice,
     starts_from_zero=False,
+    reach=Reach.COMMON,
 )
 DIFFERENCE = Operator(
     "difference",
@@ -247,6 +260,7 @@ DIFFERENCE = Operator(
     difference_choice,
     commutes=False,
     starts_from_zero=False,
+    reach=Reach.LEFT,
 )
 
 OPERATORS = (SUM, RICCI, UNION, INTERSECTION, DIFFERENCE)

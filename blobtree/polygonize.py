@@ -111,7 +111,7 @@ def mesh_cells(cells: SparseCells, report: Progress) -> Mesh:
 
     report("sampling the field", 0.0)
     values = array(count * SAMPLES, wp.float32)
-    launch(sample_blocks, count * SAMPLES, geometry, [values], device)
+    launch(cells.vocabulary.kernel(sample_blocks), count * SAMPLES, geometry, [values], device)
     codes = array(count * CHILDREN, wp.uint8)
     quad_counts, vertex_counts = array(count, wp.int32), array(count, wp.int32)
     launch(classify_cells, count, [values], [codes, quad_counts], device)
@@ -125,7 +125,8 @@ def mesh_cells(cells: SparseCells, report: Progress) -> Mesh:
     positions, normals, colors = (array(vertex_total, wp.vec3) for _ in range(3))
     report("placing vertices", 0.0)
     inputs = [*geometry, values, rows, tables.patch_count, tables.patch_of_edge, vertex_starts]
-    launch(place_vertices, count, inputs, [first_vertices, positions, normals, colors], device)
+    outputs = [first_vertices, positions, normals, colors]
+    launch(cells.vocabulary.kernel(place_vertices), count, inputs, outputs, device)
     report("placing vertices", 1.0)
     faces = array(2 * quad_total, wp.vec3i)
     inputs = [leaves.blocks, rows, tables.patch_of_edge, quad_starts, first_vertices, positions]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from . import affine
 from .errors import InvalidNode
-from .operators import DIFFERENCE, RICCI, SUM, Operator
+from .operators import RICCI, SUM, Operator, Reach
 from .skeletons import Skeleton
 from .traversal import fold
 from .warps import SpaceWarp
@@ -46,10 +46,11 @@ class Placement:
         """The factor by which all lengths are scaled, None where directions differ."""
         return affine.uniform_scale(self.matrix)
 
-    @property
-    def stretched(self) -> bool:
-        """Directions are scaled differently."""
-        return self.uniform_scale is None
+    def is_carried_by(self, skeleton: Skeleton) -> bool:
+        """Whether primitives of this kind carry the map, for it does not fold into their parameters."""
+        if skeleton.takes_maps:
+            return self.uniform_scale is None
+        return not np.array_equal(self.matrix, WORLD.matrix)
 
 
 WORLD = Placement(np.eye(4))
@@ -69,7 +70,7 @@ class Run:
 
     skeleton: Skeleton
     stretched: bool
-    """Their maps stretch directions differently, so each carries its inverse map."""
+    """Their maps do not fold into their parameters, so each carries its inverse map."""
     operator: Operator
     parameter: float
     primitives: list[PlacedPrimitive] = field(default_factory=list)
@@ -248,7 +249,8 @@ def _expand_ordered(
     operator, parameter = _operation(node)
     left, right = node.children
     left_place = step.placement
-    right_place = replace(left_place, growth=-left_place.growth) if operator is DIFFERENCE else left_place
+    cuts = operator.reach is Reach.LEFT
+    right_place = replace(left_place, growth=-left_place.growth) if cuts else left_place
     if weights[id(right)] == SIMPLE:
         leaf, placement = _strip(right, right_place)
         assert isinstance(leaf, Primitive)
@@ -266,10 +268,11 @@ def _expand_ordered(
 
 def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
     """One run per kind of primitive, in the order in which the kinds first occur."""
-    runs: dict[tuple[str, bool], Run] = {}
+    runs: dict[tuple[Skeleton, bool], Run] = {}
     for placed in primitives:
-        skeleton, stretched = placed.primitive.skeleton, placed.placement.stretched
-        key = skeleton.name, stretched
+        skeleton = placed.primitive.skeleton
+        stretched = placed.placement.is_carried_by(skeleton)
+        key = skeleton, stretched
         if key not in runs:
             runs[key] = Run(skeleton, stretched, operator, parameter)
         runs[key].primitives.append(placed)

@@ -65,7 +65,7 @@ def project(
     start: wp.array[Any] = wp.array(point_array(points), dtype=wp.vec3)
     positions, normals = wp.empty_like(start), wp.empty_like(start)
     wp.launch(
-        _project,
+        tape.vocabulary.kernel(_project),
         dim=len(start),
         inputs=[start, longest_step, uploaded.data, uploaded.span],
         outputs=[positions, normals],

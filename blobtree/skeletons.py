@@ -119,7 +119,7 @@ def box_to_cone(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4)
     return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, slimmest_of_cone(tape, at))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """One row of the table: how a kind is called, computed and stored."""
 
@@ -129,6 +129,10 @@ class Skeleton:
     box_distances: wp.Function
     parameters: int
     """Texels (vec4) that the parameters take on the tape."""
+    takes_maps: bool = True
+    """Maps that keep shapes fold into its parameters; else each primitive carries its map."""
+    digest: str = ""
+    """Of the sources of a user's kind."""
 
 
 POINT = Skeleton("point", closest_on_point, slimmest_of_one, box_to_point, parameters=1)

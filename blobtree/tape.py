@@ -3,9 +3,9 @@
 Layout, in texels (vec4 of float32):
 
     header     (code, operator, count, parameter)
-      code ≥ 0     a run of `count` primitives of SKELETONS[code], behind the header: parameters, then a
-                   texel of colour
-      code ≥ STRETCHED  the same for SKELETONS[code − STRETCHED], each behind PREFIX texels: the rows of its
+      code ≥ 0     a run of `count` primitives of the vocabulary's skeletons[code], behind the header:
+                   parameters, then a texel of colour
+      code ≥ STRETCHED  the same for skeletons[code − STRETCHED], each behind PREFIX texels: the rows of its
                    world → local map, then (largest stretch of that map, 0, 0, 0)
       PUSH         register[count] = accumulator; accumulator = 0
       POP          accumulator = operator(register[count], accumulator)
@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 
 from .errors import InvalidNode
 from .kernels import RIM
-from .operators import OPERATORS
 from .program import (
     EnterWarp,
     Instruction,
@@ -41,8 +40,7 @@ from .program import (
     registers_needed,
     warp_registers_needed,
 )
-from .skeletons import SKELETONS
-from .warps import WARPS
+from .vocabulary import BUILT_IN, Vocabulary, vocabulary_of
 
 if TYPE_CHECKING:
     from .tree import Node
@@ -84,6 +82,8 @@ class Tape:
     warps: tuple[int, ...] = ()
     """Codes of the warps in use."""
     warp_registers: int = 0
+    vocabulary: Vocabulary = BUILT_IN
+    """What the codes stand for."""
 
     def on(self, device: str | None = None) -> DeviceTape:
         """This tape on a Warp device, by default the current one."""
@@ -106,41 +106,46 @@ def compile_tape(root: "Node") -> Tape:
     if warp_registers > WARP_REGISTERS:
         raise InvalidNode(f"tree: warps nest {warp_registers} deep, at most {WARP_REGISTERS} may")
     runs = [step for step in program if isinstance(step, Run)]
-    operators = {OPERATORS.index(step.operator) for step in program if isinstance(step, Run | Pop)}
+    skeletons = {run.skeleton for run in runs}
+    operators = {step.operator for step in program if isinstance(step, Run | Pop)}
+    vocabulary = vocabulary_of(skeletons, operators)
+    texels = [texels for step in program for texels in _texels(step, vocabulary)]
     return Tape(
-        data=np.concatenate([texels for step in program for texels in _texels(step)]).astype(np.float32),
+        data=np.concatenate(texels).astype(np.float32),
         registers=registers,
-        skeletons=tuple(sorted({SKELETONS.index(run.skeleton) for run in runs})),
-        operators=tuple(sorted(operators)),
+        skeletons=tuple(sorted(map(vocabulary.skeletons.index, skeletons))),
+        operators=tuple(sorted(map(vocabulary.operators.index, operators))),
         stretched=any(run.stretched for run in runs),
-        warps=tuple(sorted({WARPS.index(step.warp) for step in program if isinstance(step, EnterWarp)})),
+        warps=tuple(
+            sorted({vocabulary.warps.index(step.warp) for step in program if isinstance(step, EnterWarp)})
+        ),
         warp_registers=warp_registers,
+        vocabulary=vocabulary,
     )
 
 
-def _texels(step: Instruction) -> Iterator[NDArray[np.float64]]:
+def _texels(step: Instruction, vocabulary: Vocabulary) -> Iterator[NDArray[np.float64]]:
     """The texels (·, 4) of one instruction."""
     match step:
         case Push(register):
             yield np.array([[PUSH, 0.0, register, 0.0]])
         case Pop(register, operator, parameter, swapped):
-            yield np.array(
-                [[POP_SWAPPED if swapped else POP, OPERATORS.index(operator), register, parameter]]
-            )
+            code = POP_SWAPPED if swapped else POP
+            yield np.array([[code, vocabulary.operators.index(operator), register, parameter]])
         case EnterWarp():
-            yield _warp_texels(WARP, step)
+            yield _warp_texels(WARP, step, vocabulary)
         case LeaveWarp(entry):
-            yield _warp_texels(UNWARP, entry)
+            yield _warp_texels(UNWARP, entry, vocabulary)
         case Run(skeleton, stretched, operator, parameter, primitives):
-            code = SKELETONS.index(skeleton) + (STRETCHED if stretched else 0)
-            yield np.array([[code, OPERATORS.index(operator), len(primitives), parameter]])
+            code = vocabulary.skeletons.index(skeleton) + (STRETCHED if stretched else 0)
+            yield np.array([[code, vocabulary.operators.index(operator), len(primitives), parameter]])
             yield _primitive_texels(primitives, stretched=stretched)
 
 
-def _warp_texels(code: int, entry: EnterWarp) -> NDArray[np.float64]:
+def _warp_texels(code: int, entry: EnterWarp, vocabulary: Vocabulary) -> NDArray[np.float64]:
     """Header, map and parameters of a warp."""
     parameters = (*entry.parameters, 0.0, 0.0, 0.0)[:3]
-    header = [code, WARPS.index(entry.warp), entry.register, 0.0]
+    header = [code, vocabulary.warps.index(entry.warp), entry.register, 0.0]
     prefix = _map_texels(entry.placement.matrix)
     prefix[-1, 1:] = parameters
     return np.vstack([header, prefix])

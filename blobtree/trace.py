@@ -29,6 +29,7 @@ from .kernels import ISO
 from .launch import launch
 from .tape import Tape
 from .validation import point_array
+from .vocabulary import Vocabulary
 
 if TYPE_CHECKING:
     from .tree import Node
@@ -222,6 +223,8 @@ class TracingCells:
         The grid: lowest corner (3,), side of the finest blocks, levels below the root.
     tolerance
         Distance to the surface at which a ray has arrived.
+    vocabulary
+        What the codes on the tape stand for.
     """
 
     tape: NDArray[np.float32]
@@ -230,6 +233,7 @@ class TracingCells:
     block_size: float
     depth: int
     tolerance: float
+    vocabulary: Vocabulary
 
 
 def tracing_cells(tree: "Node") -> TracingCells:
@@ -259,6 +263,7 @@ def _tracing_cells(tape: Tape, lower: tuple[float, ...], upper: tuple[float, ...
         block_size=cell_size * BRANCHING,
         depth=len(tables),
         tolerance=trace_tolerance(bounds),
+        vocabulary=tape.vocabulary,
     )
 
 
@@ -283,7 +288,7 @@ def trace(tree: "Node", origins: ArrayLike, directions: ArrayLike) -> NDArray[np
     cells = tracing_cells(tree)
     out: wp.array[Any] = wp.empty(len(starts), dtype=wp.float32, device="cpu")
     launch(
-        _trace,
+        cells.vocabulary.kernel(_trace),
         len(starts),
         [
             *(wp.array(array, dtype=wp.vec3, device="cpu") for array in (starts, headings)),

@@ -12,12 +12,10 @@ from typing import Any
 from blobtree.dispatch import partials, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.evaluate import field_bound, field_gradient
 from blobtree.glsl import translate_choice, translate_library
-from blobtree.operators import OPERATORS
 from blobtree.readings import BOUND, COLOR, GRADIENT, Reading, to_local
-from blobtree.skeletons import SKELETONS
 from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.trace import trace_ray
-from blobtree.warps import WARPS
+from blobtree.vocabulary import BUILT_IN, Vocabulary
 from decals.render.entry import GROUP, Entry
 from implicit_decals.shaders import Source, compose
 
@@ -39,6 +37,7 @@ class Kinds:
     stretched: bool
     warps: tuple[int, ...]
     warp_registers: int
+    vocabulary: Vocabulary = BUILT_IN
 
     @classmethod
     def of(cls, tape: Tape) -> "Kinds":
@@ -50,6 +49,7 @@ class Kinds:
             tape.stretched,
             tape.warps,
             tape.warp_registers,
+            tape.vocabulary,
         )
 
 
@@ -72,8 +72,9 @@ def tracing_shader(kinds: Kinds, entry: Entry = Entry.FRAGMENT) -> Source:
 def _library(kinds: Kinds) -> str:
     """Every typed function that the shader calls, from the sources that Warp runs."""
     readings = [reading for reading, _ in _READINGS.values()]
+    skeletons = [kinds.vocabulary.skeletons[code] for code in kinds.skeletons]
     functions = [
-        *(f for code in kinds.skeletons for f in (SKELETONS[code].closest, SKELETONS[code].slimmest)),
+        *(f for skeleton in skeletons for f in (skeleton.closest, skeleton.slimmest)),
         *(f for choices in _choices(kinds).values() for f in choices.values()),
         *(f for reading in readings for f in (reading.leaf, reading.unstretch, reading.combine)),
         *(reading.unwarp for reading in readings if kinds.warps),
@@ -85,12 +86,13 @@ def _library(kinds: Kinds) -> str:
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
     """The functions that choose by a code on the tape, and what each chooses among."""
+    operators, warps = kinds.vocabulary.operators, kinds.vocabulary.warps
     choices: dict[Any, dict[int, Any]] = {
-        partials: {code: OPERATORS[code].partials for code in kinds.operators},
-        slope: {code: OPERATORS[code].slope for code in kinds.operators},
-        warp_forward: {code: WARPS[code].forward for code in kinds.warps},
-        warp_pullback: {code: WARPS[code].pullback for code in kinds.warps},
-        warp_stretch: {code: WARPS[code].stretch for code in kinds.warps},
+        partials: {code: operators[code].partials for code in kinds.operators},
+        slope: {code: operators[code].slope for code in kinds.operators},
+        warp_forward: {code: warps[code].forward for code in kinds.warps},
+        warp_pullback: {code: warps[code].pullback for code in kinds.warps},
+        warp_stretch: {code: warps[code].stretch for code in kinds.warps},
     }
     return {chooser: among for chooser, among in choices.items() if among}
 
@@ -131,7 +133,7 @@ def _interpreter(name: str, reading: Reading, glsl_type: str, kinds: Kinds) -> S
 def _run_cases(kinds: Kinds) -> Iterable[str]:
     """A loop per kind of skeleton, so that the kind is not asked for inside it."""
     for code in kinds.skeletons:
-        skeleton = SKELETONS[code]
+        skeleton = kinds.vocabulary.skeletons[code]
         names = {"closest": skeleton.closest.key, "slimmest": skeleton.slimmest.key}
         yield _RUN.format(code=code, stride=skeleton.parameters + 1, **names)
         if kinds.stretched:
