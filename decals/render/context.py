@@ -13,6 +13,7 @@ import moderngl
 from decals.errors import NoGraphics
 from decals.render.entry import COMPUTE_BASELINE, Entry, Program, checked_entry, choose_entry
 from decals.render.libraries import require_gl
+from decals.render.shared_display import hold_display
 from implicit_decals.shaders import Source, compile_error
 
 BASELINE = 330
@@ -95,6 +96,7 @@ class Context:
             point that was asked for cannot be had.
         """
         require_gl()
+        hold_display()
         gl = _newest()
         context = cls(gl, owned=True, entry=entry)
         with context.current():  # making it made it current; hand the thread back to whoever had it

@@ -1,0 +1,9 @@
+"""Decals inside pyvista: ``plotter.decals``.
+
+Once the package is installed pyvista finds the component by itself; importing this package registers it too.
+"""
+
+from decals.vtk.component import Component
+from decals.vtk.stage import Hit, Stage
+
+__all__ = ["Component", "Hit", "Stage"]

@@ -1,0 +1,24 @@
+"""VTK's camera as the renderer sees it."""
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from decals.viewpoint import Floats, Projection
+
+
+def vtk_projection(renderer: Any, model: Floats | None = None) -> Projection:
+    """Give what a vtkRenderer's camera shows: perspective or parallel, clipping planes as they are.
+
+    Parameters
+    ----------
+    renderer
+        A vtkRenderer.
+    model
+        Model to world, ``float64[4, 4]``; identity if not given.
+    """
+    camera = renderer.GetActiveCamera()
+    matrix = camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
+    world = np.asarray(pv.array_from_vtkmatrix(matrix), np.float64)
+    return Projection(world if model is None else world @ model)

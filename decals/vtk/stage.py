@@ -1,0 +1,239 @@
+"""Our renderer in one of pyvista's renderers: a plotter's window, or one of its subplots."""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from decals.contact import Contact
+from decals.errors import InvalidScene
+from decals.mapping import Mapping
+from decals.render import Renderer, SceneLike
+from decals.scene import SceneObject, bounds_of
+from decals.viewpoint import Projection
+from decals.vtk.anchor import Anchor
+from decals.vtk.camera import vtk_projection
+from decals.vtk.composite import Composite
+from decals.vtk.context import WindowContext
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """What lies behind a place in a window.
+
+    Attributes
+    ----------
+    object_id
+        Index of the object in the scene.
+    owner
+        Number of the topmost decal there, -1 for none.
+    position, normal
+        float32[3] each, in the scene's coordinates.
+    uv
+        Place in the owner's image; zero without an owner.
+    field
+        The owner's field after contact; zero without an owner.
+    depth
+        Depth in the window, from 0 to 1: larger than that of VTK's depth buffer where an actor lies in front.
+    """
+
+    object_id: int
+    owner: int
+    position: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    uv: tuple[float, float]
+    field: float
+    depth: float
+
+
+class Stage:
+    """Draws a scene among the actors of one of pyvista's renderers.
+
+    Everything may be changed at any time; the plotter's next ``render()`` shows it.
+
+    Parameters
+    ----------
+    plotter
+        The plotter that the renderer belongs to.
+    renderer
+        One of ``plotter.renderers``.
+    context
+        Gives the window's context, the same one for all its renderers, while VTK's is current.
+
+    Attributes
+    ----------
+    samples
+        Samples a pixel along each axis; where VTK itself draws larger than the window, one.
+    draw_scale
+        Size of what is drawn relative to the window's. Below 1, one sample a texel is drawn and magnified:
+        for the time that things move.
+    mapping, contact
+        As for `decals.render.Renderer.render`.
+    frame_seconds
+        How long our part of the last frame took; with ``measure``, until the card had finished.
+    measure
+        Whether to wait for the card, so as to know.
+    """
+
+    def __init__(
+        self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]
+    ) -> None:
+        self.plotter, self.vtk_renderer = plotter, renderer
+        self.samples, self.draw_scale = 2, 1.0
+        self.mapping, self.contact = Mapping.CORRECTED, Contact.PAPER
+        self.frame_seconds, self.measure = 0.0, False
+        self._scene: SceneLike | None = None
+        self._context = context
+        self._tools: _Tools | None = None
+        self._failed: object = None
+        me = weakref.ref(self)
+        self._anchor = Anchor(renderer, lambda: _draw(me))
+
+    @property
+    def scene(self) -> SceneLike | None:
+        """What is shown; its camera is not asked, the plotter's is."""
+        return self._scene
+
+    @scene.setter
+    def scene(self, scene: SceneLike | None) -> None:
+        before = None if self._scene is None else self._scene.objects
+        self._scene = scene
+        self._failed = None
+        if scene is None or not scene.objects:
+            self._anchor.leave()
+        elif before is None or list(before) != list(scene.objects):
+            self._anchor.place(bounds_of(cast(Sequence[SceneObject], scene.objects)))
+
+    @property
+    def renderer(self) -> Renderer:
+        """The renderer in the window's context; use it inside ``with stage.current():``."""
+        return self._use_tools().renderer
+
+    @contextmanager
+    def current(self) -> Iterator[None]:
+        """Make the window's context current, and keep VTK's state, within a ``with`` block."""
+        with self._use_tools().context.current():
+            yield
+
+    def viewpoint(self) -> Projection:
+        """VTK's camera, as the renderer sees it."""
+        return vtk_projection(self.vtk_renderer, self._anchor.matrix())
+
+    def at(self, x: int, y: int) -> Hit | None:
+        """Say what lies at a place in the window, in pixels from its lower left corner; None for nothing.
+
+        That one pixel is drawn for it, at full resolution. Actors that lie in front do not count.
+        """
+        left, low = self.vtk_renderer.GetOrigin()
+        width, height = self.vtk_renderer.GetSize()
+        x, y = x - left, y - low
+        if self._scene is None or not (0 <= x < width and 0 <= y < height):
+            return None
+        viewpoint = self.viewpoint()
+        with self.current():
+            found = self.renderer.buffers_at(
+                self._scene,
+                x,
+                y,
+                size=(width, height),
+                mapping=self.mapping,
+                contact=self.contact,
+                viewpoint=viewpoint,
+            )
+        if found.object_id[0, 0] < 0:
+            return None
+        position = found.position[0, 0]
+        clip = viewpoint.matrix @ np.append(position.astype(np.float64), 1.0)
+        return Hit(
+            object_id=int(found.object_id[0, 0]),
+            owner=int(found.owner[0, 0]),
+            position=position,
+            normal=found.normal[0, 0],
+            uv=(float(found.uv[0, 0, 0]), float(found.uv[0, 0, 1])),
+            field=float(found.field[0, 0]),
+            depth=float(0.5 * clip[2] / clip[3] + 0.5),
+        )
+
+    def draw(self) -> None:
+        """Draw into the frame that VTK is drawing; called by the anchor."""
+        scene = self._scene
+        if scene is None or self.vtk_renderer.GetSelector() is not None or self._failed is scene:
+            return
+        begin = time.perf_counter()
+        try:
+            self._draw(scene)
+        except Exception:
+            self._failed = scene  # say it once, not with every frame
+            raise
+        self.frame_seconds = time.perf_counter() - begin
+
+    def _draw(self, scene: SceneLike) -> None:
+        tools = self._use_tools()
+        viewport = tools.context.viewport()
+        size, samples = self._drawn_size(viewport[2:])
+        with tools.context.current():
+            targets = tools.renderer.draw(
+                scene,
+                size=size,
+                samples=max(samples, 1),
+                mapping=self.mapping,
+                contact=self.contact,
+                viewpoint=self.viewpoint(),
+            )
+            if self.measure:
+                tools.context.gl.finish()
+        tools.composite.draw(self.vtk_renderer.GetRenderWindow(), viewport, targets, samples)
+
+    def _drawn_size(self, viewport: tuple[int, int]) -> tuple[tuple[int, int], int]:
+        """Size in pixels and samples of what is drawn; 0 samples where it is to be magnified."""
+        if not 0.0 < self.draw_scale <= 1.0:
+            raise InvalidScene(f"draw_scale must be above 0 and at most 1, got {self.draw_scale}")
+        if self.draw_scale < 1.0:
+            width, height = (max(1, round(self.draw_scale * side)) for side in viewport)
+            return (width, height), 0
+        supersampled = viewport[0] > self.vtk_renderer.GetSize()[0]
+        return viewport, 1 if supersampled else self.samples
+
+    def _use_tools(self) -> _Tools:
+        """Give what draws; made anew where the window has another context than before."""
+        if self._tools is None or self._tools.context.stale:
+            self._tools = _Tools(self._context())
+        return self._tools
+
+    def release(self) -> None:
+        """Leave the renderer and give everything back; the window must still be there. Twice is harmless."""
+        self._anchor.release()
+        if self._tools is not None and not self._tools.context.stale:
+            self._tools.release()
+        self._tools = None
+        self._scene = None
+
+
+class _Tools:
+    """What a stage has in its window's context."""
+
+    def __init__(self, context: WindowContext) -> None:
+        self.context = context
+        with context.current():
+            self.renderer = Renderer(context)
+            self.composite = Composite(context)
+
+    def release(self) -> None:
+        with self.context.current():
+            self.renderer.release()
+            self.composite.release()
+
+
+def _draw(stage: weakref.ref[Stage]) -> None:
+    """Let a stage draw, if it still exists: VTK must not keep it alive."""
+    alive = stage()
+    if alive is not None:
+        alive.draw()
