@@ -1,23 +1,21 @@
 """A BlobTree as a surface for decals."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from blobtree import ISO, Node, polygonize
-from blobtree.project import project
+from blobtree import Node, polygonize
 from blobtree.trace import trace
 from decals.errors import InvalidMesh
+from decals.ground import asked, inside
 from decals.mesh_surface import MeshSurface
 from decals.surface import Flags, Floats, as_points, as_rays
+from decals.tree_ground import TreeGround
 
 RESOLUTION = 64
 """Cells along the longest side of the tree's box from which area and samples are taken."""
 
 STEP = 0.5
 """Longest Newton step, in cells."""
-
-ARRIVED = 1e-4
-"""Largest field error, in units of the iso value, of a point that has reached the surface."""
 
 
 class ImplicitSurface:
@@ -33,6 +31,8 @@ class ImplicitSurface:
     resolution
         Cells of the coarse mesh along the longest side of the tree's box. Parts thinner than a cell
         may get no samples.
+    device
+        Warp device that answers questions of the host, rays aside.
 
     Raises
     ------
@@ -40,17 +40,18 @@ class ImplicitSurface:
         If the tree has no surface at that resolution.
     """
 
-    def __init__(self, tree: Node, *, resolution: int = RESOLUTION) -> None:
-        self.tree = tree
-        coarse = polygonize(tree, resolution=resolution)
+    def __init__(self, tree: Node, *, resolution: int = RESOLUTION, device: str = "cpu") -> None:
+        self.tree, self.device = tree, device
+        coarse = polygonize(tree, resolution=resolution, device=device)
         if len(coarse.faces) == 0:
             raise InvalidMesh(
                 f"expected a tree with a surface, got none in {resolution} cells; "
                 "its parts may be too small, or cut each other away"
             )
-        self._coarse = MeshSurface(coarse.vertices, coarse.faces)
+        self._coarse = MeshSurface(coarse.vertices, coarse.faces, device=device)
         low, high = tree.bounds
         self._longest_step = STEP * float((high - low).max()) / resolution
+        self._grounds: dict[str, TreeGround] = {}
 
     def __repr__(self) -> str:
         return f"ImplicitSurface({self.tree!r})"
@@ -69,16 +70,17 @@ class ImplicitSurface:
         """Points uniform by area on the coarse mesh, taken to the surface."""
         return self.project(self._coarse.sample(count, seed)[0])
 
+    def on(self, device: str) -> TreeGround:
+        """Return the tree in the memory of a device; it is taken there once."""
+        if device not in self._grounds:
+            self._grounds[device] = TreeGround(self.tree, self._coarse.on(device), self._longest_step)
+        return self._grounds[device]
+
     def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
         """Surface points near the points and the normals there."""
         queries = as_points(points)
-        positions, normals, lost = self._descend(queries)
-        if lost.any():
-            starts, coarse_normals = self._coarse.project(queries[lost])
-            found, found_normals, still = self._descend(starts)
-            positions[lost] = np.where(still[:, None], starts, found)
-            normals[lost] = np.where(still[:, None], coarse_normals, found_normals)
-        return positions, normals
+        reaches = np.zeros(len(queries), np.float32) if within is None else within
+        return asked(self.on(self.device), queries, reaches, self.device)
 
     def normal(self, points: ArrayLike) -> Floats:
         """Return the normals of the surface where it is closest to the points."""
@@ -95,17 +97,4 @@ class ImplicitSurface:
 
     def contains(self, points: ArrayLike) -> Flags:
         """Whether the field is above the iso value."""
-        queries = as_points(points)
-        low, high = self.tree.bounds
-        inside: Flags = np.all((queries >= low) & (queries <= high), axis=1)
-        if inside.any():
-            inside[inside] = self.tree(queries[inside]) > ISO
-        return inside
-
-    def _descend(self, starts: Floats) -> tuple[Floats, Floats, Flags]:
-        """Newton's method: positions, normals, and which of them did not arrive."""
-        if len(starts) == 0:
-            return starts.copy(), starts.copy(), np.zeros(0, np.bool_)
-        positions, normals = project(self.tree.tape, starts, self._longest_step)
-        errors: NDArray[np.float32] = np.abs(self.tree(positions) - ISO)
-        return positions, normals, (errors > ARRIVED * ISO) | ~normals.any(axis=1)
+        return inside(self.on(self.device), as_points(points), self.device)

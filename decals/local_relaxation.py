@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from decals.moving import moved
+from decals.crowd import Crowd
 from decals.population import Sites, World
-from decals.repulsion import Repulsion
+from decals.repulsion import Law
 from decals.surface import Flags, Floats
 
 INNER, OUTER = 4.0, 6.5
@@ -15,31 +15,19 @@ STEPS = 16
 
 
 def relax_near(
-    world: World,
-    sites: Sites,
-    movable: Flags,
-    sizes: Floats,
-    center: Floats,
-    *,
-    exponent: float,
-    stiffness: float,
-    device: str,
+    world: World, sites: Sites, movable: Flags, sizes: Floats, center: Floats, *, law: Law
 ) -> Sites:
     """Let the particles around a place find their rest, all others where they are."""
     distances = np.linalg.norm(sites.positions - center, axis=1)
     spacing = float(sizes[distances.argmin()])
     near = np.flatnonzero(distances < OUTER * spacing)
-    resting = (distances[near] > INNER * spacing) | ~movable[near]
-    crowd, own_sizes = sites[near], sizes[near]
-    repulsion = Repulsion(len(near), device=device)
+    moving = (distances[near] < INNER * spacing) & movable[near]
+    crowd = Crowd(world, sites[near], moving, sizes[near])
     for _ in range(STEPS):
-        if repulsion.stale:
-            repulsion.relist(crowd.positions, crowd.normals, own_sizes)
-        moves = repulsion.moves(
-            crowd.positions, crowd.normals, own_sizes, exponent=exponent, stiffness=stiffness
-        )
-        moves[resting] = 0.0
-        crowd = moved(world, crowd, moves, own_sizes)
+        if crowd.stale:
+            crowd.begin(law)
+        crowd.step()
+    found = crowd.sites()
     positions, normals = sites.positions.copy(), sites.normals.copy()
-    positions[near], normals[near] = crowd.positions, crowd.normals
+    positions[near], normals[near] = found.positions, found.normals
     return Sites(positions, normals, sites.surface_ids)

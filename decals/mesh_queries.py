@@ -13,17 +13,29 @@ def closest_points(
     first: wp.int32,
     mesh: wp.uint64,
     face_normals: wp.array(dtype=wp.vec3),
+    center: wp.vec3,
+    radius: wp.float32,
     points: wp.array(dtype=wp.vec3),
     reaches: wp.array(dtype=wp.float32),
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
 ) -> None:
-    """Closest point of the mesh to each point, and the normal of the face that it lies on."""
+    """Closest point of the mesh to each point, and the normal of the face that it lies on.
+
+    It is looked for within reach at first; then within the ball around the point that holds the ball
+    around the mesh.
+    """
     i = first + wp.tid()
-    query = wp.mesh_query_point_no_sign(mesh, points[i], reaches[i])
-    if query.result:
-        positions[i] = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
-        normals[i] = face_normals[query.face]
+    p = points[i]
+    near = wp.mesh_query_point_no_sign(mesh, p, reaches[i])
+    if near.result:
+        positions[i] = wp.mesh_eval_position(mesh, near.face, near.u, near.v)
+        normals[i] = face_normals[near.face]
+    else:
+        far = wp.mesh_query_point_no_sign(mesh, p, 1.01 * (wp.length(p - center) + radius))
+        if far.result:
+            positions[i] = wp.mesh_eval_position(mesh, far.face, far.u, far.v)
+            normals[i] = face_normals[far.face]
 
 
 @wp.kernel
@@ -44,17 +56,18 @@ def first_hits(
 
 
 @wp.kernel
-def inside_flags(
+def mark_inside(
     first: wp.int32,
     mesh: wp.uint64,
+    low: wp.vec3,
+    high: wp.vec3,
     points: wp.array(dtype=wp.vec3),
-    reach: wp.float32,
     flags: wp.array(dtype=wp.int32),
 ) -> None:
-    """1 where the winding number of the mesh around the point is above one half."""
+    """Write 1 where the winding number of the mesh around the point is above one half."""
     i = first + wp.tid()
-    query = wp.mesh_query_point_sign_winding_number(mesh, points[i], reach)
-    if query.result and query.sign < 0.0:
-        flags[i] = 1
-    else:
-        flags[i] = 0
+    p = points[i]
+    if wp.min(p, low) == low and wp.max(p, high) == high:
+        query = wp.mesh_query_point_sign_winding_number(mesh, p, 2.0 * wp.length(high - low))
+        if query.result and query.sign < 0.0:
+            flags[i] = 1

@@ -1,14 +1,15 @@
 """A triangle mesh as a surface for decals."""
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree.launch import launch
 from decals.errors import InvalidMesh
-from decals.mesh_queries import closest_points, first_hits, inside_flags
+from decals.ground import asked, inside, vectors
+from decals.mesh_ground import MeshGround
 from decals.model import LARGEST
 from decals.surface import Flags, Floats, as_points, as_rays, frozen
 
@@ -32,6 +33,8 @@ class MeshSurface:
         ``float[n, 3]``, finite and within ±LARGEST.
     faces
         ``int[m, 3]``, indices into the vertices, counter-clockwise seen from outside.
+    device
+        Warp device that answers questions of the host.
 
     Raises
     ------
@@ -39,7 +42,8 @@ class MeshSurface:
         For wrong shapes, NaN, infinite or huge vertices, indices out of range, no faces, no area.
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, device: str = "cpu") -> None:
+        self.device = device
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
         corners, normals, areas = _sound_faces(self.vertices, self.faces)
@@ -50,10 +54,7 @@ class MeshSurface:
         self._bounds = used.min(axis=(0, 1)), used.max(axis=(0, 1))
         for array in (self.vertices, self.faces, *self._bounds):
             frozen(array)
-        self._device_points: wp.array[wp.vec3] = wp.array(self.vertices, dtype=wp.vec3, device="cpu")
-        self._device_normals: wp.array[wp.vec3] = wp.array(normals, dtype=wp.vec3, device="cpu")
-        self._device_corners: wp.array[wp.int32] = wp.array(corners.reshape(-1), dtype=wp.int32, device="cpu")
-        self._mesh = wp.Mesh(points=self._device_points, indices=self._device_corners)
+        self._grounds: dict[str, MeshGround] = {}
 
     def __repr__(self) -> str:
         return f"MeshSurface({len(self.vertices)} vertices, {len(self.faces)} faces)"
@@ -73,6 +74,13 @@ class MeshSurface:
         """Whether the faces bound a volume, with or without the degenerate ones."""
         return any(_is_closed(self.vertices, faces) for faces in (self.faces, self._corners))
 
+    @cached_property
+    def _winding(self) -> int:
+        """1 if the mesh is closed and winds counter-clockwise seen from outside, -1 if clockwise, else 0."""
+        if not self.closed:
+            return 0
+        return -1 if _volume(self.vertices, self.faces) < 0 else 1
+
     def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
         """Points uniform by area, one in each ``1/count`` of it along the order of the faces."""
         rng = np.random.default_rng(seed)
@@ -83,31 +91,24 @@ class MeshSurface:
         positions = (1 - root) * a + root * ((1 - along) * b + along * c)
         return positions.astype(np.float32), self._normals[face]
 
+    def on(self, device: str) -> MeshGround:
+        """Return the mesh in the memory of a device; it is taken there once."""
+        if device not in self._grounds:
+            self._grounds[device] = MeshGround(
+                self.vertices,
+                self._corners,
+                self._normals,
+                bounds=self._bounds,
+                winding=lambda: self._winding,
+                device=device,
+            )
+        return self._grounds[device]
+
     def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
         """Closest points of the mesh and the normals of their faces."""
         queries = as_points(points)
-        positions, normals = queries.copy(), np.zeros_like(queries)
-        if within is None:
-            self._closest(
-                queries, np.full(len(queries), self._reach(queries), np.float32), positions, normals
-            )
-            return positions, normals
-        self._closest(queries, within.astype(np.float32), positions, normals)
-        missed = np.flatnonzero(~normals.any(axis=1))
-        if len(missed):
-            positions[missed], normals[missed] = self.project(queries[missed])
-        return positions, normals
-
-    def _closest(self, points: Floats, reaches: Floats, positions: Floats, normals: Floats) -> None:
-        """Write the closest points within reach, and their normals, where there are any."""
-        bounds: wp.array[wp.float32] = wp.array(reaches, dtype=wp.float32, device="cpu", copy=False)
-        launch(
-            closest_points,
-            len(points),
-            [self._mesh.id, self._device_normals, _shared(points), bounds],
-            [_shared(positions), _shared(normals)],
-            device="cpu",
-        )
+        reaches = np.zeros(len(queries), np.float32) if within is None else within.astype(np.float32)
+        return asked(self.on(self.device), queries, reaches, self.device)
 
     def normal(self, points: ArrayLike) -> Floats:
         """Return the normals of the faces closest to the points."""
@@ -116,56 +117,15 @@ class MeshSurface:
     def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Floats:
         """Distance to the first face that each ray meets, from either side."""
         starts, ways = as_rays(origins, directions)
-        distances = np.empty(len(starts), np.float32)
-        launch(
-            first_hits,
-            len(starts),
-            [self._mesh.id, _shared(starts), _shared(ways)],
-            [wp.array(distances, dtype=wp.float32, device="cpu", copy=False)],
-            device="cpu",
-        )
+        found: Any = wp.zeros(len(starts), dtype=wp.float32, device=self.device)
+        self.on(self.device).hit(vectors(starts, self.device), vectors(ways, self.device), found)
+        distances: Floats = found.numpy()
         distances[~ways.any(axis=1)] = np.inf
         return distances
 
     def contains(self, points: ArrayLike) -> Flags:
         """Whether the mesh winds around each point; an open mesh contains nothing."""
-        queries = as_points(points)
-        low, high = self.bounds
-        inside: Flags = np.all((queries >= low) & (queries <= high), axis=1)
-        if not inside.any() or not self.closed:
-            return np.zeros(len(queries), np.bool_)
-        near = np.ascontiguousarray(queries[inside])
-        flags = np.empty(len(near), np.int32)
-        launch(
-            inside_flags,
-            len(near),
-            [self._winding_mesh.id, _shared(near), self._reach(near)],
-            [wp.array(flags, dtype=wp.int32, device="cpu", copy=False)],
-            device="cpu",
-        )
-        inside[inside] = flags == 1
-        return inside
-
-    @cached_property
-    def _winding_mesh(self) -> wp.Mesh:
-        corners = self._device_corners
-        if _volume(self.vertices, self.faces) < 0:
-            turned = np.ascontiguousarray(self._corners[:, ::-1])
-            corners = wp.array(turned.reshape(-1), dtype=wp.int32, device="cpu")
-        return wp.Mesh(points=self._device_points, indices=corners, support_winding_number=True)
-
-    def _reach(self, points: Floats) -> float:
-        """Return a distance that is certainly larger than from any of the points to the mesh."""
-        low, high = (corner.astype(np.float64) for corner in self.bounds)
-        if len(points) == 0:
-            return 0.0
-        span = np.maximum(points.max(axis=0), high) - np.minimum(points.min(axis=0), low)
-        return float(2.0 * np.linalg.norm(span))
-
-
-def _shared(rows: Floats) -> wp.array[wp.vec3]:
-    """Show the rows to a kernel without a copy, so that it can also write them."""
-    return wp.array(rows, dtype=wp.vec3, device="cpu", copy=False)
+        return inside(self.on(self.device), as_points(points), self.device)
 
 
 def _as_vertices(vertices: ArrayLike) -> Floats:

@@ -100,13 +100,15 @@ def repel(
     longest: wp.float32,
     moves: wp.array(dtype=wp.vec3),
     energies: wp.array(dtype=wp.float32),
+    works: wp.array(dtype=wp.float64),
 ) -> None:
     """One damped Newton step of each particle in its tangent plane, against its neighbours at rest.
 
     The energy of a pair at distance x, in its own spacing, is x^-p, shifted so that value and slope vanish
-    at the cutoff, and a spring of the given stiffness within the core; times its spacing squared, so that
-    pressure is the same where spacings differ. Curvature across the line of a pair
-    is left out: it is negative.
+    at the cutoff, and a spring of the given stiffness within the core; below `CLOSEST` it goes on along its
+    tangent. A pair's part of the total energy is that times its spacing squared, so that pressure is the
+    same where spacings differ: `works` are halves of it, `energies` leave the square out. Curvature across
+    the line of a pair is left out: it is negative.
     """
     i = first + wp.tid()
     p = positions[i]
@@ -119,6 +121,7 @@ def repel(
     hxy = float(0.0)
     hyy = float(0.0)
     energy = float(0.0)
+    work = wp.float64(0.0)
     rim_value = wp.pow(cutoff, -exponent)
     rim_slope = exponent * rim_value / cutoff
     for k in range(counts[i]):
@@ -144,10 +147,13 @@ def repel(
             hxx += bend * ax * ax
             hxy += bend * ax * ay
             hyy += bend * ay * ay
-            energy += weight * (
-                value - rim_value + rim_slope * (x - cutoff) + 0.5 * stiffness * overlap * overlap
-            )
+            part = value - rim_value + rim_slope * (x - cutoff) + 0.5 * stiffness * overlap * overlap
+            nearer = wp.max(x - wp.length(offset) / pair, 0.0)
+            part = weight * (part + nearer * (slope - rim_slope + stiffness * overlap))
+            energy += part
+            work += wp.float64(0.5 * pair * pair * part)
     energies[i] = energy
+    works[i] = work
     extra = ISOTROPY * (hxx + hyy)
     hxx += extra
     hyy += extra

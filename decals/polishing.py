@@ -1,13 +1,16 @@
 """Part the last few pairs that repulsion leaves too close, at sharp tips above all."""
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from decals.neighbours import FacingTree
-from decals.population import Sites
+from blobtree.launch import launch
+from decals.crowd import Crowd
+from decals.looking import Lookout, outstanding, whole_numbers
+from decals.search_kernels import choose_best, places_around
+from decals.settling import spans_of
 from decals.surface import Flags, Floats
 
 CLOSE = 0.89
@@ -22,101 +25,80 @@ REACH = (0.03, 0.9)
 ALONE = 2.5
 """Least distance between particles that move in the same round, in spacings, so that they do not meet."""
 
+SIGHT = 1.5
+"""Trials farther than this many spacings from all particles are equally lonely."""
+
 GAIN = 1.001
 """A move must multiply the distance to the nearest neighbour by this."""
-
-MIXED = 7
-"""Nearest particles looked at where spacings vary, itself included: the nearest need not be the closest."""
 
 LOOK_ROUND = 5
 """Rounds after which all particles are looked at, and not those alone that were close before."""
 
-GIVE_UP = 12
+GIVE_UP = 30
 """Rounds without any move after which the search ends."""
 
-Settle = Callable[[Sites], tuple[Sites, Flags]]
-"""Puts points back onto their own surfaces and tells which may lie there."""
 
-
-def polish(
-    particles: Sites,
-    sizes: Floats,
-    movable: Flags,
-    settle: Settle,
-    *,
-    rounds: int,
-    seed: int,
-    close: float = CLOSE,
-) -> Sites:
+def polish(crowd: Crowd, *, rounds: int, seed: int, close: float = CLOSE) -> None:
     """Move particles that are too close to a neighbour to the loneliest of some places around them.
 
     After farthest-point optimisation (Schlömer, Heck and Deussen 2011), by trial because normals, and with
     them who is whose neighbour, jump at sharp edges. The least distance, in spacings, never falls.
     """
     rng = np.random.default_rng(seed)
-    idle = 0
-    watched = np.arange(len(particles))
+    lookout = Lookout(crowd, SIGHT)
+    everybody = np.arange(crowd.count)
+    watched, idle = everybody, 0
     for turn in range(rounds):
         if turn % LOOK_ROUND == 0:  # who got close to somebody on the move may have to move instead
-            watched = np.arange(len(particles))
-        tree = FacingTree(particles.positions, particles.normals)
-        nearest = _closeness(tree, sizes, particles[watched], watched)
-        pairs, nearest = watched[nearest < close], nearest[nearest < close]
-        watched = pairs
-        movers, nearest = _movers(particles, pairs[movable[pairs]], nearest[movable[pairs]], sizes, rng)
+            watched = everybody
+        nearest = lookout.nearness_of(watched)
+        watched, nearest = watched[nearest < close], nearest[nearest < close]
+        movers, nearest = _movers(crowd, watched, nearest, rng)
         if len(movers) == 0 or idle == GIVE_UP:
             break
-        tries = max(TRIALS, BUDGET // len(movers))
-        own = np.repeat(movers, tries)
-        trials, allowed = settle(_around(particles, own, sizes, rng))
-        distances = np.where(allowed, _closeness(tree, sizes, trials, own), -1.0)
-        best = distances.reshape(-1, tries).argmax(axis=1) + tries * np.arange(len(movers))
-        better = distances[best] > GAIN * nearest
-        idle = 0 if better.any() else idle + 1
-        positions, normals = particles.positions.copy(), particles.normals.copy()
-        positions[movers[better]] = trials.positions[best[better]]
-        normals[movers[better]] = trials.normals[best[better]]
-        particles = Sites(positions, normals, particles.surface_ids)
-    return particles
+        went = _try_places(crowd, lookout, movers, nearest, seed=int(rng.integers(2**31)))
+        idle = 0 if went.any() else idle + 1
+        if went.any():
+            lookout.refresh()
+    crowd.forget()
 
 
 def _movers(
-    particles: Sites,
-    close: NDArray[np.int64],
-    nearest: NDArray[np.float64],
-    sizes: Floats,
-    rng: np.random.Generator,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Choose among the close ones the closest, none near another of them; their closeness comes along."""
-    order = np.argsort(nearest + 1e-3 * rng.random(len(close)), kind="stable")
-    close, nearest = close[order], nearest[order]
-    if len(close) == 0:
-        return close, nearest
-    positions = particles.positions[close]
-    free = np.ones(len(close), np.bool_)
-    chosen: list[int] = []
-    near = cKDTree(positions).query_ball_point(positions, ALONE * sizes[close])
-    for row, others in enumerate(near):
-        if free[row]:
-            chosen.append(row)
-            free[others] = False
-    return close[chosen], nearest[chosen]
+    crowd: Crowd, close: NDArray[np.int64], nearest: Floats, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], Floats]:
+    """Choose among the close ones the closest around, sorted by number; their nearness comes along."""
+    nearest, close = nearest[crowd.movable[close]], close[crowd.movable[close]]
+    lots = (1e-3 * rng.random(len(close))).astype(np.float32)
+    points = crowd.positions.numpy()[close]
+    alone = outstanding(points, -nearest - lots, ALONE * crowd.host_sizes[close], device=crowd.device)
+    return close[alone], nearest[alone]
 
 
-def _around(particles: Sites, rows: NDArray[np.int64], sizes: Floats, rng: np.random.Generator) -> Sites:
-    """One random place near each of the particles, at all scales within reach."""
-    ways = rng.normal(size=(len(rows), 3))
-    low, high = np.log(REACH)
-    lengths = sizes[rows, None] * np.exp(rng.uniform(low, high, (len(rows), 1)))
-    ways *= lengths / np.linalg.norm(ways, axis=1, keepdims=True)
-    places = (particles.positions[rows] + ways).astype(np.float32)
-    return Sites(places, particles.normals[rows], particles.surface_ids[rows])
+def _try_places(
+    crowd: Crowd, lookout: Lookout, movers: NDArray[np.int64], nearest: Floats, *, seed: int
+) -> Flags:
+    """Move each mover to the loneliest of some random places around it; who went."""
+    device, count = crowd.device, len(movers)
+    tries = max(TRIALS, BUDGET // count)
+    rows, own = whole_numbers(movers, device), whole_numbers(np.repeat(movers, tries), device)
+    centers, center_sizes = crowd.positions[rows].contiguous(), crowd.sizes[rows].contiguous()
+    targets, places, normals = (_new(wp.vec3, count * tries, device) for _ in range(3))
+    reaches, forbidden = _new(wp.float32, count * tries, device), _new(wp.int32, count * tries, device)
+    shortest, longest = np.log(REACH)
+    inputs = [seed, tries, float(shortest), float(longest), centers, center_sizes]
+    launch(places_around, count * tries, inputs, [targets, reaches], device=device)
+    spans = [
+        (surface, tries * first, tries * last) for surface, first, last in spans_of(crowd.surface_ids[movers])
+    ]
+    crowd.world.settling.settle(targets, reaches, spans, places, normals, forbidden)
+    nearness = lookout.nearness(places, normals, crowd.sizes[own].contiguous(), own)
+    present: Any = wp.array(nearest, dtype=wp.float32, device=device)
+    went = _new(wp.int32, count, device)
+    inputs = [tries, GAIN, rows, present, places, normals, forbidden, nearness]
+    launch(choose_best, count, inputs, [crowd.positions, crowd.normals, went], device=device)
+    gone: Flags = went.numpy() == 1
+    return gone
 
 
-def _closeness(tree: FacingTree, sizes: Floats, places: Sites, own: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Distance of each place from the nearest facing particle other than its own, in their spacing."""
-    count = 2 if sizes.min() == sizes.max() else MIXED
-    distances, indices = tree.nearest(places.positions, places.normals, count=count)
-    distances[indices == own[:, None]] = np.inf
-    closeness: NDArray[np.float64] = (distances / (0.5 * (sizes[own, None] + sizes[indices]))).min(axis=1)
-    return closeness
+def _new(dtype: Any, count: int, device: str) -> Any:
+    return wp.zeros(count, dtype=dtype, device=device)

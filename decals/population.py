@@ -2,19 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidSeeding
+from decals.ground import vectors
+from decals.settling import Settling, spans_of
 from decals.surface import Flags, Floats, Surface
 
 SCOUTS = 16384
 """Samples that estimate which part of a surface is visible."""
-
-LIFT = 1e-4
-"""A point is hidden if it lies inside another surface after a lift along its own normal, by this share of its
-surface's diagonal: so coincident surfaces do not hide each other, and touching faces do."""
 
 ROUNDS = 12
 """How often the number of samples doubles before a surface counts as hidden after all."""
@@ -68,11 +68,12 @@ class World:
         *,
         density: Density | None = None,
         mask: Mask | None = None,
+        device: str = "cpu",
     ) -> None:
         self.surfaces = tuple(surfaces)
+        self.device = device
         self._seed, self._density, self._mask = seed, density, mask
-        self._boxes = np.array([surface.bounds for surface in self.surfaces]).reshape(-1, 2, 3)
-        self._lifts = LIFT * np.linalg.norm(self._boxes[:, 1] - self._boxes[:, 0], axis=1)
+        self.settling = Settling(self.surfaces, self._outside if mask is not None else None, device)
         measures = [self._measure(number) for number in range(len(self.surfaces))]
         self.areas = np.array([area for area, _ in measures])
         self.masses = np.array([mass for _, mass in measures])
@@ -98,37 +99,30 @@ class World:
             return np.ones(len(positions))
         return _answers("density", self._density, positions)
 
-    def hidden(self, number: int, positions: Floats, normals: Floats) -> Flags:
-        """Whether points of the surface of that number lie inside another surface."""
-        result = np.zeros(len(positions), np.bool_)
-        lifted = positions + np.float32(self._lifts[number]) * normals
-        for other in self._overlapping(number):
-            visible = np.flatnonzero(~result)
-            result[visible] = self.surfaces[other].contains(lifted[visible])
-        return result
-
     def barred(self, number: int, positions: Floats, normals: Floats) -> Flags:
         """Whether points of the surface of that number are hidden or outside the mask."""
-        result = self.hidden(number, positions, normals)
-        if self._mask is not None and len(positions):
-            result |= ~_answers("mask", self._mask, positions).astype(np.bool_)
-        return result
+        count = len(positions)
+        flags: Any = wp.zeros(count, dtype=wp.int32, device=self.device)
+        places, ways = vectors(positions, self.device), vectors(normals, self.device)
+        self.settling.forbid([(number, 0, count)] if count else [], places, ways, flags)
+        found: Flags = flags.numpy() == 1
+        return found
 
-    def settle(self, sites: Sites, *, within: Floats | None = None) -> tuple[Sites, Flags]:
-        """Put points back onto their own surfaces; which of them may lie there comes along.
-
-        `within`: upper bounds of their distances from their surfaces, if known.
-        """
-        positions, normals = np.empty_like(sites.positions), np.empty_like(sites.normals)
-        allowed = np.ones(len(sites), np.bool_)
-        for number, surface in enumerate(self.surfaces):
-            own: slice | NDArray[np.int64] = slice(None)
-            if len(self.surfaces) > 1:
-                own = np.flatnonzero(sites.surface_ids == number)
-            bound = None if within is None else within[own]
-            positions[own], normals[own] = surface.project(sites.positions[own], within=bound)
-            allowed[own] = ~self.barred(number, positions[own], normals[own])
-        return Sites(positions, normals, sites.surface_ids), allowed
+    def settle(self, sites: Sites) -> tuple[Sites, Flags]:
+        """Put points back onto their own surfaces; which of them may lie there comes along."""
+        count = len(sites)
+        order = np.argsort(sites.surface_ids, kind="stable")
+        points = vectors(np.ascontiguousarray(sites.positions[order]), self.device)
+        reaches: Any = wp.zeros(count, dtype=wp.float32, device=self.device)
+        found: Any = wp.zeros(count, dtype=wp.vec3, device=self.device)
+        normals: Any = wp.zeros(count, dtype=wp.vec3, device=self.device)
+        flags: Any = wp.zeros(count, dtype=wp.int32, device=self.device)
+        spans = spans_of(sites.surface_ids[order])
+        self.settling.settle(points, reaches, spans, found, normals, flags)
+        back = np.empty_like(order)
+        back[order] = np.arange(count)
+        settled = Sites(found.numpy()[back], normals.numpy()[back], sites.surface_ids)
+        return settled, (flags.numpy() == 0)[back]
 
     def sample(self, counts: NDArray[np.int64], stream: int) -> Sites:
         """Exactly so many visible random points of each surface, stratified by area and density."""
@@ -170,13 +164,12 @@ class World:
 
     def _is_whole(self, number: int) -> bool:
         """Whether nothing can hide or bar a part of the surface, or weigh it."""
-        return self.uniform and self._mask is None and not self._overlapping(number)
+        return self.uniform and self._mask is None and not self.settling.overlapping(number)
 
-    def _overlapping(self, number: int) -> list[int]:
-        """Other surfaces whose boxes meet the box of this one."""
-        low, high = self._boxes[number]
-        meets = ((self._boxes[:, 0] <= high) & (self._boxes[:, 1] >= low)).all(axis=1)
-        return [int(other) for other in np.flatnonzero(meets) if other != number]
+    def _outside(self, positions: Floats) -> Flags:
+        """Whether the mask bars a place."""
+        assert self._mask is not None
+        return ~_answers("mask", self._mask, positions).astype(np.bool_)
 
     def _stream(self, number: int, stream: int) -> int:
         words = np.random.SeedSequence([self._seed, stream, number]).generate_state(2, np.uint64)

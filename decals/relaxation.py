@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
+from decals.crowd import Crowd
 from decals.errors import InvalidSeeding
 from decals.evenness import Spacing, evenness, ideal_spacing
 from decals.local_relaxation import relax_near
-from decals.moving import moved
+from decals.looking import Lookout
 from decals.neighbours import FacingTree
 from decals.polishing import CLOSE, polish
 from decals.population import Density, Mask, Sites, World, shares
 from decals.refilling import crowded, refill
-from decals.repulsion import Repulsion
+from decals.repulsion import CUTOFF, Law
+from decals.scouting import Scouts
 from decals.surface import Flags, Floats, Surface, as_points
 
 EXPONENTS = (2.0, 3.0)
@@ -32,10 +34,7 @@ REFILLS = (0.1, 0.8, 0.05)
 RARELY = 6
 """Steps at least between two such times, for the moved to find their rest."""
 
-SCOUTS_PER_MOVER, SCOUTS_PER_PARTICLE = 200, 4
-"""Samples among which bare places are found: so many for each that must move, at most so many for each."""
-
-POLISHING = 60
+POLISHING = 150
 """Rounds at most that part the last close pairs."""
 
 CHECKS = 10
@@ -71,7 +70,7 @@ class Relaxation:
     fixed
         Particles that stay where they are, ``float[k, 3]``, on the surfaces that they are closest to.
     device
-        Warp device on which repulsion is computed.
+        Warp device on which particles are pushed and put back onto their surfaces.
 
     Raises
     ------
@@ -98,8 +97,7 @@ class Relaxation:
         self.iterations = iterations
         self.steps = 0
         self._seed = seed
-        self._device = device
-        self.world = World(surfaces, seed, density=density, mask=mask)
+        self.world = World(surfaces, seed, density=density, mask=mask, device=device)
         count = _count(count, spacing, self.world.mass)
         self.spacing = ideal_spacing(self.world.mass, count)
         placed = _placed(self.world, fixed)
@@ -112,36 +110,38 @@ class Relaxation:
         joined = Sites.joined([placed, others])
         order = np.argsort(joined.surface_ids, kind="stable")
         self._fixed: Flags = (np.arange(count) < len(placed))[order]
-        self._sites = joined[order]
+        self._sites: Sites | None = joined[order]
         first, last, step = (int(part * iterations) for part in REFILLS)
         self._refills = set(range(max(first, 1), last + 1, max(step, RARELY)))
-        self._repulsion: Repulsion | None = None
-        self._sizes = self.sizes_at(self.positions)
+        self._crowd: Crowd | None = None
+        self._scouts = Scouts(self.world, self.sizes_at)
 
     @property
     def count(self) -> int:
         """Number of particles."""
-        return len(self._sites)
+        return len(self._fixed)
 
     @property
     def sites(self) -> Sites:
         """Where the particles are, on which surface, and the normals there."""
+        if self._sites is None:
+            self._sites = self._on_device().sites()
         return self._sites
 
     @property
     def positions(self) -> Floats:
         """Where the particles are, ``float32[n, 3]``."""
-        return self._sites.positions
+        return self.sites.positions
 
     @property
     def normals(self) -> Floats:
         """Unit normals of the surfaces there, ``float32[n, 3]``."""
-        return self._sites.normals
+        return self.sites.normals
 
     @property
     def surface_ids(self) -> NDArray[np.int32]:
         """Number of the surface that each particle lies on, ``int32[n]``, ascending."""
-        return self._sites.surface_ids
+        return self.sites.surface_ids
 
     @property
     def fixed(self) -> Flags:
@@ -150,8 +150,18 @@ class Relaxation:
 
     @property
     def energies(self) -> Floats:
-        """How crowded each particle was at the last step: its energy there, ``float32[n]``."""
-        return np.zeros(self.count, np.float32) if self._repulsion is None else self._repulsion.energies
+        """How crowded each particle is: its energy where it is, ``float32[n]``; 0 before any step."""
+        return np.zeros(self.count, np.float32) if self._crowd is None else self._crowd.energies
+
+    @property
+    def energy(self) -> float:
+        """Energy of all pairs together, in square spacings; it never rises within an `epoch`."""
+        return 0.0 if self._crowd is None else self._crowd.energy / self.spacing**2
+
+    @property
+    def epoch(self) -> int:
+        """How often neighbours, spacings and the law of repulsion have been taken anew."""
+        return 0 if self._crowd is None else self._crowd.epoch
 
     @property
     def finished(self) -> bool:
@@ -187,7 +197,7 @@ class Relaxation:
                 self.polish(close=CLOSE if until is None else min(CLOSE, until))
             if progress is not None:
                 progress("spreading seeds", self.steps / self.iterations)
-            if until is not None and self.steps % CHECKS == 0 and self.statistics().rho >= until:
+            if until is not None and self.steps % CHECKS == 0 and self._least() >= until:
                 break
 
     def step(self) -> None:
@@ -206,18 +216,9 @@ class Relaxation:
 
     def polish(self, rounds: int = POLISHING, *, close: float = CLOSE) -> None:
         """Part the pairs that are still closer than so many spacings by trial, as long as that helps."""
-        if self.count < 2:
-            return
-        self._sites = polish(
-            self._sites,
-            self.sizes_at(self.positions),
-            ~self._fixed,
-            self.world.settle,
-            rounds=rounds,
-            seed=self._seed,
-            close=close,
-        )
-        self._repulsion = None
+        if self.count > 1:
+            polish(self._on_device(), rounds=rounds, seed=self._seed, close=close)
+            self._sites = None
 
     def insert(self, point: ArrayLike, *, fixed: bool = False) -> int:
         """Add a particle near the point and relax those around it; its number comes back.
@@ -233,9 +234,9 @@ class Relaxation:
         if not self.world.settle(site)[1].all():
             raise InvalidSeeding(f"expected a place that is neither hidden nor masked, got {point!r:.60}")
         row = int(np.searchsorted(self.surface_ids, site.surface_ids[0], side="right"))
-        self._sites = Sites.joined([self._sites[:row], site, self._sites[row:]])
+        sites = Sites.joined([self.sites[:row], site, self.sites[row:]])
         self._fixed = np.insert(self._fixed, row, fixed)
-        self._relax_near(self.positions[row])
+        self._relax_near(sites, site.positions[0])
         return row
 
     def remove(self, number: int) -> None:
@@ -249,24 +250,17 @@ class Relaxation:
         if not 0 <= number < self.count:
             raise InvalidSeeding(f"number: expected a particle from 0 to {self.count - 1}, got {number}")
         place = self.positions[number]
-        self._sites = Sites.joined([self._sites[:number], self._sites[number + 1 :]])
+        sites = Sites.joined([self.sites[:number], self.sites[number + 1 :]])
         self._fixed = np.delete(self._fixed, number)
-        self._relax_near(place)
+        self._relax_near(sites, place)
 
-    def _relax_near(self, place: Floats) -> None:
-        self._repulsion = None
-        self._sizes = self.sizes_at(self.positions)
-        if self.count > 1:
-            self._sites = relax_near(
-                self.world,
-                self._sites,
-                ~self._fixed,
-                self._sizes,
-                place,
-                exponent=EXPONENTS[1],
-                stiffness=STIFFNESS,
-                device=self._device,
-            )
+    def _relax_near(self, sites: Sites, place: Floats) -> None:
+        """Take other particles, and let those around the place find their rest."""
+        if len(sites) > 1:
+            sizes = self.sizes_at(sites.positions)
+            law = Law(EXPONENTS[1], STIFFNESS)
+            sites = relax_near(self.world, sites, ~self._fixed, sizes, place, law=law)
+        self._sites, self._crowd = sites, None
 
     def statistics(self) -> Spacing:
         """How evenly the particles lie now."""
@@ -277,34 +271,39 @@ class Relaxation:
         distances /= 0.5 * (sizes[:, None] + np.where(indices >= 0, sizes[indices], 1.0))
         return evenness(self.spacing * distances, self.spacing)
 
+    def _least(self) -> float:
+        """Least distance between particles, in spacings."""
+        if self.count < 2:
+            return np.inf
+        return float(Lookout(self._on_device(), CUTOFF).nearness_of(np.arange(self.count)).min())
+
     def _refill(self) -> None:
         """Move crowded particles to bare places."""
         if self.steps == 1:
             return
-        movers = crowded(self._sites, self.energies, ~self._fixed)
-        if len(movers) == 0:
-            return
-        most = min(SCOUTS_PER_PARTICLE * self.count, SCOUTS_PER_MOVER * len(movers) + 1000)
-        scouts = self.world.sample(shares(self.world.masses, most), stream=1000 + self.steps)
-        self._sites, which = refill(self._sites, movers, scouts, self.sizes_at(scouts.positions))
-        if len(which) and self._repulsion is not None:
-            self._repulsion.forget()
+        crowd = self._on_device()
+        movers = crowded(crowd)
+        if len(movers):
+            refill(crowd, movers, *self._scouts.some(len(movers), self.count))
 
     def _push(self) -> None:
         """Move every particle; those that would leave their side or get hidden stay."""
-        part = min(self.steps / self.iterations, 1.0)
-        exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
-        stiffness = STIFFNESS * float(np.interp(part, HARDENING, (0.0, 1.0)))
-        repulsion = self._repulsion or Repulsion(self.count, device=self._device)
-        if repulsion.stale:
-            self._sizes = self.sizes_at(self.positions)
-            repulsion.relist(self.positions, self.normals, self._sizes)
-        moves = repulsion.moves(
-            self.positions, self.normals, self._sizes, exponent=exponent, stiffness=stiffness
-        )
-        self._repulsion = repulsion
-        moves[self._fixed] = 0.0
-        self._sites = moved(self.world, self._sites, moves, self._sizes)
+        crowd = self._on_device()
+        if crowd.stale:
+            part = min(self.steps / self.iterations, 1.0)
+            exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
+            if not self.world.uniform:
+                crowd.resize(self.sizes_at(crowd.positions.numpy()))
+            crowd.begin(Law(exponent, STIFFNESS * float(np.interp(part, HARDENING, (0.0, 1.0)))))
+        crowd.step()
+        self._sites = None
+
+    def _on_device(self) -> Crowd:
+        """The particles in the device's memory."""
+        if self._crowd is None:
+            sites = self.sites
+            self._crowd = Crowd(self.world, sites, ~self._fixed, self.sizes_at(sites.positions))
+        return self._crowd
 
 
 def _nobody() -> Sites:

@@ -40,6 +40,7 @@ def seed(
     direction: Direction = None,
     images: int = 1,
     weights: ArrayLike | None = None,
+    device: str = "cpu",
     progress: Progress | None = None,
     cancel: Callable[[], bool] | None = None,
 ) -> Decals:
@@ -70,6 +71,8 @@ def seed(
         How many images there are to choose from.
     weights
         How often each image is chosen, ``float[images]``; equally often by default.
+    device
+        Warp device on which seeds are spread, such as ``"cuda:0"``.
     progress
         Called with a stage in plain words and the fraction done.
     cancel
@@ -87,7 +90,14 @@ def seed(
         raise InvalidSeeding(f"factor: expected a number above 0, got {factor!r}")
     tell = progress or (lambda stage, fraction: None)
     relaxation = Relaxation(
-        given, count=count, spacing=spacing, seed=seed, density=density, mask=mask, fixed=fixed
+        given,
+        count=count,
+        spacing=spacing,
+        seed=seed,
+        density=density,
+        mask=mask,
+        fixed=fixed,
+        device=device,
     )
     relaxation.run(lambda stage, fraction: tell(stage, SPREADING * fraction), cancel=cancel)
     if relaxation.count == 0:

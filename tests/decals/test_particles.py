@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
+import warp as wp
 
 from decals.model import FACING_LIMIT
 from decals.particles import CLOSEST, ISOTROPY
-from decals.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Repulsion
+from decals.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsion
 from tests.oracles.repulsion import moves as expected_moves
+from tests.oracles.repulsion import total_energy
 
 SPACING = 0.3
 
@@ -19,11 +21,23 @@ def sphere_points(count, seed, radius=1.0):
 
 
 def step(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING):
-    sizes = np.broadcast_to(np.float32(spacing), len(positions)).copy()
-    repulsion = Repulsion(len(positions))
-    repulsion.relist(positions, normals, sizes)
-    found = repulsion.moves(positions, normals, sizes, exponent=exponent, stiffness=stiffness)
-    return found, repulsion.energies
+    found, energies, _ = evaluated(positions, normals, Law(exponent, stiffness), spacing)
+    return found, energies
+
+
+def evaluated(positions, normals, law, spacing, device="cpu"):
+    count = len(positions)
+    sizes = np.broadcast_to(np.float32(spacing), count).copy()
+    places, ways = (wp.array(rows, dtype=wp.vec3, device=device) for rows in (positions, normals))
+    spacings = wp.array(sizes, dtype=wp.float32, device=device)
+    moves = wp.zeros(count, dtype=wp.vec3, device=device)
+    energies = wp.zeros(count, dtype=wp.float32, device=device)
+    works = wp.zeros(count, dtype=wp.float64, device=device)
+    repulsion = Repulsion(count, device=device)
+    varied = bool(sizes.min() != sizes.max())
+    repulsion.relist(places, ways, spacings, spacing=float(np.median(sizes)), varied=varied)
+    repulsion.evaluate(places, ways, law, moves=moves, energies=energies, works=works)
+    return moves.numpy(), energies.numpy(), works.numpy()
 
 
 def oracle(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING):
@@ -99,3 +113,22 @@ def test_a_lone_particle_rests():
 def test_the_same_particles_move_by_the_same_bytes():
     positions, normals = sphere_points(500, seed=6)
     assert step(positions, normals)[0].tobytes() == step(positions, normals)[0].tobytes()
+
+
+@pytest.mark.parametrize(("exponent", "stiffness"), [(2.0, 0.0), (3.0, 300.0)])
+def test_works_add_up_to_the_energy_of_all_pairs(exponent, stiffness):
+    positions, normals = sphere_points(150, seed=7)
+    spacing = (SPACING * (1.0 + 0.3 * positions[:, 2])).astype(np.float32)
+    works = evaluated(positions, normals, Law(exponent, stiffness), spacing)[2]
+    expected = total_energy(
+        positions,
+        normals,
+        spacing.astype(float),
+        cutoff=CUTOFF,
+        exponent=exponent,
+        core=CORE,
+        stiffness=stiffness,
+        facing_limit=FACING_LIMIT,
+        closest=CLOSEST,
+    )
+    assert works.sum() == pytest.approx(expected, rel=1e-4)

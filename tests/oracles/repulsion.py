@@ -18,6 +18,28 @@ def pair_energy(x, exponent, cutoff, core, stiffness):
     )
 
 
+def total_energy(
+    positions, normals, sizes, *, cutoff, exponent, core, stiffness, facing_limit, closest, guides=None
+):
+    """Energy of all pairs, times the squares of their spacings; `guides` are the normals that weigh them."""
+    guides = np.asarray(normals if guides is None else guides, float)
+    places = np.asarray(positions, float)
+    total = 0.0
+    for i in range(len(places)):
+        distances = np.linalg.norm(places[i + 1 :] - places[i], axis=1)
+        pairs = 0.5 * (sizes[i] + sizes[i + 1 :])
+        for j in np.flatnonzero(distances < cutoff * pairs):
+            x = distances[j] / pairs[j]
+            kept = max(x, closest)
+            values = [
+                pair_energy(kept + k * 1e-5 * kept, exponent, cutoff, core, stiffness) for k in (-1, 0, 1)
+            ]
+            slope = (values[2] - values[0]) / (2e-5 * kept)
+            energy = values[1] - (kept - x) * slope
+            total += facing_weight(guides[i] @ guides[i + 1 + j], facing_limit) * pairs[j] ** 2 * energy
+    return total
+
+
 def moves(
     positions,
     normals,
@@ -56,7 +78,8 @@ def moves(
             scale = pair / sizes[i]
             force -= weight * scale * slope * away
             curvature += weight * bend * np.outer(away, away)
-            energies[i] += weight * values[1]
+            nearer = max(x - np.linalg.norm(p - q) / pair, 0.0)
+            energies[i] += weight * (values[1] - nearer * slope)
         tangent = np.eye(3) - np.outer(n, n)
         curvature += isotropy * np.trace(curvature) * tangent
         if curvature.any():
