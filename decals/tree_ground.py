@@ -20,6 +20,8 @@ class TreeGround:
     def __init__(self, tree: Node, coarse: MeshGround, longest_step: float) -> None:
         self.device = coarse.device
         self._tape = tree.tape.on(self.device)
+        speak = tree.tape.vocabulary.kernel
+        self._descend, self._mark_above = speak(descend), speak(mark_above)
         self._coarse, self._longest_step = coarse, longest_step
         low, high = tree.bounds
         self._low, self._high = wp.vec3(*low), wp.vec3(*high)
@@ -28,9 +30,9 @@ class TreeGround:
         """Write the points that Newton's method leads to, and the normals of the field there."""
         inputs: list[Any] = [self._tape.data, self._tape.span, self._longest_step, ARRIVED * ISO]
         inputs += [*self._coarse.backing, points]
-        launch(descend, len(points), inputs, [positions, normals], device=self.device)
+        launch(self._descend, len(points), inputs, [positions, normals], device=self.device)
 
     def mark_inside(self, points: Vectors, flags: Scalars) -> None:
         """Write 1 where the field is above the iso value."""
         inputs = [self._tape.data, self._tape.span, self._low, self._high, points]
-        launch(mark_above, len(points), inputs, [flags], device=self.device)
+        launch(self._mark_above, len(points), inputs, [flags], device=self.device)
