@@ -13,7 +13,7 @@ from .errors import (
 )
 from .io import from_json, load, save, to_json
 from .kernels import ISO, RIM
-from .polygonize import Mesh, polygonize
+from .polygonize import Mesh, Polygonizer, polygonize
 from .primitives import Cone, Point, Segment
 from .progress import Progress
 from .tape import Tape
@@ -44,6 +44,7 @@ __all__ = [
     "Node",
     "Offset",
     "Point",
+    "Polygonizer",
     "Progress",
     "Ricci",
     "Segment",

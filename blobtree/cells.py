@@ -4,6 +4,12 @@ Blocks of 4³ cells form a tree of branching 4³. From level to level a block's 
 children that are surely empty or surely inside end there. What is left at the finest level is, for a sum of
 many points, a handful of primitives per block and a handful of cells per cell that the surface crosses.
 The polygonizer samples these blocks, the tracer walks through them, an edit rebuilds those that it touches.
+
+An edit finds by itself what it touches. All that happens in a block is a function of its place and of its
+pruned tape, so a block whose pruned tape came out as before, bit for bit, is as before, and with it all the
+blocks inside. A primitive is on the tapes of blocks that its influence reaches and on no others, so what
+changes is where an edited node's old or new influence is, whatever maps, warps and operators stand above it.
+Nothing has to be proven about trees, and what cannot be told apart from a change is built anew.
 """
 
 from dataclasses import dataclass
@@ -11,127 +17,20 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
-from .errors import InvalidResolution
-from .kernel_options import KERNEL_OPTIONS
-from .kernels import ISO
+from .errors import InvalidNode, InvalidResolution
+from .grid import BRANCHING, CHILDREN, Grid
 from .launch import launch
-from .prune import prune
+from .refine import inherit, match, measure, take_over, write
+from .scan import everything, starts_of, where_negative
 from .tape import Tape
 from .vocabulary import Vocabulary
-
-wp.set_module_options(KERNEL_OPTIONS)
-
-BRANCHING_BITS = 2
-BRANCHING = 1 << BRANCHING_BITS
-"""A block has BRANCHING³ children; a block of the finest level has BRANCHING³ cells."""
-
-CHILDREN = BRANCHING**3
-
-SURELY_OUTSIDE = -1
-SURELY_INSIDE = -2
-
-KEY_DIGITS = 10
-"""Levels that a key has room for: 4¹⁰ blocks along a side."""
 
 MOST_BLOCKS = 1 << 21
 """Blocks of a level, at most; a mesh in as many takes a few gigabytes, and 3000 cells span a ball."""
 
-Ints = NDArray[np.int32]
-Floats = NDArray[np.float32]
-
-
-@wp.func
-def child_block(parent: wp.vec3i, child: wp.int32) -> wp.vec3i:
-    """Coordinates of a block's child, in blocks of the child's level."""
-    return wp.vec3i(
-        (parent[0] << BRANCHING_BITS) + (child >> (2 * BRANCHING_BITS)),
-        (parent[1] << BRANCHING_BITS) + ((child >> BRANCHING_BITS) & (BRANCHING - 1)),
-        (parent[2] << BRANCHING_BITS) + (child & (BRANCHING - 1)),
-    )
-
-
-@wp.func
-def block_center(block: wp.vec3i, origin: wp.vec3, size: wp.float32) -> wp.vec3:
-    """Middle of a block."""
-    return origin + wp.vec3(float(block[0]) + 0.5, float(block[1]) + 0.5, float(block[2]) + 0.5) * size
-
-
-@wp.kernel
-def _measure(
-    first: wp.int32,
-    parents: wp.array(dtype=wp.vec3i),
-    spans: wp.array(dtype=wp.vec2i),
-    tape: wp.array(dtype=wp.vec4),
-    origin: wp.vec3,
-    size: wp.float32,
-    pad: wp.float32,
-    out: wp.array(dtype=wp.vec4),
-) -> None:
-    i = first + wp.tid()
-    parent = i // CHILDREN
-    center = block_center(child_block(parents[parent], i % CHILDREN), origin, size)
-    out[i] = prune(center, 0.5 * size + pad, tape, spans[parent], tape, 0, False)
-
-
-@wp.kernel
-def _write(
-    first: wp.int32,
-    chosen: wp.array(dtype=wp.int32),
-    parents: wp.array(dtype=wp.vec3i),
-    spans: wp.array(dtype=wp.vec2i),
-    tape: wp.array(dtype=wp.vec4),
-    origin: wp.vec3,
-    size: wp.float32,
-    pad: wp.float32,
-    starts: wp.array(dtype=wp.int32),
-    blocks: wp.array(dtype=wp.vec3i),
-    new_spans: wp.array(dtype=wp.vec2i),
-    out: wp.array(dtype=wp.vec4),
-) -> None:
-    i = first + wp.tid()
-    parent = chosen[i] // CHILDREN
-    block = child_block(parents[parent], chosen[i] % CHILDREN)
-    result = prune(
-        block_center(block, origin, size), 0.5 * size + pad, tape, spans[parent], out, starts[i] + 1, True
-    )
-    out[starts[i]] = wp.vec4(result[3], 0.0, 0.0, 0.0)
-    blocks[i] = block
-    new_spans[i] = wp.vec2i(starts[i] + 1, starts[i] + 1 + int(result[3]))
-
-
-@wp.func
-def block_key(block: wp.vec3i) -> wp.int64:
-    """A block's place in the order in which levels are refined: its children's numbers, coarsest first."""
-    key = wp.int64(0)
-    for digit in range(KEY_DIGITS):
-        shift = (KEY_DIGITS - 1 - digit) * BRANCHING_BITS
-        x = (block[0] >> shift) & (BRANCHING - 1)
-        y = (block[1] >> shift) & (BRANCHING - 1)
-        z = (block[2] >> shift) & (BRANCHING - 1)
-        child = (x << (2 * BRANCHING_BITS)) + (y << BRANCHING_BITS) + z
-        key = key * wp.int64(CHILDREN) + wp.int64(child)
-    return key
-
-
-@wp.func
-def find_block(block: wp.vec3i, blocks: wp.array(dtype=wp.vec3i)) -> wp.int32:
-    """Index of a block in a level, −1 where it is not there: bisection, levels being in key order."""
-    if block[0] < 0 or block[1] < 0 or block[2] < 0:
-        return -1
-    wanted = block_key(block)
-    low = int(0)
-    high = blocks.shape[0]
-    while low < high:
-        middle = (low + high) // 2
-        if block_key(blocks[middle]) < wanted:
-            low = middle + 1
-        else:
-            high = middle
-    if low < blocks.shape[0] and blocks[low] == block:
-        return low
-    return -1
+MOST_TEXELS = 1 << 24
+"""Texels of a tape that float32 can count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +41,14 @@ class Level:
     """
 
     blocks: "wp.array[wp.vec3i]"
-    """Coordinates (n, 3), in blocks of this level."""
+    """Coordinates (n, 3), in blocks of this level from the root's lowest one."""
     spans: "wp.array[wp.vec2i]"
     """Where in `tape` each block's tape begins and ends (n, 2)."""
     tape: "wp.array[wp.vec4]"
-    parent_children: Ints
+    children: "wp.array[wp.int32]"
     """For every child of the level above its place in this one, or SURELY_OUTSIDE, SURELY_INSIDE."""
+    sources: "wp.array[wp.int32]"
+    """For every block its place in the same level of the cells before the edit, −1 where it has changed."""
 
     def __len__(self) -> int:
         return len(self.blocks)
@@ -155,21 +56,13 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class SparseCells:
-    """A grid over a tree's box of influence, of which only blocks that the surface may cross exist.
+    """The cells of a grid, of which only those in blocks that the surface may cross exist."""
 
-    Cell (i, j, k) spans origin + cell_size · [i, i + 1] × …; block (a, b, c) of the finest level holds the
-    cells 4a … 4a + 3 × ….
-    """
-
-    origin: NDArray[np.float64]
-    cell_size: float
-    blocks_per_side: int
-    """Blocks of the finest level along each side of the root block."""
+    grid: Grid
     levels: tuple[Level, ...]
     """From the root, a single block, to the finest."""
     device: str
-    vocabulary: Vocabulary
-    """What the codes on the blocks' tapes stand for."""
+    tape: Tape
 
     @property
     def leaves(self) -> Level:
@@ -178,78 +71,138 @@ class SparseCells:
 
 
 def build_cells(
-    tape: Tape,
-    bounds: tuple[Floats, Floats],
-    cell_size: float,
-    *,
-    device: str | None = None,
+    tape: Tape, grid: Grid, *, device: str | None = None, previous: SparseCells | None = None
 ) -> SparseCells:
-    """The sparse cells of a tape, level by level.
+    """The sparse cells of a tape, level by level; blocks that `previous` has just so are taken from there.
 
     Raises
     ------
     InvalidResolution
-        The surface crosses more than MOST_BLOCKS blocks of a level.
+        The surface crosses more than MOST_BLOCKS blocks of a level, or its tapes would not fit into memory.
+    InvalidNode
+        The tape is longer than can be counted.
     """
-    place = str(wp.get_device(device))
-    lower, upper = (corner.astype(np.float64) for corner in bounds)
-    depth = _depth(lower, upper, cell_size)
-    origin = wp.vec3(*lower)
-    pad = float(np.abs([lower, upper]).max()) * 2.0**-21
-    uploaded = tape.on(place)
-    level = Level(
-        wp.zeros(1, dtype=wp.vec3i, device=place),
-        wp.array([uploaded.span], dtype=wp.vec2i, device=place),
-        uploaded.data,
-        np.zeros(0, np.int32),
-    )
-    levels = [level]
-    for remaining in reversed(range(depth)):
-        size = cell_size * BRANCHING ** (remaining + 1)
-        levels.append(_refine(levels[-1], origin, size, pad, place, tape.vocabulary))
-    return SparseCells(lower, cell_size, BRANCHING**depth, tuple(levels), place, tape.vocabulary)
-
-
-def _depth(lower: NDArray[np.float64], upper: NDArray[np.float64], cell_size: float) -> int:
-    """Levels below the root until the root holds the box."""
-    blocks = float((upper - lower).max()) / (cell_size * BRANCHING)
-    depth = 0
-    while BRANCHING**depth < blocks:
-        depth += 1
-    return depth
-
-
-def _refine(
-    level: Level, origin: wp.vec3, size: float, pad: float, device: str, vocabulary: Vocabulary
-) -> Level:
-    """The children, of side `size`, of a level's blocks that the surface may cross."""
-    count = len(level) * CHILDREN
-    measured: wp.array[Any] = wp.empty(count, dtype=wp.vec4, device=device)
-    geometry = [level.blocks, level.spans, level.tape, origin, size, pad]
-    launch(vocabulary.kernel(_measure), count, geometry, [measured], device)
-    smallest, largest, texels, _ = measured.numpy().T
-    chosen = np.flatnonzero((smallest <= ISO) & (largest >= ISO)).astype(np.int32)
-    if len(chosen) > MOST_BLOCKS:
-        raise InvalidResolution(
-            f"the surface crosses {len(chosen):,} blocks of {BRANCHING}³ cells, at most {MOST_BLOCKS:,} "
-            "are made; take larger cells"
+    if len(tape.data) > MOST_TEXELS:
+        raise InvalidNode(
+            f"tree: its tape takes {len(tape.data):,} texels, at most {MOST_TEXELS:,} can be counted; "
+            "split the model"
         )
-    children = np.where(smallest > ISO, SURELY_INSIDE, SURELY_OUTSIDE).astype(np.int32)
-    children[chosen] = np.arange(len(chosen))
-    needed = texels[chosen].astype(np.int64) + 1
-    starts = np.cumsum(needed) - needed
-    blocks: wp.array[Any] = wp.empty(len(chosen), dtype=wp.vec3i, device=device)
-    spans: wp.array[Any] = wp.empty(len(chosen), dtype=wp.vec2i, device=device)
-    tape: wp.array[Any] = wp.empty(int(needed.sum()), dtype=wp.vec4, device=device)
-    launch(
-        vocabulary.kernel(_write),
-        len(chosen),
-        [
-            wp.array(chosen, dtype=wp.int32, device=device),
-            *geometry,
-            wp.array(starts.astype(np.int32), dtype=wp.int32, device=device),
-        ],
-        [blocks, spans, tape],
-        device,
+    place = str(wp.get_device(device))
+    if previous is not None and not _comparable(previous, tape, grid, place):
+        previous = None
+    levels = [_root(tape, grid, previous, place)]
+    for number in range(1, grid.depth + 1):
+        levels.append(_Refinement(levels[-1], number, grid, previous, place, tape.vocabulary).level())
+    return SparseCells(grid, tuple(levels), place, tape)
+
+
+def _comparable(previous: SparseCells, tape: Tape, grid: Grid, device: str) -> bool:
+    """Whether two sets of cells can have blocks in common: same cells, and codes that mean the same."""
+    other = previous.grid
+    same_cells = (grid.cell_size, grid.corner, device) == (other.cell_size, other.corner, previous.device)
+    return same_cells and tape.vocabulary == previous.tape.vocabulary
+
+
+def _root(tape: Tape, grid: Grid, previous: SparseCells | None, device: str) -> Level:
+    """The level of the root block."""
+    uploaded = tape.on(device)
+    same = previous is not None and previous.grid == grid and _same_bits(previous.tape, tape)
+    return Level(
+        wp.zeros(1, dtype=wp.vec3i, device=device),
+        wp.array([uploaded.span], dtype=wp.vec2i, device=device),
+        uploaded.data,
+        wp.zeros(0, dtype=wp.int32, device=device),
+        wp.array([0 if same else -1], dtype=wp.int32, device=device),
     )
-    return Level(blocks, spans, tape, children)
+
+
+def _same_bits(first: Tape, second: Tape) -> bool:
+    """Whether two tapes are the same, −0 being another number than 0."""
+    return np.array_equal(first.data.view(np.int32), second.data.view(np.int32))
+
+
+class _Refinement:
+    """The step from one level to the next."""
+
+    def __init__(
+        self,
+        above: Level,
+        number: int,
+        grid: Grid,
+        previous: SparseCells | None,
+        device: str,
+        vocabulary: Vocabulary,
+    ) -> None:
+        self._above, self._number, self._grid, self._device = above, number, grid, device
+        self._vocabulary = vocabulary
+        self._old, self._shift = self._counterpart(previous)
+        if self._old is not None and previous is not None and previous.grid.pad == grid.pad:
+            self._fresh = where_negative(above.sources)
+            self._same = where_negative(above.sources, negative=False)
+        else:
+            self._fresh, self._same = everything(len(above), device), everything(0, device)
+
+    def _counterpart(self, previous: SparseCells | None) -> tuple[Level | None, tuple[int, int, int]]:
+        """The old level of blocks of the same size, and what takes our coordinates to its own."""
+        if previous is None:
+            return None, (0, 0, 0)
+        number = previous.grid.depth - self._grid.depth + self._number
+        if number < 1:
+            return None, (0, 0, 0)
+        ours, theirs = self._grid.base_of(self._number), previous.grid.base_of(number)
+        x, y, z = (a - b for a, b in zip(ours, theirs, strict=True))
+        return previous.levels[number], (x, y, z)
+
+    def level(self) -> Level:
+        """The level below."""
+        above, device = self._above, self._device
+        count = len(above) * CHILDREN
+        children: Any = wp.empty(count, dtype=wp.int32, device=device)
+        kept, texels = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
+        self._judge([children, kept, texels])
+        places, blocks = starts_of(kept, "blocks")
+        starts, total = starts_of(texels, "texels of the blocks' tapes")
+        if blocks > MOST_BLOCKS:
+            raise InvalidResolution(
+                f"the surface crosses {blocks:,} blocks of {BRANCHING}³ cells, at most {MOST_BLOCKS:,} are "
+                "made; take larger cells"
+            )
+        new = Level(
+            wp.empty(blocks, dtype=wp.vec3i, device=device),
+            wp.empty(blocks, dtype=wp.vec2i, device=device),
+            wp.empty(total, dtype=wp.vec4, device=device),
+            children,
+            wp.full(blocks, -1, dtype=wp.int32, device=device),
+        )
+        self._fill(new, places, starts)
+        return new
+
+    def _geometry(self) -> list[Any]:
+        """The blocks above, and where their children lie."""
+        above, grid = self._above, self._grid
+        size = grid.cell_size * grid.cells_along(self._number)
+        base = wp.vec3i(*grid.base_of(self._number))
+        return [above.blocks, above.spans, above.tape, base, wp.vec3(*grid.corner), size, grid.pad]
+
+    def _judge(self, outputs: list[Any]) -> None:
+        """Which children are kept, and how many texels each needs."""
+        inputs = [self._fresh, *self._geometry()]
+        launch(self._vocabulary.kernel(measure), len(self._fresh) * CHILDREN, inputs, outputs, self._device)
+        if self._old is not None and len(self._same):
+            inputs = [self._same, self._above.sources, self._old.children, self._old.spans]
+            launch(inherit, len(self._same) * CHILDREN, inputs, outputs, self._device)
+
+    def _fill(self, new: Level, places: Any, starts: Any) -> None:
+        """The blocks that are kept: coordinates, tapes and where they come from."""
+        fresh = len(self._fresh) * CHILDREN
+        outputs = [new.children, new.blocks, new.spans, new.tape]
+        inputs: list[Any] = [self._fresh, *self._geometry(), places, starts]
+        launch(self._vocabulary.kernel(write), fresh, inputs, outputs, self._device)
+        old, above = self._old, self._above
+        if old is None:
+            return
+        there = [old.blocks, old.spans, old.tape.view(wp.vec4i)]
+        inputs = [self._fresh, places, new.blocks, new.spans, new.tape.view(wp.vec4i)]
+        launch(match, fresh, [*inputs, wp.vec3i(*self._shift), *there], [new.sources], self._device)
+        inputs = [self._same, above.sources, above.blocks, old.children, old.spans, old.tape, places, starts]
+        launch(take_over, len(self._same) * CHILDREN, inputs, [*outputs, new.sources], self._device)

@@ -5,19 +5,16 @@ surface's area; vertices lie on the surface as exactly as float32 can tell.
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
-from .cells import CHILDREN, SparseCells, build_cells
-from .dual import SAMPLES, classify_cells, connect_vertices, place_vertices, sample_blocks, settle_rows
+from .cells import build_cells
 from .errors import InvalidResolution
-from .launch import launch
-from .patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
+from .grid import Grid, aligned_grid
 from .progress import Progress
+from .surface import Surface, extract_surface
 from .tree import Node
 
 DEFAULT_RESOLUTION = 64
@@ -62,12 +59,87 @@ def polygonize(
     InvalidResolution
         Both or a senseless value were given, or more cells than can be counted.
     """
-    report = progress or (lambda _stage, _fraction: None)
-    size = _cell_size(tree, resolution, cell_size)
-    report("finding the surface", 0.0)
-    cells = build_cells(tree.tape, _grid_box(tree, size), size, device=device)
-    report("finding the surface", 1.0)
-    return mesh_cells(cells, report)
+    return Polygonizer(
+        tree, resolution=resolution, cell_size=cell_size, device=device, progress=progress
+    ).mesh
+
+
+class Polygonizer:
+    """The mesh of a tree that is being edited: after an edit only what it touched is made anew.
+
+        polygonizer = Polygonizer(tree, resolution=128)
+        show(polygonizer.mesh)
+        show(polygonizer.update(edited_tree))
+
+    Every mesh is the one that `polygonize` makes of that tree with this `cell_size`, bit for bit and in the
+    same order. Which parts of the tree differ need not be said: blocks of cells are compared by what acts in
+    them. Cells count from the world's origin, so the grid stays where it is while the model changes its size.
+
+    Parameters are those of `polygonize`; `resolution` settles the size of the cells by the first tree.
+
+    Raises
+    ------
+    InvalidResolution
+        As for `polygonize`; the last mesh stays.
+    """
+
+    def __init__(
+        self,
+        tree: Node,
+        *,
+        resolution: int | None = None,
+        cell_size: float | None = None,
+        device: str | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self._device = device
+        self._cell_size = _cell_size(tree, resolution, cell_size)
+        self._surface = self._extract(tree, None, progress)
+        self._tree = tree
+        self._mesh: Mesh | None = None
+
+    @property
+    def tree(self) -> Node:
+        """The tree that the mesh shows."""
+        return self._tree
+
+    @property
+    def cell_size(self) -> float:
+        """Side of a cell in the model's units."""
+        return self._cell_size
+
+    @property
+    def surface(self) -> Surface:
+        """The triangles as arrays in the device's memory."""
+        return self._surface
+
+    @property
+    def mesh(self) -> Mesh:
+        """The triangles as NumPy arrays."""
+        if self._mesh is None:
+            self._mesh = download(self._surface)
+        return self._mesh
+
+    def update(self, tree: Node, *, progress: Progress | None = None) -> Mesh:
+        """The mesh of `tree`, the parts that are as before being taken over."""
+        self._surface = self._extract(tree, self._surface, progress)
+        self._tree, self._mesh = tree, None
+        return self.mesh
+
+    def _extract(self, tree: Node, previous: Surface | None, progress: Progress | None) -> Surface:
+        report = progress or (lambda _stage, _fraction: None)
+        report("finding the surface", 0.0)
+        grid = _grid(tree, self._cell_size)
+        before = previous.cells if previous is not None else None
+        cells = build_cells(tree.tape, grid, device=self._device, previous=before)
+        report("finding the surface", 1.0)
+        return extract_surface(cells, report, previous)
+
+
+def download(surface: Surface) -> Mesh:
+    """The triangles of a surface as NumPy arrays."""
+    arrays: list[Any] = [surface.vertices, surface.faces, surface.normals, surface.colors]
+    return Mesh(*(array.numpy() for array in arrays))
 
 
 def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> float:
@@ -93,70 +165,7 @@ def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> f
     return float(cell_size)
 
 
-def _grid_box(tree: Node, cell_size: float) -> tuple[Floats, Floats]:
-    """The box of influence, one cell wider so that the grid's rim lies outside the surface."""
-    lower, upper = tree.bounds
-    return lower - np.float32(cell_size), upper + np.float32(cell_size)
-
-
-def mesh_cells(cells: SparseCells, report: Progress) -> Mesh:
-    """The triangles of the surface in `cells`."""
-    leaves, device = cells.leaves, cells.device
-    count = len(leaves)
-    geometry = [leaves.blocks, leaves.spans, leaves.tape, wp.vec3(*cells.origin), cells.cell_size]
-    tables = _tables(device)
-
-    def array(size: int, dtype: Any) -> Any:
-        return wp.empty(size, dtype=dtype, device=device)
-
-    report("sampling the field", 0.0)
-    values = array(count * SAMPLES, wp.float32)
-    launch(cells.vocabulary.kernel(sample_blocks), count * SAMPLES, geometry, [values], device)
-    codes = array(count * CHILDREN, wp.uint8)
-    quad_counts, vertex_counts = array(count, wp.int32), array(count, wp.int32)
-    launch(classify_cells, count, [values], [codes, quad_counts], device)
-    rows = array(count * CHILDREN, wp.int16)
-    inputs: list[Any] = [leaves.blocks, codes, tables.patch_count, tables.knotted_face]
-    launch(settle_rows, count, inputs, [rows, vertex_counts], device)
-    report("sampling the field", 1.0)
-    vertex_starts, vertex_total = _starts(vertex_counts, device)
-    quad_starts, quad_total = _starts(quad_counts, device)
-    first_vertices = array(count * CHILDREN, wp.int32)
-    positions, normals, colors = (array(vertex_total, wp.vec3) for _ in range(3))
-    report("placing vertices", 0.0)
-    inputs = [*geometry, values, rows, tables.patch_count, tables.patch_of_edge, vertex_starts]
-    outputs = [first_vertices, positions, normals, colors]
-    launch(cells.vocabulary.kernel(place_vertices), count, inputs, outputs, device)
-    report("placing vertices", 1.0)
-    faces = array(2 * quad_total, wp.vec3i)
-    inputs = [leaves.blocks, rows, tables.patch_of_edge, quad_starts, first_vertices, positions]
-    launch(connect_vertices, count, inputs, [faces], device)
-    report("connecting vertices", 1.0)
-    return Mesh(positions.numpy(), faces.numpy(), normals.numpy(), colors.numpy())
-
-
-@dataclass(frozen=True)
-class _Tables:
-    """`patches`' tables in a device's memory."""
-
-    patch_count: Any
-    patch_of_edge: Any
-    knotted_face: Any
-
-
-@cache
-def _tables(device: str) -> _Tables:
-    return _Tables(
-        wp.array(PATCH_COUNT, dtype=wp.int8, device=device),
-        wp.array(PATCH_OF_EDGE.ravel(), dtype=wp.int8, device=device),
-        wp.array(KNOTTED_FACE, dtype=wp.int8, device=device),
-    )
-
-
-def _starts(counts: Any, device: str) -> tuple[Any, int]:
-    """Where each block's share begins, with one more place for the end; and the total."""
-    ends = np.cumsum(counts.numpy(), dtype=np.int64)
-    total = int(ends[-1]) if len(ends) else 0
-    if total > np.iinfo(np.int32).max:
-        raise InvalidResolution(f"{total:,} vertices cannot be numbered in 32 bits; take larger cells")
-    return wp.array(np.concatenate([[0], ends]).astype(np.int32), dtype=wp.int32, device=device), total
+def _grid(tree: Node, cell_size: float) -> Grid:
+    """Cells around the box of influence, one more on every side so that the rim lies outside the surface."""
+    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    return aligned_grid(lower - cell_size, upper + cell_size, cell_size)

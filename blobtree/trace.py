@@ -15,18 +15,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from .cells import (
-    BRANCHING,
-    BRANCHING_BITS,
-    CHILDREN,
-    SURELY_INSIDE,
-    build_cells,
-)
+from .cells import build_cells
 from .errors import InvalidPoints
 from .evaluate import field_bound, field_gradient
+from .grid import BRANCHING, BRANCHING_BITS, CHILDREN, grid_from
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .launch import launch
+from .refine import SURELY_INSIDE
 from .tape import Tape
 from .validation import point_array
 from .vocabulary import Vocabulary
@@ -246,9 +242,9 @@ def tracing_cells(tree: "Node") -> TracingCells:
 def _tracing_cells(tape: Tape, lower: tuple[float, ...], upper: tuple[float, ...]) -> TracingCells:
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
     cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
-    cells = build_cells(tape, bounds, cell_size, device="cpu")
+    cells = build_cells(tape, grid_from(*bounds, cell_size), device="cpu")
     whole = np.array([[len(tape.data), 0.0, 0.0, 0.0]], np.float32)
-    tables = [level.parent_children.copy() for level in cells.levels[1:]]
+    tables = [level.children.numpy().copy() for level in cells.levels[1:]]
     first_child = 0
     for level, table in zip(cells.levels[:-1], tables, strict=True):
         first_child += len(level)
@@ -259,7 +255,7 @@ def _tracing_cells(tape: Tape, lower: tuple[float, ...], upper: tuple[float, ...
     return TracingCells(
         tape=np.concatenate([whole, tape.data, cells.leaves.tape.numpy()]),
         nodes=np.concatenate(tables),
-        lower=cells.origin.astype(np.float32),
+        lower=cells.grid.origin.astype(np.float32),
         block_size=cell_size * BRANCHING,
         depth=len(tables),
         tolerance=trace_tolerance(bounds),

@@ -22,12 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import RIM, Mesh, Node, Point, Ricci, Sum, Union
-from blobtree.cells import BRANCHING, build_cells
-from blobtree.polygonize import mesh_cells
+from blobtree.cells import SparseCells, build_cells
+from blobtree.grid import BRANCHING, aligned_grid
+from blobtree.polygonize import download
+from blobtree.surface import Surface, extract_surface
 from blobtree.trace import trace
 
 RUNS = 5
-UNIT_BOX = (np.zeros(3, np.float32), np.ones(3, np.float32))
+UNIT_BOX = (np.zeros(3), np.ones(3))
 PEERS = (
     "fidget 22.0 s (5.25 with hand-made gates), Blender metaballs 7.38 s, Warp dense 30.7 s, Warp sparse "
     "marching cubes 15.6 s, NumPy + skimage 49 s at N=1000, R=256 (two cores, 2026-11)"
@@ -56,9 +58,19 @@ def mixed(count: int) -> Node:
     return Union(tuple(parts)).translate((-0.5, -0.5, 0.0)).twist(20.0).translate((0.5, 0.5, 0.0))
 
 
+def cells_of(tree: Node, resolution: int) -> SparseCells:
+    """The sparse cells of the unit cube."""
+    return build_cells(tree.tape, aligned_grid(*UNIT_BOX, 1.0 / resolution))
+
+
+def surface_of(tree: Node, resolution: int) -> Surface:
+    """The whole pipeline, up to triangles in the device's memory."""
+    return extract_surface(cells_of(tree, resolution), lambda _stage, _fraction: None)
+
+
 def mesh_of(tree: Node, resolution: int) -> Mesh:
     """The whole pipeline."""
-    return mesh_cells(build_cells(tree.tape, UNIT_BOX, 1.0 / resolution), lambda _stage, _fraction: None)
+    return download(surface_of(tree, resolution))
 
 
 def stamped(count: int, resolution: int) -> Any:
@@ -114,8 +126,8 @@ def meshing(quick: bool) -> Figures:
 def quality() -> Figures:
     """How few cells and primitives are looked at, and what the triangles are like."""
     tree = Sum(tuple(blobs(1000)))
-    cells = build_cells(tree.tape, UNIT_BOX, 1.0 / 256.0)
-    mesh = mesh_cells(cells, lambda _stage, _fraction: None)
+    cells = cells_of(tree, 256)
+    mesh = mesh_of(tree, 256)
     spans = cells.leaves.spans.numpy()
     value, slope = tree(mesh.vertices), np.linalg.norm(tree.gradient(mesh.vertices), axis=1)
     a, b, c = np.moveaxis(mesh.vertices.astype(np.float64)[mesh.faces], 1, 0)

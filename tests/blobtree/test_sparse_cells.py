@@ -5,13 +5,18 @@ import pytest
 from scipy.spatial import cKDTree
 
 from blobtree import Mesh, Node, Point, Sum, polygonize
-from blobtree.cells import BRANCHING, build_cells
+from blobtree.cells import SparseCells, build_cells
 from blobtree.evaluate import bounds_at, values_at
+from blobtree.grid import BRANCHING, aligned_grid
 from blobtree.kernels import ISO, RIM
 from tests.blobtree.trees import random_trees
 from tests.oracles.dense_polygonize import polygonize as dense_polygonize
 
 CELLS_ALONG = 28
+
+
+def cells_of(tree: Node, cell: float) -> SparseCells:
+    return build_cells(tree.tape, aligned_grid(*tree.bounds, cell))
 
 
 def quads(mesh: Mesh, labels: np.ndarray) -> set[tuple[int, ...]]:
@@ -63,11 +68,11 @@ def test_pruned_tapes_give_the_whole_tapes_values_in_their_blocks() -> None:
     for tree in random_trees(3, 25):
         lower, upper = tree.bounds
         cell = float((upper - lower).max()) / 24
-        cells = build_cells(tree.tape, tree.bounds, cell)
+        cells = cells_of(tree, cell)
         blocks, spans = cells.leaves.blocks.numpy(), cells.leaves.spans.numpy()
         texels = cells.leaves.tape.numpy()
         for i in rng.choice(len(blocks), min(12, len(blocks)), replace=False):
-            corner = cells.origin + blocks[i] * BRANCHING * cell
+            corner = cells.grid.origin + blocks[i] * BRANCHING * cell
             points = corner + rng.uniform(0.0, BRANCHING * cell, (40, 3))
             begin, end = spans[i]
             pruned = type(tree.tape)(texels[begin:end], *list(vars(tree.tape).values())[1:])
@@ -78,13 +83,13 @@ def test_blocks_that_are_left_out_hold_no_surface() -> None:
     for tree in random_trees(11, 20):
         lower, upper = tree.bounds
         cell = float((upper - lower).max()) / 20
-        cells = build_cells(tree.tape, tree.bounds, cell)
-        side = cells.blocks_per_side
+        cells = cells_of(tree, cell)
+        side, origin = cells.grid.blocks_per_side, cells.grid.origin
         kept = np.zeros((side, side, side), bool)
         kept[tuple(cells.leaves.blocks.numpy().T)] = True
         size = BRANCHING * cell
-        points = cells.origin + np.random.default_rng(5).uniform(0.0, side * size, (60_000, 3))
-        block = np.minimum(((points - cells.origin) / size).astype(int), side - 1)
+        points = origin + np.random.default_rng(5).uniform(0.0, side * size, (60_000, 3))
+        block = np.minimum(((points - origin) / size).astype(int), side - 1)
         value, slope = bounds_at(tree.tape, points, 1e-3 * cell).T
         near_surface = np.abs(value - ISO) <= slope * 1e-3 * cell
         assert kept[tuple(block[near_surface].T)].all()
@@ -100,7 +105,7 @@ def random_blobs(count: int) -> tuple[Node, float]:
 
 def test_few_cells_and_primitives_are_looked_at() -> None:
     tree, _ = random_blobs(1000)
-    cells = build_cells(tree.tape, (np.zeros(3, np.float32), np.ones(3, np.float32)), 1.0 / 128.0)
+    cells = build_cells(tree.tape, aligned_grid(np.zeros(3), np.ones(3), 1.0 / 128.0))
     spans = cells.leaves.spans.numpy()
     primitives = (spans[:, 1] - spans[:, 0] - 1) / 2  # one run of points, two texels each
     crossing = len(polygonize(tree, cell_size=1.0 / 128.0).vertices)

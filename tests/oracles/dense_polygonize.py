@@ -17,14 +17,14 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class _Grid:
-    """Sample points lower + cell · (i, j, k), `shape` of them."""
+    """Sample points cell · (first + (i, j, k)), `shape` of them."""
 
-    lower: Floats
+    first: NDArray[np.float64]
     cell: float
     shape: tuple[int, int, int]
 
     def points(self, indices: NDArray[np.floating | np.integer]) -> Floats:
-        return self.lower + indices.astype(np.float32) * np.float32(self.cell)
+        return (self.first + indices).astype(np.float32) * np.float32(self.cell)
 
 
 def polygonize(tree: Node, *, cell_size: float) -> Mesh:
@@ -37,11 +37,11 @@ def polygonize(tree: Node, *, cell_size: float) -> Mesh:
 
 
 def _make_grid(tree: Node, cell_size: float) -> _Grid:
-    """A grid over the box of influence, one cell wider on every side."""
-    lower, upper = tree.bounds
-    shape = np.ceil((upper - lower) / cell_size) + 4.0
-    nx, ny, nz = (int(n) for n in shape)
-    return _Grid(lower - np.float32(cell_size), cell_size, (nx, ny, nz))
+    """The cells of the world over the box of influence, one more on every side."""
+    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    first = np.floor(lower / cell_size) - 1.0
+    nx, ny, nz = (int(n) for n in np.ceil(upper / cell_size) + 3.0 - first)
+    return _Grid(first, cell_size, (nx, ny, nz))
 
 
 def _dual_surface(values: Floats, grid: _Grid) -> tuple[Floats, Ints]:
