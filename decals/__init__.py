@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .errors import (
         DecalsError,
         InvalidDecals,
+        InvalidEdit,
         InvalidImage,
         InvalidMesh,
         InvalidPoints,
@@ -52,6 +53,7 @@ __all__ = [
     "ImplicitSurface",
     "Interaction",
     "InvalidDecals",
+    "InvalidEdit",
     "InvalidImage",
     "InvalidMesh",
     "InvalidPoints",
@@ -89,6 +91,7 @@ _HOMES = {
     "errors": (
         "DecalsError",
         "InvalidDecals",
+        "InvalidEdit",
         "InvalidImage",
         "InvalidMesh",
         "InvalidPoints",

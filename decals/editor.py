@@ -57,7 +57,7 @@ class DecalEditor:
         self._state, self._wp_state = _shared(np.zeros(4, np.int32), wp.int32)
         self._ranges, self._wp_ranges = _shared(np.zeros((NEIGHBOURHOOD, 2), np.int32), wp.vec2i)
         self._slots, self._wp_slots = _shared(np.zeros(NEIGHBOURHOOD, np.int32), wp.int32)
-        self._put(RECORDS, with_spare(decals.packed()))
+        self._put(RECORDS, _records(decals.packed(), len(decals)))
         self._rebuild()
 
     # -- what there is ----------------------------------------------------------------------------------
@@ -201,9 +201,9 @@ class DecalEditor:
         self._note()
 
     def _write_records(self, rows: NDArray[np.int64], decals: Decals) -> None:
-        end = RECORD * (int(rows.max(initial=-1)) + 1)
-        if end > len(self.arrays[RECORDS]):
-            self._put(RECORDS, with_spare(self.arrays[RECORDS], end))
+        count = int(rows.max(initial=-1)) + 1
+        if RECORD * count > len(self.arrays[RECORDS]):
+            self._put(RECORDS, _records(self.arrays[RECORDS], count))
         self.arrays[RECORDS].reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
         for first, last in _runs(rows):
             self._journal.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
@@ -279,6 +279,11 @@ def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:
     """Give an array, and the same memory as Warp has it."""
     held = np.ascontiguousarray(array)
     return held, wp.array(held, dtype=dtype, device="cpu", copy=False)
+
+
+def _records(array: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """Copy records to more of them, at least so many."""
+    return with_spare(array.reshape(-1, RECORD, 4), count).reshape(-1, 4)
 
 
 def _runs(rows: NDArray[np.int64]) -> list[Range]:

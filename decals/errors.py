@@ -43,5 +43,9 @@ class InvalidScene(DecalsError, ValueError):
     """A scene, or a scene file, that does not hold together."""
 
 
+class InvalidEdit(DecalsError, ValueError):
+    """A command that makes no sense for the document as it is."""
+
+
 class NoGraphics(DecalsError, RuntimeError):
     """No usable OpenGL on this machine; the message says what to install."""

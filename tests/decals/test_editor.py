@@ -223,6 +223,18 @@ def test_deleted_numbers_can_be_filled_again():
     assert editor.decals.packed().tobytes() == first.packed().tobytes()
 
 
+def test_records_grow_as_wholes():
+    """Enough is added, one and many at a time, for arrays to grow several times."""
+    rng = np.random.default_rng(9)
+    editor, parts = DecalEditor(Decals.empty()), []
+    for count in (1, 255, 1, 600, 90, 900, 70, 1):
+        parts.append(some(rng, count))
+        first = editor.next_number
+        editor.put(np.arange(first, first + count), parts[-1])
+    assert editor.decals.packed().tobytes() == Decals.concatenate(parts).packed().tobytes()
+    check(editor, rng.normal(size=(50, 3)).astype(np.float32))
+
+
 def test_an_editor_is_evaluated_by_its_numbers():
     rng = np.random.default_rng(8)
     first = some(rng, 50)

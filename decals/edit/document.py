@@ -1,0 +1,100 @@
+"""What is being edited: the one owner of objects, decals, images and camera."""
+
+from typing import Any
+
+import numpy as np
+
+from decals.camera import Camera
+from decals.edit.change import NOTHING, Change, Numbers, Parts, Rows
+from decals.editor import DecalEditor
+from decals.errors import InvalidEdit
+from decals.model import Decals
+from decals.scene import DecalImage, Scene, SceneObject
+
+
+class Document:
+    """A scene whose decals keep their numbers while they are edited; renderers draw it as it is.
+
+    Nothing but `put` changes it, and that takes a `Change`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._objects, self._images, self._camera = scene.objects, scene.images, scene.camera
+        self._decals = DecalEditor(scene.decals)
+
+    @property
+    def objects(self) -> tuple[SceneObject, ...]:
+        """Meshes and trees."""
+        return self._objects
+
+    @property
+    def images(self) -> tuple[DecalImage, ...]:
+        """What the decals show."""
+        return self._images
+
+    @property
+    def camera(self) -> Camera:
+        """Where pictures are taken from."""
+        return self._camera
+
+    @property
+    def decals(self) -> DecalEditor:
+        """The decals, by number."""
+        return self._decals
+
+    @property
+    def scene(self) -> Scene:
+        """A copy that stays as it is; decals are in the order of their numbers."""
+        return Scene(objects=self.objects, images=self.images, camera=self.camera, decals=self.decals.decals)
+
+    def object(self, number: int) -> SceneObject:
+        """Give an object by its number, or `InvalidEdit`."""
+        if not 0 <= number < len(self.objects):
+            raise InvalidEdit(f"expected the number of an object, 0 to {len(self.objects) - 1}, got {number}")
+        return self.objects[number]
+
+    # -- changes of it ----------------------------------------------------------------------------------
+
+    def with_decals(self, numbers: Numbers, decals: Decals, **parts: Any) -> Change:
+        """The change that gives numbers these decals, and exchanges parts.
+
+        Raises
+        ------
+        InvalidEdit
+            A decal would show an image that is not there.
+        """
+        images = parts.get("images", self.images)
+        last = int(decals.images.max(initial=-1))
+        if last >= len(images):
+            raise InvalidEdit(
+                f"expected an image from 0 to {len(images) - 1}, got {last}; add the image first"
+            )
+        return self._change(Rows.full(numbers, decals), parts)
+
+    def with_added(self, decals: Decals) -> Change:
+        """The change that adds decals under new numbers."""
+        first = self.decals.next_number
+        return self.with_decals(np.arange(first, first + len(decals)), decals)
+
+    def without(self, numbers: Numbers) -> Change:
+        """The change that deletes decals."""
+        self.decals.take(numbers)
+        return self._change(Rows.bare(numbers), {})
+
+    def with_parts(self, **parts: Any) -> Change:
+        """The change that exchanges objects, images or camera."""
+        return self._change(NOTHING, parts)
+
+    def _change(self, after: Rows, parts: dict[str, Any]) -> Change:
+        before = Rows.of(self.decals, after.numbers)
+        return Change(before, after, Parts(**{name: getattr(self, name) for name in parts}), Parts(**parts))
+
+    def put(self, rows: Rows, parts: Parts) -> None:
+        """Put one side of a change on."""
+        rows.put_into(self._decals)
+        if parts.objects is not None:
+            self._objects = parts.objects
+        if parts.images is not None:
+            self._images = parts.images
+        if parts.camera is not None:
+            self._camera = parts.camera

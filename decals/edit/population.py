@@ -1,0 +1,130 @@
+"""Many decals at once: coats over whole objects, and neighbourhoods that even out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blobtree.progress import Progress
+from decals.edit.change import Change
+from decals.edit.document import Document
+from decals.edit.places import Places, carried, nearest
+from decals.errors import InvalidEdit
+from decals.local_relaxation import relax_near
+from decals.model import Decals
+from decals.population import Sites, World
+from decals.relaxation import EXPONENTS, STIFFNESS
+from decals.scene import SceneObject
+from decals.seeding import seed
+
+SPACING = 3.0**0.5 / 1.03
+"""Distance of neighbours in an even coat without gaps, in radii: `sizing.MARGIN` is in the radii."""
+
+MOST = 1_000_000
+
+
+def lying_on(document: Document, objects: Sequence[int]) -> NDArray[np.int64]:
+    """Numbers of the decals that are closest to one of these objects."""
+    places = nearest(document.objects, document.decals.decals.positions)
+    return document.decals.numbers[np.isin(places.objects, objects)]
+
+
+@dataclass(frozen=True, eq=False)
+class Coat:
+    """New decals in place of those that lie on some objects."""
+
+    objects: tuple[int, ...]
+    decals: Decals
+    label: ClassVar[str] = "scatter"
+
+    def change(self, document: Document) -> Change:
+        """Delete and add at once."""
+        for number in self.objects:
+            document.object(number)
+        gone = document.without(lying_on(document, self.objects))
+        return gone.then(document.with_added(self.decals))
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """An even coat of so many decals over some objects, in place of what lies there.
+
+    Spreading seeds takes long: `coat` does it anywhere, a thread for instance, for a `Coat` that is quick.
+    """
+
+    objects: tuple[int, ...]
+    count: int
+    seed: int = 0
+    label: ClassVar[str] = "scatter"
+
+    def coat(
+        self,
+        objects: Sequence[SceneObject],
+        images: int,
+        *,
+        progress: Progress | None = None,
+        cancel: Callable[[], bool] | None = None,
+    ) -> Coat:
+        """Spread the decals over a document's objects; arguments are as for `decals.seed`."""
+        for number in self.objects:
+            if not 0 <= number < len(objects):
+                raise InvalidEdit(f"expected objects from 0 to {len(objects) - 1}, got {number}")
+        if not 0 <= self.count <= MOST:
+            raise InvalidEdit(f"count: expected 0 to {MOST} decals, got {self.count}")
+        if images < 1:
+            raise InvalidEdit("expected an image for the decals to show, got none; add one first")
+        surfaces = [objects[number].surface for number in self.objects]
+        decals = seed(
+            surfaces, count=self.count, seed=self.seed, images=images, progress=progress, cancel=cancel
+        )
+        return Coat(self.objects, decals)
+
+    def change(self, document: Document) -> Change:
+        """Spread and put on, however long it takes."""
+        return self.coat(document.objects, len(document.images)).change(document)
+
+
+@dataclass(frozen=True, eq=False)
+class Relax:
+    """Let the decals around a place find their rest; all others stay where they are.
+
+    Decals of the drawing order of the nearest one take part: scales make room for scales, not for eyes.
+    """
+
+    place: ArrayLike
+    label: ClassVar[str] = "relax"
+
+    def change(self, document: Document) -> Change:
+        """Move the neighbourhood, sizes unchanged."""
+        center = np.asarray(self.place, np.float32)
+        if center.shape != (3,) or not np.isfinite(center).all():
+            raise InvalidEdit(f"place: expected three finite numbers, got {self.place!r:.60}")
+        numbers, decals = document.decals.numbers, document.decals.decals
+        if not len(decals) or not document.objects:
+            return Change()
+        closest = int(np.linalg.norm(decals.positions - center, axis=1).argmin())
+        rows = np.flatnonzero(decals.ranks == decals.ranks[closest])
+        if len(rows) < 2:
+            return Change()
+        before = _sites(document, decals[rows])
+        after = relax_near(
+            World([item.surface for item in document.objects], 0),
+            before,
+            np.ones(len(rows), np.bool_),
+            (SPACING * decals.radii[rows]).astype(np.float32),
+            center,
+            exponent=EXPONENTS[1],
+            stiffness=STIFFNESS,
+            device="cpu",
+        )
+        moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
+        places = Places(after.positions[moved], after.normals[moved], after.surface_ids[moved])
+        return document.with_decals(numbers[rows[moved]], carried(decals[rows[moved]], places))
+
+
+def _sites(document: Document, decals: Decals) -> Sites:
+    """Decals as particles on the objects that they are closest to."""
+    found = nearest(document.objects, decals.positions)
+    return Sites(decals.positions, decals.normals, found.objects)

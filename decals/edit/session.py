@@ -1,0 +1,161 @@
+"""One stack of commands: do, undo, redo, strokes and saving."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+from decals.edit.change import Change
+from decals.edit.document import Document
+from decals.scene import Scene
+from decals.scene_file import save_scene
+
+
+class Command(Protocol):
+    """Something to do to a document. It computes; the session changes."""
+
+    @property
+    def label(self) -> str:
+        """What undo would take back, in plain words."""
+        ...
+
+    def change(self, document: Document) -> Change:
+        """Give the change; the document stays as it is, and errors leave no trace."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Done:
+    """An entry of the stack."""
+
+    label: str
+    change: Change
+
+
+class EditSession:
+    """A document and everything that was done to it.
+
+    Commands between `begin` and `end` become one entry: a drag is undone as a whole.
+
+    Parameters
+    ----------
+    scene
+        What there is at first. Undoing everything gives back this, bit for bit, numbers included.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.document = Document(scene)
+        self._done: list[Done] = []
+        self._undone: list[Done] = []
+        self._stroke: Done | None = None
+        self._saved: Done | None = None
+        self._listeners: list[Callable[[Change], None]] = []
+
+    # -- doing ------------------------------------------------------------------------------------------
+
+    def do(self, command: Command) -> Change:
+        """Carry out a command; what it raises leaves everything as it was."""
+        return self._carry_out(command.label, command.change(self.document))
+
+    def _carry_out(self, label: str, change: Change) -> Change:
+        if change.empty:
+            return change
+        self.document.put(change.after, change.parts_after)
+        self._undone.clear()
+        if self._stroke is None:
+            self._done.append(Done(label, change))
+        else:
+            self._stroke = Done(self._stroke.label, self._stroke.change.then(change))
+        self._tell(change)
+        return change
+
+    def undo(self) -> str | None:
+        """Take back the last entry; its label, or None where there is none."""
+        self.end()
+        if not self._done:
+            return None
+        entry = self._done.pop()
+        self._undone.append(entry)
+        self._revert(entry.change)
+        return entry.label
+
+    def redo(self) -> str | None:
+        """Do again what was undone last; its label, or None where there is none."""
+        self.end()
+        if not self._undone:
+            return None
+        entry = self._undone.pop()
+        self._done.append(entry)
+        self.document.put(entry.change.after, entry.change.parts_after)
+        self._tell(entry.change)
+        return entry.label
+
+    def _revert(self, change: Change) -> None:
+        self.document.put(change.before, change.parts_before)
+        self._tell(change)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What was done and can be undone, the first thing first."""
+        return tuple(entry.label for entry in self._done)
+
+    # -- strokes ----------------------------------------------------------------------------------------
+
+    def begin(self, label: str) -> None:
+        """Let all that follows be one entry, until `end`."""
+        self.end()
+        self._stroke = Done(label, Change())
+
+    def end(self) -> None:
+        """End a stroke; one that did nothing leaves no entry."""
+        stroke, self._stroke = self._stroke, None
+        if stroke is not None and not stroke.change.empty:
+            self._done.append(stroke)
+
+    def take_back(self) -> None:
+        """Go back to where the open stroke began, and stay in it."""
+        if self._stroke is not None and not self._stroke.change.empty:
+            self._revert(self._stroke.change)
+            self._stroke = Done(self._stroke.label, Change())
+
+    def cancel(self) -> None:
+        """Go back to where the open stroke began, and forget it."""
+        self.take_back()
+        self._stroke = None
+
+    @contextmanager
+    def stroke(self, label: str) -> Iterator[None]:
+        """`begin` and `end` around a block; an error takes all of it back."""
+        self.begin(label)
+        try:
+            yield
+        except BaseException:
+            self.cancel()
+            raise
+        self.end()
+
+    # -- around it --------------------------------------------------------------------------------------
+
+    def listen(self, listener: Callable[[Change], None]) -> None:
+        """Call a function after every change, with the change (or the one that was taken back)."""
+        self._listeners.append(listener)
+
+    def _tell(self, change: Change) -> None:
+        for listener in self._listeners:
+            listener(change)
+
+    @property
+    def modified(self) -> bool:
+        """Whether there is something that was not saved."""
+        return self._stroke is not None or self._last is not self._saved
+
+    @property
+    def _last(self) -> Done | None:
+        return self._done[-1] if self._done else None
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the scene to a file, whole or not at all (`decals.save_scene`)."""
+        self.end()
+        save_scene(self.document.scene, path)
+        self._saved = self._last

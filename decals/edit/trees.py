@@ -1,0 +1,275 @@
+"""Primitives of a tree: finding them by path, moving and changing them, and decals that follow."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blobtree import ISO, Node
+from blobtree.primitives import Primitive
+from blobtree.tree import Combination, Transform
+from decals.edit.change import Change
+from decals.edit.document import Document
+from decals.edit.places import Places, carried, nearest
+from decals.errors import InvalidEdit
+from decals.scene import TreeObject
+
+Path = tuple[int, ...]
+"""Which child to take, from the root down."""
+
+Doubles = NDArray[np.float64]
+
+STEP = 1e-3
+"""Of the differences that tell how the surface follows a primitive, in its radii."""
+
+FIELD_ERROR = 1e-5
+"""A decal stays where it is as long as the field there is no farther from ISO."""
+
+
+def primitive_paths(tree: Node) -> list[Path]:
+    """Paths of all primitives, from the first to the last."""
+    found: list[Path] = []
+    pending: list[tuple[Path, Node]] = [((), tree)]
+    while pending:
+        path, node = pending.pop()
+        if isinstance(node, Primitive):
+            found.append(path)
+        pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
+    return found
+
+
+def _down(tree: Node, path: Path) -> Iterator[Node]:
+    """Nodes from the root to the one that a path leads to."""
+    node = tree
+    yield node
+    for step in path:
+        if not 0 <= step < len(node.children):
+            raise InvalidEdit(f"expected a path through the tree, got {path}; {step} is no child there")
+        node = node.children[step]
+        yield node
+
+
+def primitive_at(tree: Node, path: Path) -> Primitive:
+    """Give the primitive that a path leads to, or `InvalidEdit`."""
+    *_, node = _down(tree, path)
+    if not isinstance(node, Primitive):
+        raise InvalidEdit(f"expected the path of a primitive, {path} leads to a {type(node).__name__}")
+    return node
+
+
+def primitive_near(tree: Node, point: ArrayLike) -> Path:
+    """Path of the primitive whose field is the highest at a point; the first of equals."""
+    place = np.asarray(point, np.float32).reshape(1, 3)
+    paths = primitive_paths(tree)
+    near = [path for path in paths if _within(place, alone(tree, path))[0]] or paths
+    return max(near, key=lambda path: float(alone(tree, path)(place)[0]))
+
+
+def with_node(tree: Node, path: Path, node: Node) -> Node:
+    """Give the tree with another node at the end of a path."""
+    above = list(_down(tree, path))[:-1]
+    for parent, step in zip(reversed(above), reversed(path), strict=True):
+        node = _with_child(parent, step, node)
+    return node
+
+
+def _with_child(parent: Node, step: int, child: Node) -> Node:
+    """Exchange one child of a node, whichever of its fields holds it."""
+    count = 0
+    for field in fields(parent):  # type: ignore[arg-type]  # every node is a dataclass
+        value = getattr(parent, field.name)
+        held = value if isinstance(value, tuple) else (value,)
+        if not held or not isinstance(held[0], Node):
+            continue
+        if step < count + len(held):
+            news = (*held[: step - count], child, *held[step - count + 1 :])
+            return replace(parent, **{field.name: news if isinstance(value, tuple) else child})  # type: ignore[type-var]
+        count += len(held)
+    raise InvalidEdit(f"a {type(parent).__name__} has no child {step}")
+
+
+def alone(tree: Node, path: Path) -> Node:
+    """Give the primitive at a path as it lies in the world, without what it is combined with."""
+    nodes = list(_down(tree, path))
+    result = nodes[-1]
+    for parent, step in zip(reversed(nodes[:-1]), reversed(path), strict=True):
+        if not isinstance(parent, Combination):
+            result = _with_child(parent, step, result)
+    return result
+
+
+def world_matrix(tree: Node, path: Path) -> Doubles:
+    """Linear part of the map from a primitive's own space to the world, ``float64[3, 3]``.
+
+    Raises
+    ------
+    InvalidEdit
+        The primitive lies below a warp, where that differs from place to place.
+    """
+    matrix = np.eye(3)
+    for node in list(_down(tree, path))[:-1]:
+        if isinstance(node, Transform):
+            matrix = matrix @ np.asarray(node.matrix, np.float64)[:3, :3]
+        elif hasattr(node, "warp"):
+            raise InvalidEdit(f"the primitive lies below a {type(node).__name__}; move that as a whole")
+    return matrix
+
+
+def moved(primitive: Primitive, offset: ArrayLike) -> Node:
+    """Give a primitive moved in its own space."""
+    shift = np.asarray(offset, np.float64)
+    points = {
+        field.name: tuple((np.asarray(value) + shift).tolist())
+        for field in fields(primitive)  # type: ignore[arg-type]  # every node is a dataclass
+        if field.name != "color" and (value := getattr(primitive, field.name)) in primitive.control_points
+    }
+    if len(points) < len(primitive.control_points):
+        return primitive.translate(shift)
+    return replace(primitive, **points)  # type: ignore[type-var]
+
+
+def resized(primitive: Primitive, factor: float) -> Primitive:
+    """Give a primitive whose radii are larger by a factor."""
+    radii = {
+        field.name: factor * getattr(primitive, field.name)
+        for field in fields(primitive)  # type: ignore[arg-type]  # every node is a dataclass
+        if field.name == "radius" or field.name.endswith("_radius")
+    }
+    return replace(primitive, **radii)  # type: ignore[type-var]
+
+
+@dataclass(frozen=True, eq=False)
+class OfPrimitive:
+    """A command for a primitive of a tree: the object's number, and the path to it."""
+
+    object: int
+    path: Path
+
+    def tree(self, document: Document) -> Node:
+        """The object's tree, or `InvalidEdit`."""
+        item = document.object(self.object)
+        if not isinstance(item, TreeObject):
+            raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh")
+        return item.tree
+
+    def exchanged(self, document: Document, node: Node, offset: ArrayLike = (0.0, 0.0, 0.0)) -> Change:
+        """Put another node in place of the primitive; decals follow, with the offset as far as it counts."""
+        before = self.tree(document)
+        after = with_node(before, self.path, node)
+        item = TreeObject(document.objects[self.object].name, after)
+        item.surface  # noqa: B018  # refuses a tree that shows nothing, before anything changes
+        objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
+        numbers, places = _followers(document, self, item, np.asarray(offset, np.float64))
+        followed = carried(document.decals.take(numbers), places)
+        return document.with_decals(numbers, followed, objects=objects)
+
+
+def _followers(
+    document: Document, edited: OfPrimitive, item: TreeObject, offset: Doubles
+) -> tuple[NDArray[np.int64], Places]:
+    """Decals that a changed tree carries along, and where to."""
+    before = edited.tree(document)
+    numbers, decals = document.decals.numbers, document.decals.decals
+    rows = np.flatnonzero(
+        _within(decals.positions, alone(before, edited.path), alone(item.tree, edited.path))
+    )
+    places = nearest(document.objects, decals.positions[rows])
+    rows = rows[places.objects == edited.object]
+    positions = decals.positions[rows].astype(np.float64)
+    weights = following(before, edited.path, positions) if offset.any() else np.zeros(len(rows))
+    wished = positions + weights[:, None] * offset
+    changed = (weights * np.linalg.norm(offset) > 0) | (np.abs(item.tree(wished) - ISO) > FIELD_ERROR)
+    goal_positions, goal_normals = item.surface.project(wished[changed])
+    goals = np.full(int(changed.sum()), edited.object, np.int32)
+    return numbers[rows[changed]], Places(goal_positions, goal_normals, goals)
+
+
+def _within(points: NDArray[np.float32], *nodes: Node) -> NDArray[np.bool_]:
+    """Whether each point is where one of the nodes has a field."""
+    inside = np.zeros(len(points), np.bool_)
+    for node in nodes:
+        low, high = node.bounds
+        inside |= ((points >= low) & (points <= high)).all(axis=1)
+    return inside
+
+
+def following(tree: Node, path: Path, points: Doubles) -> Doubles:
+    """How far the surface at each point goes along with a primitive, from 0 to 1.
+
+    Where fields blend, a primitive moves the surface by its part of the field's change: with f the field
+    and t the primitive's position, the surface moves along its normal n by −(∂f/∂t)/|∇f|, a rigid one by n.
+    """
+    if not len(points):
+        return np.zeros(0)
+    primitive = primitive_at(tree, path)
+    step = STEP * primitive.radius
+    inverse = np.linalg.inv(world_matrix(tree, path))
+    change = np.stack(
+        [
+            (
+                _shifted(tree, path, primitive, inverse @ axis)(points)
+                - _shifted(tree, path, primitive, -inverse @ axis)(points)
+            )
+            for axis in step * np.eye(3)
+        ],
+        axis=1,
+    ) / (2.0 * step)
+    slope = tree.gradient(points).astype(np.float64)
+    squared = np.einsum("ni,ni->n", slope, slope)
+    shares = -np.einsum("ni,ni->n", change, slope) / np.where(squared > 0, squared, 1.0)
+    weights: Doubles = np.clip(shares, 0.0, 1.0)
+    return weights
+
+
+def _shifted(tree: Node, path: Path, primitive: Primitive, offset: Doubles) -> Node:
+    return with_node(tree, path, moved(primitive, offset))
+
+
+@dataclass(frozen=True, eq=False)
+class MovePrimitive(OfPrimitive):
+    """Move a primitive by an offset in the world; decals go along with their part of the surface."""
+
+    offset: ArrayLike
+    label: ClassVar[str] = "move a primitive"
+
+    def change(self, document: Document) -> Change:
+        """Exchange the tree, and carry the decals that it moves."""
+        tree = self.tree(document)
+        offset = np.asarray(self.offset, np.float64)
+        if offset.shape != (3,) or not np.isfinite(offset).all():
+            raise InvalidEdit(f"offset: expected three finite numbers, got {self.offset!r:.60}")
+        own = np.linalg.solve(world_matrix(tree, self.path), offset)
+        return self.exchanged(document, moved(primitive_at(tree, self.path), own), offset)
+
+
+@dataclass(frozen=True, eq=False)
+class ResizePrimitive(OfPrimitive):
+    """Make a primitive thicker, or thinner for a factor below 1; decals stay on the surface."""
+
+    factor: float
+    label: ClassVar[str] = "resize a primitive"
+
+    def change(self, document: Document) -> Change:
+        """Exchange the tree, and put the decals back onto it."""
+        if not (math.isfinite(self.factor) and self.factor > 0):
+            raise InvalidEdit(f"factor: expected a number above 0, got {self.factor!r}")
+        return self.exchanged(document, resized(primitive_at(self.tree(document), self.path), self.factor))
+
+
+@dataclass(frozen=True, eq=False)
+class PaintPrimitive(OfPrimitive):
+    """Give a primitive another colour, three numbers in [0, 1]."""
+
+    color: Any
+    label: ClassVar[str] = "paint a primitive"
+
+    def change(self, document: Document) -> Change:
+        """Exchange the tree; its shape stays."""
+        tree = self.tree(document)
+        primitive = replace(primitive_at(tree, self.path), color=self.color)  # type: ignore[type-var]
+        item = TreeObject(document.objects[self.object].name, with_node(tree, self.path, primitive))
+        objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
+        return document.with_parts(objects=objects)

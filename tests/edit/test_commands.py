@@ -1,0 +1,197 @@
+"""What each command does, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from decals.edit import (
+    Add,
+    AddImage,
+    Alter,
+    Carry,
+    ChangeImage,
+    Coat,
+    Delete,
+    Duplicate,
+    EditSession,
+    Look,
+    Relax,
+    RemoveImage,
+    Scale,
+    Scatter,
+    Turn,
+    nearest,
+)
+from decals.edit.population import lying_on
+from decals.errors import InvalidDecals, InvalidEdit
+from decals.neighbours import FacingTree
+from decals.scene import DecalImage
+from tests.edit.scenes import digest, one, scene
+
+
+@pytest.fixture
+def session():
+    return EditSession(scene())
+
+
+def test_added_decals_get_the_next_numbers(session):
+    decals = session.document.decals
+    session.do(Add(one(radius=0.3, images=[1])))
+    assert decals.numbers.tolist() == list(range(61))
+    assert decals[60].radii[0] == np.float32(0.3)
+    session.do(Delete([60, 3]))
+    session.do(Add(one()))
+    assert decals.numbers.tolist() == [*range(3), *range(4, 60), 61]
+
+
+def test_values_are_altered_for_all_or_for_each(session):
+    decals = session.document.decals
+    session.do(Alter.each([2, 5], tints=[1, 0.5, 0], layers=3, images=1))
+    assert decals.take([2, 5]).tints.tolist() == [[1, 0.5, 0]] * 2
+    assert decals.take([2, 5]).layers.tolist() == [3, 3]
+    session.do(Alter.each([5, 2], opacities=[0.25, 0.5]))
+    assert decals.take([2, 5]).opacities.tolist() == [0.5, 0.25]
+    assert decals.take([1, 3]).layers.tolist() == [0, 0]
+
+
+def test_scaling_and_turning(session):
+    decals = session.document.decals
+    before = decals.take([4, 7])
+    session.do(Scale([4, 7], 2.0))
+    np.testing.assert_allclose(decals.take([4, 7]).radii, 2 * before.radii, rtol=1e-6)
+    session.do(Turn([4, 7], 90.0))
+    np.testing.assert_allclose(decals.take([4, 7]).tangents, before.bitangents, atol=1e-6)
+    session.do(Turn([4, 7], -90.0))
+    np.testing.assert_allclose(decals.take([4, 7]).tangents, before.tangents, atol=1e-6)
+
+
+def test_a_group_is_carried_as_one_and_lies_on_the_other_object(session):
+    document = session.document
+    near = np.argsort(np.linalg.norm(document.decals.decals.positions - (0, 1, 0.2), axis=1))[:3]
+    before = document.decals.take(near)
+    position, normal = np.array([-2.5, 0.1, 1], np.float32), np.array([0, 0, 1], np.float32)
+    session.do(Carry(near, position, normal))
+    after = document.decals.take(near)
+    np.testing.assert_array_equal(after.positions[0], position)
+    np.testing.assert_array_equal(after.normals[0], normal)
+    assert set(near.tolist()) <= set(lying_on(document, [1]).tolist())
+    np.testing.assert_allclose(after.positions[:, 2], 1.0, atol=1e-6)
+    apart = [np.linalg.norm(group.positions - group.positions[0], axis=1) for group in (before, after)]
+    np.testing.assert_allclose(apart[0], apart[1], rtol=0.2)
+
+
+def test_duplicates_lie_beside_on_the_surface(session):
+    document = session.document
+    session.do(Duplicate([8, 9]))
+    copies, firsts = document.decals.take([60, 61]), document.decals.take([8, 9])
+    np.testing.assert_array_equal(copies.radii, firsts.radii)
+    gaps = np.linalg.norm(copies.positions - firsts.positions, axis=1) / firsts.radii
+    assert ((gaps > 0.5) & (gaps < 1.2)).all()
+    lying = nearest(document.objects, copies.positions)
+    np.testing.assert_allclose(lying.positions, copies.positions, atol=1e-5)
+    np.testing.assert_allclose(lying.normals, copies.normals, atol=1e-4)
+
+
+def test_images_come_and_go(session):
+    document = session.document
+    rivet = DecalImage.load("rivet")
+    session.do(AddImage(rivet))
+    session.do(Alter.each([0, 1, 2], images=[0, 1, 2]))
+    session.do(RemoveImage(1))
+    assert document.decals.take([0, 1, 2]).images.tolist() == [0, -1, 1]
+    assert document.images[1] is rivet
+    session.do(ChangeImage(0, rivet))
+    assert document.images[0] is rivet
+    for command in (RemoveImage(2), ChangeImage(-1, rivet)):
+        with pytest.raises(InvalidEdit, match="0 to 1"):
+            session.do(command)
+    session.undo()
+    session.undo()
+    assert document.decals.take([0, 1, 2]).images.tolist() == [0, 1, 2]
+
+
+def test_scattering_replaces_the_coat_of_one_object(session):
+    document = session.document
+    others = lying_on(document, [0])
+    before = document.decals.take(others)
+    change = session.do(Scatter((1,), 33, seed=5))
+    assert len(lying_on(document, [1])) == 33
+    assert document.decals.take(others).packed().tobytes() == before.packed().tobytes()
+    assert set(document.decals.take(lying_on(document, [1])).images.tolist()) == {0, 1}
+    again = Scatter((1,), 33, seed=5).coat(document.objects, 2)
+    assert again.decals.packed().tobytes() == change.after.decals.packed().tobytes()
+
+
+def test_relaxing_parts_those_that_crowd_and_leaves_the_far_ones(session):
+    document = session.document
+    session.do(Coat((0, 1), scene(400).decals))
+    numbers = document.decals.numbers
+    place = document.decals.take(numbers[:1]).positions[0]
+    near = np.argsort(np.linalg.norm(document.decals.decals.positions - place, axis=1))[:4]
+    for other in near[1:]:
+        goal = 0.8 * place + 0.2 * document.decals.take(numbers[other : other + 1]).positions[0]
+        session.do(
+            Carry(numbers[[other]], *(rows[0] for rows in document.objects[0].surface.project([goal])))
+        )
+    before = document.decals.decals
+    change = session.do(Relax(place))
+    after = document.decals.decals
+    moved = (after.positions != before.positions).any(axis=1)
+    assert 3 < moved.sum() < 200
+    np.testing.assert_array_equal(numbers[moved], np.sort(change.after.numbers))
+    assert np.linalg.norm(before.positions[moved] - place, axis=1).max() < 8 * before.radii.max()
+    assert least_gap(after) > 3 * least_gap(before)
+    np.testing.assert_array_equal(after.radii, before.radii)
+
+
+def least_gap(decals):
+    tree = FacingTree(decals.positions, decals.normals)
+    return tree.nearest(decals.positions, decals.normals, count=1, skip_self=True)[0].min()
+
+
+def test_layers_that_do_not_crowd_stay_where_they_are(session):
+    document = session.document
+    place = document.decals[0].positions[0]
+    session.do(Add(document.decals[0].replace(layers=[2], radii=[0.01])))
+    session.do(Add(document.decals[0].replace(layers=[2], radii=[0.01])))
+    change = session.do(Relax(place + np.float32(0.5)))
+    assert not {60, 61} & set(change.after.numbers.tolist())
+
+
+NAN = np.array([np.nan, 0, 0], np.float32)
+
+
+@pytest.mark.parametrize(
+    ("command", "error", "message"),
+    [
+        (Delete([60]), InvalidDecals, "got 60"),
+        (Delete([1, 1]), InvalidDecals, "each number once"),
+        (Scale([0], 0.0), InvalidDecals, "radii"),
+        (Scale([0], np.inf), InvalidEdit, "factor"),
+        (Turn([0], np.nan), InvalidEdit, "degrees"),
+        (Alter.each([0], images=2), InvalidEdit, "expected an image from 0 to 1, got 2"),
+        (Alter.each([0], colour=2), InvalidEdit, "'layers', got 'colour'"),
+        (Alter.each([0], tints=[0, 2, 0]), InvalidDecals, "tints"),
+        (Add(one(images=[7])), InvalidEdit, "add the image first"),
+        (Carry([0], NAN, np.ones(3, np.float32)), InvalidEdit, "a position and a normal"),
+        (Carry([0], np.zeros(3, np.float32), np.zeros(3, np.float32)), InvalidEdit, "a normal"),
+        (Relax(NAN), InvalidEdit, "place"),
+        (Scatter((2,), 5), InvalidEdit, "objects from 0 to 1, got 2"),
+        (Scatter((0,), -5), InvalidEdit, "got -5"),
+        (Coat((-1,), one()), InvalidEdit, "0 to 1, got -1"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_changes_nothing(session, command, error, message):
+    before = digest(session.document)
+    with pytest.raises(error, match=message):
+        session.do(command)
+    assert digest(session.document) == before
+    assert session.labels == ()
+    assert not session.modified
+
+
+def test_looking_is_a_command_too(session):
+    camera = scene().camera
+    session.do(Look(type(camera)((9, 9, 9))))
+    assert session.document.scene.camera.position == (9, 9, 9)
+    session.undo()
+    assert session.document.camera is camera

@@ -1,0 +1,76 @@
+"""Random commands: none breaks anything, undoing all gives back the first state, redoing all the last."""
+
+import numpy as np
+import pytest
+
+from blobtree import BlobTreeError
+from decals.edit import EditSession
+from decals.errors import DecalsError
+from tests.edit.fuzz import Monkey
+from tests.edit.scenes import digest, scene
+
+
+def play(session, monkey, count):
+    """Do so many things; how often what was tried, and what failed."""
+    done = failed = 0
+    while done < count:
+        choice = monkey.rng.random()
+        if choice < 0.12:
+            session.undo()
+        elif choice < 0.2:
+            session.redo()
+        elif choice < 0.23:
+            session.begin("stroke")
+        elif choice < 0.26:
+            session.end() if choice < 0.25 else session.cancel()
+        else:
+            command = monkey.command()
+            before = digest(session.document)
+            try:
+                session.do(command)
+            except (DecalsError, BlobTreeError):
+                assert digest(session.document) == before, command
+                failed += 1
+            done += 1
+        check_whole(session.document)
+    return failed
+
+
+def check_whole(document):
+    """What holds of every document: images are there, and the index is that of the decals."""
+    decals = document.decals.decals
+    assert decals.images.max(initial=-1) < len(document.images)
+    assert len(document.decals) == len(decals) == len(document.decals.numbers)
+
+
+@pytest.mark.parametrize(("seed", "count"), [(0, 500), pytest.param(1, 10_000, marks=pytest.mark.slow)])
+def test_random_commands_and_back(seed, count):
+    session = EditSession(scene())
+    first = digest(session.document)
+    monkey = Monkey(seed, session.document, scene(200).decals)
+    failed = play(session, monkey, count)
+    assert 0.02 * count < failed < 0.6 * count
+    session.end()
+    last, entries = digest(session.document), len(session.labels)
+    assert entries > 0.2 * count
+    while session.undo() is not None:
+        pass
+    assert digest(session.document) == first
+    while session.redo() is not None:
+        pass
+    assert digest(session.document) == last
+    assert len(session.labels) == entries
+
+
+def test_the_index_is_that_of_a_fresh_build_after_random_commands():
+    from decals.evaluate import evaluate
+
+    session = EditSession(scene())
+    play(session, Monkey(2, session.document, scene(200).decals), 150)
+    editor = session.document.decals
+    points, normals = scene().objects[0].surface.sample(2000, 0)
+    fresh = evaluate(editor.decals, points, normals)
+    edited = evaluate(editor, points, normals)
+    assert (fresh.owner >= 0).any()
+    np.testing.assert_array_equal(edited.owner, np.where(fresh.owner < 0, -1, editor.numbers[fresh.owner]))
+    np.testing.assert_allclose(edited.uv, fresh.uv, atol=1e-6)

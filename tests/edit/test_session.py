@@ -1,0 +1,137 @@
+"""The stack: strokes, undo, redo, saving, listeners."""
+
+import numpy as np
+import pytest
+
+from decals.edit import Add, Alter, Carry, Delete, EditSession, Scale
+from decals.errors import InvalidDecals, InvalidScene
+from decals.scene_file import load_scene
+from tests.edit.scenes import digest, one, scene
+
+
+@pytest.fixture
+def session():
+    return EditSession(scene())
+
+
+def drag(session, steps=10):
+    for x in np.linspace(0, 0.5, steps):
+        session.do(Carry([3], np.array([x, 0, 1], np.float32), np.array([0, 0, 1], np.float32)))
+
+
+def test_a_drag_is_one_entry(session):
+    first = digest(session.document)
+    session.begin("drag")
+    drag(session)
+    assert session.modified
+    session.end()
+    last = digest(session.document)
+    assert session.labels == ("drag",)
+    assert session.undo() == "drag"
+    assert digest(session.document) == first
+    assert session.redo() == "drag"
+    assert digest(session.document) == last
+    assert session.redo() is None
+
+
+def test_a_cancelled_stroke_leaves_no_trace(session):
+    first = digest(session.document)
+    session.do(Scale([1], 2.0))
+    before = digest(session.document)
+    session.begin("drag")
+    drag(session)
+    session.do(Delete([3]))
+    session.do(Add(one()))
+    session.cancel()
+    assert digest(session.document) == before
+    assert session.labels == ("scale",)
+    session.undo()
+    assert digest(session.document) == first
+    assert session.undo() is None
+
+
+def test_a_stroke_can_start_over(session):
+    session.begin("drag")
+    session.do(Scale([1], 2.0))
+    session.take_back()
+    session.do(Scale([1], 3.0))
+    session.end()
+    radius = scene().decals.radii[1]
+    assert session.document.decals[1].radii[0] == pytest.approx(3 * radius)
+    session.undo()
+    assert session.document.decals[1].radii[0] == radius
+
+
+def scale_and_fail(session):
+    with session.stroke("both"):
+        session.do(Scale([1], 2.0))
+        session.do(Delete([99]))
+
+
+def test_an_error_within_a_stroke_takes_all_of_it_back(session):
+    before = digest(session.document)
+    with pytest.raises(InvalidDecals):
+        scale_and_fail(session)
+    assert digest(session.document) == before
+    assert session.labels == ()
+
+
+def test_a_stroke_that_adds_and_deletes(session):
+    before = digest(session.document)
+    with session.stroke("flicker"):
+        session.do(Add(one()))
+        session.do(Scale([60], 2.0))
+        session.do(Delete([60, 5]))
+    after = digest(session.document)
+    session.undo()
+    assert digest(session.document) == before
+    session.redo()
+    assert digest(session.document) == after
+
+
+def test_a_new_command_ends_what_could_be_redone(session):
+    session.do(Scale([1], 2.0))
+    session.undo()
+    session.do(Scale([2], 2.0))
+    assert session.redo() is None
+    assert session.labels == ("scale",)
+
+
+def test_what_does_nothing_leaves_no_entry(session):
+    session.do(Delete([]))
+    with session.stroke("nothing"):
+        pass
+    assert session.labels == ()
+
+
+def test_listeners_hear_of_every_change(session):
+    heard = []
+    session.listen(lambda change: heard.append(change.after.numbers.tolist()))
+    session.do(Scale([1, 4], 2.0))
+    session.undo()
+    session.redo()
+    with pytest.raises(InvalidDecals):
+        session.do(Delete([99]))
+    assert heard == [[1, 4]] * 3
+
+
+def test_saving(session, tmp_path):
+    path = tmp_path / "scene.json"
+    session.do(Alter.each([1], tints=[0.5, 1, 0]))
+    session.do(Delete([0]))
+    assert session.modified
+    session.save(path)
+    assert not session.modified
+    loaded = load_scene(path)
+    assert loaded.decals.packed().tobytes() == session.document.decals.decals.packed().tobytes()
+    session.undo()
+    assert session.modified
+    session.redo()
+    assert not session.modified
+
+
+def test_a_save_that_fails_leaves_the_file_and_the_mark(session, tmp_path):
+    session.do(Delete([0]))
+    with pytest.raises(InvalidScene, match="existing folder"):
+        session.save(tmp_path / "nowhere" / "scene.json")
+    assert session.modified

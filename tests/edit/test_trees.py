@@ -1,0 +1,167 @@
+"""Primitives of trees: paths, moves through transforms, and decals that follow."""
+
+import numpy as np
+import pytest
+
+from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment
+from decals.camera import Camera
+from decals.edit import (
+    EditSession,
+    MovePrimitive,
+    PaintPrimitive,
+    ResizePrimitive,
+    primitive_near,
+    primitive_paths,
+)
+from decals.edit.trees import alone, following, moved, primitive_at, with_node
+from decals.errors import InvalidEdit, InvalidMesh
+from decals.scene import DecalImage, Scene, TreeObject
+from decals.seeding import seed
+from tests.edit.scenes import digest
+
+A, B = Point((0, 0, 0), radius=1.0), Segment((1, 0, 0), (2, 0, 0), radius=0.5)
+C = Cone((0, 0, 2), (0, 0, 3), radius=0.4, end_radius=0.2)
+NESTED = (A + B.translate((0.5, 0, 0)).scale(2)) - (C.rotate((0, 0, 1), 90) | A)
+
+
+def session_of(tree, count=80):
+    item = TreeObject("tree", tree)
+    return EditSession(
+        Scene(
+            objects=(item,),
+            decals=seed([item.surface], count=count),
+            images=(DecalImage.load("scale"),),
+            camera=Camera.framing(item.bounds),
+        )
+    )
+
+
+def test_paths_name_every_primitive_and_exchange_it():
+    paths = primitive_paths(NESTED)
+    assert [primitive_at(NESTED, path) for path in paths] == [A, B, C, A]
+    for path in paths:
+        assert with_node(NESTED, path, primitive_at(NESTED, path)) == NESTED
+        other = with_node(NESTED, path, Point((9, 9, 9), radius=1))
+        assert primitive_at(other, path) == Point((9, 9, 9), radius=1)
+        assert sum(primitive_at(other, at) != primitive_at(NESTED, at) for at in paths) == 1
+    for path in ((7,), (0, 0, 0), (0,)):
+        with pytest.raises(InvalidEdit):
+            primitive_at(NESTED, path)
+
+
+def test_a_primitive_alone_lies_where_it_lies_in_the_tree():
+    tree = A.translate((3, 0, 0)) + B
+    points = np.random.default_rng(0).normal(0, 3, (200, 3)).astype(np.float32)
+    np.testing.assert_array_equal(alone(tree, (0, 0))(points), A.translate((3, 0, 0))(points))
+    assert primitive_near(tree, (3, 0, 1)) == (0, 0)
+    assert primitive_near(tree, (1.5, 0, 0.5)) == (1,)
+
+
+def test_moving_keeps_what_a_primitive_is():
+    assert moved(B, (0, 1, 0)) == Segment((1, 1, 0), (2, 1, 0), radius=0.5)
+    assert moved(C, (1, 0, 0)).end_radius == 0.2
+    black = Point((0, 0, 0), radius=1, color=(0, 0, 0))
+    assert moved(black, (1, 2, 3)) == Point((1, 2, 3), radius=1, color=(0, 0, 0))
+
+
+@pytest.mark.parametrize("path", [(0,), (1, 0, 0)])
+def test_a_move_is_one_in_the_world_whatever_lies_above(path):
+    tree = A + B.rotate((0, 1, 1), 40).translate((3, 1, 0))
+    offset = np.array([0.2, -0.1, 0.3])
+    session = session_of(tree)
+    before = alone(tree, path)
+    session.do(MovePrimitive(0, path, offset))
+    after = alone(session.document.objects[0].tree, path)
+    points = np.random.default_rng(0).uniform(*before.bounds, (300, 3)).astype(np.float32)
+    np.testing.assert_allclose(after(points + offset), before(points), atol=1e-5)
+
+
+def test_decals_on_a_primitive_go_along_and_the_others_stay():
+    tree = A | Point((5, 0, 0), radius=1.0)
+    session = session_of(tree)
+    before = session.document.decals.decals
+    session.do(MovePrimitive(0, (1,), (0.3, 0.4, 0)))
+    after = session.document.decals.decals
+    right = before.positions[:, 0] > 2
+    np.testing.assert_array_equal(after.positions[~right], before.positions[~right])
+    np.testing.assert_allclose(after.positions[right], before.positions[right] + (0.3, 0.4, 0), atol=1e-4)
+    np.testing.assert_allclose(after.tangents, before.tangents, atol=1e-3)
+
+
+@pytest.mark.parametrize("tree", [A + B, Ricci([A, B], exponent=3), A - Point((0, 0, 1.2), radius=0.6)])
+@pytest.mark.parametrize(
+    "command",
+    [
+        MovePrimitive(0, (1,), (0.1, 0.15, -0.1)),
+        ResizePrimitive(0, (1,), 1.2),
+        ResizePrimitive(0, (0,), 0.8),
+    ],
+)
+def test_decals_stay_on_the_surface_and_come_back(tree, command):
+    session = session_of(tree)
+    first = digest(session.document)
+    change = session.do(command)
+    assert len(change.after.numbers)
+    decals, item = session.document.decals.decals, session.document.objects[0]
+    assert np.abs(item.tree(decals.positions) - ISO).max() < 1e-4
+    normals = item.surface.normal(decals.positions)
+    assert np.einsum("ni,ni->n", normals, decals.normals).min() > 0.999
+    session.undo()
+    assert digest(session.document) == first
+
+
+def test_following_is_whole_on_a_primitive_alone_and_shared_in_a_blend():
+    tree = A + Point((1.2, 0, 0), radius=1.0)
+    low, high = tree.bounds
+    points = seed([TreeObject("t", tree).surface], count=100).positions
+    first, second = following(tree, (0,), points), following(tree, (1,), points)
+    np.testing.assert_allclose(first + second, 1.0, atol=0.02)
+    mirror = points * (-1, 1, 1) + (1.2, 0, 0)
+    np.testing.assert_allclose(following(tree, (1,), mirror), first, atol=0.02)
+    far = np.abs(points[:, 0] - low[0]) > (high - low)[0] * 0.7
+    assert first[far].max() < 0.15
+
+
+def test_decals_in_a_hole_follow_the_tool():
+    tree = A - Point((0, 0, 1.1), radius=0.5)
+    points = TreeObject("t", tree).surface.project([[0, 0, 0.6]])[0]
+    np.testing.assert_allclose(following(tree, (1,), points), 1.0, atol=0.02)
+    np.testing.assert_allclose(following(tree, (0,), points), 0.0, atol=0.02)
+
+
+def test_painting_leaves_the_decals():
+    session = session_of(A + B)
+    change = session.do(PaintPrimitive(0, (1,), (1, 0, 0)))
+    assert not len(change.after.numbers)
+    assert primitive_at(session.document.objects[0].tree, (1,)).color == (1, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("command", "error", "message"),
+    [
+        (MovePrimitive(1, (0,), (0, 0, 1)), InvalidEdit, "0 to 0, got 1"),
+        (MovePrimitive(0, (5,), (0, 0, 1)), InvalidEdit, "path"),
+        (MovePrimitive(0, (0,), (0, 0, np.nan)), InvalidEdit, "offset"),
+        (ResizePrimitive(0, (0,), 0.0), InvalidEdit, "above 0"),
+        (PaintPrimitive(0, (0,), (2, 0, 0)), InvalidNode, "color"),
+        (ResizePrimitive(0, (0,), 0.001), InvalidMesh, "surface"),
+    ],
+)
+def test_what_cannot_be_is_refused(command, error, message):
+    session = session_of(A)
+    session.document.put(*_under_a_sum(session.document))
+    before = digest(session.document)
+    with pytest.raises(error, match=message):
+        session.do(command)
+    assert digest(session.document) == before
+
+
+def _under_a_sum(document):
+    change = document.with_parts(objects=(TreeObject("tree", A - Point((0, 0, 0), radius=0.5)),))
+    return change.after, change.parts_after
+
+
+def test_below_a_twist_nothing_moves_alone():
+    session = session_of((A + B).twist(30))
+    with pytest.raises(InvalidEdit, match="below a Twist"):
+        session.do(MovePrimitive(0, (0, 0), (0, 0, 1)))
