@@ -16,6 +16,7 @@ from decals.local_relaxation import relax_near
 from decals.model import Decals
 from decals.population import Sites, World
 from decals.relaxation import EXPONENTS, STIFFNESS
+from decals.repulsion import Law
 from decals.scene import SceneObject
 from decals.seeding import seed
 
@@ -108,23 +109,18 @@ class Relax:
         rows = np.flatnonzero(decals.ranks == decals.ranks[closest])
         if len(rows) < 2:
             return Change()
-        before = _sites(document, decals[rows])
+        surfaces = nearest(document.objects, decals.positions[rows]).objects
+        order = np.argsort(surfaces, kind="stable")  # particles come sorted by surface
+        rows, surfaces = rows[order], surfaces[order]
+        before = Sites(decals.positions[rows], decals.normals[rows], surfaces)
         after = relax_near(
             World([item.surface for item in document.objects], 0),
             before,
             np.ones(len(rows), np.bool_),
             (SPACING * decals.radii[rows]).astype(np.float32),
             center,
-            exponent=EXPONENTS[1],
-            stiffness=STIFFNESS,
-            device="cpu",
+            law=Law(EXPONENTS[1], STIFFNESS),
         )
         moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
         places = Places(after.positions[moved], after.normals[moved], after.surface_ids[moved])
         return document.with_decals(numbers[rows[moved]], carried(decals[rows[moved]], places))
-
-
-def _sites(document: Document, decals: Decals) -> Sites:
-    """Decals as particles on the objects that they are closest to."""
-    found = nearest(document.objects, decals.positions)
-    return Sites(decals.positions, decals.normals, found.objects)
