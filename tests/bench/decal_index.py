@@ -80,15 +80,15 @@ def builds(device: Any) -> Figures:
     return figures
 
 
-def edits() -> Figures:
+def edits(count: int = COUNTS["1m"]) -> Figures:
     """Median and worst milliseconds to move one decal of a million: records and index, on the processor."""
-    editor, times, rows = DecalEditor(coat(COUNTS["1m"])), [], []
+    editor, times, rows = DecalEditor(coat(count)), [], []
     editor.change(1, opacities=[0.5])  # loads the kernels
-    for number in range(0, COUNTS["1m"], COUNTS["1m"] // EDITS):
-        moved = editor[number].positions * np.float32(1.001)
+    for number in range(0, count, count // EDITS):
+        moved, before = editor[number].positions * np.float32(1.001), editor.version
         begin = time.perf_counter()
         editor.change(number, positions=moved)
-        changes = editor.take_changes()
+        changes = editor.changes(before)
         times.append(1e3 * (time.perf_counter() - begin))
         rows.append(sum(end - first for ranges in changes.values() for first, end in ranges))
     return {

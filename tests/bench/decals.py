@@ -5,6 +5,7 @@ alternate, errors against the float64 oracles of the tests. Figures whose subjec
 it is said. Other parts of it, each alone:
 
     --only index [--device cuda:0]   building the index of 100,000 and 1,000,000 decals; no graphics needed
+    --peers                          mesh-clipped decals, log maps and uv at vertices beside ours
 """
 
 import argparse
@@ -69,6 +70,13 @@ def index_alone(device: str) -> Figures:
     return figures
 
 
+def peers(*, quick: bool) -> Figures:
+    """Measure what one would pick instead, and print."""
+    from tests.bench import decal_peers
+
+    return decal_peers.run(quick=quick)
+
+
 def everything(*, quick: bool) -> Figures:
     """Measure all that needs graphics and the tests' oracles, and print."""
     from tests.bench import decal_figures
@@ -84,9 +92,15 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
     parser.add_argument("--only", choices=["index"], help="one part alone")
+    parser.add_argument("--peers", action="store_true", help="what one would pick instead, in one run")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
-    figures = index_alone(options.device) if options.only else everything(quick=options.quick)
+    if options.only:
+        figures = index_alone(options.device)
+    elif options.peers:
+        figures = peers(quick=options.quick)
+    else:
+        figures = everything(quick=options.quick)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
 

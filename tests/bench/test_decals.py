@@ -31,3 +31,9 @@ def test_the_coats_of_the_index_leave_no_gap() -> None:
     assert near.sum(axis=1).mean() < 3
     mixed = decal_index.coat(2000, spread=0.5).radii
     assert 5 < mixed.max() / mixed.min() <= 10.1
+
+
+def test_an_edit_touches_few_rows() -> None:
+    figures = decal_index.edits(2000)
+    assert 0 < figures["edit_1m_ms"] <= figures["edit_1m_worst_ms"]
+    assert 4 < figures["edit_1m_rows"] < 1000

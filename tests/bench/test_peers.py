@@ -1,0 +1,121 @@
+"""The rivals of `python -m tests.bench.decals --peers` do what they are said to do."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from decals.model import Decals
+from tests.bench import decal_peers, decal_rivals, on_meshes
+from tests.bench.mesh_decals import MeshDecals
+from tests.decals.shapes import torus
+
+FINE = on_meshes.torus_mesh(rows=120)
+"""A torus mesh of 14,400 faces."""
+
+
+def areas(vertices: Any, faces: Any) -> Any:
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+
+def on_plane(count: int, seed: int) -> tuple[MeshDecals, Decals]:
+    """A plane of 800 triangles, and decals well within it."""
+    n = 21
+    x, y = np.meshgrid(np.linspace(-2, 2, n), np.linspace(-2, 2, n), indexing="ij")
+    vertices = np.stack([x, y, 0.2 * x], -1).reshape(-1, 3).astype(np.float32)
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
+    quads = np.stack([corner, corner + n, corner + n + 1, corner + 1], -1)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(-1, 1, (count, 2))
+    positions = np.column_stack([places, 0.2 * places[:, 0]])
+    normals = np.tile([-0.2, 0, 1.0], (count, 1))
+    decals = Decals(positions, normals, rng.normal(size=(count, 3)), rng.uniform(0.05, 0.6, count))
+    return MeshDecals(vertices, faces), decals
+
+
+def test_on_a_plane_every_box_cuts_out_its_square() -> None:
+    mesh, decals = on_plane(50, 1)
+    result = mesh.clip(decals)
+    area = np.bincount(result.decals, areas(result.vertices, result.faces), minlength=50)
+    np.testing.assert_allclose(area, (2 * decals.radii.astype(float)) ** 2, rtol=1e-5)
+    assert result.uv.min() >= -1e-9
+    assert result.uv.max() <= 1 + 1e-9
+    for decal in range(50):
+        corners = result.faces[result.decals == decal].reshape(-1)
+        frame = np.stack([decals.tangents[decal], decals.bitangents[decal]], 1).astype(float)
+        away = result.vertices[corners] - decals.positions[decal]
+        uv = 0.5 + 0.5 * away @ frame / decals.radii[decal]
+        np.testing.assert_allclose(result.uv[corners], uv, atol=1e-6)
+
+
+def test_clipping_keeps_what_lies_in_the_box_and_nothing_else() -> None:
+    """Area in each box against points spread over the mesh."""
+    shape = torus(rows=60, columns=30)
+    rng = np.random.default_rng(2)
+    corners = shape.vertices.astype(float)[shape.faces]
+    sizes = areas(shape.vertices.astype(float), shape.faces)
+    face = rng.choice(len(sizes), 400_000, p=sizes / sizes.sum())
+    points = np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], len(face)), corners[face])
+    decals = Decals(points[:6], rng.normal(size=(6, 3)), rng.normal(size=(6, 3)), np.full(6, 0.35))
+    result = MeshDecals(shape.vertices, shape.faces).clip(decals)
+    area = np.bincount(result.decals, areas(result.vertices, result.faces), minlength=6)
+    for decal in range(6):
+        frame = np.stack([decals.tangents[decal], decals.bitangents[decal], decals.normals[decal]], 1)
+        inside = (np.abs((points - decals.positions[decal]) @ frame) <= decals.radii[decal]).all(axis=1)
+        assert area[decal] == pytest.approx(inside.mean() * sizes.sum(), rel=0.03)
+
+
+def test_a_decal_off_the_mesh_cuts_out_nothing() -> None:
+    mesh, decals = on_plane(1, 3)
+    result = mesh.clip(decals.replace(positions=[[0, 0, 30]]))
+    assert len(result.faces) == 0
+
+
+def test_values_are_linear_over_the_triangles() -> None:
+    rng = np.random.default_rng(4)
+    face = rng.integers(0, len(FINE.faces), 500)
+    points = np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], 500), FINE.vertices[FINE.faces[face]])
+    locator = on_meshes.Locator(FINE.vertices, FINE.faces)
+    np.testing.assert_allclose(locator.interpolate(FINE.vertices, points), points, atol=1e-12)
+
+
+def test_discs_are_geodesic() -> None:
+    """On a torus the outer equator is one: along it the log map is the angle times the radius 1.4."""
+    mesh = on_meshes.torus_mesh(rows=40)
+    points, logs = mesh.discs(np.random.default_rng(5), np.array([0]), 0.3, 50)
+    assert np.linalg.norm(logs[0], axis=1).max() <= 0.3
+    assert np.abs(np.hypot(np.hypot(*points[0, :, :2].T) - 1, points[0, :, 2]) - 0.4).max() < 1e-6
+    assert (np.linalg.norm(logs[0], axis=1) >= np.linalg.norm(points[0] - mesh.vertices[0], axis=1)).all()
+
+
+def test_errors_of_the_rivals() -> None:
+    """Of decals a fifth of the tube: projection is the worst, vertices lose little on a fine mesh."""
+    mesh, rng = FINE, np.random.default_rng(6)
+    vertex = 1234
+    points, logs = mesh.discs(rng, np.array([vertex]), 0.1, 400)
+    want = logs[0] @ decal_rivals.frame_at(mesh, vertex)[:2].T
+
+    def error(offsets: Any) -> float:
+        found = offsets(mesh, vertex, points[0], 0.1)
+        return float(np.sqrt(((found - want) ** 2).sum(axis=1).mean()) / 0.1)
+
+    assert error(decal_rivals.drawn) < 0.002 < error(decal_rivals.planar) < 0.01
+    assert error(decal_rivals.interpolated) == pytest.approx(error(decal_rivals.drawn), abs=1e-3)
+    maps = decal_rivals.log_maps()
+    if maps is not None:
+        assert error(maps.offsets) < 0.003
+
+
+def test_table_and_figures_say_the_same() -> None:
+    row = decal_peers.Row("log maps (x 1)", "no contact", setup_s=2.0, decal_ms=50.0, megabytes=3.0)
+    row.errors = {"torus_large": 0.01}
+    text = decal_peers.table("a knot", [row, row])
+    assert "| log maps (x 1) | 2 | 50 | 52 | 3 |  | 1.00% |" in text
+    assert decal_peers.figures([row]) == {
+        "log_maps_torus_large": 0.01,
+        "log_maps_setup_s": 2.0,
+        "log_maps_decal_ms": 50.0,
+        "log_maps_megabytes": 3.0,
+    }
