@@ -17,6 +17,7 @@ from .polygonize import Mesh, Polygonizer, polygonize
 from .primitives import Cone, Point, Segment
 from .progress import Progress
 from .tape import Tape
+from .trace import Hits
 from .tree import (
     Difference,
     Intersection,
@@ -35,6 +36,7 @@ __all__ = [
     "BlobTreeError",
     "Cone",
     "Difference",
+    "Hits",
     "Intersection",
     "InvalidFile",
     "InvalidNode",

@@ -23,6 +23,7 @@ from .interval import range_over
 from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from .outline import outline
 from .tape import Tape, compile_tape
+from .trace import Hits, raycast
 from .validation import (
     Matrix,
     affine_matrix,
@@ -159,6 +160,19 @@ class Node:
     def colors(self, points: ArrayLike) -> NDArray[np.float32]:
         """Blended colours (n, 3) at `points` (n, 3), black where no primitive reaches."""
         return colors_at(self.tape, points)
+
+    def raycast(self, origins: ArrayLike, directions: ArrayLike, *, device: str | None = None) -> Hits:
+        """What the rays from `origins` (n, 3) along `directions` (n, 3) meet first of the surface.
+
+        Directions need not be unit; a ray that starts inside hits at once. `device` is the Warp device that
+        does the work, by default the current one.
+
+        Raises
+        ------
+        InvalidPoints
+            Origins and directions differ in number, or a direction has no length.
+        """
+        return raycast(self, origins, directions, device=device)
 
 
 class Combination(Node):

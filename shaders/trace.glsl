@@ -1,7 +1,7 @@
-// What the ray through a pixel sees of an implicit object (blobtree/trace.py); body of trace.frag and trace.comp.
+// What the ray through a pixel sees of an implicit object (blobtree/rays.py); body of trace.frag and trace.comp.
 //@ include camera.glsl
 //@ include surface.glsl
-// blobtree.trace.TracingCells
+// blobtree.tracing_cells.TracingCells
 uniform sampler2D tape;
 uniform isampler2D nodes;
 uniform vec3 grid_lower;

@@ -12,9 +12,9 @@ from typing import Any
 from blobtree.dispatch import partials, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.evaluate import field_bound, field_gradient
 from blobtree.glsl import translate_choice, translate_library
+from blobtree.rays import trace_ray
 from blobtree.readings import BOUND, COLOR, GRADIENT, Reading, to_local
 from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
-from blobtree.trace import trace_ray
 from blobtree.vocabulary import BUILT_IN, Vocabulary
 from decals.render.entry import GROUP, Entry
 from implicit_decals.shaders import Source, compose

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Node
-from blobtree.trace import tracing_cells
+from blobtree.tracing_cells import TracingCells, tracing_cells
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import GROUP, Entry, Program
@@ -43,14 +43,7 @@ class TreeDrawable:
         cells = tracing_cells(tree)
         self._bounds = tree.bounds
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.nodes))
-        self._uniforms: dict[str, object] = {
-            "tape": 0,
-            "nodes": 1,
-            "grid_lower": tuple(cells.lower.tolist()),
-            "block_size": cells.block_size,
-            "grid_depth": cells.depth,
-            "tolerance": cells.tolerance,
-        }
+        self._uniforms = {**tracing_uniforms(cells), "tape": 0, "nodes": 1}
         tracer = _ComputeTracer if context.entry is Entry.COMPUTE else _FragmentTracer
         self._tracer: _FragmentTracer | _ComputeTracer = tracer(context, Kinds.of(tree.tape), tree.bounds)
 
@@ -76,6 +69,16 @@ class TreeDrawable:
         """Give the memory back."""
         for resource in (self._tracer, *self._textures):
             resource.release()
+
+
+def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
+    """What ``trace.glsl`` is told of a tree's cells, less the textures."""
+    return {
+        "grid_lower": tuple(cells.lower.tolist()),
+        "block_size": cells.block_size,
+        "grid_depth": cells.depth,
+        "tolerance": cells.tolerance,
+    }
 
 
 class _FragmentTracer:

@@ -5,7 +5,9 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import InvalidPoints, Node, Point, Segment
-from blobtree.trace import box_interval, trace, trace_tolerance
+from blobtree.rays import box_interval
+from blobtree.trace import trace
+from blobtree.tracing_cells import trace_tolerance
 from tests.blobtree.trees import random_trees
 from tests.blobtree.warp_functions import call
 from tests.oracles import blobtree as oracle
@@ -116,6 +118,33 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     assert hits > 40
 
 
+def test_what_a_ray_meets() -> None:
+    """Distances are `trace`'s; place, normal and colour are the field's at the hit."""
+    several = 0
+    for tree in random_trees(seed=40, count=6, depth=3):
+        origins, directions = rays_through(np.random.default_rng(4), tree, 200)
+        hits = tree.raycast(origins, 2.0 * directions)
+        np.testing.assert_array_equal(hits.distances, cast(tree, origins, directions))
+        assert len(hits) == 200
+        np.testing.assert_array_equal(hits.hit, np.isfinite(hits.distances))
+        where = hits.hit
+        for array in (hits.positions, hits.normals, hits.colors):
+            assert array.shape == (200, 3)
+            assert array.dtype == np.float32
+            assert (array[~where] == 0.0).all()
+        places = origins[where] + hits.distances[where, None] * directions[where]
+        size = float(np.linalg.norm(tree.bounds[1] - tree.bounds[0]))
+        np.testing.assert_allclose(hits.positions[where], places, atol=1e-5 * size)
+        field = oracle.evaluate(tree, hits.positions[where].astype(np.float64))
+        smooth = field.margin > 2e-3
+        several += int(smooth.sum())
+        normals = -unit(oracle.gradient(tree, hits.positions[where][smooth].astype(np.float64)))
+        np.testing.assert_allclose(hits.normals[where][smooth], normals, atol=1e-3)
+        colors = tree.colors(hits.positions[where][smooth])
+        np.testing.assert_allclose(hits.colors[where][smooth], colors, atol=1e-3)
+    assert several > 100
+
+
 # -- rays that no one would send ------------------------------------------------------------------------
 
 BALL = Point((0, 0, 0), radius=1.0)
@@ -195,6 +224,7 @@ def test_an_empty_model_is_missed() -> None:
 
 def test_no_rays_give_no_hits() -> None:
     assert cast(BALL, np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+    assert len(BALL.raycast(np.zeros((0, 3)), np.zeros((0, 3)))) == 0
 
 
 def test_senseless_rays_are_refused() -> None:

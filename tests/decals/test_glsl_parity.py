@@ -42,7 +42,7 @@ DECALS = 300
 
 MODULES = (
     "blobtree.kernels", "blobtree.skeletons", "blobtree.operators", "blobtree.dispatch",
-    "blobtree.readings", "blobtree.trace",
+    "blobtree.readings", "blobtree.rays",
     "blobtree.warps",
     "decals.contact", "decals.mapping", "decals.lookup", "decals.radial", "decals.records", "decals.stack",
     "decals.cells", "decals.ownership",

@@ -1,0 +1,130 @@
+"""What rays into the engine's scene cost: in Warp on any device, or in OpenGL on another machine.
+
+    python -m tests.bench.tracing                           # Warp, all cores
+    python -m tests.bench.tracing --device cuda:0           # Warp on a graphics card
+    python -m tests.bench.tracing --record tracing.npz      # for tests/bench/replay_tracing.py
+
+The scene is that of `tests.bench.blobtree`, N points of influence 0.6 N^(−1/3) summed in the unit cube, all
+of it in view, a ray for every pixel. Times are medians; what is uploaded and compiled is not counted.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree import Sum
+from blobtree.trace import trace_arrays
+from blobtree.tracing_cells import tracing_cells
+from decals.camera import Camera
+from tests.bench.blobtree import UNIT_BOX, blobs, median_time
+
+COUNTS = (100, 1_000, 10_000)
+SIZE = (1600, 1200)
+CHECKED = 8
+"""Every so many pixels along each axis, what Warp traces here is recorded, for comparison."""
+
+
+def camera_of(size: tuple[int, int]) -> Camera:
+    """The whole cube in view."""
+    return Camera.framing(UNIT_BOX, aspect=size[0] / size[1])
+
+
+def pixel_rays(size: tuple[int, int], step: int = 1) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Origins and unit directions (n, 3) of every `step`-th pixel, from the lower left one."""
+    rays = camera_of(size).rays(*size)
+    x, y = np.meshgrid(np.arange(0, size[0], step) + 0.5, np.arange(0, size[1], step) + 0.5)
+    directions = rays.directions(x, y).reshape(-1, 3)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return np.broadcast_to(rays.origin, directions.shape).astype(np.float32), directions.astype(np.float32)
+
+
+def warp_times(device: str, counts: tuple[int, ...], size: tuple[int, int], runs: int) -> dict[str, float]:
+    """Milliseconds for all pixels' distances, arrays being on the device already, and the share that hits."""
+    figures = {}
+    for count in counts:
+        tree = Sum(tuple(blobs(count)))
+        rays = [wp.array(array, dtype=wp.vec3, device=device) for array in pixel_rays(size)]
+
+        def work(tree: Sum = tree, rays: list[Any] = rays) -> Any:
+            distances = trace_arrays(tree, *rays)[0]
+            wp.synchronize_device(device)
+            return distances
+
+        figures[f"hits_{count}"] = float(np.isfinite(work().numpy()).mean())
+        figures[f"trace_{count}_ms"] = 1e3 * median_time(work, runs)
+    return figures
+
+
+def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
+    """Write shaders, textures' contents and uniforms of the scenes, and what Warp traces here."""
+    from decals.render.entry import GROUP, Entry  # Warp's times need no OpenGL
+    from decals.render.tape_shader import Kinds, tracing_shader
+    from decals.render.tile import Picture
+    from decals.render.tree import covered, tracing_uniforms
+    from implicit_decals.shaders import compose
+
+    tile = Picture.of(camera_of(size), size, UNIT_BOX).whole()
+    arrays: dict[str, NDArray[Any]] = {"camera": np.frombuffer(tile.block(), np.float32)}
+    scenes: dict[str, dict[str, Any]] = {}
+    for count in counts:
+        tree = Sum(tuple(blobs(count)))
+        cells = tracing_cells(tree)
+        kinds = Kinds.of(tree.tape)
+        part = covered(tree.bounds, tile)
+        arrays[f"tape/{count}"], arrays[f"nodes/{count}"] = cells.tape, cells.nodes
+        arrays[f"distances/{count}"] = tree.raycast(*pixel_rays(size, CHECKED)).distances
+        scenes[str(count)] = {
+            "fragment": tracing_shader(kinds, Entry.FRAGMENT).text,
+            "compute": tracing_shader(kinds, Entry.COMPUTE).text,
+            "uniforms": {
+                **tracing_uniforms(cells),
+                "box_lower": tree.bounds[0].tolist(),
+                "box_upper": tree.bounds[1].tolist(),
+                "rectangle": [part.x, part.y, part.width, part.height],
+                "object_id": 0,
+            },
+        }
+    settings = {
+        "size": size,
+        "checked": CHECKED,
+        "group": GROUP,
+        "vertex": compose("box.vert").text,
+        "scenes": scenes,
+    }
+    np.savez_compressed(path, settings=np.array(json.dumps(settings)), **arrays)  # type: ignore[arg-type]
+
+
+def main() -> None:
+    """Read the command line; measure or record."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.bench.tracing",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0")
+    parser.add_argument("--record", type=Path, metavar="PATH", help="write a recording in place of measuring")
+    parser.add_argument("--size", default="x".join(map(str, SIZE)))
+    parser.add_argument("--points", type=int, nargs="+", default=COUNTS)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
+    options = parser.parse_args()
+    width, height = (int(part) for part in options.size.split("x"))
+    if options.record:
+        record(options.record, tuple(options.points), (width, height))
+        return
+    with wp.ScopedDevice(options.device):
+        figures = warp_times(options.device, tuple(options.points), (width, height), options.runs)
+    print(f"{wp.get_device(options.device).name}, warp-lang {wp.__version__}, {width}x{height} rays")
+    for name, number in figures.items():
+        print(f"  {name:20} {number:12.6g}")
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
