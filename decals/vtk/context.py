@@ -7,6 +7,7 @@ from typing import Any, Self
 import moderngl
 from _moderngl import DefaultLoader  # type: ignore[import-untyped]
 
+from decals.errors import NoGraphics
 from decals.render.context import Context
 
 VIEWPORT = 0x0BA2
@@ -21,13 +22,22 @@ class WindowContext(Context):
     Parameters
     ----------
     window
-        A vtkOpenGLRenderWindow that has rendered before, or is about to: it owns the context.
+        A vtkOpenGLRenderWindow that has rendered before, or is rendering: it owns the context.
+
+    Raises
+    ------
+    NoGraphics
+        The window has made no context yet.
     """
 
     def __init__(self, window: Any) -> None:
         self._window = window
         self._open = 0
         window.MakeCurrent()
+        if not window.IsCurrent():
+            raise NoGraphics(
+                "expected a window that has drawn before, got one without OpenGL; render it first"
+            )
         self.created = window.GetContextCreationTime()
         with self.current():
             # One for each window: moderngl's default is one for the whole process.

@@ -131,6 +131,11 @@ class Stage:
         """Say what lies at a place in the window, in pixels from its lower left corner; None for nothing.
 
         That one pixel is drawn for it, at full resolution. Actors that lie in front do not count.
+
+        Raises
+        ------
+        NoGraphics
+            The window has not been rendered yet.
         """
         left, low = self.vtk_renderer.GetOrigin()
         width, height = self.vtk_renderer.GetSize()

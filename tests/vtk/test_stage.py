@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from decals.errors import NoGraphics
 from decals.render import TRANSPARENT
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory
@@ -50,3 +51,10 @@ def test_one_place_in_the_window(plotter: Factory) -> None:
             np.testing.assert_allclose(hit.uv, buffers.uv[y, x], atol=1e-2)
     assert stage.at(-1, 5) is None
     assert stage.at(5, 120) is None
+
+
+def test_before_the_first_frame_there_is_no_graphics(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    with pytest.raises(NoGraphics, match="render it first"):
+        pl.decals.stage.at(80, 60)
