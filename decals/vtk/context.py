@@ -33,12 +33,11 @@ class WindowContext(Context):
     def __init__(self, window: Any) -> None:
         self._window = window
         self._open = 0
-        window.MakeCurrent()
-        if not window.IsCurrent():
+        self.created = window.GetContextCreationTime()
+        if not self.created:
             raise NoGraphics(
                 "expected a window that has drawn before, got one without OpenGL; render it first"
             )
-        self.created = window.GetContextCreationTime()
         with self.current():
             # One for each window: moderngl's default is one for the whole process.
             loader: Any = DefaultLoader()
