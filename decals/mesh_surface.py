@@ -19,6 +19,9 @@ SLIVER = 1e-6
 """A face whose doubled area is below this share of its squared edges has no usable normal and is left out
 (Warp's own mesh queries skip the same faces)."""
 
+EVEN_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
+"""Steps of the R2 sequence (Roberts 2018): powers of the inverse of the plastic number."""
+
 
 class MeshSurface:
     """A triangle mesh: closest points, rays and containment through a bounding volume hierarchy.
@@ -82,11 +85,15 @@ class MeshSurface:
         return -1 if _volume(self.vertices, self.faces) < 0 else 1
 
     def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
-        """Points uniform by area, one in each ``1/count`` of it along the order of the faces."""
+        """Points uniform by area, one in each ``1/count`` of it along the order of the faces.
+
+        Within a face they follow a sequence of low discrepancy, so that parts of large faces get their share.
+        """
         rng = np.random.default_rng(seed)
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)
-        root, along = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+        square = (rng.random(2) + np.arange(count)[:, None] * EVEN_STEPS) % 1.0
+        root, along = np.sqrt(square[:, :1]), square[:, 1:]
         a, b, c = np.moveaxis(self.vertices[self._corners[face]].astype(np.float64), 1, 0)
         positions = (1 - root) * a + root * ((1 - along) * b + along * c)
         return positions.astype(np.float32), self._normals[face]

@@ -1,5 +1,6 @@
 """Part the last few pairs that repulsion leaves too close, at sharp tips above all."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from blobtree.launch import launch
 from decals.crowd import Crowd
 from decals.looking import Lookout, outstanding, whole_numbers
+from decals.population import crosses_edge
 from decals.search_kernels import choose_best, places_around
 from decals.settling import spans_of
 from decals.surface import Flags, Floats
@@ -16,7 +18,7 @@ from decals.surface import Flags, Floats
 CLOSE = 0.89
 """A particle is too close to its neighbour below this many spacings."""
 
-TRIALS, BUDGET = 24, 1000
+TRIALS, BUDGET = 60, 1000
 """Places tried in each round: for each particle at least so many, and for all together."""
 
 REACH = (0.03, 0.9)
@@ -24,6 +26,9 @@ REACH = (0.03, 0.9)
 
 ALONE = 2.5
 """Least distance between particles that move in the same round, in spacings, so that they do not meet."""
+
+LOTS = 0.05
+"""Chance in who moves among the close ones, in spacings: the closest may have nowhere to go."""
 
 SIGHT = 1.5
 """Trials farther than this many spacings from all particles are equally lonely."""
@@ -38,11 +43,14 @@ GIVE_UP = 30
 """Rounds without any move after which the search ends."""
 
 
-def polish(crowd: Crowd, *, rounds: int, seed: int, close: float = CLOSE) -> None:
+def polish(
+    crowd: Crowd, *, rounds: int, seed: int, sizes_at: Callable[[Floats], Floats], close: float = CLOSE
+) -> None:
     """Move particles that are too close to a neighbour to the loneliest of some places around them.
 
     After farthest-point optimisation (Schlömer, Heck and Deussen 2011), by trial because normals, and with
-    them who is whose neighbour, jump at sharp edges. The least distance, in spacings, never falls.
+    them who is whose neighbour, jump at sharp edges. The least distance, in spacings, never falls. Nobody
+    crosses an edge of the density; `sizes_at` are the spacings wished for at other places.
     """
     rng = np.random.default_rng(seed)
     lookout = Lookout(crowd, SIGHT)
@@ -56,7 +64,7 @@ def polish(crowd: Crowd, *, rounds: int, seed: int, close: float = CLOSE) -> Non
         movers, nearest = _movers(crowd, watched, nearest, rng)
         if len(movers) == 0 or idle == GIVE_UP:
             break
-        went = _try_places(crowd, lookout, movers, nearest, seed=int(rng.integers(2**31)))
+        went = _try_places(crowd, lookout, movers, nearest, seed=int(rng.integers(2**31)), sizes_at=sizes_at)
         idle = 0 if went.any() else idle + 1
         if went.any():
             lookout.refresh()
@@ -68,14 +76,20 @@ def _movers(
 ) -> tuple[NDArray[np.int64], Floats]:
     """Choose among the close ones the closest around, sorted by number; their nearness comes along."""
     nearest, close = nearest[crowd.movable[close]], close[crowd.movable[close]]
-    lots = (1e-3 * rng.random(len(close))).astype(np.float32)
+    lots = (LOTS * rng.random(len(close))).astype(np.float32)
     points = crowd.positions.numpy()[close]
     alone = outstanding(points, -nearest - lots, ALONE * crowd.host_sizes[close], device=crowd.device)
     return close[alone], nearest[alone]
 
 
 def _try_places(
-    crowd: Crowd, lookout: Lookout, movers: NDArray[np.int64], nearest: Floats, *, seed: int
+    crowd: Crowd,
+    lookout: Lookout,
+    movers: NDArray[np.int64],
+    nearest: Floats,
+    *,
+    seed: int,
+    sizes_at: Callable[[Floats], Floats],
 ) -> Flags:
     """Move each mover to the loneliest of some random places around it; who went."""
     device, count = crowd.device, len(movers)
@@ -91,7 +105,13 @@ def _try_places(
         (surface, tries * first, tries * last) for surface, first, last in spans_of(crowd.surface_ids[movers])
     ]
     crowd.world.settling.settle(targets, reaches, spans, places, normals, forbidden)
-    nearness = lookout.nearness(places, normals, crowd.sizes[own].contiguous(), own)
+    sizes = crowd.sizes[own].contiguous()
+    if crowd.varied:
+        there = sizes_at(places.numpy())
+        barred = crosses_edge(sizes.numpy(), there) | (forbidden.numpy() == 1)
+        forbidden.assign(barred.astype(np.int32))
+        sizes.assign(there)
+    nearness = lookout.nearness(places, normals, sizes, own)
     present: Any = wp.array(nearest, dtype=wp.float32, device=device)
     went = _new(wp.int32, count, device)
     inputs = [tries, GAIN, rows, present, places, normals, forbidden, nearness]

@@ -23,6 +23,12 @@ ROUNDS = 12
 CHOICE = 8
 """Samples from which one is chosen where density varies."""
 
+EDGE = 1.5
+"""A change of density by this factor within less than a spacing is an edge, which nobody crosses."""
+
+CURVE_BITS = 16
+"""Bits of each coordinate along the space-filling curve (Morton's)."""
+
 Density = Callable[[Floats], ArrayLike]
 """How densely particles lie, relative to elsewhere: ``points[n, 3]`` to numbers above zero, ``[n]``."""
 
@@ -145,6 +151,8 @@ class World:
             positions, normals = surface.sample(tries, seed)
             visible = np.flatnonzero(~self.barred(number, positions, normals))
             if len(visible) >= wanted:
+                if not self.uniform:
+                    visible = visible[_in_order(positions[visible], self.density(positions[visible]))]
                 chosen = visible[_evenly(self.density(positions[visible]), count)]
                 return positions[chosen], normals[chosen]
             tries *= 2
@@ -174,6 +182,28 @@ class World:
     def _stream(self, number: int, stream: int) -> int:
         words = np.random.SeedSequence([self._seed, stream, number]).generate_state(2, np.uint64)
         return int(words[0])
+
+
+def crosses_edge(before: Floats, after: Floats) -> Flags:
+    """Whether spacings differ so much that there is an edge of the density between."""
+    crossed: Flags = np.abs(np.log(after / before)) > 0.5 * np.log(EDGE)
+    return crossed
+
+
+def _in_order(positions: Floats, densities: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Order places by steps of density, and along a space-filling curve within each.
+
+    Who takes every so much of the running sum then takes from each part of a surface what it is due.
+    """
+    steps = np.floor(np.log(densities) / np.log(EDGE) + 0.5)
+    low = positions.min(axis=0)
+    span = max(float((positions.max(axis=0) - low).max()), 1e-30)
+    cells = ((positions - low) * ((1 << CURVE_BITS) - 1) / span).astype(np.int64)
+    keys = np.zeros(len(positions), np.int64)
+    for bit in range(CURVE_BITS):
+        for axis in range(3):
+            keys |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.lexsort((keys, steps))
 
 
 def _evenly(weights: NDArray[np.float64], count: int) -> NDArray[np.int64]:

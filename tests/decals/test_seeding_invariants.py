@@ -112,7 +112,8 @@ def test_any_surfaces_under_any_control_hold_what_was_promised(number, count, fi
     assert np.array_equal(relaxation.surface_ids, np.sort(relaxation.surface_ids))
     for index, surface in enumerate(surfaces):
         own = relaxation.positions[relaxation.surface_ids == index]
-        assert np.allclose(surface.project(own)[0], own, atol=1e-4 * relaxation.spacing)
+        gaps = closest_points(own, surface.vertices, surface.faces[:-2]) if len(own) else np.zeros(1)
+        assert gaps.max() < 1e-4 * relaxation.spacing
 
 
 def test_more_seeds_than_the_floats_of_a_place_can_tell_apart():
