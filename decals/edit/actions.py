@@ -1,0 +1,309 @@
+"""What the key table names: actions on what is selected and on what is under the cursor."""
+
+from collections.abc import Callable
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree import BlobTreeError
+from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
+from decals.edit.jobs import Job
+from decals.edit.keys import BINDINGS, CAMERA
+from decals.edit.pick import Pick
+from decals.edit.population import Relax, Scatter, lying_on
+from decals.edit.session import Command, EditSession
+from decals.edit.trees import MovePrimitive, PaintPrimitive, Path, ResizePrimitive, alone, primitive_near
+from decals.errors import DecalsError, InvalidEdit
+from decals.model import LAYERS, PLAIN, Decals
+from decals.orientation import tangents
+from decals.scene import TreeObject
+from decals.surface import Floats
+
+LARGER, TURN, FAINTER, THICKER = 1.1, 7.5, 0.8, 1.05
+"""What one step of the wheel or a key does: factors, and degrees."""
+
+SMALL = 0.05
+"""Radius of the very first decal, in diagonals of the scene."""
+
+TINTS = ((1.0, 1.0, 1.0), (0.95, 0.45, 0.35), (0.95, 0.8, 0.35), (0.5, 0.85, 0.5), (0.4, 0.6, 0.95))
+"""sRGB tints to go through."""
+
+Cursor = Callable[[], Pick | None]
+"""Says what is under the cursor, when somebody asks."""
+
+
+class Actions:
+    """Selection, and one method for each action of the table.
+
+    Parameters
+    ----------
+    session
+        What is edited.
+    path
+        Where to save.
+    run
+        Takes long work; without it, it is done at once.
+
+    Attributes
+    ----------
+    selection
+        Numbers of the selected decals, in the order in which they were selected.
+    message
+        What happened last, in plain words.
+    help
+        Whether the help is wanted.
+    grip
+        Object and path of the primitive that is held, if any.
+    """
+
+    def __init__(
+        self,
+        session: EditSession,
+        *,
+        path: str | PathLike[str] | None = None,
+        run: Callable[[Job], None] | None = None,
+    ) -> None:
+        self.session, self.path = session, path
+        self.selection: tuple[int, ...] = ()
+        self.message = ""
+        self.help = False
+        self.grip: tuple[int, Path] | None = None
+        self._run = run or self._do_at_once
+        self._coats = 0
+        self._series: tuple[str, object] | None = None
+        session.listen(lambda _change: self._forget_deleted())
+
+    # -- doing ------------------------------------------------------------------------------------------
+
+    def perform(self, action: str, cursor: Cursor) -> None:
+        """Carry out an action; what cannot be done is said in `message`, and nothing changes."""
+        series = (action, self.selection) if action in _SERIES else None
+        if series != self._series:
+            self.session.end()
+        try:
+            if series is not None and series != self._series:
+                self.session.begin(_TEXTS[action])
+            getattr(self, f"_{action}")(cursor)
+        except (DecalsError, BlobTreeError) as error:
+            self.message = str(error)
+        self._series = series
+
+    def attempt(self, command: Command) -> bool:
+        """Do a command; what cannot be done is said in `message`."""
+        try:
+            self.session.do(command)
+        except (DecalsError, BlobTreeError) as error:
+            self.message = str(error)
+            return False
+        self.message = command.label
+        return True
+
+    def settle(self) -> None:
+        """End what goes on: the next action is an entry of its own."""
+        self.session.end()
+        self._series = None
+
+    def _do(self, command: Command) -> None:
+        self.session.do(command)
+        self.message = command.label
+
+    def _do_at_once(self, job: Job) -> None:
+        self._do(job.work(lambda _stage, _fraction: None, lambda: False))
+
+    def _forget_deleted(self) -> None:
+        there = self.session.document.decals.has(np.array(self.selection, np.int64))
+        self.selection = tuple(n for n, stays in zip(self.selection, there, strict=True) if stays)
+
+    def _chosen(self) -> tuple[Decals, np.ndarray]:
+        if not self.selection:
+            raise InvalidEdit("select a decal first: click on one")
+        numbers = np.array(self.selection, np.int64)
+        return self.session.document.decals.take(numbers), numbers
+
+    def _alter(self, label: str, **values: ArrayLike) -> None:
+        self._do(Alter(self._chosen()[1], values, label))
+
+    # -- selecting --------------------------------------------------------------------------------------
+
+    def _pick(self, cursor: Cursor) -> None:
+        found = cursor()
+        self.selection = () if found is None or found.owner < 0 else (found.owner,)
+        self.message = f"decal {found.owner}" if found is not None and self.selection else ""
+
+    def _pick_also(self, cursor: Cursor) -> None:
+        found = cursor()
+        if found is None or found.owner < 0:
+            return
+        rest = tuple(number for number in self.selection if number != found.owner)
+        self.selection = rest if found.owner in self.selection else (*rest, found.owner)
+        self.message = f"{len(self.selection)} decals"
+
+    def _pick_all(self, _cursor: Cursor) -> None:
+        self.selection = tuple(self.session.document.decals.numbers.tolist())
+        self.message = f"{len(self.selection)} decals"
+
+    def _let_go(self, _cursor: Cursor) -> None:
+        self.session.cancel()
+        self.selection, self.message = (), ""
+
+    # -- decals -----------------------------------------------------------------------------------------
+
+    def _place(self, cursor: Cursor) -> None:
+        found = _surface(cursor)
+        self._do(Add(self._new(found.position, found.normal)))
+        self.selection = (self.session.document.decals.next_number - 1,)
+
+    def _new(self, position: Floats, normal: Floats) -> Decals:
+        """A decal like the selected one, or of the usual size."""
+        document = self.session.document
+        places = position[None], normal[None]
+        if self.selection:
+            model = document.decals[self.selection[-1]]
+            way = tangents(*places, model.tangents[0], 0)
+            return model.replace(positions=places[0], normals=places[1], tangents=way)
+        radii = document.decals.decals.radii
+        low, high = document.scene.bounds
+        radius = float(np.median(radii)) if len(radii) else SMALL * float(np.linalg.norm(high - low))
+        image = 0 if document.images else PLAIN
+        return Decals(
+            *places,
+            tangents(*places, (1.0, 0.0, 0.0), 0),
+            np.array([radius], np.float32),
+            images=np.array([image]),
+        )
+
+    def _duplicate(self, _cursor: Cursor) -> None:
+        first = self.session.document.decals.next_number
+        self._do(Duplicate(self._chosen()[1]))
+        self.selection = tuple(range(first, self.session.document.decals.next_number))
+
+    def _delete(self, _cursor: Cursor) -> None:
+        self._do(Delete(self._chosen()[1]))
+
+    def _larger(self, _cursor: Cursor) -> None:
+        self._do(Scale(self._chosen()[1], LARGER))
+
+    def _smaller(self, _cursor: Cursor) -> None:
+        self._do(Scale(self._chosen()[1], 1.0 / LARGER))
+
+    def _turn_left(self, _cursor: Cursor) -> None:
+        self._do(Turn(self._chosen()[1], TURN))
+
+    def _turn_right(self, _cursor: Cursor) -> None:
+        self._do(Turn(self._chosen()[1], -TURN))
+
+    def _next_image(self, _cursor: Cursor, step: int = 1) -> None:
+        count = len(self.session.document.images)
+        images = (self._chosen()[0].images - PLAIN + step) % (count - PLAIN) + PLAIN
+        self._alter("change the image", images=images)
+
+    def _previous_image(self, cursor: Cursor) -> None:
+        self._next_image(cursor, -1)
+
+    def _next_tint(self, _cursor: Cursor) -> None:
+        now = self._chosen()[0].tints[0]
+        nearest = int(np.abs(np.array(TINTS) - now).sum(axis=1).argmin())
+        self._alter("tint", tints=TINTS[(nearest + 1) % len(TINTS)])
+
+    def _fainter(self, _cursor: Cursor) -> None:
+        self._alter("fade", opacities=self._chosen()[0].opacities * FAINTER)
+
+    def _stronger(self, _cursor: Cursor) -> None:
+        self._alter("fade", opacities=np.minimum(self._chosen()[0].opacities / FAINTER, 1.0))
+
+    def _layer_up(self, _cursor: Cursor, step: int = 1) -> None:
+        layers = np.clip(self._chosen()[0].layers + step, -LAYERS, LAYERS - 1)
+        self._alter("change the layer", layers=layers)
+
+    def _layer_down(self, cursor: Cursor) -> None:
+        self._layer_up(cursor, -1)
+
+    def _next_interaction(self, _cursor: Cursor) -> None:
+        self._alter("change the interaction", interactions=(self._chosen()[0].interactions + 1) % 3)
+
+    # -- many -------------------------------------------------------------------------------------------
+
+    def _relax(self, cursor: Cursor) -> None:
+        self._do(Relax(_surface(cursor).position))
+
+    def _scatter(self, cursor: Cursor) -> None:
+        document, number = self.session.document, _surface(cursor).object
+        self._coats += 1
+        wish = Scatter((number,), len(lying_on(document, [number])), self._coats)
+        objects, images = document.objects, len(document.images)
+        self._run(Job("scatter", lambda tell, stop: wish.coat(objects, images, progress=tell, cancel=stop)))
+
+    # -- primitives -------------------------------------------------------------------------------------
+
+    def _grip(self, cursor: Cursor) -> None:
+        self.grip = None if self.grip else self._primitive(cursor)
+
+    def _thicker(self, cursor: Cursor, factor: float = THICKER) -> None:
+        self._do(ResizePrimitive(*self._primitive(cursor), factor))
+
+    def _thinner(self, cursor: Cursor) -> None:
+        self._thicker(cursor, 1.0 / THICKER)
+
+    def _next_color(self, cursor: Cursor) -> None:
+        number, path = self._primitive(cursor)
+        self._coats += 1
+        self._do(PaintPrimitive(number, path, TINTS[self._coats % len(TINTS)]))
+
+    def _primitive(self, cursor: Cursor) -> tuple[int, Path]:
+        found = _surface(cursor)
+        item = self.session.document.objects[found.object]
+        if not isinstance(item, TreeObject):
+            raise InvalidEdit(f"{item.name!r} is a mesh and has no primitives; point at a BlobTree")
+        return found.object, primitive_near(item.tree, found.position)
+
+    @property
+    def grip_center(self) -> Floats:
+        """Where the held primitive is: the middle of its box, ``float32[3]``."""
+        assert self.grip is not None
+        item = self.session.document.objects[self.grip[0]]
+        assert isinstance(item, TreeObject)
+        low, high = alone(item.tree, self.grip[1]).bounds
+        return np.asarray((low + high) / 2)
+
+    def begin_grip(self) -> None:
+        """Begin to move the held primitive."""
+        self.settle()
+        self.session.begin("move a primitive")
+
+    def move_grip(self, offset: ArrayLike) -> None:
+        """Move the held primitive by an offset from where it was at first."""
+        if self.grip is not None:
+            self.session.take_back()
+            self.attempt(MovePrimitive(*self.grip, offset))
+
+    # -- the scene --------------------------------------------------------------------------------------
+
+    def _undo(self, _cursor: Cursor) -> None:
+        label = self.session.undo()
+        self.message = "nothing to undo" if label is None else f"undid: {label}"
+
+    def _redo(self, _cursor: Cursor) -> None:
+        label = self.session.redo()
+        self.message = "nothing to redo" if label is None else f"did again: {label}"
+
+    def _save(self, _cursor: Cursor) -> None:
+        if self.path is None:
+            raise InvalidEdit("nowhere to save to; name a file when you open the window")
+        self.session.save(self.path)
+        self.message = f"saved to {self.path}"
+
+    def _help(self, _cursor: Cursor) -> None:
+        self.help = not self.help
+
+
+def _surface(cursor: Cursor) -> Pick:
+    found = cursor()
+    if found is None:
+        raise InvalidEdit("point at a surface")
+    return found
+
+
+_TEXTS = {binding.action: binding.text for binding in BINDINGS if binding.action != CAMERA}
+_SERIES = {"larger", "smaller", "turn_left", "turn_right", "fainter", "stronger", "thicker", "thinner"}
+"""Actions that, done again and again, are one entry of the stack."""
