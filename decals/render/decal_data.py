@@ -1,5 +1,6 @@
 """Decals on the graphics card: their records and their index, and the functions that read them."""
 
+from collections.abc import Sequence
 from functools import cache
 
 from blobtree.glsl import translate_library
@@ -66,11 +67,16 @@ class DecalData:
 
     def use(self, program: Program, first_unit: int) -> None:
         """Bind everything for a program, textures from a unit on."""
-        for unit, (name, texture) in enumerate(self._textures.items(), first_unit):
-            texture.use(unit)
-            set_uniform(program, name, unit)
-        for name, number in self._numbers.items():
+        units = range(first_unit, first_unit + len(self._textures))
+        for name, number in self.bind(units).items():
             set_uniform(program, name, number)
+
+    def bind(self, units: Sequence[int]) -> dict[str, int]:
+        """Bind the textures to four units; all uniforms that a program then wants, by their names."""
+        samplers = dict(zip(self._textures, units, strict=True))
+        for name, unit in samplers.items():
+            self._textures[name].use(unit)
+        return samplers | self._numbers
 
     def release(self) -> None:
         """Give the memory back."""

@@ -254,7 +254,7 @@ class Renderer:
     def _upload(self, scene: SceneLike) -> _Uploaded:
         drawables = [self._drawable(thing) for thing in scene.objects]
         bounds = _union([drawable.bounds for drawable in drawables])
-        return _Uploaded(drawables, *self._uploads(scene), bounds)
+        return _Uploaded(drawables, *self.uploads(scene), bounds)
 
     def _sweep(self) -> None:
         for kept in (self._drawables, self._decals, self._images):
@@ -263,7 +263,11 @@ class Renderer:
     def _drawable(self, thing: object) -> Drawable:
         return self._drawables.get(lambda: drawable_for(self.context, thing), thing)
 
-    def _uploads(self, scene: SceneLike) -> tuple[DecalData | None, ImageArray | None]:
+    def uploads(self, scene: SceneLike) -> tuple[DecalData | None, ImageArray | None]:
+        """Give a scene's decals and images as they are on the graphics card, for other shaders than ours.
+
+        They stay until another scene is drawn. The context must be current.
+        """
         if not len(scene.decals):
             return None, None
         pixels = [image.pixels for image in scene.images]

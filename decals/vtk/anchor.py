@@ -1,14 +1,14 @@
 """The prop that stands for our objects among VTK's: it gives them bounds, and a moment in which to draw."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkCommand, vtkObject
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from decals.viewpoint import Bounds
+from decals.viewpoint import Bounds, Floats
+from decals.vtk.camera import matrix_of
 
 NAME = "decals"
 """What pyvista calls the actor."""
@@ -55,9 +55,9 @@ class Anchor:
         if self._renderer.HasViewProp(self.actor):
             self._renderer.remove_actor(self.actor, render=False)
 
-    def matrix(self) -> Any:
+    def matrix(self) -> Floats:
         """Where the actor stands in the world, ``float64[4, 4]``; identity, unless somebody moved it."""
-        return pv.array_from_vtkmatrix(self.actor.GetMatrix())
+        return matrix_of(self.actor)
 
     def _come_last(self) -> None:
         """Edges are blended over what is there, so other opaque actors go first."""

@@ -8,6 +8,11 @@ import pyvista as pv
 from decals.viewpoint import Floats, Projection
 
 
+def matrix_of(actor: Any) -> Floats:
+    """Give an actor's own coordinates to the world's, ``float64[4, 4]``."""
+    return np.asarray(pv.array_from_vtkmatrix(actor.GetMatrix()), np.float64)
+
+
 def vtk_projection(renderer: Any, model: Floats | None = None) -> Projection:
     """Give what a vtkRenderer's camera shows: perspective or parallel, clipping planes as they are.
 

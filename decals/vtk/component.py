@@ -119,6 +119,31 @@ class Component:
         self.scene = scene.replace(decals=together, images=(*scene.images, *added))
         return together
 
+    def apply(self, actor: pv.Actor, *, follow: bool = False) -> pv.Actor:
+        """Lay the subplot's decals onto an actor of pyvista's own, whose lights, scalars and edges stay.
+
+        The same functions that colour our objects run in VTK's shader of the actor.
+
+        Parameters
+        ----------
+        actor
+            What ``plotter.add_mesh`` returns.
+        follow
+            Whether the decals are given in the actor's own coordinates and move with it; otherwise they lie
+            where they are in the world, across all actors and objects there.
+
+        Raises
+        ------
+        InvalidScene
+            The actor is not drawn as polygons.
+        """
+        self.stage.apply(actor, follow=follow)
+        return actor
+
+    def remove(self, actor: pv.Actor) -> None:
+        """Take the decals off an actor again."""
+        self.stage.remove(actor)
+
     def add_scene(self, scene: Scene, *, camera: bool = True) -> Scene:
         """Show a scene in place of what there was; with ``camera``, from where its own camera stands."""
         self.scene = scene

@@ -7,22 +7,27 @@ import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkCommand
 
 from decals.contact import Contact
 from decals.errors import InvalidScene
 from decals.mapping import Mapping
 from decals.render import Renderer, SceneLike
 from decals.scene import SceneObject, bounds_of
-from decals.viewpoint import Projection
+from decals.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
 from decals.vtk.camera import vtk_projection
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
+from decals.vtk.injection import Injection
+
+INJECTED_TEXTURES = 5
+"""Images, records and the three arrays of the index."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +101,12 @@ class Stage:
         self._failed: object = None
         me = weakref.ref(self)
         self._anchor = Anchor(renderer, lambda: _draw(me))
+        self._injections: list[Injection] = []
+        self._units: list[int] = []
+        self._tags = [
+            renderer.AddObserver(vtkCommand.StartEvent, lambda *_: _prepare(me)),
+            renderer.AddObserver(vtkCommand.EndEvent, lambda *_: _finish(me)),
+        ]
 
     @property
     def scene(self) -> SceneLike | None:
@@ -112,6 +123,36 @@ class Stage:
         elif before is None or list(before) != list(scene.objects):
             self._anchor.place(bounds_of(cast(Sequence[SceneObject], scene.objects)))
 
+    def apply(self, actor: Any, *, follow: bool = False) -> None:
+        """Put the scene's decals into VTK's own shader of an actor; see `Component.apply`."""
+        self.remove(actor)
+        self._injections.append(Injection(self, actor, follow=follow))
+
+    def remove(self, actor: Any) -> None:
+        """Take the decals off an actor; nothing happens if it had none."""
+        for injection in [item for item in self._injections if item.actor is actor]:
+            injection.release()
+            self._injections.remove(injection)
+
+    def texture_units(self) -> list[int]:
+        """Texture units that are ours until the end of this frame, as many as an injected shader reads."""
+        manager = self.vtk_renderer.GetRenderWindow().GetTextureUnitManager()
+        if not self._units:
+            self._units = [manager.Allocate() for _ in range(INJECTED_TEXTURES)]
+        return self._units
+
+    def _finish(self) -> None:
+        manager = self.vtk_renderer.GetRenderWindow().GetTextureUnitManager()
+        for unit in self._units:
+            manager.Free(unit)
+        self._units = []
+
+    def _prepare(self) -> None:
+        if self._injections:
+            with self.current():
+                for injection in self._injections:
+                    injection.prepare()
+
     @property
     def renderer(self) -> Renderer:
         """The renderer in the window's context; use it inside ``with stage.current():``."""
@@ -125,7 +166,15 @@ class Stage:
 
     def viewpoint(self) -> Projection:
         """VTK's camera, as the renderer sees it."""
-        return vtk_projection(self.vtk_renderer, self._anchor.matrix())
+        return vtk_projection(self.vtk_renderer, self.frame())
+
+    def frame(self) -> Floats:
+        """The scene's coordinates to the world's: identity, unless somebody moved or scaled the whole."""
+        return self._anchor.matrix()
+
+    def viewport(self) -> tuple[int, int, int, int]:
+        """Lower left corner and size of the part of the frame that VTK draws to now, in pixels."""
+        return self._use_tools().context.viewport()
 
     def at(self, x: int, y: int) -> Hit | None:
         """Say what lies at a place in the window, in pixels from its lower left corner; None for nothing.
@@ -216,6 +265,13 @@ class Stage:
     def release(self) -> None:
         """Leave the renderer and give everything back; the window must still be there. Twice is harmless."""
         self._anchor.release()
+        for tag in self._tags:
+            self.vtk_renderer.RemoveObserver(tag)
+        if self._tools is not None and not self._tools.context.stale:
+            with self.current():
+                for injection in self._injections:
+                    injection.release()
+        self._injections.clear()
         if self._tools is not None and not self._tools.context.stale:
             self._tools.release()
         self._tools = None
@@ -235,6 +291,20 @@ class _Tools:
         with self.context.current():
             self.renderer.release()
             self.composite.release()
+
+
+def _prepare(stage: weakref.ref[Stage]) -> None:
+    """Let a stage prepare a frame, if it still exists."""
+    alive = stage()
+    if alive is not None:
+        alive._prepare()
+
+
+def _finish(stage: weakref.ref[Stage]) -> None:
+    """Let a stage end a frame, if it still exists."""
+    alive = stage()
+    if alive is not None:
+        alive._finish()
 
 
 def _draw(stage: weakref.ref[Stage]) -> None:

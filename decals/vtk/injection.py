@@ -1,0 +1,187 @@
+"""Our decals in VTK's own shader of an actor: its lights, scalars and edges stay."""
+
+from __future__ import annotations
+
+import weakref
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from vtkmodules.util.vtkConstants import VTK_OBJECT
+from vtkmodules.vtkCommonCore import vtkCommand
+from vtkmodules.vtkCommonDataModel import vtkDataObject
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
+from decals.contact import Contact
+from decals.render.decal_data import DecalData, library
+from decals.render.textures import ImageArray
+from decals.render.tile import CameraBuffer, Picture, Rectangle
+from decals.viewpoint import Floats
+from decals.vtk.camera import matrix_of, vtk_projection
+from decals.vtk.mapper import NORMALS, SmoothNormals, polygon_mapper
+from implicit_decals.shaders import compose
+
+if TYPE_CHECKING:
+    from decals.vtk.stage import Stage
+
+POSITION, NORMAL, PLACE = "decalPositionVSOutput", "decalNormalVSOutput", "decalModel"
+NO_SHIFT_SCALE = 0
+UNIT_BOX = np.zeros(3), np.ones(3)
+
+VERTEX_DECLARATION = f"""//VTK::TCoord::Dec
+in vec3 decalNormalMC;
+uniform mat4 {PLACE};
+out vec3 {POSITION};
+out vec3 {NORMAL};
+"""
+VERTEX = f"""//VTK::TCoord::Impl
+  {POSITION} = ({PLACE} * vertexMC).xyz;
+  {NORMAL} = transpose(inverse(mat3({PLACE}))) * decalNormalMC;
+"""
+GEOMETRY_DECLARATION = "//VTK::TCoord::Dec\n" + "".join(
+    f"in vec3 {name}[];\nout vec3 {name.replace('VSOutput', 'GSOutput')};\n" for name in (POSITION, NORMAL)
+)
+GEOMETRY = "//VTK::TCoord::Impl\n" + "".join(
+    f"    {name.replace('VSOutput', 'GSOutput')} = {name}[i];\n" for name in (POSITION, NORMAL)
+)
+FRAGMENT_DECLARATION = f"//VTK::TCoord::Dec\nin vec3 {POSITION};\nin vec3 {NORMAL};\n"
+PAINT = f"""
+  vec4 decals = injected_decals({POSITION}, {NORMAL});
+  diffuseColor = decal_over(diffuseColor, diffuseIntensity, decals);
+  ambientColor = decal_over(ambientColor, ambientIntensity, decals);
+"""
+
+
+class Injection:
+    """Decals on one of pyvista's actors; several may share a stage's coat.
+
+    Parameters
+    ----------
+    stage
+        Whose decals.
+    actor
+        An actor of polygons.
+    follow
+        Whether the decals are given in the actor's own coordinates and move with it.
+    paint
+        GLSL that changes VTK's colours, in place of PAINT: for tests.
+    """
+
+    def __init__(self, stage: Stage, actor: Any, *, follow: bool = False, paint: str = PAINT) -> None:
+        self.actor, self._follow, self._paint = actor, follow, paint
+        self._mapper = polygon_mapper(actor)
+        self._normals = SmoothNormals()
+        self._normals.insert_before(actor.GetMapper())
+        self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
+        self._mapper.MapDataArrayToVertexAttribute(
+            "decalNormalMC", NORMALS, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1
+        )
+        self._stage = weakref.ref(stage)
+        self._written: tuple[Contact, bool] | None = None
+        self._camera: CameraBuffer | None = None
+        me = weakref.ref(self)
+
+        def bind(_caller: object, _event: str, program: Any) -> None:
+            alive = me()
+            if alive is not None:
+                alive.bind(program)
+
+        bind.CallDataType = VTK_OBJECT  # type: ignore[attr-defined]  # as VTK asks for
+        self._tag = self._mapper.AddObserver(vtkCommand.UpdateShaderEvent, bind)
+
+    # -- once a frame -----------------------------------------------------------------------------------
+
+    def prepare(self) -> None:
+        """Bring mesh and shader up to date, before VTK draws the frame."""
+        found = self._found()
+        if found is None:
+            self._erase()
+            return
+        self._normals.insert_before(self.actor.GetMapper())  # somebody may have given it other data
+        stage, data, _ = found
+        wanted = stage.contact, data.layered
+        if wanted != self._written:
+            self._write(library(stage.contact, layered=data.layered))
+            self._written = wanted
+
+    def _write(self, functions: str) -> None:
+        """Put our code behind VTK's own; tags stay, for what VTK puts there."""
+        text = compose("inject.glsl", slots={"functions": functions}, version=None).text
+        shader = self.actor.GetShaderProperty()
+        shader.AddVertexShaderReplacement("//VTK::TCoord::Dec", True, VERTEX_DECLARATION, False)
+        shader.AddVertexShaderReplacement("//VTK::TCoord::Impl", True, VERTEX, False)
+        shader.AddGeometryShaderReplacement("//VTK::TCoord::Dec", True, GEOMETRY_DECLARATION, False)
+        shader.AddGeometryShaderReplacement("//VTK::TCoord::Impl", True, GEOMETRY, False)
+        shader.AddFragmentShaderReplacement("//VTK::TCoord::Dec", True, FRAGMENT_DECLARATION + text, False)
+        shader.AddFragmentShaderReplacement(
+            "//VTK::Color::Impl", True, "//VTK::Color::Impl\n" + self._paint, False
+        )
+
+    def _erase(self) -> None:
+        """Leave VTK's shader as it was."""
+        if self._written is None:
+            return
+        shader = self.actor.GetShaderProperty()
+        for tag in ("//VTK::TCoord::Dec", "//VTK::TCoord::Impl"):
+            shader.ClearVertexShaderReplacement(tag, True)
+            shader.ClearGeometryShaderReplacement(tag, True)
+        shader.ClearFragmentShaderReplacement("//VTK::TCoord::Dec", True)
+        shader.ClearFragmentShaderReplacement("//VTK::Color::Impl", True)
+        self._written = None
+
+    # -- whenever VTK draws the actor -------------------------------------------------------------------
+
+    def bind(self, program: Any) -> None:
+        """Give VTK's program what ours would have: decals, images, camera."""
+        found = self._found()
+        if found is None or self._written is None:
+            return
+        stage, data, images = found
+        place = self._frame(stage)
+        self._use_camera(stage, place)
+        model = np.linalg.inv(place) @ matrix_of(self.actor)
+        program.SetUniformMatrix(PLACE, _vtk_matrix(model))
+        units = stage.texture_units()
+        numbers = data.bind(units[1:])
+        images.use(units[0])
+        numbers |= {"decal_images": units[0], "decal_mapping": int(stage.mapping)}
+        for name, number in numbers.items():
+            program.SetUniformi(name, number)
+        stage.vtk_renderer.GetRenderWindow().GetState().ResetGLActiveTexture()
+
+    def _found(self) -> tuple[Stage, DecalData, ImageArray] | None:
+        """The stage and its decals, if there are any."""
+        stage = self._stage()
+        if stage is None or stage.scene is None:
+            return None
+        data, images = stage.renderer.uploads(stage.scene)
+        return None if data is None or images is None else (stage, data, images)
+
+    def _frame(self, stage: Stage) -> Floats:
+        """Decals' space to world."""
+        return matrix_of(self.actor) if self._follow else stage.frame()
+
+    def _use_camera(self, stage: Stage, frame: Floats) -> None:
+        """Fill the camera's block for the frame that VTK is drawing, which may be larger than the window."""
+        if self._camera is None:
+            self._camera = CameraBuffer(stage.renderer.context)
+        x, y, width, height = stage.viewport()
+        view = vtk_projection(stage.vtk_renderer, frame)
+        whole = Picture.of(view, (width, height), UNIT_BOX)
+        self._camera.use(whole.part(Rectangle(-x, -y, width, height)))
+
+    def release(self) -> None:
+        """Leave the actor as it was."""
+        self._erase()
+        self._mapper.RemoveObserver(self._tag)
+        self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
+        self._normals.leave(self.actor.GetMapper())
+        if self._camera is not None:
+            self._camera.release()
+            self._camera = None
+
+
+def _vtk_matrix(matrix: Floats) -> vtkMatrix4x4:
+    """Lay out a matrix as VTK hands it to OpenGL: columns first."""
+    made = vtkMatrix4x4()
+    made.DeepCopy(matrix.T.ravel().tolist())
+    return made
