@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from .dispatch import closest, slimmest, stride, warp_forward, warp_stretch
+from .dispatch import closest, slimmest, stride, warp_forward
 from .kernel_options import KERNEL_OPTIONS
 from .readings import BOUND, COLOR, GRADIENT, VALUE, Reading, to_local
 from .tape import (
@@ -31,7 +31,7 @@ _Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
 def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
     """The interpreter of one reading: (q, reach, tape, span), span being (first texel, one past the last)."""
     leaf, combine, empty = reading.leaf, reading.combine, reading.empty
-    unstretch, unwarp = reading.unstretch, reading.unwarp
+    unstretch, unwarp, widen = reading.unstretch, reading.unwarp, reading.widen
     contribution = reading.type
 
     @wp.func
@@ -81,7 +81,7 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
                 balls[count] = ball
                 p = tape[at + 3]
                 local = to_local(place, tape, at)
-                ball = ball * p[0] * warp_stretch(operator, local, ball * p[0], p)
+                ball = widen(operator, local, ball * p[0], p)
                 place = warp_forward(operator, local, p)
                 at += PREFIX
             elif code == UNWARP:

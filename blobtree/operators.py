@@ -42,8 +42,8 @@ def sum_slope(
 def ricci_norm(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.float32:
     """(aⁿ + bⁿ)^(1/n) for a, b ≥ 0, scaled by the larger so that no power overflows or vanishes."""
     larger = wp.max(a, b)
-    if larger <= 0.0:
-        return 0.0
+    if wp.min(a, b) <= 0.0:
+        return larger
     return larger * wp.pow(1.0 + wp.pow(wp.min(a, b) / larger, exponent), 1.0 / exponent)
 
 
@@ -53,16 +53,16 @@ def ricci_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec
 
     Written in r = smaller / larger, because float32 cannot take (a/F) to a large power to more than 4 digits.
     """
+    if b <= 0.0:
+        return wp.vec3(a, 1.0, 0.0)
+    if a <= 0.0:
+        return wp.vec3(b, 0.0, 1.0)
     larger = wp.max(a, b)
-    if larger <= 0.0:
-        return wp.vec3(0.0, 0.0, 0.0)
     ratio = wp.min(a, b) / larger
     power = wp.pow(ratio, exponent)
     root = wp.pow(1.0 + power, 1.0 / exponent)
     by_larger = root / (1.0 + power)
-    by_smaller = float(0.0)
-    if ratio > 0.0:
-        by_smaller = by_larger * power / ratio
+    by_smaller = by_larger * power / ratio
     if a >= b:
         return wp.vec3(larger * root, by_larger, by_smaller)
     return wp.vec3(larger * root, by_smaller, by_larger)

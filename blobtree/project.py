@@ -22,20 +22,22 @@ CONVERGED = 1e-6
 @wp.func
 def project_to_surface(
     p: wp.vec3, longest_step: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
-) -> wp.vec3:
-    """Newton's method for f = ISO from p, no step longer than `longest_step`.
+) -> tuple[wp.vec3, wp.vec4]:
+    """Newton's method for f = ISO from p, no step longer than `longest_step`: the place, and (f, ∇f) there.
 
     Where the field is flat (its gradient 0) the point stays where it is.
     """
+    q = p
+    f = field_gradient(q, tape, span)
     for _step in range(NEWTON_STEPS):
-        f = field_gradient(p, tape, span)
         gap = ISO - f[0]
         g = wp.vec3(f[1], f[2], f[3])
         steepness = wp.length(g)
         if wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
-            return p
-        p += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
-    return p
+            break
+        q += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
+        f = field_gradient(q, tape, span)
+    return q, f
 
 
 @wp.kernel
@@ -48,8 +50,7 @@ def _project(
     normals: wp.array(dtype=wp.vec3),
 ) -> None:
     i = wp.tid()
-    p = project_to_surface(points[i], longest_step, tape, span)
-    f = field_gradient(p, tape, span)
+    p, f = project_to_surface(points[i], longest_step, tape, span)
     positions[i] = p
     normals[i] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
 

@@ -26,7 +26,7 @@ ROUNDING = wp.constant(2e-6)
 _Ranges = wp.types.matrix(shape=(REGISTERS, 2), dtype=wp.float32)
 _Starts = wp.types.vector(length=REGISTERS, dtype=wp.int32)
 _Places = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
-_Sides = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
+_Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
 _OuterStarts = wp.types.vector(length=WARP_REGISTERS, dtype=wp.int32)
 
 
@@ -43,14 +43,12 @@ def primitive_range(
 
 
 @wp.func
-def stretched_range(
-    kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+def range_in_ball(
+    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec2:
-    """The same for a primitive behind a map: the ball around the cube becomes a ball around its image."""
-    local = to_local(center, tape, at)
-    radius = half * HALF_DIAGONAL * tape[at + 3][0]
-    c = closest(kind, local, tape, at + PREFIX)
-    distances = squared_distances_to_ball(local, radius, c, slimmest(kind, tape, at + PREFIX))
+    """Range of a primitive over a ball."""
+    c = closest(kind, center, tape, at)
+    distances = squared_distances_to_ball(center, radius, c, slimmest(kind, tape, at))
     return widened(falloff_range(distances[0], distances[1]))
 
 
@@ -116,9 +114,10 @@ def prune(
     run_at = int(-1)
     run = wp.vec4()
     place = center
-    side = half
+    ball = half * HALF_DIAGONAL  # what is looked at lies in this ball; behind a warp nothing better is known
+    warped = int(0)
     places = _Places()
-    sides = _Sides()
+    balls = _Balls()
     outer_starts = _OuterStarts()
     at = span[0]
     while at < span[1]:
@@ -138,9 +137,12 @@ def prune(
             for _i in range(count):
                 r = wp.vec2()
                 if stretched:
-                    r = stretched_range(kind, place, side, tape, at)
+                    local = to_local(place, tape, at)
+                    r = range_in_ball(kind, local, ball * tape[at + 3][0], tape, at + PREFIX)
+                elif warped > 0:
+                    r = range_in_ball(kind, place, ball, tape, at)
                 else:
-                    r = primitive_range(kind, place, side, tape, at)
+                    r = primitive_range(kind, place, half, tape, at)
                 choice = operator_choice(operator, accumulator, r)
                 if choice == KEEP_NONE:
                     end = accumulator_start
@@ -183,12 +185,13 @@ def prune(
         elif code == WARP:
             p = tape[at + 3]
             local = to_local(place, tape, at)
-            reach = side * HALF_DIAGONAL * p[0]
+            reach = ball * p[0]
             places[count] = place
-            sides[count] = side
+            balls[count] = ball
             outer_starts[count] = accumulator_start
             place = warp_forward(operator, local, p)
-            side = reach * warp_stretch(operator, local, reach, p)
+            ball = reach * warp_stretch(operator, local, reach, p)
+            warped += 1
             if write:
                 for k in range(PREFIX + 1):
                     out[start + end + k] = tape[at - 1 + k]
@@ -199,7 +202,8 @@ def prune(
             at += PREFIX
         elif code == UNWARP:
             place = places[count]
-            side = sides[count]
+            ball = balls[count]
+            warped -= 1
             accumulator_start = outer_starts[count]
             if accumulator[1] <= 0.0:
                 end = accumulator_start

@@ -6,6 +6,8 @@ Each is the functions that the interpreter's loop is closed over:
   there, slim the smallest influence on it;
 * `unstretch(f, tape, at)`: that, computed behind the map at tape[at], as seen in front of it;
 * `unwarp(kind, f, q, reach, tape, at)`: the same for a subtree behind a warp and the map at tape[at];
+* `widen(kind, q, reach, p)`: the radius behind a warp of the ball of radius `reach` about q, 0 where the
+  reading needs none;
 * `combine(operator, a, b, reach, parameter)`, and the `empty` field.
 """
 
@@ -62,6 +64,12 @@ def value_unwarp(
 
 
 @wp.func
+def pointwise_widen(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
+    """What holds at a point alone needs no ball around it."""
+    return 0.0
+
+
+@wp.func
 def value_combine(
     operator: wp.int32, a: wp.float32, b: wp.float32, reach: wp.float32, parameter: wp.float32
 ) -> wp.float32:
@@ -96,6 +104,12 @@ def bound_unwarp(
     p = tape[at + 3]
     stretch = warp_stretch(kind, to_local(q, tape, at), reach * p[0], p)
     return wp.vec2(f[0], f[1] * p[0] * stretch)
+
+
+@wp.func
+def bound_widen(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
+    """A ball's image lies in the ball that the warp's largest stretch makes of it."""
+    return reach * warp_stretch(kind, q, reach, p)
 
 
 @wp.func
@@ -192,14 +206,25 @@ class Reading:
     leaf: wp.Function
     unstretch: wp.Function
     unwarp: wp.Function
+    widen: wp.Function
     combine: wp.Function
     empty: wp.Function
     type: Any
 
 
-VALUE = Reading(value_leaf, value_unstretch, value_unwarp, value_combine, value_empty, wp.float32)
-BOUND = Reading(bound_leaf, bound_unstretch, bound_unwarp, bound_combine, bound_empty, wp.vec2)
-GRADIENT = Reading(
-    gradient_leaf, gradient_unstretch, gradient_unwarp, gradient_combine, vector_empty, wp.vec4
+VALUE = Reading(
+    value_leaf, value_unstretch, value_unwarp, pointwise_widen, value_combine, value_empty, wp.float32
 )
-COLOR = Reading(color_leaf, color_unstretch, color_unwarp, color_combine, vector_empty, wp.vec4)
+BOUND = Reading(bound_leaf, bound_unstretch, bound_unwarp, bound_widen, bound_combine, bound_empty, wp.vec2)
+GRADIENT = Reading(
+    gradient_leaf,
+    gradient_unstretch,
+    gradient_unwarp,
+    pointwise_widen,
+    gradient_combine,
+    vector_empty,
+    wp.vec4,
+)
+COLOR = Reading(
+    color_leaf, color_unstretch, color_unwarp, pointwise_widen, color_combine, vector_empty, wp.vec4
+)

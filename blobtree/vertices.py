@@ -4,7 +4,7 @@ import warp as wp
 
 from .blocks import child_place, grid_point
 from .dual import SAMPLES, corner_place, corner_sample
-from .evaluate import field_color, field_gradient
+from .evaluate import field_color
 from .grid import CHILDREN
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
@@ -68,8 +68,7 @@ def place_vertices(
     row = int(rows[block * CHILDREN + c])
     lowest = grid_point(corner_place(base + blocks[block], 0, 0, 0), corner, cell)
     start = lowest + crossing_mean(slot, c, row, patch, values, patch_of_edge) * cell
-    p = project_to_surface(start, 0.5 * cell, tape, spans[block])
-    f = field_gradient(p, tape, spans[block])
+    p, f = project_to_surface(start, 0.5 * cell, tape, spans[block])
     color = field_color(p, tape, spans[block])
     vertex = vertex_starts[block] + int(offsets[block * CHILDREN + c]) + patch
     positions[vertex] = p

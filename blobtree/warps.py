@@ -35,8 +35,9 @@ def twist_pullback(q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
     """The turn undone, and what the change of the turn along z adds."""
     c = wp.cos(p[1] * q[2])
     s = wp.sin(p[1] * q[2])
-    t = twist_forward(q, p)
-    return wp.vec3(c * g[0] - s * g[1], s * g[0] + c * g[1], g[2] + p[1] * (t[1] * g[0] - t[0] * g[1]))
+    x = c * q[0] + s * q[1]
+    y = c * q[1] - s * q[0]
+    return wp.vec3(c * g[0] - s * g[1], s * g[0] + c * g[1], g[2] + p[1] * (y * g[0] - x * g[1]))
 
 
 @wp.func

@@ -40,8 +40,7 @@ def descend(
     from there too takes that point itself, and the normal of its face.
     """
     i = first + wp.tid()
-    p = project_to_surface(points[i], longest_step, tape, span)
-    f = field_gradient(p, tape, span)
+    p, f = project_to_surface(points[i], longest_step, tape, span)
     normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
     if not settles(f, tolerance):
         far = 1.01 * (wp.length(points[i] - center) + radius)
@@ -49,11 +48,10 @@ def descend(
         if query.result:
             p = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
             normal = face_normals[query.face]
-            q = project_to_surface(p, longest_step, tape, span)
-            f = field_gradient(q, tape, span)
-            if settles(f, tolerance):
+            q, g = project_to_surface(p, longest_step, tape, span)
+            if settles(g, tolerance):
                 p = q
-                normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+                normal = -wp.normalize(wp.vec3(g[1], g[2], g[3]))
     positions[i] = p
     normals[i] = normal
 
