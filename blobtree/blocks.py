@@ -54,21 +54,21 @@ def block_key(block: wp.vec3i) -> wp.int64:
 
 
 @wp.func
-def find_block(block: wp.vec3i, blocks: wp.array(dtype=wp.vec3i)) -> wp.int32:
-    """Index of a block in a level, −1 where it is not there: bisection, levels being in key order."""
+def find_block(block: wp.vec3i, keys: wp.array(dtype=wp.int64)) -> wp.int32:
+    """Index of a block in a level, −1 where it is not there: bisection of the level's keys, which rise."""
     side = 1 << (KEY_DIGITS * BRANCHING_BITS)
     for axis in range(3):
         if block[axis] < 0 or block[axis] >= side:
             return -1
     wanted = block_key(block)
     low = int(0)
-    high = blocks.shape[0]
+    high = keys.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if block_key(blocks[middle]) < wanted:
+        if keys[middle] < wanted:
             low = middle + 1
         else:
             high = middle
-    if low < blocks.shape[0] and blocks[low] == block:
+    if low < keys.shape[0] and keys[low] == wanted:
         return low
     return -1

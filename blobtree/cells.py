@@ -42,6 +42,8 @@ class Level:
 
     blocks: "wp.array[wp.vec3i]"
     """Coordinates (n, 3), in blocks of this level from the root's lowest one."""
+    keys: "wp.array[wp.int64]"
+    """Their keys (n), by which they are ordered and found."""
     spans: "wp.array[wp.vec2i]"
     """Where in `tape` each block's tape begins and ends (n, 2)."""
     tape: "wp.array[wp.vec4]"
@@ -109,6 +111,7 @@ def _root(tape: Tape, grid: Grid, previous: SparseCells | None, device: str) -> 
     same = previous is not None and previous.grid == grid and _same_bits(previous.tape, tape)
     return Level(
         wp.zeros(1, dtype=wp.vec3i, device=device),
+        wp.zeros(1, dtype=wp.int64, device=device),
         wp.array([uploaded.span], dtype=wp.vec2i, device=device),
         uploaded.data,
         wp.zeros(0, dtype=wp.int32, device=device),
@@ -169,6 +172,7 @@ class _Refinement:
             )
         new = Level(
             wp.empty(blocks, dtype=wp.vec3i, device=device),
+            wp.empty(blocks, dtype=wp.int64, device=device),
             wp.empty(blocks, dtype=wp.vec2i, device=device),
             wp.empty(total, dtype=wp.vec4, device=device),
             children,
@@ -195,13 +199,13 @@ class _Refinement:
     def _fill(self, new: Level, places: Any, starts: Any) -> None:
         """The blocks that are kept: coordinates, tapes and where they come from."""
         fresh = len(self._fresh) * CHILDREN
-        outputs = [new.children, new.blocks, new.spans, new.tape]
+        outputs = [new.children, new.blocks, new.keys, new.spans, new.tape]
         inputs: list[Any] = [self._fresh, *self._geometry(), places, starts]
         launch(self._vocabulary.kernel(write), fresh, inputs, outputs, self._device)
         old, above = self._old, self._above
         if old is None:
             return
-        there = [old.blocks, old.spans, old.tape.view(wp.vec4i)]
+        there = [old.keys, old.spans, old.tape.view(wp.vec4i)]
         inputs = [self._fresh, places, new.blocks, new.spans, new.tape.view(wp.vec4i)]
         launch(match, fresh, [*inputs, wp.vec3i(*self._shift), *there], [new.sources], self._device)
         inputs = [self._same, above.sources, above.blocks, old.children, old.spans, old.tape, places, starts]

@@ -75,16 +75,31 @@ def classify_cells(
     slot = first + wp.tid()
     block = listed[slot]
     total = int(0)
-    for cell in range(CHILDREN):
-        code = int(0)
-        for corner in range(8):
-            if values[slot * SAMPLES + corner_sample(cell, corner)] >= ISO:
-                code = code | (1 << corner)
-        codes[block * CHILDREN + cell] = wp.uint8(code)
-        for axis in range(3):
-            if ((code ^ (code >> (1 << axis))) & 1) == 1:
-                total += 1
+    for column in range(BRANCHING * BRANCHING):
+        cell = column * BRANCHING
+        lower = inside_corners(values, slot * SAMPLES + corner_sample(cell, 0))
+        for z in range(BRANCHING):
+            upper = inside_corners(values, slot * SAMPLES + corner_sample(cell + z, 4))
+            code = lower | (upper << 4)
+            codes[block * CHILDREN + cell + z] = wp.uint8(code)
+            total += ((code ^ (code >> 1)) & 1) + ((code ^ (code >> 2)) & 1) + ((code ^ (code >> 4)) & 1)
+            lower = upper
     quads[block] = total
+
+
+@wp.func
+def inside_corners(values: wp.array(dtype=wp.float32), first: wp.int32) -> wp.int32:
+    """Which of four samples of one height are inside, the lowest being `first`: bits as in a cell's code."""
+    bits = int(0)
+    if values[first] >= ISO:
+        bits = 1
+    if values[first + SIDE * SIDE] >= ISO:
+        bits += 2
+    if values[first + SIDE] >= ISO:
+        bits += 4
+    if values[first + SIDE * SIDE + SIDE] >= ISO:
+        bits += 8
+    return bits
 
 
 @wp.kernel
@@ -92,6 +107,7 @@ def settle_rows(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),
     blocks: wp.array(dtype=wp.vec3i),
+    keys: wp.array(dtype=wp.int64),
     codes: wp.array(dtype=wp.uint8),
     patch_count: wp.array(dtype=wp.int8),
     knotted_face: wp.array(dtype=wp.int8),
@@ -106,7 +122,7 @@ def settle_rows(
         row = int(codes[block * CHILDREN + cell])
         face = int(knotted_face[row])
         if face >= 0:
-            other = cell_across(block, cell, face, blocks)
+            other = cell_across(block, cell, face, blocks, keys)
             if int(knotted_face[int(codes[other])]) == (face ^ 1):
                 row += FLIPPED
         rows[block * CHILDREN + cell] = wp.int16(row)
@@ -117,7 +133,11 @@ def settle_rows(
 
 @wp.func
 def cell_across(
-    block: wp.int32, cell: wp.int32, face: wp.int32, blocks: wp.array(dtype=wp.vec3i)
+    block: wp.int32,
+    cell: wp.int32,
+    face: wp.int32,
+    blocks: wp.array(dtype=wp.vec3i),
+    keys: wp.array(dtype=wp.int64),
 ) -> wp.int32:
     """Index among all cells of the one behind a crossed face; its block exists, for the surface enters it."""
     axis = face // 2
@@ -128,7 +148,7 @@ def cell_across(
     neighbour = blocks[block]
     neighbour[axis] = neighbour[axis] + 2 * (face % 2) - 1
     place[axis] = place[axis] & (BRANCHING - 1)
-    return find_block(neighbour, blocks) * CHILDREN + child_number(place)
+    return find_block(neighbour, keys) * CHILDREN + child_number(place)
 
 
 @wp.kernel
@@ -136,6 +156,7 @@ def connect_vertices(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),
     blocks: wp.array(dtype=wp.vec3i),
+    keys: wp.array(dtype=wp.int64),
     rows: wp.array(dtype=wp.int16),
     offsets: wp.array(dtype=wp.uint8),
     patch_of_edge: wp.array(dtype=wp.int8),
@@ -150,7 +171,7 @@ def connect_vertices(
         return
     neighbours = _Neighbours()
     for step in range(8):
-        neighbours[step] = find_block(blocks[block] - wp.vec3i(step & 1, (step >> 1) & 1, step >> 2), blocks)
+        neighbours[step] = find_block(blocks[block] - wp.vec3i(step & 1, (step >> 1) & 1, step >> 2), keys)
     face = 2 * quad_starts[block]
     for c in range(CHILDREN):
         code = int(rows[block * CHILDREN + c])

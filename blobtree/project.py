@@ -18,6 +18,9 @@ NEWTON_STEPS = 8
 CONVERGED = 1e-6
 """Field error, in units of ISO, at which a point is on the surface as far as float32 can tell."""
 
+STALLED = 1e-4
+"""Field error, in units of ISO, below which a step that does not halve it has met float32's rounding."""
+
 
 @wp.func
 def project_to_surface(
@@ -27,17 +30,27 @@ def project_to_surface(
 
     Where the field is flat (its gradient 0) the point stays where it is.
     """
+    kept = p
+    at_kept = field_gradient(p, tape, span)
+    gap = ISO - at_kept[0]
     q = p
-    f = field_gradient(q, tape, span)
+    f = at_kept
     for _step in range(NEWTON_STEPS):
-        gap = ISO - f[0]
         g = wp.vec3(f[1], f[2], f[3])
         steepness = wp.length(g)
         if wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
             break
         q += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
         f = field_gradient(q, tape, span)
-    return q, f
+        stalled = wp.abs(gap) <= STALLED * ISO and wp.abs(ISO - f[0]) > 0.5 * wp.abs(gap)
+        gap = ISO - f[0]
+        if stalled and wp.abs(gap) > wp.abs(ISO - at_kept[0]):
+            break
+        kept = q
+        at_kept = f
+        if stalled:
+            break
+    return kept, at_kept
 
 
 @wp.kernel

@@ -6,7 +6,7 @@ an older level has a block of the same place with the same tape, everything belo
 
 import warp as wp
 
-from .blocks import block_center, child_block, find_block
+from .blocks import block_center, block_key, child_block, find_block
 from .grid import CHILDREN
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
@@ -63,6 +63,7 @@ def write(
     starts: wp.array(dtype=wp.int32),
     children: wp.array(dtype=wp.int32),
     new_blocks: wp.array(dtype=wp.vec3i),
+    new_keys: wp.array(dtype=wp.int64),
     new_spans: wp.array(dtype=wp.vec2i),
     new_tape: wp.array(dtype=wp.vec4),
 ) -> None:
@@ -79,6 +80,7 @@ def write(
     result = prune(center, 0.5 * size + pad, tape, spans[parent], new_tape, start + 1, True)
     new_tape[start] = wp.vec4(result[3], 0.0, 0.0, 0.0)
     new_blocks[place] = block
+    new_keys[place] = block_key(block)
     new_spans[place] = wp.vec2i(start + 1, start + 1 + int(result[3]))
     children[child] = place
 
@@ -92,7 +94,7 @@ def match(
     spans: wp.array(dtype=wp.vec2i),
     tape: wp.array(dtype=wp.vec4i),
     shift: wp.vec3i,
-    old_blocks: wp.array(dtype=wp.vec3i),
+    old_keys: wp.array(dtype=wp.int64),
     old_spans: wp.array(dtype=wp.vec2i),
     old_tape: wp.array(dtype=wp.vec4i),
     sources: wp.array(dtype=wp.int32),
@@ -103,7 +105,7 @@ def match(
     place = places[child]
     if places[child + 1] == place:
         return
-    old = find_block(blocks[place] + shift, old_blocks)
+    old = find_block(blocks[place] + shift, old_keys)
     if old < 0:
         return
     length = spans[place][1] - spans[place][0]
@@ -152,6 +154,7 @@ def take_over(
     starts: wp.array(dtype=wp.int32),
     children: wp.array(dtype=wp.int32),
     new_blocks: wp.array(dtype=wp.vec3i),
+    new_keys: wp.array(dtype=wp.int64),
     new_spans: wp.array(dtype=wp.vec2i),
     new_tape: wp.array(dtype=wp.vec4),
     new_sources: wp.array(dtype=wp.int32),
@@ -168,7 +171,9 @@ def take_over(
     length = old_spans[old][1] - old_spans[old][0]
     for k in range(-1, length):
         new_tape[start + 1 + k] = old_tape[old_spans[old][0] + k]
-    new_blocks[place] = child_block(blocks[parent], i % CHILDREN)
+    block = child_block(blocks[parent], i % CHILDREN)
+    new_blocks[place] = block
+    new_keys[place] = block_key(block)
     new_spans[place] = wp.vec2i(start + 1, start + 1 + length)
     new_sources[place] = old
     children[child] = place

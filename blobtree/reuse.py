@@ -13,6 +13,7 @@ def mark_beside(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),
     blocks: wp.array(dtype=wp.vec3i),
+    keys: wp.array(dtype=wp.int64),
     flags: wp.array(dtype=wp.int32),
 ) -> None:
     """The listed blocks and those behind their faces: which row a cell takes depends on a cell across."""
@@ -21,7 +22,7 @@ def mark_beside(
     for face in range(6):
         place = blocks[block]
         place[face // 2] = place[face // 2] + 2 * (face % 2) - 1
-        other = find_block(place, blocks)
+        other = find_block(place, keys)
         if other >= 0:
             flags[other] = 1
 
@@ -31,12 +32,13 @@ def mark_above(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),
     blocks: wp.array(dtype=wp.vec3i),
+    keys: wp.array(dtype=wp.int64),
     flags: wp.array(dtype=wp.int32),
 ) -> None:
     """The blocks whose triangles use vertices of the listed ones."""
     block = listed[first + wp.tid()]
     for step in range(8):
-        other = find_block(blocks[block] + wp.vec3i(step & 1, (step >> 1) & 1, step >> 2), blocks)
+        other = find_block(blocks[block] + wp.vec3i(step & 1, (step >> 1) & 1, step >> 2), keys)
         if other >= 0:
             flags[other] = 1
 

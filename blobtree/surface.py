@@ -104,7 +104,8 @@ class _Extraction:
         vocabulary = self._cells.tape.vocabulary
         self._launch(vocabulary.kernel(sample_blocks), len(anew) * SAMPLES, [anew, *self._geometry], [values])
         self._launch(classify_cells, len(anew), [anew, values], [codes, counts[1]])
-        inputs = [anew, self._leaves.blocks, codes, self._tables.patch_count, self._tables.knotted_face]
+        found = [self._leaves.blocks, self._leaves.keys]
+        inputs = [anew, *found, codes, self._tables.patch_count, self._tables.knotted_face]
         self._launch(settle_rows, len(anew), inputs, [rows, offsets, counts[0]])
         vertex_starts, vertex_total = starts_of(counts[0], "vertices")
         quad_starts, quad_total = starts_of(counts[1], "triangles")
@@ -116,7 +117,7 @@ class _Extraction:
         report("placing vertices", 1.0)
         faces = self._empty(2 * quad_total, wp.vec3i)
         connected, rest = self._users(anew)
-        inputs = [connected, self._leaves.blocks, rows, offsets, self._tables.patch_of_edge]
+        inputs = [connected, *found, rows, offsets, self._tables.patch_of_edge]
         inputs += [quad_starts, vertex_starts, vertices]
         self._launch(connect_vertices, len(connected), inputs, [faces])
         self._copy_faces(rest, quad_starts, moved, faces)
@@ -149,7 +150,7 @@ class _Extraction:
     def _around(self, mark: wp.Kernel, listed: Array) -> tuple[Array, Array]:
         """The blocks that `mark` finds, and the others."""
         flags, others = self._zeros(self._count + 1), self._zeros(self._count + 1)
-        self._launch(mark, len(listed), [listed, self._leaves.blocks], [flags])
+        self._launch(mark, len(listed), [listed, self._leaves.blocks, self._leaves.keys], [flags])
         self._launch(invert, self._count, [flags], [others])
         return chosen(flags), chosen(others)
 

@@ -5,7 +5,7 @@
 
 import warp as wp
 
-from blobtree.evaluate import field_gradient, field_value
+from blobtree.evaluate import field_value
 from blobtree.kernel_options import KERNEL_OPTIONS
 from blobtree.kernels import ISO
 from blobtree.project import project_to_surface

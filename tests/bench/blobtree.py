@@ -3,6 +3,9 @@
 The scene: N points of influence s = 0.6 N^(−1/3), uniform in the unit cube, summed; (R + 1)³ samples.
 Times are medians of whole pipelines in process, nodes to triangles, compiles excluded. The rival stamps
 each point's box with NumPy and contours with vtkFlyingEdges3D: it can only sum points, and it is fast.
+
+With `--device cuda:0` (NumPy and Warp are enough there): meshes that stay on the device, the same brought to
+the host, and what tapes and cells take of it.
 """
 
 import argparse
@@ -14,19 +17,22 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
-from blobtree import RIM, Mesh, Node, Point, Ricci, Sum, Union
+from blobtree import RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygonize
 from blobtree.cells import SparseCells, build_cells
 from blobtree.grid import BRANCHING, aligned_grid
 from blobtree.polygonize import download
 from blobtree.surface import Surface, extract_surface
 from blobtree.trace import trace
+from tests.bench.marching_cubes import marching_cubes
 
 RUNS = 5
 UNIT_BOX = (np.zeros(3), np.ones(3))
@@ -44,7 +50,7 @@ def centers(count: int) -> tuple[NDArray[np.float64], float]:
     return rng.uniform(0.75 * s, 1.0 - 0.75 * s, (count, 3)), s
 
 
-def blobs(count: int) -> list[Node]:
+def blobs(count: int) -> list[Point]:
     """The scene's points as nodes."""
     places, s = centers(count)
     return [Point((x, y, z), radius=s * RIM) for x, y, z in places.tolist()]
@@ -58,19 +64,23 @@ def mixed(count: int) -> Node:
     return Union(tuple(parts)).translate((-0.5, -0.5, 0.0)).twist(20.0).translate((0.5, 0.5, 0.0))
 
 
-def cells_of(tree: Node, resolution: int) -> SparseCells:
+def cells_of(tree: Node, resolution: int, device: str = "cpu") -> SparseCells:
     """The sparse cells of the unit cube."""
-    return build_cells(tree.tape, aligned_grid(*UNIT_BOX, 1.0 / resolution))
+    cells = build_cells(tree.tape, aligned_grid(*UNIT_BOX, 1.0 / resolution), device=device)
+    wp.synchronize_device(device)
+    return cells
 
 
-def surface_of(tree: Node, resolution: int) -> Surface:
+def surface_of(tree: Node, resolution: int, device: str = "cpu") -> Surface:
     """The whole pipeline, up to triangles in the device's memory."""
-    return extract_surface(cells_of(tree, resolution), lambda _stage, _fraction: None)
+    surface = extract_surface(cells_of(tree, resolution, device), lambda _stage, _fraction: None)
+    wp.synchronize_device(device)
+    return surface
 
 
-def mesh_of(tree: Node, resolution: int) -> Mesh:
+def mesh_of(tree: Node, resolution: int, device: str = "cpu") -> Mesh:
     """The whole pipeline."""
-    return download(surface_of(tree, resolution))
+    return download(surface_of(tree, resolution, device))
 
 
 def stamped(count: int, resolution: int) -> Any:
@@ -95,15 +105,16 @@ def stamped(count: int, resolution: int) -> Any:
     return grid.contour([0.5], scalars="field", method="flying_edges")
 
 
+def timed(work: Callable[[], object]) -> float:
+    """Seconds that `work` takes."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
 def median_time(work: Callable[[], object], runs: int = RUNS) -> float:
     """Median seconds, after one run that is not counted."""
-    times = []
-    for run in range(runs + 1):
-        start = time.perf_counter()
-        work()
-        if run:
-            times.append(time.perf_counter() - start)
-    return statistics.median(times)
+    return statistics.median([timed(work) for _ in range(runs + 1)][1:])
 
 
 def meshing(quick: bool) -> Figures:
@@ -121,6 +132,77 @@ def meshing(quick: bool) -> Figures:
     ]
     figures["mixed_over_sum"] = per_cell[1] / per_cell[0]
     return figures
+
+
+def remeshing(device: str = "cpu", resolution: int = 256) -> Figures:
+    """One of 1,000 points moved, again and again: the time from the new tree to its triangles."""
+    nodes, rng = blobs(1000), np.random.default_rng(7)
+    polygonizer = Polygonizer(Sum(tuple(nodes)), cell_size=1.0 / resolution, device=device)
+    edits, fresh = [], []
+    for edit in range(16):
+        moved = int(rng.integers(len(nodes)))
+        x, y, z = nodes[moved].center + rng.normal(size=3) * 0.01
+        nodes[moved] = replace(nodes[moved], center=(x, y, z))
+        tree = Sum(tuple(nodes))
+        start = time.perf_counter()
+        polygonizer.update(tree)
+        edits.append(time.perf_counter() - start)
+        if edit % 4 == 0:
+            start = time.perf_counter()
+            polygonize(Sum(tuple(nodes)), cell_size=1.0 / resolution, device=device)
+            fresh.append(time.perf_counter() - start)
+    sources = polygonizer.surface.cells.leaves.sources.numpy()
+    return {
+        "remesh_ms": 1e3 * statistics.median(edits[2:]),
+        "remesh_over_fresh": statistics.median(edits[2:]) / statistics.median(fresh[1:]),
+        "remesh_blocks": float((sources < 0).mean()),
+    }
+
+
+def cost_of_quality(device: str = "cpu", resolution: int = 256) -> Figures:
+    """Our triangles against plain marching cubes, in turn, on the same cells."""
+    tree = Sum(tuple(blobs(1000)))
+
+    def plain() -> None:
+        marching_cubes(cells_of(tree, resolution, device))
+        wp.synchronize_device(device)
+
+    ours, theirs = [], []
+    for run in range(8):
+        ours.append(timed(lambda: surface_of(tree, resolution, device)))
+        theirs.append(timed(plain))
+        if run == 0:
+            ours, theirs = [], []
+    return {"quality_cost": statistics.median(ours) / statistics.median(theirs)}
+
+
+def curve(device: str = "cpu", *, quick: bool = False) -> Figures:
+    """Nanoseconds per cell that the surface crosses, at one overlap, over N and R."""
+    figures = {}
+    for count in (100, 1000, 10_000):
+        for resolution in (128, 256) if quick else (128, 256, 512):
+            tree = Sum(tuple(blobs(count)))
+            crossing = len(surface_of(tree, resolution, device).vertices)
+            seconds = median_time(lambda t=tree, r=resolution: surface_of(t, r, device), 3)
+            figures[f"crossing_{count}_{resolution}"] = float(crossing)
+            figures[f"ns_per_crossing_{count}_{resolution}"] = 1e9 * seconds / crossing
+    return figures
+
+
+def on_device(device: str, *, quick: bool) -> Figures:
+    """What a graphics card takes: the pipeline and its stages."""
+    figures = {}
+    scenes = [(1000, 256), (1000, 512)] + ([] if quick else [(10_000, 512), (100_000, 512)])
+    for count, resolution in scenes:
+        nodes, name = tuple(blobs(count)), f"{count}_{resolution}"
+        tree = Sum(nodes)
+        figures[f"tape_{name}_ms"] = 1e3 * median_time(lambda n=nodes: Sum(n).tape, 3)
+        figures[f"cells_{name}_ms"] = 1e3 * median_time(lambda t=tree, r=resolution: cells_of(t, r, device))
+        for kind, work in (("mesh", surface_of), ("host", mesh_of)):
+            seconds = median_time(lambda w=work, t=tree, r=resolution: w(t, r, device))
+            figures[f"{kind}_{name}_ms"] = 1e3 * seconds
+        figures[f"vertices_{name}"] = float(len(surface_of(tree, resolution, device).vertices))
+    return figures | remeshing(device) | cost_of_quality(device) | curve(device, quick=quick)
 
 
 def quality() -> Figures:
@@ -190,18 +272,26 @@ def main() -> None:
     )
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="fewer runs; ends within a minute on two cores")
+    parser.add_argument("--device", default="cpu", help="a Warp device, say cuda:0")
     parser.add_argument("--peak", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.peak:
         print_peak()
         return
-    figures = meshing(options.quick) | quality() | tracing() | peak()
-    print(f"{platform.machine()}, {os.cpu_count()} cores; python -m tests.bench.blobtree")
-    print(f"warp-lang {version('warp-lang')}, numpy {version('numpy')}, vtk {version('vtk')}")
+    if options.device == "cpu":
+        figures = meshing(options.quick) | remeshing() | cost_of_quality() | quality() | tracing() | peak()
+        figures |= curve(quick=options.quick)
+        packages = ("warp-lang", "numpy", "vtk")
+    else:
+        figures = on_device(options.device, quick=options.quick)
+        packages = ("warp-lang", "numpy")
+    print(f"{wp.get_device(options.device).name}, {os.cpu_count()} cores ({platform.machine()})")
+    print(f"python -m {' '.join(['tests.bench.blobtree', *sys.argv[1:]])}")
+    print(", ".join(f"{package} {version(package)}" for package in packages))
     for name, number in figures.items():
-        print(f"  {name:20} {number:12.6g}")
-    print(f"Others, quoted: {PEERS}.")
-    print("Not there: quality_cost (no plain marching cubes on these cells), remesh_ms (no local edits yet).")
+        print(f"  {name:28} {number:12.6g}")
+    if options.device == "cpu":
+        print(f"Others, quoted: {PEERS}.")
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 
