@@ -6,8 +6,8 @@ Each is the functions that the interpreter's loop is closed over:
   there, slim the smallest influence on it;
 * `unstretch(f, tape, at)`: that, computed behind the map at tape[at], as seen in front of it;
 * `unwarp(kind, f, q, reach, tape, at)`: the same for a subtree behind a warp and the map at tape[at];
-* `widen(kind, q, reach, p)`: the radius behind a warp of the ball of radius `reach` about q, 0 where the
-  reading needs none;
+* `widen(kind, q, reach, p)`: the radius behind a warp of the ball of radius `reach` about q, where the
+  reading looks at it;
 * `combine(operator, a, b, reach, parameter)`, and the `empty` field.
 """
 
@@ -65,8 +65,8 @@ def value_unwarp(
 
 @wp.func
 def pointwise_widen(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
-    """What holds at a point alone needs no ball around it."""
-    return 0.0
+    """What holds at a point alone looks at no ball: it is handed through."""
+    return reach
 
 
 @wp.func
