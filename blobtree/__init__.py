@@ -16,6 +16,7 @@ from .kernels import ISO, RIM
 from .polygonize import Mesh, Polygonizer, polygonize
 from .primitives import Cone, Point, Segment
 from .progress import Progress
+from .splitting import split_creases
 from .tape import Tape
 from .trace import Hits
 from .tree import (
@@ -60,5 +61,6 @@ __all__ = [
     "load",
     "polygonize",
     "save",
+    "split_creases",
     "to_json",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import build_cells
+from .creases import sharpened
 from .errors import InvalidResolution
 from .grid import Grid, aligned_grid
 from .progress import Progress
@@ -27,12 +28,17 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles: float32[n, 3] `vertices`, outward unit `normals` and `colors`; int32[m, 3] `faces`."""
+    """Triangles: float32[n, 3] `vertices`, outward unit `normals` and `colors`; int32[m, 3] `faces`.
+
+    A normal on a crease is the mean of those on either side.
+    """
 
     vertices: Floats
     faces: Ints
     normals: Floats
     colors: Floats
+    meetings: NDArray[np.uint8] | None = None
+    """Where creases were asked for, how many smooth pieces meet in each vertex (n,), see `creases`."""
 
 
 def polygonize(
@@ -40,6 +46,7 @@ def polygonize(
     *,
     resolution: int | None = None,
     cell_size: float | None = None,
+    creases: bool = False,
     device: str | None = None,
     progress: Progress | None = None,
 ) -> Mesh:
@@ -51,6 +58,8 @@ def polygonize(
         Cells along the longest side of the tree's box; 64 by default.
     cell_size
         Side of a cell in the model's units, in place of `resolution`; thinner features may be lost.
+    creases
+        Vertices lie on the edges and corners that unions, intersections and differences leave.
     device
         Warp device that does the work, by default the current one.
 
@@ -60,7 +69,7 @@ def polygonize(
         Both or a senseless value were given, or more cells than can be counted.
     """
     return Polygonizer(
-        tree, resolution=resolution, cell_size=cell_size, device=device, progress=progress
+        tree, resolution=resolution, cell_size=cell_size, creases=creases, device=device, progress=progress
     ).mesh
 
 
@@ -89,10 +98,12 @@ class Polygonizer:
         *,
         resolution: int | None = None,
         cell_size: float | None = None,
+        creases: bool = False,
         device: str | None = None,
         progress: Progress | None = None,
     ) -> None:
         self._device = device
+        self._creases = creases
         self._cell_size = _cell_size(tree, resolution, cell_size)
         self._surface = self._extract(tree, None, progress)
         self._tree = tree
@@ -110,14 +121,14 @@ class Polygonizer:
 
     @property
     def surface(self) -> Surface:
-        """The triangles as arrays in the device's memory."""
+        """The triangles as arrays in the device's memory, before vertices go onto creases."""
         return self._surface
 
     @property
     def mesh(self) -> Mesh:
         """The triangles as NumPy arrays."""
         if self._mesh is None:
-            self._mesh = download(self._surface)
+            self._mesh = download(*sharpened(self._surface)) if self._creases else download(self._surface)
         return self._mesh
 
     def update(self, tree: Node, *, progress: Progress | None = None) -> Mesh:
@@ -136,10 +147,11 @@ class Polygonizer:
         return extract_surface(cells, report, previous)
 
 
-def download(surface: Surface) -> Mesh:
+def download(surface: Surface, meetings: NDArray[np.uint8] | None = None) -> Mesh:
     """The triangles of a surface as NumPy arrays."""
     arrays: list[Any] = [surface.vertices, surface.faces, surface.normals, surface.colors]
-    return Mesh(*(array.numpy() for array in arrays))
+    vertices, faces, normals, colors = (array.numpy() for array in arrays)
+    return Mesh(vertices, faces, normals, colors, meetings)
 
 
 def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> float:

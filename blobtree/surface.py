@@ -57,7 +57,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class _Tables:
+class Tables:
     """`patches`' tables in a device's memory."""
 
     patch_count: Array
@@ -66,8 +66,9 @@ class _Tables:
 
 
 @cache
-def _tables(device: str) -> _Tables:
-    return _Tables(
+def tables(device: str) -> Tables:
+    """The tables in the memory of one device."""
+    return Tables(
         wp.array(PATCH_COUNT, dtype=wp.int8, device=device),
         wp.array(PATCH_OF_EDGE.ravel(), dtype=wp.int8, device=device),
         wp.array(KNOTTED_FACE, dtype=wp.int8, device=device),
@@ -85,7 +86,7 @@ class _Extraction:
     def __init__(self, cells: SparseCells, previous: Surface | None) -> None:
         self._cells, self._old, self._device = cells, previous, cells.device
         self._leaves, self._count = cells.leaves, len(cells.leaves)
-        self._tables = _tables(cells.device)
+        self._tables = tables(cells.device)
         base = cells.grid.base_of(cells.grid.depth)
         leaves = self._leaves
         self._geometry = [leaves.blocks, leaves.spans, leaves.tape, wp.vec3i(*base)]

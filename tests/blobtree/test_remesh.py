@@ -15,6 +15,9 @@ from tests.blobtree.trees import random_trees, trees
 def assert_same_bits(ours: Mesh, fresh: Mesh) -> None:
     for field in fields(Mesh):
         a, b = getattr(ours, field.name), getattr(fresh, field.name)
+        if field.name == "meetings":
+            assert a is b is None
+            continue
         assert a.dtype == b.dtype
         assert a.shape == b.shape, field.name
         assert np.array_equal(a.view(np.int32), b.view(np.int32)), field.name
@@ -117,7 +120,7 @@ def test_nothing_new_is_nothing_to_do_and_old_meshes_stay_as_they_are() -> None:
     blobs = small_blobs(50)
     polygonizer = Polygonizer(Sum(tuple(blobs)), resolution=48)
     first = polygonizer.mesh
-    copy = Mesh(*(getattr(first, field.name).copy() for field in fields(Mesh)))
+    copy = Mesh(first.vertices.copy(), first.faces.copy(), first.normals.copy(), first.colors.copy())
     assert_same_bits(polygonizer.update(Sum(tuple(small_blobs(50)))), copy)
     assert remade(polygonizer) == 0
     polygonizer.update(Sum(tuple(blobs[1:])))

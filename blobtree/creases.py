@@ -1,0 +1,56 @@
+"""Sharp creases: a surface whose vertices lie on the edges and corners that CSG leaves.
+
+Unions, intersections and differences have kinks, which a vertex in the middle of its patch cuts off. Here
+every patch whose edge crossings lie on different smooth branches gives its vertex to the place where these
+meet. What is connected with what does not change, so the mesh stays closed and manifold.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from .crease_kernels import SMOOTH, find_choices, place_on_creases, turn_diagonals
+from .grid import CHILDREN
+from .launch import launch
+from .surface import Surface, tables
+from .visible import Cells
+
+
+def sharpened(surface: Surface) -> tuple[Surface, NDArray[np.uint8]]:
+    """`surface` with its vertices on creases, and how many smooth branches meet in each of them (n,).
+
+    1 is a vertex of a smooth patch, 2 one on a crease, 3 or 4 one in a corner, 0 one whose patch touches
+    several branches that were not found to meet nearby; that one stays where it was.
+    """
+    device, vocabulary = surface.cells.device, surface.cells.tape.vocabulary
+    cells = _cells(surface)
+    count = len(surface.cells.leaves)
+    choosing = wp.empty(count, dtype=wp.uint8, device=device)
+    launch(vocabulary.kernel(find_choices), count, [cells.spans, cells.tape], [choosing], device)
+    meetings = wp.full(len(surface.vertices), SMOOTH, dtype=wp.uint8, device=device)
+    vertices, normals, colors, faces = (
+        wp.clone(array) for array in (surface.vertices, surface.normals, surface.colors, surface.faces)
+    )
+    patches = tables(device)
+    inputs = [cells, choosing, surface.rows, patches.patch_count, patches.patch_of_edge]
+    inputs += [surface.offsets, surface.vertex_starts]
+    outputs = [vertices, normals, colors, meetings]
+    launch(vocabulary.kernel(place_on_creases), count * CHILDREN, inputs, outputs, device)
+    inputs = [cells, vertices, meetings]
+    launch(vocabulary.kernel(turn_diagonals), len(faces) // 2, inputs, [faces], device)
+    sharp = replace(surface, vertices=vertices, normals=normals, colors=colors, faces=faces)
+    return sharp, meetings.numpy()
+
+
+def _cells(surface: Surface) -> Any:
+    """What kernels need to know of a surface's cells."""
+    cells: Any = Cells()
+    leaves, grid = surface.cells.leaves, surface.cells.grid
+    cells.blocks, cells.spans, cells.tape = leaves.blocks, leaves.spans, leaves.tape
+    cells.base, cells.corner = wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner)
+    cells.cell = grid.cell_size
+    cells.whole = surface.cells.tape.on(surface.cells.device).data
+    return cells
