@@ -5,14 +5,18 @@ The pipeline: tree → program → tape → value, gradient, colour → rays (`t
 
 from .errors import (
     BlobTreeError,
+    InvalidDefinition,
     InvalidFile,
     InvalidNode,
     InvalidPoints,
     InvalidResolution,
+    UnknownKind,
     UntranslatableFunction,
 )
 from .io import from_json, load, save, to_json
 from .kernels import ISO, RIM
+from .own_operator import OwnCombination, define_operator
+from .own_skeleton import OwnPrimitive, define_skeleton
 from .polygonize import Mesh, Polygonizer, polygonize
 from .primitives import Cone, Point, Segment
 from .progress import Progress
@@ -39,6 +43,7 @@ __all__ = [
     "Difference",
     "Hits",
     "Intersection",
+    "InvalidDefinition",
     "InvalidFile",
     "InvalidNode",
     "InvalidPoints",
@@ -46,6 +51,8 @@ __all__ = [
     "Mesh",
     "Node",
     "Offset",
+    "OwnCombination",
+    "OwnPrimitive",
     "Point",
     "Polygonizer",
     "Progress",
@@ -56,7 +63,10 @@ __all__ = [
     "Transform",
     "Twist",
     "Union",
+    "UnknownKind",
     "UntranslatableFunction",
+    "define_operator",
+    "define_skeleton",
     "from_json",
     "load",
     "polygonize",

@@ -50,7 +50,7 @@ def influence_bounds(root: "Node") -> tuple[NDArray[np.float32], NDArray[np.floa
 
 def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
     """Boxes (n, 3), (n, 3) of balls swept over the primitives' skeletons, under their maps."""
-    points = np.array([placed.primitive.control_points for placed in primitives])
+    points = primitives[0].primitive.hulls([placed.primitive for placed in primitives])
     matrices = np.array([placed.placement.matrix for placed in primitives])
     growth = np.array([placed.placement.growth for placed in primitives]) / RIM
     influences = np.array([max(placed.primitive.influences) for placed in primitives]) + growth

@@ -5,6 +5,8 @@ BlobTreeError (ValueError)
 ├── InvalidPoints       points to evaluate are not a finite n×3 array
 ├── InvalidResolution   a cell size or resolution that no grid can have
 ├── InvalidFile         a file that holds no BlobTree
+├── InvalidDefinition   an own skeleton or operator is not what its definition claims
+├── UnknownKind         a node of an own kind that this process has no definition of
 └── UntranslatableFunction   a typed function outside the subset that GLSL shares
 """
 
@@ -27,6 +29,14 @@ class InvalidResolution(BlobTreeError):
 
 class InvalidFile(BlobTreeError):
     """A file that holds no BlobTree."""
+
+
+class InvalidDefinition(BlobTreeError):
+    """A user's skeleton or operator is not what its definition claims."""
+
+
+class UnknownKind(BlobTreeError):
+    """A node of a user's kind that this process has no definition of."""
 
 
 class UntranslatableFunction(BlobTreeError):

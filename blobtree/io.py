@@ -2,23 +2,27 @@
 
     {"format": "blobtree", "version": 1, "nodes": [
         {"type": "point", "center": [0, 0, 0], "radius": 1, "color": [0.8, 0.8, 0.8]},
-        {"type": "point", "center": [1, 0, 0], "radius": 1, "color": [0.8, 0.8, 0.8]},
+        {"type": "own skeleton", "kind": "ring", "parameters": {"size": 1}, "radius": 1, "color": [0, 0, 1]},
         {"type": "sum", "operands": [0, 1]}]}
 
 The last node is the root. Operands stand before the node that uses them, so a file can hold no cycle, a
-shared subtree is written once, and depth costs no recursion.
+shared subtree is written once, and depth costs no recursion. A node of an own kind names its kind; whoever
+reads the file must have defined it (`registry`).
 """
 
 import os
 import shutil
 import uuid
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import msgspec
 
 from .errors import BlobTreeError, InvalidFile
+from .own_operator import OwnCombination
+from .own_skeleton import OwnPrimitive
 from .primitives import Cone, Point, Segment
+from .registry import find_kind
 from .traversal import postorder
 from .tree import (
     Difference,
@@ -35,12 +39,18 @@ from .validation import Matrix, Vector
 
 VERSION: Literal[1] = 1
 
+OwnValue = float | tuple[float, ...]
+
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
     """One node in a file; fields that hold other nodes hold their places instead."""
 
     node_type: ClassVar[type[Node]]
     references: ClassVar[tuple[str, ...]] = ()
+
+    def make(self, values: dict[str, Any]) -> Node:
+        """The node of these fields, other nodes in place of their places."""
+        return self.node_type(**values)
 
 
 class PointRecord(Record, frozen=True, tag="point"):
@@ -142,6 +152,34 @@ class TwistRecord(Record, frozen=True, tag="twist"):
     degrees: float
 
 
+class OwnSkeletonRecord(Record, frozen=True, tag="own skeleton"):
+    """A primitive around a user's skeleton."""
+
+    node_type = OwnPrimitive
+    kind: str
+    values: dict[str, OwnValue] = msgspec.field(name="parameters")
+    radius: float
+    color: Vector
+
+    def make(self, values: dict[str, Any]) -> Node:
+        """The node, if its kind is defined."""
+        return _own_node(OwnPrimitive, values)
+
+
+class OwnOperatorRecord(Record, frozen=True, tag="own operator"):
+    """A combination by a user's operator."""
+
+    node_type = OwnCombination
+    references = ("operands",)
+    kind: str
+    values: dict[str, OwnValue] = msgspec.field(name="parameters")
+    operands: tuple[int, ...]
+
+    def make(self, values: dict[str, Any]) -> Node:
+        """The node, if its kind is defined."""
+        return _own_node(OwnCombination, values)
+
+
 _AnyRecord = (
     PointRecord
     | SegmentRecord
@@ -154,6 +192,8 @@ _AnyRecord = (
     | TransformRecord
     | OffsetRecord
     | TwistRecord
+    | OwnSkeletonRecord
+    | OwnOperatorRecord
 )
 _RECORD_OF: dict[type[Node], type[_AnyRecord]] = {record.node_type: record for record in _AnyRecord.__args__}
 
@@ -239,7 +279,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 def _record(node: Node, place: dict[int, int]) -> _AnyRecord:
     """`node` with its operands replaced by their places."""
-    record_type = _RECORD_OF[type(node)]
+    record_type = _record_type(node)
     values = {name: getattr(node, name) for name in record_type.__struct_fields__}
     for name in record_type.references:
         operand = values[name]
@@ -259,7 +299,29 @@ def _node(record: Record, earlier: list[Node]) -> Node:
             if isinstance(places, int)
             else tuple(_at(place, earlier) for place in places)
         )
-    return record.node_type(**values)
+    return record.make(values)
+
+
+def _record_type(node: Node) -> type[_AnyRecord]:
+    if isinstance(node, OwnPrimitive):
+        return OwnSkeletonRecord
+    return OwnOperatorRecord if isinstance(node, OwnCombination) else _RECORD_OF[type(node)]
+
+
+def _own_node(base: type[Node], fields: dict[str, Any]) -> Node:
+    """A node of a user's kind."""
+    name, parameters = fields.pop("kind"), fields.pop("values")
+    kind: Any = find_kind(name)
+    if not issubclass(kind, base):
+        raise InvalidFile(f"kind {name!r} is defined as {kind.__mro__[1].__name__}, not {base.__name__}")
+    wanted = {parameter.name for parameter in kind.parameters}
+    if wanted != set(parameters):
+        raise InvalidFile(
+            f"kind {name!r} has the parameters {sorted(wanted)}, got {sorted(parameters)}; "
+            "its definition here is not that of whoever wrote this"
+        )
+    node: Node = kind(**parameters, **fields)
+    return node
 
 
 def _at(place: int, earlier: list[Node]) -> Node:

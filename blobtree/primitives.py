@@ -1,5 +1,6 @@
 """Primitives: the leaves of a tree, each a skeleton with a radius and a colour."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar
 
@@ -35,6 +36,22 @@ class Primitive(Node):
     def control_points(self) -> tuple[Vector, ...]:
         """Points whose convex hull holds the skeleton."""
         raise NotImplementedError
+
+    @classmethod
+    def hulls(cls, primitives: Sequence["Primitive"]) -> Floats:
+        """Points (n, k, 3) whose convex hulls hold the skeletons of n primitives of this kind."""
+        return np.array([primitive.control_points for primitive in primitives])
+
+    @classmethod
+    def packed(cls, primitives: Sequence["Primitive"], influences: Floats, matrices: Floats | None) -> Floats:
+        """Parameters (n, ·, 4) on the tape of n primitives of this kind, under maps (n, 4, 4) if any.
+
+        The maps are those that fold into the parameters; influences (n, ·) are scaled by them already.
+        """
+        points = cls.hulls(primitives)
+        if matrices is not None:
+            points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
+        return cls.texels(points, influences)
 
     @staticmethod
     def texels(points: Floats, influences: Floats) -> Floats:

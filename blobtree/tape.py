@@ -164,15 +164,14 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
     Where the maps keep shapes they fold into the parameters; where they stretch them, each primitive carries
     its map and points are taken to its own space instead.
     """
-    first = primitives[0].primitive
+    nodes = [placed.primitive for placed in primitives]
     grown = _grown_influences(primitives)
-    points = np.array([placed.primitive.control_points for placed in primitives])
+    matrices = None
     if not stretched:
         matrices = np.array([placed.placement.matrix for placed in primitives])
         scales = np.array([placed.placement.uniform_scale for placed in primitives])
-        points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
         grown = grown * scales[:, None]
-    parameters = first.texels(points, grown)
+    parameters = nodes[0].packed(nodes, grown, matrices)
     colors = np.array([[*placed.primitive.color, 1.0] for placed in primitives])[:, None]
     parts = [parameters, colors]
     if stretched:

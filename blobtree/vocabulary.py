@@ -107,25 +107,36 @@ BUILT_IN = Vocabulary(*_TABLES)
 """What trees without own kinds speak."""
 
 
+_MADE: list[Vocabulary] = [BUILT_IN]
+
+
 def vocabulary_of(skeletons: Iterable[Skeleton], operators: Iterable[Operator]) -> Vocabulary:
-    """The smallest vocabulary that has these rows: the built-in ones, then the others in a fixed order."""
+    """A vocabulary that has these rows.
+
+    The smallest one that was made before, so that a tree which uses less than another one compiles nothing;
+    a new one, of the built-in rows and then the others in a fixed order, where there is none.
+    """
     own_skeletons = {row for row in skeletons if row not in SKELETONS}
     own_operators = {row for row in operators if row not in OPERATORS}
-    if not own_skeletons and not own_operators:
-        return BUILT_IN
-    return _extended(
-        tuple(sorted(own_skeletons, key=_order)),
-        tuple(sorted(own_operators, key=_order)),
-    )
+    with _LOCK:
+        fitting = [
+            vocabulary
+            for vocabulary in _MADE
+            if own_skeletons.issubset(vocabulary.skeletons) and own_operators.issubset(vocabulary.operators)
+        ]
+        if fitting:
+            return min(fitting, key=lambda made: len(made.skeletons) + len(made.operators))
+        made = Vocabulary(
+            (*SKELETONS, *sorted(own_skeletons, key=_order)),
+            (*OPERATORS, *sorted(own_operators, key=_order)),
+            WARPS,
+        )
+        _MADE.append(made)
+        return made
 
 
 def _order(row: Skeleton | Operator) -> tuple[str, str]:
     return row.name, row.digest
-
-
-@cache
-def _extended(skeletons: tuple[Skeleton, ...], operators: tuple[Operator, ...]) -> Vocabulary:
-    return Vocabulary((*SKELETONS, *skeletons), (*OPERATORS, *operators), WARPS)
 
 
 @cache

@@ -1,5 +1,7 @@
 """Random trees: a seeded generator for numbers, a Hypothesis strategy for structure."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import reduce
 from operator import add, and_, or_
 
@@ -31,7 +33,17 @@ def triple(array: NDArray[np.floating]) -> Vector:
     return x, y, z
 
 
-def random_leaf(rng: np.random.Generator) -> Node:
+@dataclass(frozen=True)
+class OwnKinds:
+    """How random trees come by nodes of own kinds."""
+
+    leaf: Callable[[np.random.Generator], Node]
+    combine: Callable[[np.random.Generator, list[Node]], Node]
+
+
+def random_leaf(rng: np.random.Generator, own: OwnKinds | None = None) -> Node:
+    if own and rng.random() < 0.5:
+        return own.leaf(rng)
     color = triple(rng.uniform(0.0, 1.0, 3))
     radius = float(rng.uniform(0.2, 0.7))
     start = rng.uniform(-1.0, 1.0, 3)
@@ -56,14 +68,16 @@ def random_transform(rng: np.random.Generator, node: Node) -> Node:
     return placed.offset(float(rng.uniform(-0.03, 0.05))) if rng.random() < 0.3 else placed
 
 
-def random_tree(rng: np.random.Generator, depth: int = 4) -> Node:
+def random_tree(rng: np.random.Generator, depth: int = 4, own: OwnKinds | None = None) -> Node:
     """A tree of all kinds of nodes, about two units wide, at most `depth` deep."""
-    kind = rng.integers(0, 8) if depth else 0
+    kind = rng.integers(0, 11 if own else 8) if depth else 0
     if kind <= 1:
-        return random_leaf(rng)
+        return random_leaf(rng, own)
     if kind == 2:
-        return random_transform(rng, random_tree(rng, depth - 1))
-    operands = [random_tree(rng, depth - 1) for _ in range(rng.integers(2, 5))]
+        return random_transform(rng, random_tree(rng, depth - 1, own))
+    operands = [random_tree(rng, depth - 1, own) for _ in range(rng.integers(2, 5))]
+    if own and kind >= 8:
+        return own.combine(rng, operands)
     if kind == 3:
         return Ricci(tuple(operands), exponent=float(rng.choice([1.0, 1.5, 2.0, 4.0, 20.0])))
     if kind == 4:
@@ -72,12 +86,12 @@ def random_tree(rng: np.random.Generator, depth: int = 4) -> Node:
     return reduce(combine, operands)
 
 
-def random_trees(seed: int, count: int, depth: int = 4) -> list[Node]:
+def random_trees(seed: int, count: int, depth: int = 4, own: OwnKinds | None = None) -> list[Node]:
     """Trees with at least one combination each; every kind of node occurs among two dozen of them."""
     rng = np.random.default_rng(seed)
     trees: list[Node] = []
     while len(trees) < count:
-        tree = random_tree(rng, depth)
+        tree = random_tree(rng, depth, own)
         if len(tree.children) > 1:
             trees.append(tree)
     return trees

@@ -18,6 +18,8 @@ from blobtree import (
     Intersection,
     Node,
     Offset,
+    OwnCombination,
+    OwnPrimitive,
     Point,
     Ricci,
     Segment,
@@ -26,6 +28,9 @@ from blobtree import (
     Twist,
     Union,
 )
+from blobtree.operators import Reach
+
+from . import own_kinds
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +54,11 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return _leaf(q - np.array(center), radius, color)
         case Segment(start=start, end=end, radius=radius, color=color):
             return _leaf(q - _closest_on_segment(q, np.array(start), np.array(end)), radius, color)
+        case OwnPrimitive(radius=radius, color=color):
+            closest, clearance = own_kinds.CLOSEST[node.kind](q, **node.values)
+            return replace(_leaf(q - closest, radius, color), margin=clearance)
+        case OwnCombination():
+            return reduce(lambda a, b: _own(a, b, node), [evaluate(operand, q) for operand in node.operands])
         case Cone(color=color):
             return _leaf_at(_least_ratio(q, node), color)
         case Twist(child=child, degrees=degrees):
@@ -87,7 +97,11 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
 def grown(node: Node, distance: float) -> Node:
     """`node` with every radius larger by `distance`, those of tools smaller."""
     match node:
-        case Point() | Segment():
+        case OwnCombination(operands=(solid, tool)) if node.operator.reach is Reach.LEFT:
+            return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
+        case OwnCombination():
+            return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
+        case Point() | Segment() | OwnPrimitive():
             return replace(node, radius=node.radius + distance)
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
@@ -143,6 +157,15 @@ def _closest_on_segment(q: Floats, start: Floats, end: Floats) -> Floats:
     share = np.clip((q - start) @ axis / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(q))
     closest: Floats = start + share[:, None] * axis
     return closest
+
+
+def _own(a: Field, b: Field, node: OwnCombination) -> Field:
+    value, by_a, by_b, kink = own_kinds.OPERATORS[node.kind](a.value, b.value, **node.values)
+    weights = np.abs(by_a) * a.value, np.abs(by_b) * b.value
+    total = weights[0] + weights[1]
+    share = np.where(total > 0.0, weights[1] / np.where(total > 0.0, total, 1.0), b.value > a.value)
+    margin = np.minimum(np.minimum(a.margin, b.margin), kink)
+    return Field(value, _mixed(a, b, 1.0 - share, share), margin)
 
 
 def _ricci(a: Field, b: Field, exponent: float) -> Field:

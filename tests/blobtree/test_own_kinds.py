@@ -1,0 +1,226 @@
+"""Trees with own skeletons and operators: everything that holds of built-in kinds holds of them."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from warp._src.context import user_modules
+
+from blobtree import ISO, Node, Point, polygonize
+from blobtree.evaluate import bounds_at, gradients_at
+from blobtree.kernels import RIM
+from blobtree.trace import trace
+from blobtree.traversal import postorder
+from blobtree.vocabulary import BUILT_IN
+from tests.blobtree.own_kinds import EVERYTHING, KINDS, OWN, OWN_TREES, Brick, Mean, Path, Ring, Soft
+from tests.blobtree.test_polygonize import assert_closed, assert_valid
+from tests.blobtree.test_sparse_cells import assert_same_surface
+from tests.blobtree.trees import points_around, random_trees
+from tests.oracles import blobtree as oracle
+
+POINTS = 120
+AWAY = 1e-3
+NUMBER = pytest.mark.parametrize("start", range(0, len(OWN_TREES), 40))
+
+ORIGIN = [[0.0, 0.0, 0.0]]
+UNIT_RING = Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.2)
+
+
+def cases(start: int) -> list[tuple[Node, NDArray[np.float32]]]:
+    rng = np.random.default_rng(start)
+    return [(tree, points_around(rng, tree, POINTS)) for tree in OWN_TREES[start : start + 40]]
+
+
+def test_the_random_trees_hold_every_own_kind_and_maps_among_them() -> None:
+    kinds = {type(node) for tree in OWN_TREES for node in postorder(tree)}
+    assert set(KINDS) <= kinds
+    assert {tree.tape.vocabulary for tree in OWN_TREES} == {BUILT_IN, EVERYTHING.tape.vocabulary}
+    assert sum(tree.tape.stretched for tree in OWN_TREES) > 30
+
+
+@NUMBER
+def test_values_are_those_of_float64(start: int) -> None:
+    inside = 0
+    for tree, points in cases(start):
+        expected = oracle.value(tree, points)
+        assert np.abs(tree(points) - expected).max() <= 2e-5 * max(1.0, expected.max()), tree
+        inside += int((expected > ISO).sum())
+    assert inside > 100
+
+
+@NUMBER
+def test_gradients_are_those_of_float64_differences(start: int) -> None:
+    compared = 0
+    for tree, points in cases(start):
+        smooth = oracle.evaluate(tree, points).margin > AWAY
+        seen, expected = tree.gradient(points)[smooth], oracle.gradient(tree, points[smooth])
+        error = np.linalg.norm(seen - expected, axis=1)
+        assert (error <= 1e-4 * np.maximum(1.0, np.linalg.norm(expected, axis=1))).all(), tree
+        compared += int(smooth.sum())
+    assert compared > 0.7 * 40 * POINTS
+
+
+@NUMBER
+def test_colours_follow_the_field(start: int) -> None:
+    for tree, points in cases(start):
+        field = oracle.evaluate(tree, points)
+        sure = (field.margin > AWAY) & (field.value > 0.01)
+        np.testing.assert_allclose(tree.colors(points)[sure], field.color[sure], atol=3e-4)
+
+
+@NUMBER
+def test_outside_the_bounds_the_field_is_exactly_zero(start: int) -> None:
+    rng = np.random.default_rng(start)
+    for tree in OWN_TREES[start : start + 40]:
+        lower, upper = tree.bounds
+        points = rng.uniform(lower - 0.3, upper + 0.3, (3000, 3)).astype(np.float32)
+        beyond = ((points < lower) | (points > upper)).any(axis=1)
+        assert (tree(points[beyond]) == 0.0).all()
+
+
+def test_no_value_in_a_box_lies_outside_its_interval() -> None:
+    rng = np.random.default_rng(3)
+    for tree in OWN_TREES[:40]:
+        for middle in rng.uniform(-1.0, 1.0, (4, 3)):
+            half = 10.0 ** rng.uniform(-2.0, 0.0)
+            smallest, largest = tree.interval(middle - half, middle + half)
+            values = tree(rng.uniform(middle - half, middle + half, (200, 3)))
+            assert smallest <= values.min()
+            assert values.max() <= largest
+
+
+@NUMBER
+def test_no_gradient_inside_a_ball_is_longer_than_its_bound(start: int) -> None:
+    rng = np.random.default_rng(start)
+    for tree, points in cases(start):
+        reach = (10.0 ** rng.uniform(-2.0, 0.0, len(points))).astype(np.float32)
+        bound = bounds_at(tree.tape, points, reach)[:, 1]
+        inside = rng.normal(size=points.shape)
+        inside *= (rng.random(len(points)) * reach / np.linalg.norm(inside, axis=1))[:, None]
+        slope = np.linalg.norm(gradients_at(tree.tape, (points + inside).astype(np.float32))[:, 1:], axis=1)
+        assert (slope <= bound * (1.0 + 1e-4) + 1e-5).all(), tree
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sparse_and_dense_give_the_same_quads(seed: int) -> None:
+    surfaces = 0
+    for tree in random_trees(seed, 12, own=OWN):
+        assert_same_surface(tree)
+        mesh = polygonize(tree, resolution=20)
+        assert_valid(mesh)
+        assert_closed(mesh)
+        surfaces += len(mesh.faces) > 0
+    assert surfaces >= 5
+
+
+@pytest.mark.slow
+def test_sparse_and_dense_give_the_same_quads_over_a_thousand_trees() -> None:
+    for tree in random_trees(98, 1000, depth=5, own=OWN):
+        assert_same_surface(tree)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_ray_passes_through_unseen(seed: int) -> None:
+    """Against dense marching: never later than the first sample inside, and on the surface."""
+    rng = np.random.default_rng(seed)
+    hits = on_surface = 0
+    for tree in random_trees(60 + seed, 8, depth=3, own=OWN):
+        lower, upper = tree.bounds
+        size = float(np.linalg.norm(upper - lower))
+        origins = rng.normal(size=(60, 3))
+        origins *= 2.0 * size / np.linalg.norm(origins, axis=1, keepdims=True)
+        directions = rng.uniform(lower, upper, (60, 3)) - origins
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        seen = trace(tree, origins, directions)
+        steps = np.linspace(0.0, 4.0 * size, 2001)
+        places = origins[:, None] + steps[None, :, None] * directions[:, None]
+        inside = tree(places.reshape(-1, 3)).reshape(60, -1) > ISO + 1e-4
+        first = np.where(inside.any(axis=1), steps[inside.argmax(axis=1)], np.inf)
+        assert (seen <= first + 2e-4 * size).all()
+        hit = np.isfinite(seen)
+        reached = tree(origins[hit] + seen[hit, None] * directions[hit])
+        hits += int(hit.sum())
+        on_surface += int((np.abs(reached - ISO) < 0.01).sum())
+    assert hits > 50
+    assert on_surface > 0.95 * hits
+
+
+def test_a_ring_is_a_torus() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 50)
+    around = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    np.testing.assert_allclose(UNIT_RING(around), 1.0, atol=1e-6)
+    np.testing.assert_allclose(UNIT_RING(1.2 * around), ISO, atol=1e-6)
+    np.testing.assert_allclose(UNIT_RING(around + np.array([0.0, 0.0, 0.2])), ISO, atol=1e-6)
+    mesh = polygonize(UNIT_RING, resolution=60)
+    assert len(mesh.vertices) == len(mesh.faces) // 2  # V − E + F = 0, one handle
+    height = mesh.vertices[:, 2].astype(np.float64)
+    tube = np.hypot(np.hypot(*mesh.vertices[:, :2].astype(np.float64).T) - 1.0, height)
+    np.testing.assert_allclose(tube, 0.2, atol=2e-6)
+
+
+@pytest.mark.parametrize("away", [0.0, 100.0])
+def test_bounds_are_tight_around_an_own_skeleton(away: float) -> None:
+    reach = 0.2 / RIM
+    place = np.array([away, 0.0, -away])
+    ring = Ring(tuple(place), (0, 0, 1), 1.0, radius=0.2)
+    half = np.array([1.0 + reach, 1.0 + reach, reach])
+    for seen, exact in zip(ring.bounds, (place - half, place + half), strict=True):
+        np.testing.assert_allclose(seen, exact, atol=0.012 + 1e-4 * away)
+    point = Path((5, 5, 5), (5, 5, 5), (5, 5, 5), radius=0.2)
+    np.testing.assert_allclose(point.bounds, [[5.0 - reach] * 3, [5.0 + reach] * 3], atol=2e-3)
+
+
+def test_a_small_and_a_large_model() -> None:
+    for scale in (1e-5, 1e5):
+        ring = Ring((0, 0, 0), (0, 0, 1), scale, radius=0.2 * scale)
+        mesh = polygonize(ring, resolution=40)
+        assert_closed(mesh)
+        assert np.abs(mesh.vertices).max() / scale == pytest.approx(1.2, rel=3e-3)
+
+
+def test_maps_of_every_sort_move_an_own_primitive() -> None:
+    points = np.random.default_rng(2).uniform(-1.5, 1.5, (300, 3))
+    for placed in (
+        UNIT_RING.translate((0.1, 0.2, 0.3)),
+        UNIT_RING.rotate((1, 2, 3), 50).scale(0.8),
+        UNIT_RING.scale((0.5, 1.0, -0.7)),
+        UNIT_RING.twist(40.0),
+        UNIT_RING.offset(0.1),
+        UNIT_RING.scale(2.0).offset(-0.1).translate((1, 0, 0)),
+    ):
+        np.testing.assert_allclose(placed(points), oracle.value(placed, points), atol=1e-5)
+
+
+def test_one_kind_many_primitives_is_one_run() -> None:
+    rng = np.random.default_rng(8)
+    rings = [Ring(tuple(p), (0, 0, 1), 0.1, radius=0.05) for p in rng.uniform(-1, 1, (500, 3)).tolist()]
+    tree = rings[0]
+    for ring in rings[1:]:
+        tree = tree + ring
+    assert len(tree.tape.data) == 1 + 500 * 3  # two texels of parameters, one of colour
+    points = rng.uniform(-1, 1, (200, 3))
+    np.testing.assert_allclose(tree(points), oracle.value(tree, points), atol=2e-5)
+
+
+def test_built_in_trees_speak_the_built_in_vocabulary() -> None:
+    assert (Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=1.0)).tape.vocabulary is BUILT_IN
+    assert UNIT_RING.tape.vocabulary is EVERYTHING.tape.vocabulary
+
+
+def test_edits_of_parameters_and_of_structure_load_no_kernel() -> None:
+    ball = Point((1, 0, 0), radius=0.4)
+    look_at(Soft((UNIT_RING, ball), 1.0))
+    before = loaded_kernels()
+    look_at(Soft((Ring((0.2, 0, 0), (0, 1, 1), 0.6, radius=0.3), ball), 2.0))
+    look_at(Mean((Brick((0, 0, 0), (1, 1, 1), radius=0.1), ball - UNIT_RING.scale((1, 2, 3)))))
+    assert loaded_kernels() == before
+
+
+def look_at(tree: Node) -> None:
+    polygonize(tree, resolution=16)
+    tree(ORIGIN), tree.gradient(ORIGIN), tree.colors(ORIGIN), tree.interval((0, 0, 0), (1, 1, 1))
+    trace(tree, [[5, 0, 0]], [[-1, 0, 0]])
+
+
+def loaded_kernels() -> dict[str, int]:
+    """How often each of Warp's modules was loaded onto a device."""
+    return {name: len(module.execs) for name, module in user_modules.items()}
