@@ -1,7 +1,7 @@
 """Typed `@wp.func` → GLSL, so that every formula of the project is written once.
 
 The subset: typed scalars and vectors, arithmetic, comparisons, `if`, `for … in range`, `while`, Warp's
-maths, calls of other such functions. Arrays become 1024-wide 2D textures read with `texelFetch`.
+maths, calls of other such functions. Arrays become 4096-wide 2D textures read with `texelFetch`.
 Whatever lies outside is refused with file and line, never guessed.
 """
 
@@ -17,8 +17,8 @@ import warp as wp
 from .errors import UntranslatableFunction
 from .glsl_builtins import BUILTINS, CASTS, HELPERS, RESERVED_WORDS, Expression, type_name
 
-TEXTURE_WIDTH_BITS = 10
-"""Data textures are 1 << 10 = 1024 texels wide."""
+TEXTURE_WIDTH_BITS = 12
+"""Data textures are 1 << 12 = 4096 texels wide: room for an index of millions."""
 
 _INFIX = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _BITWISE = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         InvalidScene,
         InvalidSeeding,
         NoGraphics,
+        TooMuchData,
     )
     from .evaluate import Samples, evaluate
     from .fields import gradient_of
@@ -69,6 +70,7 @@ __all__ = [
     "Scene",
     "Sizing",
     "Surface",
+    "TooMuchData",
     "TreeObject",
     "bounds_of",
     "cover",
@@ -98,6 +100,7 @@ _HOMES = {
         "InvalidScene",
         "InvalidSeeding",
         "NoGraphics",
+        "TooMuchData",
     ),
     "evaluate": ("Samples", "evaluate"),
     "fields": ("gradient_of",),

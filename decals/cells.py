@@ -67,6 +67,35 @@ def in_cell(
 
 
 @wp.func
+def uppermost_over(
+    q: wp.vec3,
+    n_q: wp.vec3,
+    decal: wp.int32,
+    above: wp.int32,
+    decals: wp.array(dtype=wp.vec4),
+    level_count: wp.int32,
+    levels: wp.array(dtype=wp.vec4),
+    table: wp.array(dtype=wp.vec4i),
+    mask: wp.int32,
+    ids: wp.array(dtype=wp.int32),
+) -> wp.int32:
+    """Uppermost of those stacked over a decal whose rims hold q; if `above` is one, of those below it."""
+    rank = rank_of(decal, decals)
+    upper = wp.int32(NOBODY)
+    for level in range(level_count):
+        span = cell_range(q, level, levels, table, mask, ids)
+        for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
+            if rank_of(ids[j], decals) != rank:
+                break
+            if lies_over(ids[j], decal, decals) and complement_of(q, n_q, ids[j], decals) <= 0.5:
+                if upper < 0 or lies_over(ids[j], upper, decals):
+                    if above < 0 or lies_over(above, ids[j], decals):
+                        if stacked(ids[j], decal, decals):
+                            upper = ids[j]
+    return upper
+
+
+@wp.func
 def cell_owner(
     q: wp.vec3,
     n_q: wp.vec3,
@@ -93,17 +122,12 @@ def cell_owner(
                     owner = ids[j]
     if owner < 0:
         return owner
-    nearest = owner
-    for level in range(level_count):
-        span = cell_range(q, level, levels, table, mask, ids)
-        for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
-            if rank_of(ids[j], decals) != rank:
-                break
-            if lies_over(ids[j], owner, decals) and complement_of(q, n_q, ids[j], decals) <= 0.5:
-                # Whoever shares q with the nearest cell is stacked with it.
-                if stacked(ids[j], nearest, decals):
-                    if in_cell(q, n_q, ids[j], decals, level_count, levels, table, mask, ids):
-                        owner = ids[j]
+    # Whoever shares q with the nearest cell is stacked with it: from the uppermost down, who does?
+    upper = uppermost_over(q, n_q, owner, NOBODY, decals, level_count, levels, table, mask, ids)
+    while upper >= 0:
+        if in_cell(q, n_q, upper, decals, level_count, levels, table, mask, ids):
+            return upper
+        upper = uppermost_over(q, n_q, owner, upper, decals, level_count, levels, table, mask, ids)
     return owner
 
 

@@ -44,7 +44,8 @@ NOWHERE = 2.0
 
 SERIES_BELOW = 0.02
 SMALLEST_SPAN = 1.0e-7
-SMALLEST_COMPLEMENT = 1.0e-30
+SMALLEST_COMPLEMENT = 1.0e-37
+"""Above the numbers that graphics cards may take for 0, and with a reciprocal that they can hold."""
 
 
 @wp.func

@@ -9,6 +9,7 @@
     ├── InvalidSeeding(ValueError)            an impossible wish for seeds: negative count, no surface, ...
     ├── InvalidImage(ValueError)              a file or array that is no image
     ├── InvalidScene(ValueError)              a scene or scene file that does not hold together
+    ├── TooMuchData(ValueError)               more than fits into a texture of this graphics card
     └── NoGraphics(RuntimeError)              no usable OpenGL here; the message says what to install
 
 A message says what was expected, what came, and what to do.
@@ -45,6 +46,10 @@ class InvalidScene(DecalsError, ValueError):
 
 class InvalidEdit(DecalsError, ValueError):
     """A command that makes no sense for the document as it is."""
+
+
+class TooMuchData(DecalsError, ValueError):
+    """More decals, or a larger tree, than fit into a texture of this graphics card."""
 
 
 class NoGraphics(DecalsError, RuntimeError):

@@ -21,6 +21,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from decals.index_build import build_index
+from decals.index_cells import LEVEL_SHIFT
 from decals.lookup import count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, Decals
 
@@ -83,6 +84,14 @@ class DecalIndex:
     def nbytes(self) -> int:
         """Bytes of all arrays."""
         return self.levels.nbytes + self.table.nbytes + self.ids.nbytes
+
+    @property
+    def longest_walk(self) -> int:
+        """Most candidates that any point can have: the longest lists of all levels together."""
+        cells = self.table[self.table[:, 0] >= 0]
+        longest = np.zeros(1 + int(cells[:, 0].max(initial=0) >> LEVEL_SHIFT), np.int64)
+        np.maximum.at(longest, cells[:, 0] >> LEVEL_SHIFT, self.ids[cells[:, 3]])
+        return int(longest.sum())
 
     def on(self, device: Any = None) -> DeviceIndex:
         """Copy the arrays to a Warp device."""

@@ -21,7 +21,7 @@ struct DecalHit {
 };
 
 vec4 decal_texel(int i) {
-    return texelFetch(decal_records, ivec2(i & 1023, i >> 10), 0);
+    return texelFetch(decal_records, ivec2(i & 4095, i >> 12), 0);
 }
 
 DecalHit decal_hit(int owner, vec3 q, vec3 n) {

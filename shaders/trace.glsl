@@ -10,7 +10,7 @@ uniform int grid_depth;
 uniform float tolerance;
 
 vec4 tape_texel(sampler2D data, int i) {
-    return texelFetch(data, ivec2(i & 1023, i >> 10), 0);
+    return texelFetch(data, ivec2(i & 4095, i >> 12), 0);
 }
 
 //@ slot library

@@ -1,6 +1,6 @@
-"""Arrays on the graphics card: textures of 1024 texels a row, read with ``texelFetch``.
+"""Arrays on the graphics card: textures of 4096 texels a row, read with ``texelFetch``.
 
-Element ``i`` lies at ``ivec2(i & 1023, i >> 10)``: the form into which `blobtree.glsl` translates arrays.
+Element ``i`` lies at ``ivec2(i & 4095, i >> 12)``: the form into which `blobtree.glsl` translates arrays.
 """
 
 import math
@@ -10,10 +10,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.glsl import TEXTURE_WIDTH_BITS
+from decals.errors import TooMuchData
 from decals.render.context import Context
 
-WIDTH = 1024
-"""Texels in a row."""
+WIDTH = 1 << TEXTURE_WIDTH_BITS
+"""Texels in a row. With 16,384 rows, which every card of the last ten years has, 67 million elements."""
 
 _KINDS = {
     (np.dtype(np.float32), (4,)): "f4",
@@ -35,16 +37,18 @@ class DataTexture:
     Raises
     ------
     ValueError
-        Another shape or type, or more elements than a texture has room for.
+        Another shape or type.
+    TooMuchData
+        More elements than a texture has room for here.
     """
 
     def __init__(self, context: Context, array: NDArray[Any]) -> None:
         components, dtype = _kind(array)
         rows = max(1, -(-len(array) // WIDTH))
         if rows > context.max_texture_size:
-            raise ValueError(
-                f"{len(array):,} elements do not fit into one texture here; the most are "
-                f"{context.max_texture_size * WIDTH:,}"
+            raise TooMuchData(
+                f"{len(array):,} elements do not fit into one texture here; expected at most "
+                f"{context.max_texture_size * WIDTH:,}; take fewer decals or a smaller tree"
             )
         self.count = len(array)
         self.texture = context.gl.texture(

@@ -21,6 +21,10 @@ BASELINE = 330
 ANISOTROPY = 8.0
 """How much longer than wide a pixel's footprint in an image may be before it blurs."""
 
+SOFTWARE_WALK = 4000
+"""Most candidates of one pixel in Mesa's software rasteriser: it ends all loops of a pixel after 65,535 turns
+together (LP_MAX_TGSI_LOOP_ITERATIONS), without a word, and every candidate may take a dozen."""
+
 
 class _Entered(threading.local):
     """The contexts whose blocks are open on this thread, the innermost last."""
@@ -38,8 +42,12 @@ def _anisotropy(gl: moderngl.Context) -> float:
     Mesa's software rasteriser filters a 2 × 2 quad along the derivatives of its first pixel, even those that
     ``textureGrad`` is given: neighbouring decals would show specks of each other's images.
     """
-    software = "llvmpipe" in gl.info["GL_RENDERER"] or "softpipe" in gl.info["GL_RENDERER"]
-    return 1.0 if software else min(ANISOTROPY, gl.max_anisotropy)
+    return 1.0 if _is_software(gl) else min(ANISOTROPY, gl.max_anisotropy)
+
+
+def _is_software(gl: moderngl.Context) -> bool:
+    """Whether Mesa draws on the processor."""
+    return "llvmpipe" in gl.info["GL_RENDERER"] or "softpipe" in gl.info["GL_RENDERER"]
 
 
 def _newest() -> moderngl.Context:
@@ -84,6 +92,7 @@ class Context:
         self._wished_entry = checked_entry(self, entry) if entry else None
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         self.anisotropy = _anisotropy(gl)
+        self.longest_walk = SOFTWARE_WALK if _is_software(gl) else None
 
     @classmethod
     def standalone(cls, *, entry: str | None = None) -> "Context":

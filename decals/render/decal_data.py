@@ -7,6 +7,7 @@ from blobtree.glsl import translate_library
 from blobtree.kernels import RIM
 from decals.contact import Contact
 from decals.editor import DecalEditor
+from decals.errors import TooMuchData
 from decals.index import DecalIndex
 from decals.mapping import tangent_coordinates
 from decals.model import Decals
@@ -39,6 +40,7 @@ class DecalData:
                 "index_table": index.table,
                 "index_ids": index.ids,
             }
+        _check_walk(context, index)
         self._textures = {name: DataTexture(context, array) for name, array in arrays.items()}
         self._describe(decals, index)
 
@@ -82,6 +84,15 @@ class DecalData:
         """Give the memory back."""
         for texture in self._textures.values():
             texture.release()
+
+
+def _check_walk(context: Context, index: DecalIndex) -> None:
+    most = context.longest_walk
+    if most is not None and len(index.ids) > most and index.longest_walk > most:
+        raise TooMuchData(
+            f"{index.longest_walk:,} decals reach the same place; expected at most {most:,} on this software "
+            "rasteriser, which would cut them off; spread them, draw on a graphics card, or use evaluate"
+        )
 
 
 @cache

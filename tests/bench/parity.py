@@ -32,13 +32,15 @@ LIMITS = {
     "owners_differ": 0,
     "not_finite": 0,
     "contact_error_rh": 2e-5,
+    "unlike_error_rh": 1e-4,
     "cut_error_rh": 7e-5 * (MEMBERS - 1),
     "uv_error": 2e-5,
 }
-"""The most that may be. Errors of r/r_h: of float32 alone, and with what neighbours beyond REACH would add,
-less than 7e-5 each; of uv, over the quotient of chord and tangent offset, which says how ill the direction
-is conditioned. Owners count where no relative change of 1e-4 decides about them, contact where no neighbour
-lies within 1e-6 of REACH."""
+"""The most that may be. Errors of r/r_h: of float32 alone among sizes to 20:1, and to 1,000:1 (unlike: radial
+contact takes the difference of the squares of sizes); with what neighbours beyond REACH would add, less than
+7e-5 each. Errors of uv: over the quotient of chord and tangent offset, which says how ill the direction is
+conditioned. Owners count where no relative change of 1e-4 decides about them, contact where no neighbour lies
+within 1e-6 of REACH and the owner's centre is no nearer than 1e-18 influence radii."""
 
 
 def members_of(world: World, device: Any) -> Any:
@@ -105,7 +107,7 @@ class Chunk:
         found = self.found(contact, mapping, once=once)
         cut = self.wanted(contact, mapping, reach=REACH)
         uncut = self.wanted(contact, mapping, reach=1.0)[1]
-        self._launch(kernels.compare_points, [*found, *cut, uncut], [counts, worst])
+        self._launch(kernels.compare_points, [self.members, *found, *cut, uncut], [counts, worst])
 
 
 def parity(contact: Contact, *, layered: bool, samples: int, device: Any, chunk: int = CHUNK) -> Figures:
@@ -121,7 +123,7 @@ def parity(contact: Contact, *, layered: bool, samples: int, device: Any, chunk:
         total += counts.numpy()
         worst = np.maximum(worst, errors.numpy())
     names = ("points", "owned", "unclear", "owners_differ", "not_finite")
-    errors_of = ("contact_error_rh", "cut_error_rh", "uv_error")
+    errors_of = ("contact_error_rh", "cut_error_rh", "uv_error", "unlike_error_rh")
     return dict(zip(names, total.tolist(), strict=True)) | dict(zip(errors_of, worst.tolist(), strict=True))
 
 

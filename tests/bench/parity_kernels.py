@@ -32,10 +32,12 @@ COUNTS = 5
 CONTACT_ERROR = wp.constant(0)
 CUT_ERROR = wp.constant(1)
 UV_ERROR = wp.constant(2)
-WORST = 3
+UNLIKE_ERROR = wp.constant(3)
+WORST = 4
 
 TIE = wp.constant(wp.float64(1e-4))
 EDGE = wp.constant(wp.float64(1e-6))
+MOST_RATIO = wp.constant(wp.float32(20.5))
 MOST_STRETCH = wp.constant(wp.float64(20.0))
 
 
@@ -193,8 +195,19 @@ def raise_to(worst: wp.array(dtype=wp.float64), which: wp.int32, value: wp.float
     return value
 
 
+@wp.func
+def largest_ratio(owner: wp.int32, these: Members) -> wp.float32:
+    """Radius of the largest decal of a set over that of one of them."""
+    first = owner - owner % these.size
+    largest = wp.float32(0.0)
+    for i in range(first, first + these.size):
+        largest = wp.max(largest, these.radii[i])
+    return largest / these.radii[owner]
+
+
 @wp.kernel
 def compare_points(
+    these: Members,
     owners: wp.array(dtype=wp.int32),
     rims: wp.array(dtype=wp.float32),
     uv: wp.array(dtype=wp.vec2),
@@ -222,7 +235,11 @@ def compare_points(
         rim = wp.float64(rims[i])
         raise_to(worst, CUT_ERROR, wp.abs(rim - wp.min(rim_of(uncut[i]), ONE)))
         if edges[i] > EDGE:
-            raise_to(worst, CONTACT_ERROR, wp.abs(rim - wp.min(rim_of(complements[i]), ONE)))
+            error = wp.abs(rim - wp.min(rim_of(complements[i]), ONE))
+            if largest_ratio(owners[i], these) <= MOST_RATIO:
+                raise_to(worst, CONTACT_ERROR, error)
+            else:
+                raise_to(worst, UNLIKE_ERROR, error)
             stretch = places[i][2]
             if stretch < MOST_STRETCH:
                 x = wp.abs(wp.float64(uv[i][0]) - places[i][0])

@@ -20,7 +20,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-WIDTH = 1024
+WIDTH = 4096
 WARM_UP = 3
 BOX_VERTICES = 36
 ENTRIES = ("fragment", "compute")

@@ -92,16 +92,16 @@ def test_what_the_shader_provides_is_only_declared() -> None:
     assert "float doubled(float x) {" not in text
 
 
-def test_arrays_become_textures_of_1024_texels_a_row() -> None:
-    assert TEXTURE_WIDTH_BITS == 10
+def test_arrays_become_textures_of_4096_texels_a_row() -> None:
+    assert TEXTURE_WIDTH_BITS == 12
     text = translate_library([glsl_samples.texel, glsl_samples.entry, glsl_samples.slot])
     assert "vec4 texel(sampler2D data, int i) {" in text
-    assert "texelFetch(data, ivec2((i + 1) & 1023, (i + 1) >> 10), 0);" in text
+    assert "texelFetch(data, ivec2((i + 1) & 4095, (i + 1) >> 12), 0);" in text
     assert "int entry(isampler2D ids, int i) {" in text
-    assert "texelFetch(ids, ivec2((2 * i) & 1023, (2 * i) >> 10), 0).x;" in text
+    assert "texelFetch(ids, ivec2((2 * i) & 4095, (2 * i) >> 12), 0).x;" in text
     assert "#define ivec4_sampler isampler2D\n" in text
     assert "int slot(ivec4_sampler table, int i) {" in text
-    assert "key = texelFetch(table, ivec2(i & 1023, i >> 10), 0);" in text
+    assert "key = texelFetch(table, ivec2(i & 4095, i >> 12), 0);" in text
 
 
 def test_words_that_glsl_reserves_are_renamed() -> None:

@@ -263,6 +263,17 @@ def test_error_on_adversarial_points(make, contact, record_property):
     assert worst <= ERROR_LIMIT
 
 
+@pytest.mark.parametrize("contact", [Contact.PAPER, Contact.SMOOTH])
+def test_concentric_decals_push_alike_at_every_distance(contact):
+    """Twice the complement is a push of nearly 1/e, down to the smallest squares that float32 holds."""
+    e = 10.0 ** np.linspace(-36.5, -1, 200)
+    rows = np.float32(np.column_stack([e, 2 * e]))
+    found = complement_of(rows, contact)
+    want = oracle.contact_complement(rows.astype(np.float64))[1]
+    assert np.abs(found - want).max() < 1e-6
+    assert found[0] == pytest.approx(0.5 / np.e, abs=1e-6)
+
+
 def test_what_lies_beyond_reach_hardly_matters():
     """The promise behind REACH, for one neighbour anywhere beyond it."""
     e_k = np.linspace(1e-6, 0.5, 2001)

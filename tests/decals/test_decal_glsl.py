@@ -15,7 +15,7 @@ from decals.mapping import Mapping, surface_offset, tangent_coordinates
 wp.set_module_options({"enable_backward": False})
 
 AGREEMENT = 1e-5
-WIDTH = 1024
+WIDTH = 4096
 
 VERTEX = """#version 330
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }

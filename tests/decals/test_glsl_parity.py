@@ -125,6 +125,7 @@ BY_NAME: dict[str, Draw] = {
     "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
     "center": place, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5), "contact": whole(0, 3),
     "decal": whole(0, DECALS),
+    "above": whole(-1, DECALS),
     "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
     "p": uniform(-1.5, 1.5, 4), "slim": uniform(0.3, 2.5), "slimmest": uniform(0.3, 2.5),
     "e_k": uniform(0.0, 0.5), "e_i": share,

@@ -6,20 +6,20 @@ import moderngl
 import numpy as np
 import pytest
 
-from decals.errors import InvalidImage
+from decals.errors import InvalidImage, TooMuchData
 from decals.render.buffers import WIDTH, DataTexture
 from decals.render.context import Context
 from decals.render.textures import ImageArray, common_size, linear_premultiplied, resized
 from implicit_decals.shaders import Source, compose
 
-SIZES = [0, 1, 1023, 1024, 1025, 1024 * 1024 + 7]
+SIZES = [0, 1, 4095, 4096, 4097, 1024 * 1024 + 7]
 
 FETCH = """
 uniform {kind} data;
 out {result} value;
 void main() {{
     int i = int(gl_FragCoord.x) + {width} * int(gl_FragCoord.y);
-    value = {result}(texelFetch(data, ivec2(i & 1023, i >> 10), 0){swizzle});
+    value = {result}(texelFetch(data, ivec2(i & 4095, i >> 12), 0){swizzle});
 }}
 """
 
@@ -68,8 +68,8 @@ def test_other_arrays_are_refused(context: Context, array: np.ndarray) -> None:
 
 def test_too_many_elements_say_how_many_fit(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(context, "max_texture_size", 2)
-    with pytest.raises(ValueError, match=r"2,049 elements do not fit .* 2,048"):
-        DataTexture(context, np.zeros(2049, np.int32))
+    with pytest.raises(TooMuchData, match=r"8,193 elements do not fit .* 8,192; take fewer decals"):
+        DataTexture(context, np.zeros(8193, np.int32))
 
 
 def decoded(level: int) -> float:

@@ -102,11 +102,11 @@ def test_every_pixel_of_every_contact_mode(renderer: Renderer, contact: Contact,
     assert compare(view, buffers, Mapping.CORRECTED, contact).any()
 
 
-@pytest.mark.slow
-def test_every_pixel_of_two_hundred_random_scenes(renderer: Renderer) -> None:
+@pytest.mark.parametrize("scenes", [18, pytest.param(200, marks=pytest.mark.slow)])
+def test_every_pixel_of_random_scenes(renderer: Renderer, scenes: int) -> None:
     """Sizes over three decades, any interaction, layer, contact and mapping, on one torus."""
     shape = torus()
-    for seed in range(200):
+    for seed in range(scenes):
         rng = np.random.default_rng(seed)
         contact, mapping = list(Contact)[seed % 3], list(Mapping)[seed // 3 % 2]
         radii = (0.001, 1.0) if seed % 4 == 0 else (0.05, 0.5)

@@ -20,14 +20,14 @@ def some(rng: np.random.Generator, count: int) -> Decals:
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 1), (5, 1024), (1000, 50), (1023, 1), (1024, 3000), (0, 5000)]
+    ("first", "count"), [(0, 1), (5, 4096), (4000, 150), (4095, 1), (4096, 9000), (0, 15000)]
 )
 @pytest.mark.parametrize("row", [(), (4,)])
 def test_writing_changes_these_elements_alone(
     context: Context, first: int, count: int, row: tuple[int, ...]
 ) -> None:
-    array = np.arange(5000 * 4, dtype=np.int32).reshape(5000, 4)[:, 0] if row == () else None
-    array = np.arange(5000 * 4, dtype=np.int32).reshape(5000, 4) if array is None else array.copy()
+    array = np.arange(15000 * 4, dtype=np.int32).reshape(15000, 4)[:, 0] if row == () else None
+    array = np.arange(15000 * 4, dtype=np.int32).reshape(15000, 4) if array is None else array.copy()
     texture = DataTexture(context, array)
     array[first : first + count] *= -3
     texture.write(first, array[first : first + count])

@@ -27,6 +27,7 @@ FACING_LIMIT = wp.constant(wp.float64(-0.25))
 KEPT_LEAST = wp.constant(wp.float64(0.21))
 TINY = wp.constant(wp.float64(1e-300))
 NEARLY = wp.constant(wp.float64(1e-3))
+UNDERFLOW = wp.constant(wp.float64(1e-36))
 FLAT = wp.constant(wp.float64(1e-4))
 CONTACT = wp.constant(1)
 SMOOTH = wp.constant(1)
@@ -48,7 +49,10 @@ class Members:
 
 @wp.struct
 class Answer:
-    """Owner or −1; E = 1 − F; doubt: smallest relative change that changes the owner; edge: that of a cut."""
+    """Owner or −1; E = 1 − F; doubt: smallest relative change that changes the owner; edge: that of a cut.
+
+    edge is 0 nearer to a centre than 1e-18 influence radii, where squares leave the range of float32.
+    """
 
     owner: wp.int32
     complement: wp.float64
@@ -143,6 +147,8 @@ def sheet(
             if squared < least:
                 owner = i
             least = wp.min(least, squared)
+    if least < UNDERFLOW:
+        edge = wp.float64(0.0)
     own = complement(least)
     kept = wp.float64(1.0)
     for i in range(first, first + these.size):
