@@ -106,7 +106,10 @@ def _kernels(module_name: str) -> dict[str, tuple[wp.Kernel, TypedFunction]]:
     return {function.name: (getattr(made, f"run_{function.name}"), function) for function in functions}
 
 
-_HEAD = 'import warp as wp\n\nwp.set_module_options({"enable_backward": False})\n'
+_HEAD = (
+    "import warp as wp\n\nfrom blobtree.kernel_options import KERNEL_OPTIONS\n\n"
+    "wp.set_module_options(KERNEL_OPTIONS)\n"
+)
 
 
 def _kernel_source(module_name: str, typed: TypedFunction) -> str:
