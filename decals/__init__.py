@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from .mesh_surface import MeshSurface
     from .model import Decals, Interaction
     from .orientation import Orientation
+    from .painted_image import PaintedImage
+    from .projections import Cylindrical, Planar, Spherical, TextureCoordinates
     from .relaxation import Relaxation
     from .scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
     from .scene_file import load_scene, save_scene
@@ -46,6 +48,7 @@ __all__ = [
     "BUILTIN_IMAGES",
     "Camera",
     "Contact",
+    "Cylindrical",
     "DecalEditor",
     "DecalImage",
     "DecalIndex",
@@ -65,11 +68,15 @@ __all__ = [
     "MeshSurface",
     "NoGraphics",
     "Orientation",
+    "PaintedImage",
+    "Planar",
     "Relaxation",
     "Samples",
     "Scene",
     "Sizing",
+    "Spherical",
     "Surface",
+    "TextureCoordinates",
     "TooMuchData",
     "TreeObject",
     "bounds_of",
@@ -112,6 +119,8 @@ _HOMES = {
     "mesh_surface": ("MeshSurface",),
     "model": ("Decals", "Interaction"),
     "orientation": ("Orientation",),
+    "painted_image": ("PaintedImage",),
+    "projections": ("Cylindrical", "Planar", "Spherical", "TextureCoordinates"),
     "relaxation": ("Relaxation",),
     "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
     "scene_file": ("load_scene", "save_scene"),

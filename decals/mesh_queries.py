@@ -39,6 +39,24 @@ def closest_points(
 
 
 @wp.kernel
+def closest_faces(
+    first: wp.int32,
+    mesh: wp.uint64,
+    center: wp.vec3,
+    radius: wp.float32,
+    points: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.int32),
+    weights: wp.array(dtype=wp.vec2),
+) -> None:
+    """Face that holds the closest point of the mesh, and the weights of its first two corners there."""
+    i = first + wp.tid()
+    query = wp.mesh_query_point_no_sign(mesh, points[i], 1.01 * (wp.length(points[i] - center) + radius))
+    if query.result:
+        faces[i] = query.face
+        weights[i] = wp.vec2(query.u, query.v)
+
+
+@wp.kernel
 def first_hits(
     first: wp.int32,
     mesh: wp.uint64,

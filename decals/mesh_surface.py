@@ -49,8 +49,8 @@ class MeshSurface:
         self.device = device
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
-        corners, normals, areas = _sound_faces(self.vertices, self.faces)
-        self._corners = corners
+        self.sound, normals, areas = _sound_faces(self.vertices, self.faces)
+        self._corners = corners = np.ascontiguousarray(self.faces[self.sound])
         self._cumulative = np.cumsum(areas)
         self._normals = normals
         used = self.vertices[corners]
@@ -173,8 +173,8 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Faces:
     return np.array(given, dtype=np.int32, order="C")
 
 
-def _sound_faces(vertices: Floats, faces: Faces) -> tuple[Faces, Floats, NDArray[np.float64]]:
-    """Select the faces that have a normal, with unit normals and areas."""
+def _sound_faces(vertices: Floats, faces: Faces) -> tuple[NDArray[np.int64], Floats, NDArray[np.float64]]:
+    """Rows of the faces that have a normal, with unit normals and areas."""
     a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
     crosses = np.cross(b - a, c - a)
     doubled = np.linalg.norm(crosses, axis=1)
@@ -185,7 +185,7 @@ def _sound_faces(vertices: Floats, faces: Faces) -> tuple[Faces, Floats, NDArray
             f"expected a mesh with area, got {len(faces)} degenerate faces; check its units and its indices"
         )
     normals = (crosses[sound] / doubled[sound, None]).astype(np.float32)
-    return np.ascontiguousarray(faces[sound]), normals, 0.5 * doubled[sound]
+    return np.flatnonzero(sound), normals, 0.5 * doubled[sound]
 
 
 def _is_closed(vertices: Floats, faces: Faces) -> bool:

@@ -23,8 +23,8 @@ ROUNDS = 12
 CHOICE = 8
 """Samples from which one is chosen where density varies."""
 
-EDGE = 1.5
-"""A change of density by this factor within less than a spacing is an edge, which nobody crosses."""
+EDGE = 1.3
+"""Particles stay within this factor of the density at which they began."""
 
 CURVE_BITS = 16
 """Bits of each coordinate along the space-filling curve (Morton's)."""
@@ -185,7 +185,7 @@ class World:
 
 
 def crosses_edge(before: Floats, after: Floats) -> Flags:
-    """Whether spacings differ so much that there is an edge of the density between."""
+    """Whether spacings are too different for a particle to go from the one to the other."""
     crossed: Flags = np.abs(np.log(after / before)) > 0.5 * np.log(EDGE)
     return crossed
 

@@ -41,8 +41,8 @@ def crowded(crowd: Crowd) -> NDArray[np.int64]:
     return rows[alone][:most]
 
 
-def refill(crowd: Crowd, movers: NDArray[np.int64], scouts: Sites, scout_sizes: Floats) -> None:
-    """Move particles to the barest scouts, each within its own surface.
+def refill(crowd: Crowd, movers: NDArray[np.int64], scouts: Sites, scout_sizes: Floats) -> NDArray[np.int64]:
+    """Move particles to the barest scouts, each within its own surface; who went comes back.
 
     Repulsion only acts nearby: it carries no particle to another component, round a sharp tip, or past
     its neighbours. Counts per surface stay as they are. `scout_sizes` are the spacings wished for there.
@@ -62,7 +62,9 @@ def refill(crowd: Crowd, movers: NDArray[np.int64], scouts: Sites, scout_sizes: 
         pairs = min(len(own), len(free))
         moved += own[:pairs]
         filled += free[:pairs]
-    crowd.place(np.array(moved, np.int64), scouts.positions[filled], scouts.normals[filled])
+    rows = np.array(moved, np.int64)
+    crowd.place(rows, scouts.positions[filled], scouts.normals[filled])
+    return rows
 
 
 def _bareness(crowd: Crowd, scouts: Sites, sizes: Floats) -> Floats:

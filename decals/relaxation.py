@@ -9,11 +9,12 @@ from blobtree.progress import Progress
 from decals.crowd import Crowd
 from decals.errors import InvalidSeeding
 from decals.evenness import Spacing, evenness, ideal_spacing
+from decals.homes import Homes
 from decals.local_relaxation import relax_near
 from decals.looking import Lookout
 from decals.neighbours import FacingTree
 from decals.polishing import CLOSE, polish
-from decals.population import Density, Mask, Sites, World, crosses_edge, shares
+from decals.population import Density, Mask, Sites, World, shares
 from decals.refilling import crowded, refill
 from decals.repulsion import CUTOFF, Law
 from decals.scouting import Scouts
@@ -114,7 +115,7 @@ class Relaxation:
         first, last, step = (int(part * iterations) for part in REFILLS)
         self._refills = set(range(max(first, 1), last + 1, max(step, RARELY)))
         self._crowd: Crowd | None = None
-        self._resting: Sites | None = None
+        self._homes = Homes(self.sizes_at)
         self._scouts = Scouts(self.world, self.sizes_at)
 
     @property
@@ -219,9 +220,10 @@ class Relaxation:
         """Part the pairs that are still closer than so many spacings by trial, as long as that helps."""
         if self.count > 1:
             crowd = self._on_device()
-            self._take_back(crowd)
+            self._call_home(crowd)
             polish(crowd, rounds=rounds, seed=self._seed, close=close, sizes_at=self.sizes_at)
-            self._sites = self._resting = None
+            self._homes.change(crowd, np.arange(self.count))
+            self._sites = None
 
     def insert(self, point: ArrayLike, *, fixed: bool = False) -> int:
         """Add a particle near the point and relax those around it; its number comes back.
@@ -263,7 +265,7 @@ class Relaxation:
             sizes = self.sizes_at(sites.positions)
             law = Law(EXPONENTS[1], STIFFNESS)
             sites = relax_near(self.world, sites, ~self._fixed, sizes, place, law=law)
-        self._sites, self._crowd, self._resting = sites, None, None
+        self._sites, self._crowd, self._homes = sites, None, Homes(self.sizes_at)
 
     def statistics(self) -> Spacing:
         """How evenly the particles lie now."""
@@ -287,9 +289,9 @@ class Relaxation:
         crowd = self._on_device()
         movers = crowded(crowd)
         if len(movers):
-            self._take_back(crowd)
-            refill(crowd, movers, *self._scouts.some(len(movers), self.count))
-            self._resting = None
+            self._call_home(crowd)
+            moved = refill(crowd, movers, *self._scouts.some(len(movers), self.count))
+            self._homes.change(crowd, moved)
 
     def _push(self) -> None:
         """Move every particle; those that would leave their side or get hidden stay."""
@@ -297,26 +299,15 @@ class Relaxation:
         if crowd.stale:
             part = min(self.steps / self.iterations, 1.0)
             exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
-            self._take_back(crowd)
+            self._call_home(crowd)
             crowd.begin(Law(exponent, STIFFNESS * float(np.interp(part, HARDENING, (0.0, 1.0)))))
         crowd.step()
         self._sites = None
 
-    def _take_back(self, crowd: Crowd) -> None:
-        """Put those who crossed an edge of the density back to where they began; take the spacings anew.
-
-        Nothing else holds them: pressures are the same on both sides, but not at an edge, where the coarse
-        side would gain half a row.
-        """
-        if self.world.uniform:
-            return
-        sizes = self.sizes_at(crowd.positions.numpy())
-        if self._resting is not None:
-            crossed = np.flatnonzero(crosses_edge(crowd.host_sizes, sizes))
-            crowd.place(crossed, self._resting.positions[crossed], self._resting.normals[crossed])
-            sizes[crossed] = crowd.host_sizes[crossed]
-        crowd.resize(sizes)
-        self._resting = crowd.sites()
+    def _call_home(self, crowd: Crowd) -> None:
+        """Where density varies: nobody stays at another one, and spacings are taken anew."""
+        if not self.world.uniform:
+            self._homes.call(crowd)
 
     def _on_device(self) -> Crowd:
         """The particles in the device's memory."""
