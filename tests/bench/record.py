@@ -19,6 +19,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.contact import Contact
 from decals.render import entry
 from decals.render.context import Context
 from decals.render.entry import Entry
@@ -33,7 +34,7 @@ TARGETS = ("g_position", "g_normal", "g_color", "g_paint")
 """Textures that the picture itself fills."""
 
 
-def record(scene: Scene, size: tuple[int, int], path: Path) -> None:
+def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact = Contact.PAPER) -> None:
     """Write what a picture draws: a scene of meshes, one sample a pixel, in one tile."""
     arrays: Arrays = {}
     passes: dict[str, dict[str, Any]] = {}
@@ -46,9 +47,9 @@ def record(scene: Scene, size: tuple[int, int], path: Path) -> None:
             Renderer(context) as renderer,
             _listening(arrays, passes.setdefault(point, {})),
         ):
-            renderer.render(scene, size=size, samples=1)
+            renderer.render(scene, size=size, samples=1, contact=contact)
     texts = {name: compose(name).text for name in ("mesh.vert", "mesh.frag", "screen.vert")}
-    settings = {"size": size, "texts": texts, "passes": passes}
+    settings = {"size": size, "texts": texts, "passes": passes, "layered": scene.decals.layered}
     np.savez_compressed(path, settings=np.array(json.dumps(settings)), **arrays)  # type: ignore[arg-type]
 
 
@@ -118,18 +119,23 @@ def _texture(texture: Any, name: str, arrays: Arrays) -> dict[str, Any]:
 
 def main() -> None:
     """Read the command line, make the scene and record it."""
-    from tests.bench.scenes import bench_scene
+    from tests.bench.scenes import bench_scene, in_layers
 
     parser = argparse.ArgumentParser(prog="python -m tests.bench.record", description=__doc__)
     parser.add_argument("model", help="dragon, horse or knot")
     parser.add_argument("--decals", type=int, default=10_000)
     parser.add_argument("--seeded", action="store_true", help="decals.seed, in place of a quick even coat")
+    parser.add_argument("--contact", choices=[mode.name.lower() for mode in Contact], default="paper")
+    parser.add_argument("--layered", action="store_true", help="decals of all interactions in three layers")
     parser.add_argument("--size", default="1600x1200")
     parser.add_argument("path", type=Path)
     options = parser.parse_args()
     width, height = (int(part) for part in options.size.split("x"))
     size = width, height
-    record(bench_scene(options.model, options.decals, size, seeded=options.seeded), size, options.path)
+    scene = bench_scene(options.model, options.decals, size, seeded=options.seeded)
+    if options.layered:
+        scene = scene.replace(decals=in_layers(scene.decals))
+    record(scene, size, options.path, contact=Contact[options.contact.upper()])
 
 
 if __name__ == "__main__":

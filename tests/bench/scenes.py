@@ -1,6 +1,9 @@
 """Scenes for measurements: a model under even decals, which cover it equally often at any count."""
 
+import numpy as np
+
 from decals.camera import Camera
+from decals.model import Decals
 from decals.scene import DecalImage, Scene
 from decals.seeding import seed
 from implicit_decals.apps.coats import even_coat
@@ -23,3 +26,10 @@ def bench_scene(
         decals=seed(item.surface, count=count) if seeded else even_coat(item.surface, count=count),
         images=(DecalImage.load(image),),
     )
+
+
+def in_layers(decals: Decals) -> Decals:
+    """Give decals any interaction, in three layers."""
+    rng = np.random.default_rng(0)
+    count = len(decals)
+    return decals.replace(interactions=rng.integers(0, 3, count), layers=rng.integers(-1, 2, count))
