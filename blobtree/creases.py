@@ -49,7 +49,8 @@ def _cells(surface: Surface) -> Any:
     """What kernels need to know of a surface's cells."""
     cells: Any = Cells()
     leaves, grid = surface.cells.leaves, surface.cells.grid
-    cells.blocks, cells.spans, cells.tape = leaves.blocks, leaves.spans, leaves.tape
+    cells.blocks, cells.keys = leaves.blocks, leaves.keys
+    cells.spans, cells.tape = leaves.spans, leaves.tape
     cells.base, cells.corner = wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner)
     cells.cell = grid.cell_size
     cells.whole = surface.cells.tape.on(surface.cells.device).data

@@ -44,6 +44,7 @@ class Cells:
     """The cells of a surface: blocks with their pruned tapes, and the whole tape for what lies in none."""
 
     blocks: wp.array(dtype=wp.vec3i)
+    keys: wp.array(dtype=wp.int64)
     spans: wp.array(dtype=wp.vec2i)
     tape: wp.array(dtype=wp.vec4)
     base: wp.vec3i
@@ -75,7 +76,7 @@ def block_at(p: wp.vec3, cells: Cells) -> wp.int32:
     """The block that p lies in, −1 where there is none."""
     place = (p - cells.corner) / (cells.cell * float(BRANCHING))
     block = wp.vec3i(int(wp.floor(place[0])), int(wp.floor(place[1])), int(wp.floor(place[2])))
-    return find_block(block - cells.base, cells.blocks)
+    return find_block(block - cells.base, cells.keys)
 
 
 @wp.func
