@@ -16,6 +16,7 @@ EXAMPLES = (
     "contact_modes",
     "size_ratio",
     "mapping_modes",
+    "own_nodes",
 )
 """Names of the examples."""
 
