@@ -23,6 +23,14 @@ implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json 
 
 implicit-decals render dragon.json --size 2400x1800 -o large.png
 """,
+    "view": """Open models or a scene in a window, and push decals by hand.
+
+For instance:
+
+implicit-decals view knot --decals 300 --image scale --image eye --save knot.json
+
+implicit-decals view knot.json
+""",
     "seed": """Spread seeds over models and write the decals that lie on them.
 
 Several models keep their own coordinates; where they touch, seeds push each other.

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .camera import Camera
     from .contact import Contact
     from .cover import cover
+    from .edit import EditSession
     from .editor import DecalEditor
     from .errors import (
         DecalsError,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from .sizing import Sizing
     from .surface import Surface
     from .vertex_density import vertex_density
+    from .window import EditWindow, view
 
 __all__ = [
     "BUILTIN_IMAGES",
@@ -54,6 +56,8 @@ __all__ = [
     "DecalIndex",
     "Decals",
     "DecalsError",
+    "EditSession",
+    "EditWindow",
     "ImplicitSurface",
     "Interaction",
     "InvalidDecals",
@@ -90,12 +94,14 @@ __all__ = [
     "save_scene",
     "seed",
     "vertex_density",
+    "view",
 ]
 
 _HOMES = {
     "camera": ("Camera",),
     "contact": ("Contact",),
     "cover": ("cover",),
+    "edit": ("EditSession",),
     "editor": ("DecalEditor",),
     "errors": (
         "DecalsError",
@@ -128,6 +134,7 @@ _HOMES = {
     "sizing": ("Sizing",),
     "surface": ("Surface",),
     "vertex_density": ("vertex_density",),
+    "window": ("EditWindow", "view"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
+from decals.camera import Camera
 from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
 from decals.edit.jobs import Job
 from decals.edit.keys import BINDINGS, CAMERA
@@ -55,6 +56,8 @@ class Actions:
         Whether the help is wanted.
     grip
         Object and path of the primitive that is held, if any.
+    camera
+        Gives the camera to save with the scene; None for the document's.
     """
 
     def __init__(
@@ -69,6 +72,7 @@ class Actions:
         self.message = ""
         self.help = False
         self.grip: tuple[int, Path] | None = None
+        self.camera: Callable[[], Camera | None] = lambda: None
         self._run = run or self._do_at_once
         self._coats = 0
         self._series: tuple[str, object] | None = None
@@ -290,7 +294,7 @@ class Actions:
     def _save(self, _cursor: Cursor) -> None:
         if self.path is None:
             raise InvalidEdit("nowhere to save to; name a file when you open the window")
-        self.session.save(self.path)
+        self.session.save(self.path, camera=self.camera())
         self.message = f"saved to {self.path}"
 
     def _help(self, _cursor: Cursor) -> None:

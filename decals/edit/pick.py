@@ -63,6 +63,23 @@ def outline(document: Document, number: int, *, contact: Contact = Contact.PAPER
     return np.concatenate([line, line[:1]])
 
 
+def rims(document: Document, numbers: ArrayLike) -> Floats:
+    """Undisturbed rims of decals, laid onto the surfaces, ``float32[n, ANGLES / 2 + 1, 3]``, closed."""
+    decals = document.decals.take(numbers)
+    if not len(decals):
+        return np.zeros((0, ANGLES // 2 + 1, 3), np.float32)
+    turn = np.linspace(0.0, 2.0 * np.pi, ANGLES // 2 + 1)
+    around = [
+        np.cos(turn)[None, :, None] * decals.tangents[:, None, :],
+        np.sin(turn)[None, :, None] * decals.bitangents[:, None, :],
+    ]
+    points = decals.positions[:, None] + decals.radii[:, None, None] * (around[0] + around[1])
+    found = nearest(document.objects, points.reshape(-1, 3))
+    lifts = LIFT * np.repeat(decals.radii, len(turn))[:, None]
+    lines: Floats = (found.positions + lifts * found.normals).astype(np.float32)
+    return lines.reshape(points.shape)
+
+
 def _owned(
     document: Document, number: int, center: Doubles, ways: Doubles, shares: Doubles, contact: Contact
 ) -> Doubles:

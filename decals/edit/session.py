@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from decals.camera import Camera
 from decals.edit.change import Change
 from decals.edit.document import Document
 from decals.scene import Scene
@@ -154,8 +155,8 @@ class EditSession:
     def _last(self) -> Done | None:
         return self._done[-1] if self._done else None
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the scene to a file, whole or not at all (`decals.save_scene`)."""
+    def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
+        """Write the scene to a file, whole or not at all (`decals.save_scene`), with a camera if given."""
         self.end()
-        save_scene(self.document.scene, path)
+        save_scene(self.document.scene.replace(camera=camera), path)
         self._saved = self._last

@@ -18,8 +18,10 @@ from decals.camera import Camera
 from decals.errors import NoGraphics
 from decals.scene import Scene, TreeObject
 from decals.scene_file import save_scene
+from decals.window import EditWindow
 from implicit_decals.apps import demo as demo_module
 from implicit_decals.apps import render as render_module
+from implicit_decals.apps import view as view_module
 from implicit_decals.apps.cli import run
 
 Capture = pytest.CaptureFixture[str]
@@ -392,3 +394,57 @@ def test_files_are_replaced_not_left_half(folder: Path, monkeypatch: pytest.Monk
     assert run([*_small("knot"), "-o", "a.png"]) == 2
     assert (folder / "a.png").read_bytes() == b"old"
     assert [path.name for path in folder.iterdir()] == ["a.png"]
+
+
+# -- the window ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[EditWindow]:
+    """Windows that `view` opens, without a screen and closed at once."""
+    opened: list[EditWindow] = []
+
+    class Window(EditWindow):
+        def __init__(self, *arguments: object, **options: object) -> None:
+            super().__init__(*arguments, **options, off_screen=True)
+            opened.append(self)
+
+        @staticmethod
+        def require_screen() -> None:
+            pass
+
+    monkeypatch.setattr(view_module, "EditWindow", Window)
+    return opened
+
+
+def test_view_opens_models_and_scenes(folder: Path, windows: list[EditWindow]) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    arguments = ["view", "ball.json", "--decals", "20", "--size", "80x60", "--save", "scene.json"]
+    assert run(arguments) == 0
+    assert len(windows[0].document.decals) == 20
+    assert windows[0].actions.path == Path("scene.json")
+    save_scene(windows[0].document.scene, folder / "scene.json")
+    assert run(["view", "scene.json", "--size", "80x60"]) == 0
+    assert len(windows[1].document.decals) == 20
+    assert windows[1].actions.path == Path("scene.json")
+
+
+def test_view_says_what_is_wrong(folder: Path, windows: list[EditWindow], capsys: Capture) -> None:
+    save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "scene.json")
+    for wrong, message in (
+        (["view", "scene.json", "--decals", "3"], "brings its own decals"),
+        (["view", "nothing.ply"], "nothing.ply"),
+        (["view", "scene.json", "--size", "0x3"], "--size"),
+        (["view", "scene.json", "--save", "scene.png"], "scene.png"),
+    ):
+        assert run(wrong) == 2
+        assert message in capsys.readouterr().err
+    assert windows == []
+
+
+def test_view_wants_a_screen(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert run(["view", "knot"]) == 2
+    assert "DISPLAY" in capsys.readouterr().err

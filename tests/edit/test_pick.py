@@ -7,7 +7,7 @@ from blobtree import Point
 from decals.camera import Camera
 from decals.edit import EditSession
 from decals.edit.document import Document
-from decals.edit.pick import LIFT, outline, pick
+from decals.edit.pick import LIFT, outline, pick, rims
 from decals.evaluate import evaluate
 from decals.model import Interaction
 from decals.render.renderer import Renderer
@@ -66,3 +66,12 @@ def test_who_does_not_show_has_an_undisturbed_rim():
     cover = one((0, 0, 0), 1.0, layers=[1], interactions=[Interaction.OVERLAP])
     line = outline(flat(one((0, 0, 0), 0.5), cover), 0)
     np.testing.assert_allclose(np.linalg.norm(line, axis=1), 0.5, rtol=0.02)
+
+
+def test_rims_of_many_at_once():
+    document = flat(one((0, 0, 0), 0.5), one((0.6, 0, 0), 0.25))
+    lines = rims(document, [1, 0])
+    np.testing.assert_allclose(np.linalg.norm(lines[0] - (0.6, 0, 0), axis=1), 0.25, rtol=0.02)
+    np.testing.assert_allclose(np.linalg.norm(lines[1], axis=1), 0.5, rtol=0.02)
+    np.testing.assert_allclose(lines[:, 0], lines[:, -1], atol=1e-6)
+    assert rims(document, []).shape[0] == 0

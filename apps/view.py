@@ -1,0 +1,74 @@
+"""``implicit-decals view``: open a window in which decals are pushed by hand."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from decals.scene import Scene
+from decals.window import EditWindow
+
+from .errors import UsageError
+from .models import load_models
+from .options import MAX_DECALS, MAX_SEED, OptionalWhole, check_count, parse_size
+from .output import check_output
+from .progress_bars import progress_bars
+from .render import Coat
+from .samples import axes_of
+from .views import UPRIGHT, parse_view
+from .warp_start import start_warp
+
+
+def view(
+    model: Annotated[list[str], Parameter(negative=())],
+    /,
+    *,
+    decals: OptionalWhole = None,
+    image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
+    up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
+    size: str = "1200x800",
+    seed: OptionalWhole = None,
+    save: Path | None = None,
+) -> None:
+    """Open models or a scene in a window, and push decals by hand.
+
+    Press h in the window for all that can be done.
+
+    Parameters
+    ----------
+    model
+        As for render: mesh files, BlobTrees in JSON, samples, or one saved scene.
+    decals
+        How many decals there are at first. Default: 500.
+    image
+        What is on them, as for render; keys change between several. Default: scale.
+    up
+        The axis that points upward. Default: y, or what suits the sample.
+    size
+        Width and height of the window in pixels.
+    seed
+        The same number gives the same decals. Default: 0.
+    save
+        The JSON file that Ctrl + S writes. Default: the scene that was opened.
+    """
+    pixels = parse_size(size)
+    if decals is not None:
+        check_count("--decals", decals, 0, MAX_DECALS)
+    if seed is not None:
+        check_count("--seed", seed, 0, MAX_SEED)
+    if save is not None:
+        check_output(save, (".json",))
+    EditWindow.require_screen()
+    start_warp()
+    loaded, path = load_models(model), save
+    if isinstance(loaded, Scene):
+        if decals is not None or image or seed is not None:
+            raise UsageError("a saved scene brings its own decals; leave out --decals, --image and --seed")
+        scene, path = loaded, path or Path(model[0])
+    else:
+        with progress_bars() as progress:
+            coat = Coat.asked(decals, image, seed)
+            where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
+            scene = coat.scene(loaded, where, pixels, progress)
+    with EditWindow(scene, path=path, size=pixels) as window:
+        window.show()

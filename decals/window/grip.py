@@ -1,0 +1,109 @@
+"""A handle in the window that moves a primitive of a tree."""
+
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from decals.edit.actions import Actions
+from decals.surface import Floats
+
+SIZE = 0.03
+"""Radius of the handle, in diagonals of the scene."""
+
+COLOR = (0.2, 0.6, 1.0)
+
+
+class Grip:
+    """A ball in the middle of the primitive that is held; dragging it drags the primitive.
+
+    Parameters
+    ----------
+    plotter
+        Where.
+    actions
+        Know what is held, and move it.
+    redraw
+        Called after every step, and with True at the end.
+    """
+
+    def __init__(self, plotter: pv.BasePlotter, actions: Actions, redraw: Callable[[bool], None]) -> None:
+        self._plotter: Any
+        self._plotter, self._actions, self._redraw = plotter, actions, redraw
+        self._widget: Any = None
+        self._held: Any = None
+        self._start: Floats = np.zeros(3, np.float32)
+        self._moving = False
+
+    def update(self) -> None:
+        """Show the handle where the held primitive is now, or none."""
+        if self._moving:
+            return
+        if self._actions.grip != self._held or self._actions.grip is None:
+            self.release()
+        if self._actions.grip is None:
+            return
+        center = self._actions.grip_center
+        if self._widget is None:
+            self._widget, self._held = self._make(center), self._actions.grip
+        self._widget.SetCenter(*center.tolist())
+
+    def _make(self, center: Floats) -> Any:
+        low, high = self._actions.session.document.scene.bounds
+        widget = self._plotter.add_sphere_widget(
+            lambda _center: None,
+            center=tuple(center.tolist()),
+            radius=SIZE * float(np.linalg.norm(high - low)),
+            color=COLOR,
+            test_callback=False,
+        )
+        me = weakref.ref(self)
+        for event, name in (
+            ("StartInteractionEvent", "begin"),
+            ("InteractionEvent", "move"),
+            ("EndInteractionEvent", "end"),
+        ):
+            widget.AddObserver(event, _calling(me, name))
+        return widget
+
+    def begin(self) -> None:
+        """The handle was taken."""
+        self._moving, self._start = True, np.array(self._widget.GetCenter())
+        self._actions.begin_grip()
+
+    def move(self) -> None:
+        """The handle is somewhere else."""
+        self._actions.move_grip(np.array(self._widget.GetCenter()) - self._start)
+        self._redraw(False)
+
+    def end(self) -> None:
+        """The handle was let go."""
+        self._actions.settle()
+        self._moving = False
+        self.update()
+        self._redraw(True)
+
+    @property
+    def widget(self) -> Any:
+        """VTK's widget, None while nothing is held."""
+        return self._widget
+
+    def release(self) -> None:
+        """Take the handle away."""
+        if self._widget is not None:
+            self._plotter.clear_sphere_widgets()
+            self._widget.RemoveAllObservers()
+            self._widget = self._held = None
+
+
+def _calling(me: "weakref.ref[Grip]", name: str) -> Any:
+    """An observer that does not keep the grip alive."""
+
+    def call(_widget: Any, _event: str) -> None:
+        grip = me()
+        if grip is not None:
+            getattr(grip, name)()
+
+    return call

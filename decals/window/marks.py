@@ -1,0 +1,95 @@
+"""What the window shows besides the scene: outlines of what is selected, a line of text, and the help."""
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from decals.contact import Contact
+from decals.edit.document import Document
+from decals.edit.keys import help_lines
+from decals.edit.pick import outline, rims
+from decals.surface import Floats
+
+MOST = 64
+"""Of the selected decals that are outlined; the last one by what is seen of it, others by their rims."""
+
+COLOR = (1.0, 0.75, 0.1)
+WIDTH = 3
+PAPER = 0.85
+"""Opacity of what lies behind text."""
+
+
+class Marks:
+    """Outlines, status and help in a plotter."""
+
+    def __init__(self, plotter: pv.BasePlotter) -> None:
+        self._lines = pv.PolyData()
+        self._actor = plotter.add_mesh(
+            pv.Line((0, 0, 0), (0, 0, 0)),
+            color=COLOR,
+            line_width=WIDTH,
+            lighting=False,
+            pickable=False,
+            reset_camera=False,
+            render=False,
+            name="decals-selection",
+        )
+        self._actor.mapper.dataset = self._lines
+        self._actor.use_bounds = False
+        self._status: Any = plotter.add_text(
+            "", position=(12, 10), font_size=9, color="black", render=False, name="decals-status"
+        )
+        self._help: Any = plotter.add_text(
+            "\n".join(help_lines()),
+            position=(12, 40),
+            font_size=8,
+            color="black",
+            font="courier",
+            render=False,
+            name="decals-help",
+        )
+        for text in (self._status, self._help):
+            text.prop.SetBackgroundColor(1.0, 1.0, 1.0)
+            text.prop.SetBackgroundOpacity(PAPER)
+        self._help.SetVisibility(False)
+
+    def outline(self, document: Document, numbers: tuple[int, ...], contact: Contact) -> None:
+        """Outline decals; the last one exactly."""
+        chosen = numbers[-MOST:]
+        lines = [outline(document, chosen[-1], contact=contact)] if chosen else []
+        lines += list(rims(document, np.array(chosen[:-1], np.int64)))
+        self._lines.copy_from(_polylines(lines))
+        self._actor.SetVisibility(bool(lines))
+
+    def say(self, text: str) -> None:
+        """Show a line of text at the bottom."""
+        self._status.SetInput(text)
+
+    def show_help(self, shown: bool) -> None:
+        """Show the help, or hide it."""
+        self._help.SetVisibility(shown)
+
+    @property
+    def status(self) -> str:
+        """The line of text at the bottom."""
+        return str(self._status.GetInput())
+
+    @property
+    def help_shown(self) -> bool:
+        """Whether the help is to be seen."""
+        return bool(self._help.GetVisibility())
+
+    @property
+    def lines(self) -> pv.PolyData:
+        """The outlines, as they are drawn."""
+        return self._lines
+
+
+def _polylines(lines: list[Floats]) -> pv.PolyData:
+    if not lines:
+        return pv.PolyData()
+    counts = [len(line) for line in lines]
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    cells = [np.concatenate([[n], start + np.arange(n)]) for n, start in zip(counts, starts, strict=True)]
+    return pv.PolyData(np.concatenate(lines), lines=np.concatenate(cells))

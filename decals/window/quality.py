@@ -1,0 +1,66 @@
+"""How large to draw while things move, chosen from how long frames took."""
+
+TARGET = 0.08
+"""Seconds that a frame may take while things move."""
+
+SCALES = (1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125)
+"""Sizes to draw at, relative to the window's; few, because a new size wants new targets."""
+
+ROOM = 0.7
+"""A larger size is taken where it is expected to need less than this part of the time."""
+
+PIXELS_PART = 0.8
+"""Part of a frame's time that is taken to grow with the number of its pixels, until two sizes were seen."""
+
+
+class Quality:
+    """Chooses the size of frames while things move; at rest frames are whole.
+
+    A frame takes some time whatever its size, and some for each pixel. Both are estimated from the last
+    frames of two sizes.
+
+    Parameters
+    ----------
+    target
+        Seconds that a frame may take.
+    """
+
+    def __init__(self, target: float = TARGET) -> None:
+        self.target = target
+        self._seconds: dict[float, float] = {}
+        self._scale: float | None = None
+
+    def saw(self, scale: float, seconds: float) -> None:
+        """Take note of a frame, of so many times the window's size along each axis."""
+        self._seconds.pop(scale, None)
+        self._seconds[scale] = seconds
+        self._scale = self._choose()
+
+    @property
+    def scale(self) -> float:
+        """Size for the next frame of something that moves."""
+        return 1.0 if self._scale is None else self._scale
+
+    def expected(self, scale: float) -> float:
+        """Seconds that a frame of some size should take."""
+        fixed, each = self._model() if self._seconds else (0.0, 0.0)
+        return fixed + each * scale**2
+
+    def _model(self) -> tuple[float, float]:
+        """Seconds for any frame, and for one of the window's size besides."""
+        latest = list(self._seconds.items())[-2:]
+        if len(latest) < 2:
+            ((scale, seconds),) = latest
+            return (1.0 - PIXELS_PART) * seconds, PIXELS_PART * seconds / scale**2
+        (a, slow), (b, fast) = sorted(latest, reverse=True)
+        each = max((slow - fast) / (a**2 - b**2), 0.0)
+        return max(fast - each * b**2, 0.0), each
+
+    def _choose(self) -> float:
+        """The largest size that should be done in time; larger than now only with room to spare."""
+        now = 0.0 if self._scale is None else self._scale
+        for scale in SCALES:
+            limit = self.target * (ROOM if scale > now and now else 1.0)
+            if self.expected(scale) <= limit:
+                return scale
+        return SCALES[-1]

@@ -1,0 +1,266 @@
+"""A window in which decals are pushed by hand."""
+
+import os
+import sys
+import time
+import weakref
+from typing import Any
+
+import pyvista as pv
+
+import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
+from decals.camera import Camera
+from decals.edit.actions import Actions
+from decals.edit.change import Change
+from decals.edit.jobs import Job, Worker
+from decals.edit.session import EditSession
+from decals.edit.tools import Ray, Tools
+from decals.errors import DecalsError, NoGraphics
+from decals.render.libraries import require_gl
+from decals.scene import Scene
+from decals.window.bindings import Bindings
+from decals.window.grip import Grip
+from decals.window.marks import Marks
+from decals.window.quality import Quality
+
+SIZE = (1200, 800)
+BACKGROUND = ((0.80, 0.82, 0.85), (0.96, 0.96, 0.95))
+"""Colours at the bottom and at the top."""
+
+TICK = 100
+"""Milliseconds between looks at the background work."""
+
+REST = 0.2
+"""Seconds without any movement after which a whole frame is drawn."""
+
+
+class EditWindow:
+    """A scene in a pyvista window, edited by hand.
+
+    ``window.plotter`` is an ordinary plotter: everything of pyvista can be added. `decals.view` is one call
+    over this.
+
+    Parameters
+    ----------
+    scene
+        What to edit, or a session that goes on.
+    path
+        Where to save.
+    size
+        Of the window, in pixels.
+    off_screen
+        Whether to do without a screen; events are then the caller's.
+    samples
+        Samples a pixel along each axis, at rest.
+
+    Raises
+    ------
+    NoGraphics
+        There is no OpenGL, or no screen for a window.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | EditSession,
+        *,
+        path: str | os.PathLike[str] | None = None,
+        size: tuple[int, int] = SIZE,
+        off_screen: bool = False,
+        samples: int = 2,
+    ) -> None:
+        require_gl()
+        if not off_screen:
+            self.require_screen()
+        self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
+        self.document = self.session.document
+        self.samples = samples
+        self.worker, self.quality = Worker(), Quality()
+        self.actions = Actions(self.session, path=path, run=self._start)
+        self.actions.camera = self._camera
+        self.plotter = _plotter(off_screen, size)
+        self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
+        self.tools = Tools(self.actions, self._ray)
+        self._open_stage()
+        self.marks = Marks(self.plotter)
+        self.grip = Grip(self.plotter, self.actions, lambda whole: self.redraw(whole=whole))
+        self._bindings = Bindings(self, self.plotter.iren.interactor)
+        self._moved = 0.0
+        self._closed = False
+
+    def _open_stage(self) -> None:
+        self.plotter.decals.add_scene(self.document.scene)
+        self.stage = self.plotter.decals.stage
+        self.stage.scene = self.document
+        self.stage.measure, self.stage.samples = True, self.samples
+        me = weakref.ref(self)
+        self.session.listen(lambda change: _pass_on(me, change))
+        self._began = 0.0
+        self.plotter.renderer.AddObserver("StartEvent", lambda *_: _timed(me, begin=True))
+        self.plotter.renderer.AddObserver("EndEvent", lambda *_: _timed(me, begin=False))
+
+    # -- what is seen -----------------------------------------------------------------------------------
+
+    def redraw(self, *, whole: bool) -> None:
+        """Show what there is: as a whole once nothing moves any more, or quickly."""
+        self.actions_shown()
+        if not whole:
+            self.moving()
+            self.plotter.render()
+        elif self.plotter.off_screen:
+            self.rest()
+        else:
+            self.moving()  # `tick` draws the whole frame a little later
+            self.plotter.render()
+
+    def actions_shown(self) -> None:
+        """Bring outlines, handle, help and status up to date."""
+        if not self.tools.dragging:
+            self.grip.update()
+        self.marks.outline(self.document, self.actions.selection, self.stage.contact)
+        self.marks.show_help(self.actions.help)
+        self.marks.say(self._status())
+
+    def _status(self) -> str:
+        if not self.worker.busy:
+            return self.actions.message or "h: help"
+        stage, fraction = self.worker.progress
+        return f"{stage}: {100 * fraction:.0f} %"
+
+    def moving(self) -> None:
+        """Draw the next frames at the size that is done in time."""
+        self._moved = time.perf_counter()
+        if self.quality.expected(self.samples) > self.quality.target:
+            self.stage.draw_scale, self.stage.samples = self.quality.scale, 1
+
+    def rest(self) -> None:
+        """Draw a whole frame."""
+        self.stage.draw_scale, self.stage.samples = 1.0, self.samples
+        self._moved = 0.0
+        self.plotter.render()
+
+    def _timed(self, *, begin: bool) -> None:
+        if begin:
+            self._began = time.perf_counter()
+        else:
+            drawn = self.stage.draw_scale * self.stage.samples
+            self.quality.saw(drawn, time.perf_counter() - self._began)
+
+    def _changed(self, change: Change) -> None:
+        if change.parts_after.objects is not None:
+            self.stage.scene = None  # so that it looks at the bounds anew
+            self.stage.scene = self.document
+
+    # -- what goes on -----------------------------------------------------------------------------------
+
+    def tick(self) -> None:
+        """Look after the background work, and draw a whole frame once nothing moves."""
+        if self.worker.busy:
+            self._finish()
+            self.marks.say(self._status())
+            self.plotter.render()
+        elif self._moved and time.perf_counter() - self._moved > REST and not self.tools.dragging:
+            self.rest()
+
+    def _start(self, job: Job) -> None:
+        if not self.worker.start(job):
+            self.actions.message = "wait for what goes on, or press Escape"
+
+    def _finish(self) -> None:
+        try:
+            command = self.worker.take()
+        except DecalsError as error:
+            self.actions.message = str(error)
+            return
+        if command is not None:
+            self.actions.settle()
+            self.actions.attempt(command)
+            self.redraw(whole=True)
+
+    def _ray(self, x: float, y: float) -> Ray | None:
+        """The ray through the middle of a pixel."""
+        renderer = self.plotter.renderer
+        (left, low), (width, height) = renderer.GetOrigin(), renderer.GetSize()
+        x, y = x - left + 0.5, y - low + 0.5
+        if not (0 <= x <= width and 0 <= y <= height):
+            return None
+        rays = self.stage.viewpoint().rays(width, height)
+        return rays.origins(x, y), rays.directions(x, y)
+
+    def _camera(self) -> Camera | None:
+        """The camera to save: VTK's, if it is one of ours."""
+        view = self.plotter.camera
+        if view.parallel_projection:
+            return None
+        return Camera(tuple(view.position), tuple(view.focal_point), tuple(view.up), view.view_angle)
+
+    # -- opening and closing ----------------------------------------------------------------------------
+
+    @staticmethod
+    def require_screen() -> None:
+        """Raise `NoGraphics` where a window has no screen: VTK would do without one silently."""
+        here = sys.platform.startswith("linux")
+        if here and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise NoGraphics(
+                "expected a screen for the window, got none (DISPLAY is not set); log in with a desktop, "
+                "use `ssh -X`, or draw pictures with `implicit-decals render`"
+            )
+
+    def show(self) -> None:
+        """Open the window, and stay until it is closed; off screen, draw the first frame."""
+        self.actions_shown()
+        self.plotter.iren.initialize()
+        self.plotter.iren.interactor.CreateRepeatingTimer(TICK)
+        interactive = not self.plotter.off_screen
+        self.plotter.show(auto_close=False, interactive=interactive)
+        if interactive:
+            self.close()
+
+    def close(self) -> None:
+        """Close the window, and give everything back. Twice is harmless."""
+        if self._closed:
+            return
+        self._closed = True
+        self.worker.cancel()
+        self.session.end()
+        self.grip.release()
+        self._bindings.release()
+        self.plotter.close()
+
+    def __enter__(self) -> "EditWindow":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def view(
+    scene: Scene | EditSession,
+    *,
+    path: str | os.PathLike[str] | None = None,
+    size: tuple[int, int] = SIZE,
+) -> Scene:
+    """Open a window, edit in it, and give the scene as it is when the window is closed.
+
+    Arguments and errors are those of `EditWindow`.
+    """
+    with EditWindow(scene, path=path, size=size) as window:
+        window.show()
+        return window.document.scene
+
+
+def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
+    """Make an empty window; its methods are wrapped in ways that type checkers do not follow."""
+    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
+    return plotter
+
+
+def _pass_on(me: "weakref.ref[EditWindow]", change: Change) -> None:
+    window = me()
+    if window is not None and not window._closed:
+        window._changed(change)
+
+
+def _timed(me: "weakref.ref[EditWindow]", *, begin: bool) -> None:
+    window = me()
+    if window is not None:
+        window._timed(begin=begin)

@@ -1,0 +1,32 @@
+"""Windows without a screen, closed at the end of each test."""
+
+import pytest
+
+from decals.render.libraries import install_advice, missing_gl_libraries
+from decals.window import EditWindow
+from tests.edit.scenes import scene
+from tests.window.driver import Driver
+
+
+@pytest.fixture
+def opened():
+    """Open windows of 180 × 120 pixels."""
+    missing = missing_gl_libraries()
+    if missing:
+        pytest.skip(f"no OpenGL here: {install_advice(missing)}")
+    made = []
+
+    def open_window(shown=None, **options):
+        window = EditWindow(shown or scene(), off_screen=True, size=(180, 120), **options)
+        made.append(window)
+        window.show()
+        return Driver(window)
+
+    yield open_window
+    for window in made:
+        window.close()
+
+
+@pytest.fixture
+def driver(opened):
+    return opened()

@@ -1,0 +1,47 @@
+"""The size of frames follows the time that they take."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from decals.window.quality import SCALES, TARGET, Quality
+
+
+def settled(fixed, each, frames=12):
+    """What is chosen on a machine that takes so long for any frame and for one of the window's size."""
+    quality = Quality()
+    quality.saw(2.0, fixed + 4 * each)
+    for _ in range(frames):
+        quality.saw(quality.scale, fixed + each * quality.scale**2)
+    return quality
+
+
+@given(st.floats(0, 0.06), st.floats(1e-4, 10))
+def test_frames_of_what_moves_are_done_in_time_if_they_can_be(fixed, each):
+    quality = settled(fixed, each)
+    smallest = fixed + each * SCALES[-1] ** 2
+    assert fixed + each * quality.scale**2 <= max(TARGET, smallest) * 1.01
+    larger = [scale for scale in SCALES if scale > quality.scale]
+    if larger and fixed + each * min(larger) ** 2 < 0.6 * TARGET:
+        pytest.fail(f"{quality.scale} is smaller than it need be")
+
+
+def test_a_fast_machine_draws_whole_frames():
+    quality = settled(0.001, 0.005)
+    assert quality.scale == 1.0
+    assert quality.expected(2.0) == pytest.approx(0.021)
+
+
+def test_a_choice_stays_while_times_waver():
+    quality = settled(0.01, 0.6)
+    chosen = {quality.scale}
+    for number in range(50):
+        wavering = (0.01 + 0.6 * quality.scale**2) * (1.0 + 0.15 * (number % 2))
+        quality.saw(quality.scale, wavering)
+        chosen.add(quality.scale)
+    assert len(chosen) <= 2
+
+
+def test_before_the_first_frame_everything_is_whole():
+    assert Quality().scale == 1.0
+    assert Quality().expected(2.0) == 0.0

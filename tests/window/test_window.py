@@ -1,0 +1,252 @@
+"""Driven windows: what is done with mouse and keys is done to the scene, is seen, and can be undone."""
+
+import os
+import subprocess
+import sys
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+
+from decals.edit.population import lying_on
+from decals.errors import NoGraphics
+from decals.scene_file import load_scene
+from decals.window import EditWindow, view
+from tests.edit.scenes import scene
+
+
+def test_a_drag_deforms_the_neighbours_and_undo_gives_back_the_first_picture(driver):
+    first, state = driver.shot(), driver.state
+    number, at = next(driver.visible())
+    driver.click(at)
+    owner, uv = driver.owners()
+    marked = driver.shot()
+    assert (marked != first).any()
+    driver.drag(at, (at[0] + 4, at[1]), (at[0] + 12, at[1] + 3))
+    after_owner, after_uv = driver.owners()
+    neighbours = (owner == after_owner) & (owner >= 0) & (owner != number)
+    moved = (np.abs(after_uv - uv).max(axis=2) > 1e-3) & neighbours
+    assert moved.sum() > 10
+    assert driver.session.labels == ("move",)
+    driver.key("z", ctrl=True)
+    driver.key("Escape")
+    assert driver.state == state
+    driver.window.actions.message = ""
+    driver.window.actions_shown()
+    np.testing.assert_array_equal(driver.shot(), first)
+
+
+def test_neighbours_deform_while_the_pointer_is_down(driver):
+    _, at = next(driver.visible())
+    driver.click(at)
+    seen = [driver.owners()[1]]
+    driver.event("LeftButtonPressEvent", at)
+    for step in (5, 10, 15):
+        driver.event("MouseMoveEvent", (at[0] + step, at[1]))
+        seen.append(driver.owners()[1])
+    for before, after in pairwise(seen):
+        assert (before != after).any()
+    driver.event("LeftButtonReleaseEvent", (at[0] + 15, at[1]))
+
+
+def test_the_camera_is_left_its_drags_and_wheel(driver):
+    state, before = driver.state, driver.plotter.camera.position
+    driver.drag((3, 3), (40, 20), (60, 30))
+    turned = driver.plotter.camera.position
+    assert turned != before
+    _, at = next(driver.visible())
+    driver.wheel(at)
+    closer = driver.plotter.camera.position
+    assert closer != turned
+    driver.click(at)
+    assert len(driver.window.actions.selection) == 1
+    driver.drag(at, (at[0] + 10, at[1]))
+    driver.wheel(at, ctrl=True)
+    assert driver.plotter.camera.position == pytest.approx(closer)
+    assert driver.session.labels == ("move",)
+    driver.key("z", ctrl=True)
+    driver.key("z", ctrl=True)
+    assert driver.state == state
+
+
+def test_a_click_places_on_either_object(driver):
+    for number in (0, 1):
+        at = next(at for n, at in driver.visible() if n in lying_on(driver.document, [number]))
+        driver.click(at, ctrl=True)
+        (placed,) = driver.window.actions.selection
+        assert placed in lying_on(driver.document, [number])
+        assert driver.window.tools.at(*at).owner == placed
+    assert len(driver.document.decals) == 62
+
+
+def test_the_cpu_picks_what_the_window_shows(driver):
+    owner, _ = driver.owners()
+    height, width = owner.shape
+    rng = np.random.default_rng(0)
+    wrong = 0
+    for _ in range(100):
+        x, y = int(rng.integers(width)), int(rng.integers(height))
+        found = driver.window.tools.at(x, y)
+        wrong += owner[height - 1 - y, x] != (-1 if found is None else found.owner)
+    assert wrong <= 2  # silhouettes
+
+
+def test_keys_of_pyvista_are_ours_where_the_table_says_so(driver):
+    """`plus` widens lines in pyvista, `k` and `t` mean something to VTK; here they edit."""
+    number, at = next(driver.visible())
+    driver.click(at)
+    radius = driver.document.decals[number].radii[0]
+    driver.key("plus")
+    driver.key("k")
+    assert driver.document.decals[number].radii[0] > radius
+    assert driver.document.decals[number].interactions[0] == 2
+    assert driver.window.marks._actor.prop.line_width == 3
+    driver.key("h")
+    assert driver.window.marks.help_shown
+    driver.key("h")
+    assert not driver.window.marks.help_shown
+
+
+def test_what_is_selected_is_outlined(driver):
+    (number, at), (_, there) = islice(driver.visible(), 2)
+    driver.click(at)
+    decal = driver.document.decals[number]
+    points = driver.window.marks.lines.points
+    assert np.linalg.norm(points - decal.positions[0], axis=1).max() < 1.1 * decal.radii[0]
+    driver.click(there, shift=True)
+    assert driver.window.marks.lines.n_lines == 2
+    driver.key("Escape")
+    assert driver.window.marks.lines.n_points == 0
+
+
+def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
+    point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
+    driver.key("m", driver.pixel(point))
+    first, state = driver.shot(), driver.state
+    number, path = driver.window.actions.grip
+    widget = driver.window.grip.widget
+    center = driver.window.actions.grip_center
+    assert widget.GetCenter() == pytest.approx(center.tolist())
+    before = driver.document.decals.decals.positions
+    widget.InvokeEvent("StartInteractionEvent")
+    for step in (0.1, 0.2, 0.4):
+        widget.SetCenter(*np.add(center, (step, 0, 0)).tolist())
+        widget.InvokeEvent("InteractionEvent")
+    widget.InvokeEvent("EndInteractionEvent")
+    moved = np.linalg.norm(driver.document.decals.decals.positions - before, axis=1)
+    assert moved.max() > 0.2
+    assert (moved == 0).any()
+    assert driver.session.labels == ("move a primitive",)
+    assert (driver.shot() != first).any()
+    driver.key("z", ctrl=True)
+    assert driver.state == state
+    driver.key("m", driver.pixel(point))
+    assert driver.window.grip.widget is None
+    assert number == 0
+    assert path
+
+
+def test_scattering_goes_on_in_the_background(driver):
+    number, at = next((n, at) for n, at in driver.visible() if n in lying_on(driver.document, [0]))
+    driver.key("g", at)
+    assert driver.window.worker.busy
+    assert number in driver.document.decals.numbers
+    driver.window.tick()
+    assert "%" in driver.window.marks.status or not driver.window.worker.busy
+    while driver.window.worker.busy:
+        driver.window.worker._thread.join(30)
+        driver.window.tick()
+    assert number not in driver.document.decals.numbers
+    assert driver.session.labels == ("scatter",)
+
+
+def test_things_that_move_are_drawn_smaller_where_the_card_is_slow(driver):
+    window = driver.window
+    window.quality.saw(2.0, 10.0)
+    _, at = next(driver.visible())
+    driver.click(at)
+    driver.event("LeftButtonPressEvent", at)
+    driver.event("MouseMoveEvent", (at[0] + 9, at[1]))
+    assert window.stage.draw_scale < 1
+    driver.event("LeftButtonReleaseEvent", (at[0] + 9, at[1]))
+    assert window.stage.draw_scale == 1
+    assert window.stage.samples == 2
+    window.quality.saw(2.0, 10.0)
+    driver.event("LeftButtonPressEvent", (2, 2))
+    driver.event("MouseMoveEvent", (20, 9))
+    assert window.stage.draw_scale < 1
+    driver.event("LeftButtonReleaseEvent", (20, 9))
+    assert window.stage.draw_scale == 1
+
+
+def test_saving_keeps_the_windows_camera(opened, tmp_path):
+    driver = opened(path=tmp_path / "scene.json")
+    driver.drag((3, 3), (40, 20))
+    driver.key("s", ctrl=True)
+    assert not driver.session.modified
+    saved = load_scene(tmp_path / "scene.json")
+    assert saved.camera.position == pytest.approx(driver.plotter.camera.position)
+    assert saved.decals.packed().tobytes() == driver.document.decals.decals.packed().tobytes()
+
+
+def test_a_session_goes_on_in_another_window(opened):
+    first = opened()
+    _, at = next(first.visible())
+    first.click(at)
+    first.key("Delete")
+    first.window.close()
+    second = opened(first.session)
+    assert len(second.document.decals) == 59
+    second.key("z", ctrl=True)
+    assert len(second.document.decals) == 60
+
+
+def test_without_a_screen_a_window_says_so(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(NoGraphics, match="DISPLAY is not set"):
+        view(scene())
+
+
+MEMORY = """
+import gc, resource, sys
+from decals.window import EditWindow
+from tests.edit.scenes import scene
+
+def once():
+    with EditWindow(scene(), off_screen=True, size=(120, 80), samples=1) as window:
+        window.show()
+
+def used():
+    gc.collect()
+    return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize() / 2**20
+
+warm, rounds = int(sys.argv[1]), int(sys.argv[2])
+for _ in range(warm):
+    once()
+before = used()
+for _ in range(rounds):
+    once()
+print((used() - before) / rounds)
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory is read from /proc")  # noqa: PTH110
+@pytest.mark.parametrize(("warm", "rounds"), [(3, 6), pytest.param(20, 200, marks=pytest.mark.slow)])
+def test_opening_and_closing_keeps_no_memory(warm, rounds):
+    """In a process of its own: megabytes kept by each window."""
+    run = subprocess.run(
+        [sys.executable, "-c", MEMORY, str(warm), str(rounds)], capture_output=True, text=True, check=True
+    )
+    assert float(run.stdout.split()[-1]) < (1.0 if rounds < 50 else 0.1)
+
+
+def test_two_windows_at_once(opened):
+    one, two = opened(), opened()
+    _, at = next(one.visible())
+    one.click(at)
+    one.key("Delete")
+    assert (len(one.document.decals), len(two.document.decals)) == (59, 60)
+    assert (one.shot() != two.shot()).any()
+    assert isinstance(one.window, EditWindow)
