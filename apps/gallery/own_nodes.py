@@ -1,7 +1,6 @@
 """Own skeletons and operators, a function each: a ring, a solid box, a blend of chosen width, a soft cut."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -22,11 +21,12 @@ def ring(q: wp.vec3, center: wp.vec3, axis: wp.vec3, size: wp.float32) -> wp.vec
     n = wp.normalize(axis)
     w = q - center
     flat = w - n * wp.dot(w, n)
-    if wp.length(flat) <= 1e-6 * wp.length(w):  # on the axis all points are as close: take any
+    if wp.length(flat) <= wp.length(w) * 1e-6:  # on the axis all points are as close: take any
         flat = wp.cross(n, wp.vec3(1.0, 0.0, 0.0))
-        if wp.abs(n[0]) > 0.6:
+        if wp.abs(axis[0]) > wp.length(axis) * 0.6:
             flat = wp.cross(n, wp.vec3(0.0, 1.0, 0.0))
-    return center + wp.normalize(flat) * size
+    way = wp.normalize(flat) * size
+    return wp.vec3(center[0] + way[0], center[1] + way[1], center[2] + way[2])
 
 
 @wp.func
@@ -112,7 +112,7 @@ _PLACES = 0.85 * np.stack([np.cos(_SPOKES), np.sin(_SPOKES), 0.0 * _SPOKES], axi
 
 
 def _wheel() -> Node:
-    wheel: Any = Ring((0, 0, 0), (0, 0, 1), 0.85, radius=0.16, color=SLATE)
+    wheel: Node = Ring((0, 0, 0), (0, 0, 1), 0.85, radius=0.16, color=SLATE)
     for place in _PLACES.tolist():
         wheel = Weld((wheel, Point(tuple(place), radius=0.32, color=SEA)), width=0.6)
     return wheel
