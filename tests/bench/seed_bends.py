@@ -67,9 +67,8 @@ def main() -> None:
         here = ring[ringed & (bend >= low) & (bend < high)]
         if len(here) > 5:
             share = 100 * len(here) / ringed.sum()
-            print(
-                f"  {low:5.2f} to {min(high, 1):4.2f} {share:10.1f} {here.mean():11.3f} {100 * here.std() / here.mean():14.2f}"
-            )
+            spread = 100 * here.std() / here.mean()
+            print(f"  {low:5.2f} to {min(high, 1):4.2f} {share:10.1f} {here.mean():11.3f} {spread:14.2f}")
 
 
 if __name__ == "__main__":
