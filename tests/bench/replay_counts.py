@@ -45,7 +45,7 @@ def random_coat(vertices: Any, faces: Any, count: int, *, layered: bool) -> Deca
     return Decals(
         np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], count), corners[face]),
         normals[face],
-        rng.normal(size=(count, 3)),
+        np.cross(normals[face], rng.normal(size=(count, 3))),
         np.full(count, radius),
         **more,
     )

@@ -29,7 +29,7 @@ def coat(count: int, seed: int, *, spread: float) -> tuple[Shape, Decals]:
     arrays: dict[str, Any] = {
         "positions": np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], count), corners[face]),
         "normals": normals[face],
-        "tangents": rng.normal(size=(count, 3)),
+        "tangents": np.cross(normals[face], rng.normal(size=(count, 3))),
         "radii": radius * 10.0 ** rng.uniform(-spread, spread, count),
     }
     return shape, Decals(**arrays)
