@@ -15,6 +15,7 @@ from decals.model import PLAIN, Decals
 from decals.render import SceneLike
 from decals.scene import CLAY, Color, DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.vtk.context import WindowContext
+from decals.vtk.modes import restore_exports, warn_of_exports
 from decals.vtk.stage import Stage
 
 Image = str | DecalImage | NDArray[np.uint8]
@@ -172,6 +173,7 @@ class Component:
         renderer = self._plotter.renderer
         if id(renderer) not in self._stages:
             self._stages[id(renderer)] = Stage(self._plotter, renderer, self._window_context)
+            warn_of_exports(self._plotter)
         return self._stages[id(renderer)]
 
     @property
@@ -198,6 +200,7 @@ class Component:
         for stage in self._stages.values():
             stage.release()
         self._stages.clear()
+        restore_exports(self._plotter)
         if self._context is not None and not self._context.stale:
             self._context.release()
         self._context = None

@@ -12,6 +12,33 @@ from decals.render.context import Context
 
 VIEWPORT = 0x0BA2
 """GL_VIEWPORT."""
+FRAMEBUFFER = 0x8D40
+"""GL_FRAMEBUFFER."""
+
+
+_idle: dict[str, list[moderngl.Context]] = {}
+"""What windows that are gone leave behind, by driver: moderngl never gives all of its memory back."""
+
+
+def _driver(window: Any) -> str:
+    """What OpenGL's functions and limits depend on."""
+    state = window.GetState()
+    return "; ".join([window.GetClassName(), state.GetVendor(), state.GetRenderer(), state.GetVersion()])
+
+
+def _attach(window: Any) -> moderngl.Context:
+    """Give moderngl's view of the context that is current: one for each window, while it is open."""
+    window.GetState().vtkglBindFramebuffer(
+        FRAMEBUFFER, 0
+    )  # moderngl asks what is bound; some it cannot describe
+    idle = _idle.get(_driver(window), [])
+    if not idle:
+        loader: Any = DefaultLoader()
+        return moderngl.create_context(context=loader)
+    gl = idle.pop()
+    gl.fbo = gl.detect_framebuffer()  # as create_context does: the old window's is gone
+    gl.mglo.fbo = gl.fbo.mglo
+    return gl
 
 
 class WindowContext(Context):
@@ -39,9 +66,8 @@ class WindowContext(Context):
                 "expected a window that has drawn before, got one without OpenGL; render it first"
             )
         with self.current():
-            # One for each window: moderngl's default is one for the whole process.
-            loader: Any = DefaultLoader()
-            super().__init__(moderngl.create_context(context=loader))
+            super().__init__(_attach(window))
+        self._attached = True
 
     @contextmanager
     def current(self) -> Iterator[Self]:
@@ -62,6 +88,13 @@ class WindowContext(Context):
             state.Reset()
             state.PopFramebufferBindings()
             state.Pop()
+
+    def release(self) -> None:
+        """Give back the programs; the context is the window's. Calling twice is harmless."""
+        super().release()
+        if self._attached:
+            _idle.setdefault(_driver(self._window), []).append(self.gl)
+            self._attached = False
 
     @property
     def stale(self) -> bool:

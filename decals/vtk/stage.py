@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from decals.vtk.camera import vtk_projection
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
 from decals.vtk.injection import Injection
+from decals.vtk.modes import complaints
 
 INJECTED_TEXTURES = 5
 """Images, records and the three arrays of the index."""
@@ -77,9 +79,6 @@ class Stage:
     ----------
     samples
         Samples a pixel along each axis; where VTK itself draws larger than the window, one.
-    draw_scale
-        Size of what is drawn relative to the window's. Below 1, one sample a texel is drawn and magnified:
-        for the time that things move.
     mapping, contact
         As for `decals.render.Renderer.render`.
     frame_seconds
@@ -92,7 +91,8 @@ class Stage:
         self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]
     ) -> None:
         self.plotter, self.vtk_renderer = plotter, renderer
-        self.samples, self.draw_scale = 2, 1.0
+        self.samples = 2
+        self._draw_scale = 1.0
         self.mapping, self.contact = Mapping.CORRECTED, Contact.PAPER
         self.frame_seconds, self.measure = 0.0, False
         self._scene: SceneLike | None = None
@@ -103,6 +103,7 @@ class Stage:
         self._anchor = Anchor(renderer, lambda: _draw(me))
         self._injections: list[Injection] = []
         self._units: list[int] = []
+        self._said: set[str] = set()
         self._tags = [
             renderer.AddObserver(vtkCommand.StartEvent, lambda *_: _prepare(me)),
             renderer.AddObserver(vtkCommand.EndEvent, lambda *_: _finish(me)),
@@ -122,6 +123,20 @@ class Stage:
             self._anchor.leave()
         elif before is None or list(before) != list(scene.objects):
             self._anchor.place(bounds_of(cast(Sequence[SceneObject], scene.objects)))
+
+    @property
+    def draw_scale(self) -> float:
+        """Size of what is drawn relative to the window's.
+
+        Below 1, one sample a texel is drawn and magnified: for the time that things move.
+        """
+        return self._draw_scale
+
+    @draw_scale.setter
+    def draw_scale(self, scale: float) -> None:
+        if not 0.0 < scale <= 1.0:
+            raise InvalidScene(f"draw_scale must be above 0 and at most 1, got {scale}")
+        self._draw_scale = float(scale)
 
     def apply(self, actor: Any, *, follow: bool = False) -> None:
         """Put the scene's decals into VTK's own shader of an actor; see `Component.apply`."""
@@ -148,6 +163,11 @@ class Stage:
         self._units = []
 
     def _prepare(self) -> None:
+        if self._scene is not None:
+            for complaint in complaints(self.vtk_renderer):
+                if complaint not in self._said:
+                    self._said.add(complaint)
+                    warnings.warn(complaint, stacklevel=2)
         if self._injections:
             with self.current():
                 for injection in self._injections:
@@ -248,8 +268,6 @@ class Stage:
 
     def _drawn_size(self, viewport: tuple[int, int]) -> tuple[tuple[int, int], int]:
         """Size in pixels and samples of what is drawn; 0 samples where it is to be magnified."""
-        if not 0.0 < self.draw_scale <= 1.0:
-            raise InvalidScene(f"draw_scale must be above 0 and at most 1, got {self.draw_scale}")
         if self.draw_scale < 1.0:
             width, height = (max(1, round(self.draw_scale * side)) for side in viewport)
             return (width, height), 0
