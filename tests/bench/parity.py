@@ -21,6 +21,7 @@ from decals.contact import REACH, Contact
 from decals.index import DeviceIndex
 from decals.mapping import Mapping
 from tests.bench import parity_kernels as kernels
+from tests.bench.parity_report import worst_points
 from tests.bench.parity_worlds import MEMBERS, World, make_world
 from tests.oracles.parallel import Members, answer_points
 
@@ -102,12 +103,21 @@ class Chunk:
         self._launch(answer_points, inputs, outputs)
         return outputs
 
-    def compare(self, contact: Contact, mapping: Mapping, *, once: bool, counts: Any, worst: Any) -> None:
-        """Add to the counts and raise the worst errors."""
+    def compare(self, contact: Contact, mapping: Mapping, *, once: bool) -> tuple[Any, Any]:
+        """Counts and worst errors; points of errors that may not be are printed."""
+        counts = wp.zeros(kernels.COUNTS, dtype=wp.int32, device=self.device)
+        worst = wp.zeros(kernels.WORST, dtype=wp.float64, device=self.device)
         found = self.found(contact, mapping, once=once)
         cut = self.wanted(contact, mapping, reach=REACH)
         uncut = self.wanted(contact, mapping, reach=1.0)[1]
         self._launch(kernels.compare_points, [self.members, *found, *cut, uncut], [counts, worst])
+        figures = named(counts.numpy(), worst.numpy())
+        if any(figures[name] > most for name, most in LIMITS.items()):
+            arrays = [[array.numpy() for array in arrays] for arrays in (found, cut)]
+            print(
+                figures, *worst_points(self.world, self.points.numpy(), self.sets.numpy(), *arrays), sep="\n"
+            )
+        return counts.numpy(), worst.numpy()
 
 
 def parity(contact: Contact, *, layered: bool, samples: int, device: Any, chunk: int = CHUNK) -> Figures:
@@ -115,16 +125,18 @@ def parity(contact: Contact, *, layered: bool, samples: int, device: Any, chunk:
     total, worst = np.zeros(kernels.COUNTS, np.int64), np.zeros(kernels.WORST)
     for number, first in enumerate(range(0, samples, chunk)):
         points = Chunk(make_world(number, layered=layered), min(chunk, samples - first), number, device)
-        counts = wp.zeros(kernels.COUNTS, dtype=wp.int32, device=device)
-        errors = wp.zeros(kernels.WORST, dtype=wp.float64, device=device)
         once = not layered and contact != Contact.RADIAL and number % 2 == 0
         mapping = Mapping.CORRECTED if number // 2 % 2 == 0 else Mapping.CHORD
-        points.compare(contact, mapping, once=once, counts=counts, worst=errors)
-        total += counts.numpy()
-        worst = np.maximum(worst, errors.numpy())
+        counts, errors = points.compare(contact, mapping, once=once)
+        total, worst = total + counts, np.maximum(worst, errors)
+    return named(total, worst)
+
+
+def named(counts: Any, worst: Any) -> Figures:
+    """Figures by name."""
     names = ("points", "owned", "unclear", "owners_differ", "not_finite")
-    errors_of = ("contact_error_rh", "cut_error_rh", "uv_error", "unlike_error_rh")
-    return dict(zip(names, total.tolist(), strict=True)) | dict(zip(errors_of, worst.tolist(), strict=True))
+    errors = ("contact_error_rh", "cut_error_rh", "uv_error", "unlike_error_rh")
+    return dict(zip(names, counts.tolist(), strict=True)) | dict(zip(errors, worst.tolist(), strict=True))
 
 
 def measure(samples: int, device: Any) -> Figures:

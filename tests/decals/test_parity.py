@@ -9,6 +9,7 @@ import pytest
 from decals.contact import REACH, Contact
 from decals.mapping import Mapping
 from tests.bench.parity import LIMITS, Chunk, parity
+from tests.bench.parity_report import worst_points
 from tests.bench.parity_worlds import make_world
 from tests.oracles.contact import rim_distance
 from tests.oracles.decals import decals_at
@@ -77,3 +78,17 @@ def test_half_a_million_points_in_a_sheet_and_in_layers(contact, layered):
 @pytest.mark.parametrize("contact", Contact)
 def test_a_hundred_million_points_on_a_cuda_device(contact, layered):
     check(parity(contact, layered=layered, samples=100_000_000, device="cuda:0"), 100_000_000)
+
+
+def test_the_worst_points_are_described():
+    """An owner that differs comes first, then the largest error."""
+    world = make_world(3)
+    chunk = Chunk(world, 1000, 3, "cpu")
+    found = [a.numpy().copy() for a in chunk.found(Contact.PAPER, Mapping.CORRECTED, once=True)]
+    wanted = [a.numpy() for a in chunk.wanted(Contact.PAPER, Mapping.CORRECTED, reach=REACH)]
+    clear = np.flatnonzero((found[0] >= 0) & (wanted[3] > 0.01) & (wanted[4] > 0.01))
+    found[0][clear[0]], found[1][clear[1]] = -1, found[1][clear[1]] - 0.5
+    lines = worst_points(world, chunk.points.numpy(), chunk.sets.numpy(), found, wanted)
+    assert lines[0].startswith("  error 2.000e+00")
+    assert lines[4].startswith("  error 5.000e-01")
+    assert len(lines) == 16
