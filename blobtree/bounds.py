@@ -1,7 +1,6 @@
 """Boxes outside of which a tree's field is exactly 0."""
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,26 +8,23 @@ from numpy.typing import NDArray
 from . import affine
 from .kernels import RIM
 from .operators import Operator, Reach
-from .program import EnterWarp, LeaveWarp, PlacedPrimitive, Pop, Push, Run, compile_program
-
-if TYPE_CHECKING:
-    from .tree import Node
+from .program import EnterWarp, Instruction, LeaveWarp, PlacedPrimitive, Pop, Push, Run, distinct_placements
 
 Box = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 EMPTY: Box = (np.full(3, np.inf), np.full(3, -np.inf))
 
 
-def influence_bounds(root: "Node") -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Lower and upper corner (3,) of the box of influence of `root`, rounded outward.
+def influence_bounds(program: list[Instruction]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Lower and upper corner (3,) of the box of influence of a tree, rounded outward.
 
-    The tree's program, run over boxes in place of numbers. A tree that is empty everywhere has the box of
+    Its program, run over boxes in place of numbers. A tree that is empty everywhere has the box of
     its first primitive, so that there is always a place to look at.
     """
     box = EMPTY
     registers: dict[int, Box] = {}
     fallback: Box | None = None
-    for step in compile_program(root):
+    for step in program:
         match step:
             case Push(register):
                 registers[register], box = box, EMPTY
@@ -51,8 +47,9 @@ def influence_bounds(root: "Node") -> tuple[NDArray[np.float32], NDArray[np.floa
 def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
     """Boxes (n, 3), (n, 3) of balls swept over the primitives' skeletons, under their maps."""
     points = primitives[0].primitive.hulls([placed.primitive for placed in primitives])
-    matrices = np.array([placed.placement.matrix for placed in primitives])
-    growth = np.array([placed.placement.growth for placed in primitives]) / RIM
+    placements, placed_by = distinct_placements(primitives)
+    matrices = np.array([placement.matrix for placement in placements])[placed_by]
+    growth = np.array([placement.growth for placement in placements])[placed_by] / RIM
     influences = np.array([max(placed.primitive.influences) for placed in primitives]) + growth
     placed_points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
     margins = influences[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)

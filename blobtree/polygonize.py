@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from .cells import build_cells
@@ -133,9 +134,14 @@ class Polygonizer:
 
     def update(self, tree: Node, *, progress: Progress | None = None) -> Mesh:
         """The mesh of `tree`, the parts that are as before being taken over."""
+        self.update_surface(tree, progress=progress)
+        return self.mesh
+
+    def update_surface(self, tree: Node, *, progress: Progress | None = None) -> Surface:
+        """The same without bringing the triangles to the host."""
         self._surface = self._extract(tree, self._surface, progress)
         self._tree, self._mesh = tree, None
-        return self.mesh
+        return self._surface
 
     def _extract(self, tree: Node, previous: Surface | None, progress: Progress | None) -> Surface:
         report = progress or (lambda _stage, _fraction: None)
@@ -149,9 +155,22 @@ class Polygonizer:
 
 def download(surface: Surface, meetings: NDArray[np.uint8] | None = None) -> Mesh:
     """The triangles of a surface as NumPy arrays."""
-    arrays: list[Any] = [surface.vertices, surface.faces, surface.normals, surface.colors]
-    vertices, faces, normals, colors = (array.numpy() for array in arrays)
+    arrays = [surface.vertices, surface.faces, surface.normals, surface.colors]
+    vertices, faces, normals, colors = map(_on_host, arrays)
     return Mesh(vertices, faces, normals, colors, meetings)
+
+
+def _on_host(array: Any) -> Any:
+    """A device's vectors as NumPy array; the CPU's own memory is handed out as it is.
+
+    NumPy takes large arrays in large pages, which a graphics card fills far faster than Warp's small ones.
+    """
+    if array.device.is_cpu:
+        return array.numpy()
+    host = np.empty((len(array), 3), np.int32 if array.dtype == wp.vec3i else np.float32)
+    wp.copy(wp.array(host, dtype=array.dtype, device="cpu", copy=False), array)
+    wp.synchronize_device(array.device)
+    return host
 
 
 def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> float:

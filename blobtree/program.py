@@ -9,7 +9,7 @@ first, so a tree of n leaves needs at most log₂ n registers and a spine of any
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from . import affine
 from .errors import InvalidNode
 from .operators import RICCI, SUM, Operator, Reach
 from .skeletons import Skeleton
-from .traversal import fold
+from .traversal import postorder
 from .warps import SpaceWarp
 
 if TYPE_CHECKING:
@@ -56,12 +56,19 @@ class Placement:
 WORLD = Placement(np.eye(4))
 
 
-@dataclass(frozen=True)
-class PlacedPrimitive:
+class PlacedPrimitive(NamedTuple):
     """A leaf and where it stands."""
 
     primitive: "Primitive"
     placement: Placement
+
+
+def distinct_placements(primitives: list[PlacedPrimitive]) -> tuple[list[Placement], NDArray[np.intp]]:
+    """The placements of `primitives`, each object once, and which one each primitive has."""
+    identities = np.array([id(placed.placement) for placed in primitives])
+    _, first, placed_by = np.unique(identities, return_index=True, return_inverse=True)
+    placements = [primitives[i].placement for i in first]
+    return placements, placed_by
 
 
 @dataclass(frozen=True)
@@ -134,17 +141,7 @@ class _Emit:
 
 def compile_program(root: "Node") -> list[Instruction]:
     """The instructions that leave the value of `root` in the accumulator, which starts empty (0)."""
-    if fold(root, _count_primitives) > MOST_PRIMITIVES:
-        raise InvalidNode(
-            f"tree: its subtrees, counted as often as they are used, exceed {MOST_PRIMITIVES:,} primitives"
-        )
-    weights: dict[int, int] = {}
-
-    def weigh(node: "Node", child_weights: list[int]) -> int:
-        weights[id(node)] = weight = _weight(node, child_weights)
-        return weight
-
-    fold(root, weigh)
+    weights = _weights(root)
     program: list[Instruction] = []
     pending: list[_Emit | Instruction] = [_Emit(root, WORLD)]
     while pending:
@@ -168,17 +165,26 @@ def warp_registers_needed(program: list[Instruction]) -> int:
     return max((step.register + 1 for step in program if isinstance(step, EnterWarp)), default=0)
 
 
-def _count_primitives(_node: "Node", child_counts: list[int]) -> int:
-    """Leaves below a node, those of shared subtrees as often as they are used."""
-    return sum(child_counts) if child_counts else 1
+def _weights(root: "Node") -> dict[int, int]:
+    """Weight of every node that has children; refuses trees that use their subtrees too often."""
+    weights: dict[int, int] = {}
+    counts: dict[int, int] = {}
+    for node in postorder(root):
+        if node.children:
+            children = [id(child) for child in node.children]
+            counts[id(node)] = sum([counts.get(child, 1) for child in children])
+            weights[id(node)] = _weight(node, [weights.get(child, SIMPLE) for child in children])
+    if counts.get(id(root), 1) > MOST_PRIMITIVES:
+        raise InvalidNode(
+            f"tree: its subtrees, counted as often as they are used, exceed {MOST_PRIMITIVES:,} primitives"
+        )
+    return weights
 
 
 def _weight(node: "Node", child_weights: list[int]) -> int:
-    """Registers that `node` needs, SIMPLE where it needs no accumulator of its own."""
+    """Registers that a node with children needs, SIMPLE where it needs no accumulator of its own."""
     from .tree import Twist
 
-    if not child_weights:
-        return SIMPLE
     if isinstance(node, Twist):
         return max(0, child_weights[0])
     if len(child_weights) == 1:
@@ -251,13 +257,13 @@ def _expand_ordered(
     left_place = step.placement
     cuts = operator.reach is Reach.LEFT
     right_place = replace(left_place, growth=-left_place.growth) if cuts else left_place
-    if weights[id(right)] == SIMPLE:
+    if weights.get(id(right), SIMPLE) == SIMPLE:
         leaf, placement = _strip(right, right_place)
         assert isinstance(leaf, Primitive)
         yield step.into(left, left_place)
         yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameter)
         return
-    swapped = weights[id(right)] > weights[id(left)]
+    swapped = weights[id(right)] > weights.get(id(left), SIMPLE)
     operands = [(left, left_place), (right, right_place)]
     first, second = reversed(operands) if swapped else operands
     yield step.into(*first)
@@ -269,13 +275,15 @@ def _expand_ordered(
 def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
     """One run per kind of primitive, in the order in which the kinds first occur."""
     runs: dict[tuple[Skeleton, bool], Run] = {}
+    run: Run | None = None
+    placement: Placement | None = None
     for placed in primitives:
         skeleton = placed.primitive.skeleton
-        stretched = placed.placement.is_carried_by(skeleton)
-        key = skeleton, stretched
-        if key not in runs:
-            runs[key] = Run(skeleton, stretched, operator, parameter)
-        runs[key].primitives.append(placed)
+        if run is None or placed.placement is not placement or skeleton is not run.skeleton:
+            placement = placed.placement
+            key = skeleton, placement.is_carried_by(skeleton)
+            run = runs.setdefault(key, Run(*key, operator, parameter))
+        run.primitives.append(placed)
     yield from runs.values()
 
 
@@ -308,7 +316,11 @@ def _flatten(root: "Combination", place: Placement) -> Iterator[tuple["Node", Pl
     operation = _operation(root)
     pending: list[tuple[Node, Placement]] = [(child, place) for child in reversed(root.children)]
     while pending:
-        node, placement = _strip(*pending.pop())
+        node, placement = pending.pop()
+        if not node.children:
+            yield node, placement
+            continue
+        node, placement = _strip(node, placement)
         if isinstance(node, Combination) and _operation(node) == operation:
             pending.extend((child, placement) for child in reversed(node.children))
         else:

@@ -20,7 +20,6 @@ Everything of a primitive lies in one place, so a part of a tape is a tape.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
@@ -36,14 +35,11 @@ from .program import (
     Pop,
     Push,
     Run,
-    compile_program,
+    distinct_placements,
     registers_needed,
     warp_registers_needed,
 )
 from .vocabulary import BUILT_IN, Vocabulary, vocabulary_of
-
-if TYPE_CHECKING:
-    from .tree import Node
 
 PUSH = -1
 POP = -2
@@ -95,9 +91,8 @@ def _upload(tape: Tape, device: str) -> DeviceTape:
     return DeviceTape(wp.array(tape.data, dtype=wp.vec4, device=device), wp.vec2i(0, len(tape.data)))
 
 
-def compile_tape(root: "Node") -> Tape:
-    """The tape of the tree below `root`."""
-    program = compile_program(root)
+def compile_tape(program: list[Instruction]) -> Tape:
+    """The tape of a tree's program."""
     registers, warp_registers = registers_needed(program), warp_registers_needed(program)
     if registers > REGISTERS:
         raise InvalidNode(
@@ -165,24 +160,27 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
     its map and points are taken to its own space instead.
     """
     nodes = [placed.primitive for placed in primitives]
+    placements, placed_by = distinct_placements(primitives)
     grown = _grown_influences(primitives)
     matrices = None
     if not stretched:
-        matrices = np.array([placed.placement.matrix for placed in primitives])
-        scales = np.array([placed.placement.uniform_scale for placed in primitives])
+        matrices = np.array([placement.matrix for placement in placements])[placed_by]
+        scales = np.array([placement.uniform_scale for placement in placements])[placed_by]
         grown = grown * scales[:, None]
     parameters = nodes[0].packed(nodes, grown, matrices)
-    colors = np.array([[*placed.primitive.color, 1.0] for placed in primitives])[:, None]
+    colors = np.ones((len(nodes), 1, 4))
+    colors[:, 0, :3] = [node.color for node in nodes]
     parts = [parameters, colors]
     if stretched:
-        parts.insert(0, np.array([_map_texels(placed.placement.matrix) for placed in primitives]))
+        parts.insert(0, np.array([_map_texels(placement.matrix) for placement in placements])[placed_by])
     return np.concatenate(parts, axis=1).reshape(-1, 4)
 
 
 def _grown_influences(primitives: list[PlacedPrimitive]) -> NDArray[np.float64]:
     """Influences (n, k) of primitives under the offsets above them."""
     influences = np.array([placed.primitive.influences for placed in primitives])
-    growth = np.array([placed.placement.growth for placed in primitives]) / RIM
+    placements, placed_by = distinct_placements(primitives)
+    growth = np.array([placement.growth for placement in placements])[placed_by] / RIM
     grown: NDArray[np.float64] = influences + growth[:, None]
     if (grown <= 0.0).any():
         worst = primitives[int(np.argmin(grown.min(axis=1)))]

@@ -23,9 +23,12 @@ def postorder(root: "Node", *, into: Callable[["Node"], bool] = lambda _node: Tr
             order.append(node)
         elif id(node) not in seen:
             seen.add(id(node))
-            pending.append((node, True))
-            if into(node):
-                pending.extend((child, False) for child in reversed(node.children))
+            children = node.children
+            if children and into(node):
+                pending.append((node, True))
+                pending.extend([(child, False) for child in reversed(children)])
+            else:
+                order.append(node)
     return order
 
 

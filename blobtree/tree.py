@@ -22,6 +22,7 @@ from .identity import equal, from_records, hash_of, text_of, to_records
 from .interval import range_over
 from .operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from .outline import outline
+from .program import Instruction, compile_program
 from .tape import Tape, compile_tape
 from .trace import Hits, raycast
 from .validation import (
@@ -136,14 +137,18 @@ class Node:
     # -- asking -------------------------------------------------------------------------------------
 
     @cached_property
+    def _program(self) -> list[Instruction]:
+        return compile_program(self)
+
+    @cached_property
     def tape(self) -> Tape:
         """The flat form of this tree that every backend reads."""
-        return compile_tape(self)
+        return compile_tape(self._program)
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Corners (3,), (3,) of a box outside of which the field is exactly 0."""
-        return influence_bounds(self)
+        return influence_bounds(self._program)
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float32]:
         """Field values (n,) at `points` (n, 3)."""
