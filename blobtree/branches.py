@@ -160,8 +160,8 @@ def branch_leaf(
     q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> Branch:
     """A primitive is smooth: its value at the reference, and value and gradient at q."""
-    f = gradient_leaf(q, closest(kind, q, tape, at), 0.0, 0.0, wp.vec4())
-    value = value_leaf(r, closest(kind, r, tape, at), 0.0, 0.0, wp.vec4())
+    f = gradient_leaf(q, wp.vec3(), 0.0, 0.0, closest(kind, q, tape, at), 0.0, wp.vec4())
+    value = value_leaf(r, wp.vec3(), 0.0, 0.0, closest(kind, r, tape, at), 0.0, wp.vec4())
     return make_branch(value, 0, f)
 
 

@@ -44,6 +44,26 @@ def stride(kind: wp.int32) -> wp.int32:
 
 
 @wp.func
+def convex(kind: wp.int32) -> wp.bool:
+    """Whether a skeleton of this kind is `Skeleton.convex`."""
+    result = bool(False)
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            result = bool(wp.static(SKELETONS[code].convex))
+    return result
+
+
+@wp.func
+def rises(operator: wp.int32) -> wp.bool:
+    """Whether an operator is `Operator.rises`."""
+    result = bool(False)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = bool(wp.static(OPERATORS[code].rises))
+    return result
+
+
+@wp.func
 def partials(operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
     """Value and partial derivatives of any operator."""
     result = wp.vec3()

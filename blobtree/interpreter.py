@@ -7,9 +7,9 @@ from typing import Any
 
 import warp as wp
 
-from .dispatch import closest, slimmest, stride, warp_forward
+from .dispatch import closest, convex, slimmest, stride, warp_forward
 from .kernel_options import KERNEL_OPTIONS
-from .readings import BOUND, COLOR, GRADIENT, VALUE, Reading, to_local
+from .readings import BOUND, COLOR, GRADIENT, VALUE, Reading, to_local, turned_to_local
 from .tape import (
     POP,
     POP_SWAPPED,
@@ -25,25 +25,30 @@ from .tape import (
 wp.set_module_options(KERNEL_OPTIONS)
 
 _Places = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
-_Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
+_Speeds = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
 
 
 def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
-    """The interpreter of one reading: (q, reach, tape, span), span being (first texel, one past the last)."""
+    """The interpreter of one reading: (q, heading, reach, tape, span).
+
+    Slopes are bounded on the way from q along `heading` (unit, or 0 for all directions), `reach` far; the
+    tape is read from texel span[0] up to span[1].
+    """
     leaf, combine, empty = reading.leaf, reading.combine, reading.empty
-    unstretch, unwarp, widen = reading.unstretch, reading.unwarp, reading.widen
+    unstretch, unwarp, hasten = reading.unstretch, reading.unwarp, reading.hasten
     contribution = reading.type
 
     @wp.func
     def interpret(
-        q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+        q: wp.vec3, heading: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
     ) -> contribution:
         accumulator = empty()
         registers = registers_type()
         place = q
-        ball = reach
+        aim = heading
+        speed = float(1.0)
         places = _Places()
-        balls = _Balls()
+        speeds = _Speeds()
         at = span[0]
         while at < span[1]:
             header = tape[at]
@@ -56,38 +61,47 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
                 kind = code - STRETCHED
                 for _i in range(count):
                     local = to_local(place, tape, at)
+                    v = turned_to_local(aim, tape, at)
+                    if not convex(kind):
+                        v = wp.vec3()
                     c = closest(kind, local, tape, at + PREFIX)
                     slim = slimmest(kind, tape, at + PREFIX)
                     end = at + PREFIX + stride(kind)
-                    f = unstretch(leaf(local, c, slim, ball * tape[at + 3][0], tape[end - 1]), tape, at)
-                    accumulator = combine(operator, accumulator, f, ball, parameter)
+                    f = leaf(local, v, speed * tape[at + 3][0], reach, c, slim, tape[end - 1])
+                    accumulator = combine(operator, accumulator, unstretch(f, tape, at), reach, parameter)
                     at = end
             elif code >= 0:
+                v = aim
+                if not convex(code):
+                    v = wp.vec3()
                 for _i in range(count):
                     c = closest(code, place, tape, at)
                     slim = slimmest(code, tape, at)
                     at += stride(code)
-                    f = leaf(place, c, slim, ball, tape[at - 1])
-                    accumulator = combine(operator, accumulator, f, ball, parameter)
+                    f = leaf(place, v, speed, reach, c, slim, tape[at - 1])
+                    accumulator = combine(operator, accumulator, f, reach, parameter)
             elif code == PUSH:
                 registers[count] = accumulator
                 accumulator = empty()
             elif code == POP:
-                accumulator = combine(operator, registers[count], accumulator, ball, parameter)
+                accumulator = combine(operator, registers[count], accumulator, reach, parameter)
             elif code == POP_SWAPPED:
-                accumulator = combine(operator, accumulator, registers[count], ball, parameter)
+                accumulator = combine(operator, accumulator, registers[count], reach, parameter)
             elif code == WARP:
                 places[count] = place
-                balls[count] = ball
+                speeds[count] = speed
                 p = tape[at + 3]
                 local = to_local(place, tape, at)
-                ball = widen(operator, local, ball * p[0], p)
+                speed = hasten(operator, local, speed * p[0], reach, p)
+                aim = wp.vec3()
                 place = warp_forward(operator, local, p)
                 at += PREFIX
             elif code == UNWARP:
                 place = places[count]
-                ball = balls[count]
-                accumulator = unwarp(operator, accumulator, place, ball, tape, at)
+                speed = speeds[count]
+                if count == 0:
+                    aim = heading  # behind another warp still there is none
+                accumulator = unwarp(operator, accumulator, place, tape, at)
                 at += PREFIX
         return accumulator
 
@@ -95,10 +109,10 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
 
 
 _Registers1 = wp.types.vector(length=REGISTERS, dtype=wp.float32)
-_Registers2 = wp.types.matrix(shape=(REGISTERS, 2), dtype=wp.float32)
+_Registers3 = wp.types.matrix(shape=(REGISTERS, 3), dtype=wp.float32)
 _Registers4 = wp.types.matrix(shape=(REGISTERS, 4), dtype=wp.float32)
 
 interpret_value = make_interpreter(VALUE, _Registers1)
-interpret_bound = make_interpreter(BOUND, _Registers2)
+interpret_bound = make_interpreter(BOUND, _Registers3)
 interpret_gradient = make_interpreter(GRADIENT, _Registers4)
 interpret_color = make_interpreter(COLOR, _Registers4)

@@ -52,14 +52,24 @@ def falloff_steepness(distance: wp.float32) -> wp.float32:
 
 @wp.func
 def falloff_slope_bound(distance: wp.float32, reach: wp.float32) -> wp.float32:
-    """Largest |g'| over [distance − reach, distance + reach].
+    """Largest |g'| over [distance − reach, distance + reach]."""
+    return falloff_steepest(wp.max(distance - reach, 0.0), distance + reach)
+
+
+@wp.func
+def falloff_steepest(nearest: wp.float32, farthest: wp.float32) -> wp.float32:
+    """Largest |g'| over [nearest, farthest].
 
     |g'| rises up to STEEPEST_DISTANCE and falls after it, so its maximum over an interval lies at the
     point of the interval that is nearest to STEEPEST_DISTANCE.
     """
-    nearest = wp.max(distance - reach, 0.0)
-    farthest = distance + reach
     return falloff_steepness(wp.clamp(STEEPEST_DISTANCE, nearest, farthest))
+
+
+@wp.func
+def falloff_shallowest(nearest: wp.float32, farthest: wp.float32) -> wp.float32:
+    """Smallest |g'| over [nearest, farthest], which lies at one of its ends."""
+    return wp.min(falloff_steepness(nearest), falloff_steepness(farthest))
 
 
 @wp.func

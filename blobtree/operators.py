@@ -4,7 +4,8 @@ Each operator is two typed functions:
 
 * `partials(a, b, parameter) -> vec3(F, ∂F/∂a, ∂F/∂b)`;
 * `slope(slope_a, slope_b, max_a, max_b, parameter)`: a bound on |∇F| wherever the operands' gradients are
-  bounded by slope_a, slope_b and their values by max_a, max_b. The tracer's proof rests on it.
+  bounded by slope_a, slope_b and their values by max_a, max_b. The tracer's proof rests on it; slopes along
+  a ray are bounded by it too, for a field may well change along one direction alone.
 
 And two that let a cell forget what cannot matter in it; a = (smallest, largest) of the operand over the cell:
 
@@ -73,7 +74,7 @@ def ricci_slope(
     slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
 ) -> wp.float32:
     """Hölder: the partials lie on the dual norm's unit sphere, so slopes combine by the norm itself."""
-    return ricci_norm(slope_a, slope_b, exponent)
+    return ricci_norm(wp.max(slope_a, 0.0), wp.max(slope_b, 0.0), exponent)
 
 
 @wp.func
@@ -235,14 +236,16 @@ class Operator:
     """Operands may change places and nest in any way."""
     starts_from_zero: bool = True
     """F(0, b) = b, so that a fold may start from the empty field."""
+    rises: bool = False
+    """F never falls where its operands rise, and `slope` takes slopes below 0, of operands that fall."""
     reach: Reach = Reach.EITHER
     digest: str = ""
     """Of the sources of a user's operator."""
 
 
-SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice)
-RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice)
-UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice)
+SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice, rises=True)
+RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice, rises=True)
+UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice, rises=True)
 INTERSECTION = Operator(
     "intersection",
     intersection_partials,
@@ -250,6 +253,7 @@ INTERSECTION = Operator(
     intersection_range,
     intersection_choice,
     starts_from_zero=False,
+    rises=True,
     reach=Reach.COMMON,
 )
 DIFFERENCE = Operator(

@@ -1,10 +1,11 @@
 """Rays through sparse cells, with a proven step bound: none passes through the surface unseen.
 
 A ray leaps over blocks that hold no surface; in the others it reads their pruned tapes alone. At each place
-the tape gives the value f and a bound L on the slope over a ball of radius r. Within the ball the field can
-rise by at most L · distance, so the ray is free for min(r, (ISO − f) / L) (Hart 1996, with the global
-Lipschitz constant replaced by one of the ball ahead, after Galin et al. 2020). The ball then takes twice the
-length of the last step, so rays speed up through empty space and slow down near the surface.
+the tape gives the value f and a bound L on how fast it rises over the next stretch of the ray, r long. So
+the ray is free for min(r, (ISO − f) / L): sphere tracing (Hart 1996) with the slope along the ray in place of
+a global Lipschitz constant (segment tracing, Galin et al. 2020). The next stretch takes twice the length of
+the last step, so rays speed up through empty space; near the surface L tends to the slope itself, and they
+arrive as by Newton's method.
 """
 
 import warp as wp
@@ -48,7 +49,7 @@ def first_hit(
     for _step in range(MAX_STEPS):
         if t > t_max:
             return MISS
-        bound = field_bound(origin + direction * t, reach, tape, span)
+        bound = field_bound(origin + direction * t, direction, reach, tape, span)
         gap = ISO - bound[0]
         free = reach
         if bound[1] * reach > gap:

@@ -1,14 +1,20 @@
-"""Four readings of a tape: value, slope bound over a ball, gradient, colour.
+"""Four readings of a tape: value, slope bound, gradient, colour.
 
 Each is the functions that the interpreter's loop is closed over:
 
-* `leaf(q, c, slim, reach, color)`: what a primitive contributes, c being its closest point and influence
-  there, slim the smallest influence on it;
+* `leaf(q, aim, speed, reach, c, slim, color)`: what a primitive contributes, c being its closest point and
+  influence there, slim the smallest influence on it;
 * `unstretch(f, tape, at)`: that, computed behind the map at tape[at], as seen in front of it;
-* `unwarp(kind, f, q, reach, tape, at)`: the same for a subtree behind a warp and the map at tape[at];
-* `widen(kind, q, reach, p)`: the radius behind a warp of the ball of radius `reach` about q, where the
-  reading looks at it;
+* `unwarp(kind, f, q, tape, at)`: the same for a subtree behind a warp and the map at tape[at];
+* `hasten(kind, q, speed, reach, p)`: how fast, behind a warp, that moves at most which moves with `speed` in
+  front of it;
 * `combine(operator, a, b, reach, parameter)`, and the `empty` field.
+
+Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): q + u · aim for u
+from 0 to `reach`, per unit of u. Behind an affine map the ray is a line still, and `aim` says which; behind a
+warp it is bent, and for a skeleton that is not convex the line tells little: then `aim` is 0, and all that is
+known is that the point moves at most as fast as `speed`. With aim 0 from the start, bounds hold in all
+directions.
 """
 
 from dataclasses import dataclass
@@ -16,9 +22,9 @@ from typing import Any
 
 import warp as wp
 
-from .dispatch import partials, slope, warp_pullback, warp_stretch
+from .dispatch import partials, rises, slope, warp_pullback, warp_stretch
 from .kernel_options import KERNEL_OPTIONS
-from .kernels import falloff, falloff_derivative, falloff_slope_bound
+from .kernels import falloff, falloff_derivative, falloff_shallowest, falloff_slope_bound, falloff_steepest
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -27,6 +33,13 @@ wp.set_module_options(KERNEL_OPTIONS)
 def to_local(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """`q` in the space of the stretched primitive whose map starts at `at`."""
     x = wp.vec4(q[0], q[1], q[2], 1.0)
+    return wp.vec3(wp.dot(tape[at], x), wp.dot(tape[at + 1], x), wp.dot(tape[at + 2], x))
+
+
+@wp.func
+def turned_to_local(v: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """A direction in the space of the stretched primitive whose map starts at `at`."""
+    x = wp.vec4(v[0], v[1], v[2], 0.0)
     return wp.vec3(wp.dot(tape[at], x), wp.dot(tape[at + 1], x), wp.dot(tape[at + 2], x))
 
 
@@ -44,7 +57,15 @@ def value_empty() -> wp.float32:
 
 
 @wp.func
-def value_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.float32:
+def value_leaf(
+    q: wp.vec3,
+    aim: wp.vec3,
+    speed: wp.float32,
+    reach: wp.float32,
+    c: wp.vec4,
+    slim: wp.float32,
+    color: wp.vec4,
+) -> wp.float32:
     """Field of one primitive."""
     return falloff(squared_distance(q, c))
 
@@ -57,16 +78,18 @@ def value_unstretch(f: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
 
 @wp.func
 def value_unwarp(
-    kind: wp.int32, f: wp.float32, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+    kind: wp.int32, f: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.float32:
     """A value is the same in every space."""
     return f
 
 
 @wp.func
-def pointwise_widen(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
-    """What holds at a point alone looks at no ball: it is handed through."""
-    return reach
+def pointwise_hasten(
+    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, p: wp.vec4
+) -> wp.float32:
+    """What holds at a point alone does not ask."""
+    return speed
 
 
 @wp.func
@@ -78,47 +101,81 @@ def value_combine(
 
 
 @wp.func
-def bound_empty() -> wp.vec2:
+def bound_empty() -> wp.vec3:
     """The empty field is 0 and flat."""
-    return wp.vec2(0.0, 0.0)
+    return wp.vec3(0.0, 0.0, 0.0)
 
 
 @wp.func
-def bound_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.vec2:
-    """(value at q, bound on |∇f| over the ball of radius `reach` about q)."""
+def bound_leaf(
+    q: wp.vec3,
+    aim: wp.vec3,
+    speed: wp.float32,
+    reach: wp.float32,
+    c: wp.vec4,
+    slim: wp.float32,
+    color: wp.vec4,
+) -> wp.vec3:
+    """(value at q, how fast it rises at most on the way ahead, how fast it falls at most).
+
+    The distance d from a convex skeleton is a convex function along a line: nowhere ahead does it grow less
+    fast, or shrink faster, than here. Where it shrinks, that bounds how fast the field rises, and how near to
+    the skeleton the way leads. Where it grows, the field falls, and the first number is not above 0.
+    """
     z = squared_distance(q, c)
-    return wp.vec2(falloff(z), falloff_slope_bound(wp.sqrt(z), reach / slim) / slim)
+    d = wp.sqrt(z)
+    most = speed / slim
+    if wp.dot(aim, aim) == 0.0:
+        either = most * falloff_slope_bound(d, reach * most)
+        return wp.vec3(falloff(z), either, either)
+    growing = most
+    if d > 0.0:
+        w = q - wp.vec3(c[0], c[1], c[2])
+        growing = wp.dot(w, aim) / (d * c[3] * c[3])
+    nearest = wp.max(d + wp.min(growing, 0.0) * reach, 0.0)
+    farthest = d + most * reach
+    rise = -growing * falloff_steepest(nearest, d)
+    if growing > 0.0:
+        rise = -growing * falloff_shallowest(d, farthest)
+    return wp.vec3(falloff(z), rise, most * falloff_steepest(nearest, farthest))
 
 
 @wp.func
-def bound_unstretch(f: wp.vec2, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Slopes grow by the largest stretch of the map."""
-    return wp.vec2(f[0], f[1] * tape[at + 3][0])
+def bound_unstretch(f: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Slopes along the ray are the same in every space."""
+    return f
 
 
 @wp.func
 def bound_unwarp(
-    kind: wp.int32, f: wp.vec2, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
-    """Slopes grow by the largest stretch of the warp behind the map."""
-    p = tape[at + 3]
-    stretch = warp_stretch(kind, to_local(q, tape, at), reach * p[0], p)
-    return wp.vec2(f[0], f[1] * p[0] * stretch)
+    kind: wp.int32, f: wp.vec3, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Slopes along the ray are the same in every space."""
+    return f
 
 
 @wp.func
-def bound_widen(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
-    """A ball's image lies in the ball that the warp's largest stretch makes of it."""
-    return reach * warp_stretch(kind, q, reach, p)
+def bound_hasten(kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, p: wp.vec4) -> wp.float32:
+    """Faster by the warp's largest stretch in the ball that can be reached."""
+    return speed * warp_stretch(kind, q, reach * speed, p)
 
 
 @wp.func
 def bound_combine(
-    operator: wp.int32, a: wp.vec2, b: wp.vec2, reach: wp.float32, parameter: wp.float32
-) -> wp.vec2:
-    """Within `reach`, an operand exceeds its value at q by at most reach · slope."""
+    operator: wp.int32, a: wp.vec3, b: wp.vec3, reach: wp.float32, parameter: wp.float32
+) -> wp.vec3:
+    """Ahead, an operand exceeds its value at q by at most reach · how fast it rises.
+
+    An operator's `slope` bounds what its result rises by what its operands rise, if they never make it fall.
+    """
     value = partials(operator, a[0], b[0], parameter)[0]
-    return wp.vec2(value, slope(operator, a[1], b[1], a[0] + reach * a[1], b[0] + reach * b[1], parameter))
+    max_a = a[0] + reach * wp.max(a[1], 0.0)
+    max_b = b[0] + reach * wp.max(b[1], 0.0)
+    if rises(operator):
+        rise = slope(operator, a[1], b[1], max_a, max_b, parameter)
+        return wp.vec3(value, rise, slope(operator, a[2], b[2], max_a, max_b, parameter))
+    either = slope(operator, wp.max(a[1], a[2]), wp.max(b[1], b[2]), max_a, max_b, parameter)
+    return wp.vec3(value, either, either)
 
 
 @wp.func
@@ -128,7 +185,15 @@ def vector_empty() -> wp.vec4:
 
 
 @wp.func
-def gradient_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.vec4:
+def gradient_leaf(
+    q: wp.vec3,
+    aim: wp.vec3,
+    speed: wp.float32,
+    reach: wp.float32,
+    c: wp.vec4,
+    slim: wp.float32,
+    color: wp.vec4,
+) -> wp.vec4:
     """(value, ∇f) of one primitive."""
     z = squared_distance(q, c)
     g = (q - wp.vec3(c[0], c[1], c[2])) * (2.0 * falloff_derivative(z) / (c[3] * c[3]))
@@ -144,7 +209,7 @@ def gradient_unstretch(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
 
 @wp.func
 def gradient_unwarp(
-    kind: wp.int32, f: wp.vec4, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+    kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec4:
     """Gradients pull back by the warp's transposed Jacobian, then by the transposed map."""
     p = tape[at + 3]
@@ -163,7 +228,15 @@ def gradient_combine(
 
 
 @wp.func
-def color_leaf(q: wp.vec3, c: wp.vec4, slim: wp.float32, reach: wp.float32, color: wp.vec4) -> wp.vec4:
+def color_leaf(
+    q: wp.vec3,
+    aim: wp.vec3,
+    speed: wp.float32,
+    reach: wp.float32,
+    c: wp.vec4,
+    slim: wp.float32,
+    color: wp.vec4,
+) -> wp.vec4:
     """(value, red, green, blue) of one primitive."""
     return wp.vec4(falloff(squared_distance(q, c)), color[0], color[1], color[2])
 
@@ -176,7 +249,7 @@ def color_unstretch(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 @wp.func
 def color_unwarp(
-    kind: wp.int32, f: wp.vec4, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+    kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec4:
     """Colours are the same in every space."""
     return f
@@ -206,25 +279,25 @@ class Reading:
     leaf: wp.Function
     unstretch: wp.Function
     unwarp: wp.Function
-    widen: wp.Function
+    hasten: wp.Function
     combine: wp.Function
     empty: wp.Function
     type: Any
 
 
 VALUE = Reading(
-    value_leaf, value_unstretch, value_unwarp, pointwise_widen, value_combine, value_empty, wp.float32
+    value_leaf, value_unstretch, value_unwarp, pointwise_hasten, value_combine, value_empty, wp.float32
 )
-BOUND = Reading(bound_leaf, bound_unstretch, bound_unwarp, bound_widen, bound_combine, bound_empty, wp.vec2)
+BOUND = Reading(bound_leaf, bound_unstretch, bound_unwarp, bound_hasten, bound_combine, bound_empty, wp.vec3)
 GRADIENT = Reading(
     gradient_leaf,
     gradient_unstretch,
     gradient_unwarp,
-    pointwise_widen,
+    pointwise_hasten,
     gradient_combine,
     vector_empty,
     wp.vec4,
 )
 COLOR = Reading(
-    color_leaf, color_unstretch, color_unwarp, pointwise_widen, color_combine, vector_empty, wp.vec4
+    color_leaf, color_unstretch, color_unwarp, pointwise_hasten, color_combine, vector_empty, wp.vec4
 )

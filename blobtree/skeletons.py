@@ -131,12 +131,14 @@ class Skeleton:
     """Texels (vec4) that the parameters take on the tape."""
     takes_maps: bool = True
     """Maps that keep shapes fold into its parameters; else each primitive carries its map."""
+    convex: bool = False
+    """It is a convex set with one influence everywhere, so the tracer may rely on how distances change."""
     digest: str = ""
     """Of the sources of a user's kind."""
 
 
-POINT = Skeleton("point", closest_on_point, slimmest_of_one, box_to_point, parameters=1)
-SEGMENT = Skeleton("segment", closest_on_segment, slimmest_of_one, box_to_segment, parameters=2)
+POINT = Skeleton("point", closest_on_point, slimmest_of_one, box_to_point, parameters=1, convex=True)
+SEGMENT = Skeleton("segment", closest_on_segment, slimmest_of_one, box_to_segment, parameters=2, convex=True)
 CONE = Skeleton("cone", closest_on_cone, slimmest_of_cone, box_to_cone, parameters=2)
 
 SKELETONS = (POINT, SEGMENT, CONE)

@@ -17,12 +17,12 @@ vec4 tape_texel(sampler2D data, int i) {
 //@ slot dispatch
 //@ slot readings
 
-vec2 field_bound(vec3 q, float reach, sampler2D tape_, ivec2 span) {
-    return interpret_bound(q, reach, tape_, span);
+vec3 field_bound(vec3 q, vec3 heading, float reach, sampler2D tape_, ivec2 span) {
+    return interpret_bound(q, heading, reach, tape_, span);
 }
 
 vec4 field_gradient(vec3 q, sampler2D tape_, ivec2 span) {
-    return interpret_gradient(q, 0.0, tape_, span);
+    return interpret_gradient(q, vec3(0.0), 0.0, tape_, span);
 }
 
 // What the ray through a place in pixels, such as gl_FragCoord.xy, comes to.
@@ -47,5 +47,5 @@ Hit trace_pixel(vec2 pixel) {
 
 Surface surface_of(Hit hit) {
     vec3 normal = -field_gradient(hit.position, tape, hit.span).yzw;
-    return surface_at(hit.position, normal, interpret_color(hit.position, 0.0, tape, hit.span).yzw, true);
+    return surface_at(hit.position, normal, interpret_color(hit.position, vec3(0.0), 0.0, tape, hit.span).yzw, true);
 }

@@ -9,18 +9,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from blobtree.dispatch import partials, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.evaluate import field_bound, field_gradient
 from blobtree.glsl import translate_choice, translate_library
 from blobtree.rays import trace_ray
-from blobtree.readings import BOUND, COLOR, GRADIENT, Reading, to_local
+from blobtree.readings import BOUND, COLOR, GRADIENT, Reading, to_local, turned_to_local
 from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.vocabulary import BUILT_IN, Vocabulary
 from decals.render.entry import GROUP, Entry
 from implicit_decals.shaders import Source, compose
 
 _READINGS: dict[str, tuple[Reading, str]] = {
-    "bound": (BOUND, "vec2"),
+    "bound": (BOUND, "vec3"),
     "gradient": (GRADIENT, "vec4"),
     "color": (COLOR, "vec4"),
 }
@@ -79,9 +79,10 @@ def _library(kinds: Kinds) -> str:
         *(f for reading in readings for f in (reading.leaf, reading.unstretch, reading.combine)),
         *(reading.unwarp for reading in readings if kinds.warps),
         to_local,
+        turned_to_local,
         trace_ray,
     ]
-    return translate_library(functions, provided=[*_choices(kinds), field_bound, field_gradient])
+    return translate_library(functions, provided=[*_choices(kinds), rises, field_bound, field_gradient])
 
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
@@ -99,7 +100,12 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
 
 def _dispatch(kinds: Kinds) -> str:
     """Those functions, each knowing the kinds in use alone."""
-    return "\n".join(translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
+    rising = [code for code in kinds.operators if kinds.vocabulary.operators[code].rises]
+    test = " || ".join(f"operator == {code}" for code in rising) or "false"
+    if len(rising) == len(kinds.operators):
+        test = "true"
+    choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
+    return "\n".join([*choices, f"bool rises(int operator) {{ return {test}; }}"])
 
 
 def _interpreter(name: str, reading: Reading, glsl_type: str, kinds: Kinds) -> Source:
@@ -134,7 +140,12 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
     """A loop per kind of skeleton, so that the kind is not asked for inside it."""
     for code in kinds.skeletons:
         skeleton = kinds.vocabulary.skeletons[code]
-        names = {"closest": skeleton.closest.key, "slimmest": skeleton.slimmest.key}
+        names = {
+            "closest": skeleton.closest.key,
+            "slimmest": skeleton.slimmest.key,
+            "aim": "aim" if skeleton.convex else "vec3(0.0)",
+            "local_aim": "turned_to_local(aim, tape, map)" if skeleton.convex else "vec3(0.0)",
+        }
         yield _RUN.format(code=code, stride=skeleton.parameters + 1, **names)
         if kinds.stretched:
             yield _STRETCHED_RUN.format(
@@ -151,8 +162,8 @@ case {code}:
         vec4 c = {closest}(place, tape, at);
         float slim = {slimmest}(tape, at);
         at += {stride};
-        FIELD field = LEAF(place, c, slim, ball, PRIMITIVE_COLOR);
-        accumulator = COMBINE(operator_, accumulator, field, ball, header.w);
+        FIELD field = LEAF(place, {aim}, speed, reach, c, slim, PRIMITIVE_COLOR);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w);
     }}
     break;
 """
@@ -165,8 +176,9 @@ case {code}:
         vec4 c = {closest}(local, tape, map + {prefix});
         float slim = {slimmest}(tape, map + {prefix});
         at += {stride};
-        FIELD field = LEAF(local, c, slim, ball * tape_texel(tape, map + {prefix} - 1).x, PRIMITIVE_COLOR);
-        accumulator = COMBINE(operator_, accumulator, UNSTRETCH(field, tape, map), ball, header.w);
+        float local_speed = speed * tape_texel(tape, map + {prefix} - 1).x;
+        FIELD field = LEAF(local, {local_aim}, local_speed, reach, c, slim, PRIMITIVE_COLOR);
+        accumulator = COMBINE(operator_, accumulator, UNSTRETCH(field, tape, map), reach, header.w);
     }}
     break;
 """
@@ -186,23 +198,24 @@ case {POP_SWAPPED}: {{
     FIELD kept = r0;
     switch (count) {{ {load} }}
     accumulator = int(header.x) == {POP}
-        ? COMBINE(operator_, kept, accumulator, ball, header.w)
-        : COMBINE(operator_, accumulator, kept, ball, header.w);
+        ? COMBINE(operator_, kept, accumulator, reach, header.w)
+        : COMBINE(operator_, accumulator, kept, reach, header.w);
     break;
 }}
 """
 
 
 def _warp_cases(registers: int) -> str:
-    """Entering keeps the place and the ball's radius; leaving returns to them and takes the field along."""
-    store = " ".join(f"case {i}: w{i} = vec4(place, ball); break;" for i in range(registers))
+    """Entering keeps the place and the speed; leaving returns to them and takes the field along."""
+    store = " ".join(f"case {i}: w{i} = vec4(place, speed); break;" for i in range(registers))
     load = " ".join(f"case {i}: kept = w{i}; break;" for i in range(registers))
     return f"""\
 case {WARP}: {{
     switch (count) {{ {store} }}
     vec4 p = tape_texel(tape, at + {PREFIX} - 1);
     vec3 local = to_local(place, tape, at);
-    ball *= p.x * warp_stretch(operator_, local, ball * p.x, p);
+    speed *= p.x * warp_stretch(operator_, local, reach * speed * p.x, p);
+    aim = vec3(0.0);
     place = warp_forward(operator_, local, p);
     at += {PREFIX};
     break;
@@ -211,8 +224,9 @@ case {UNWARP}: {{
     vec4 kept = w0;
     switch (count) {{ {load} }}
     place = kept.xyz;
-    ball = kept.w;
-    accumulator = UNWARP(operator_, accumulator, place, ball, tape, at);
+    speed = kept.w;
+    aim = count == 0 ? heading : vec3(0.0);
+    accumulator = UNWARP(operator_, accumulator, place, tape, at);
     at += {PREFIX};
     break;
 }}

@@ -10,7 +10,9 @@ from blobtree.kernels import (
     STEEPEST_SLOPE,
     falloff,
     falloff_derivative,
+    falloff_shallowest,
     falloff_slope_bound,
+    falloff_steepest,
     falloff_steepness,
     inverse_falloff,
 )
@@ -76,3 +78,16 @@ def test_the_slope_bound_is_a_bound_and_is_attained() -> None:
     largest = slope(np.maximum(distance.astype(np.float64) + inside * reach, 0.0)).max(axis=0)
     assert (bound >= largest - 1e-6).all()
     np.testing.assert_allclose(bound, largest, atol=2e-3)
+
+
+def test_steepest_and_shallowest_slope_of_an_interval() -> None:
+    rng = np.random.default_rng(1)
+    ends = np.sort(rng.uniform(0.0, 1.5, (2, 4000)), axis=0).astype(np.float32)
+    ends[0, ::5] = ends[1, ::5]
+    inside = slope(ends[0] + (ends[1] - ends[0]).astype(np.float64) * np.linspace(0.0, 1.0, 401)[:, None])
+    steepest = call(falloff_steepest, nearest=ends[0], farthest=ends[1])
+    shallowest = call(falloff_shallowest, nearest=ends[0], farthest=ends[1])
+    assert (steepest >= inside.max(axis=0) - 1e-6).all()
+    assert (shallowest <= inside.min(axis=0) + 1e-6).all()
+    np.testing.assert_allclose(steepest, inside.max(axis=0), atol=1e-4)
+    np.testing.assert_allclose(shallowest, inside.min(axis=0), atol=1e-4)

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import Node, Point, Segment
-from blobtree.dispatch import partials, slope, warp_forward, warp_pullback, warp_stretch
-from blobtree.evaluate import bounds_at, colors_at, gradients_at
+from blobtree.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.evaluate import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.glsl import translate_library
 from blobtree.operators import OPERATORS
 from blobtree.skeletons import SKELETONS
@@ -47,7 +47,7 @@ MODULES = (
     "decals.contact", "decals.mapping", "decals.lookup", "decals.radial", "decals.records", "decals.stack",
     "decals.cells", "decals.ownership",
 )  # fmt: skip
-WRITTEN_TWICE = {"closest", "slimmest", "stride"}
+WRITTEN_TWICE = {"closest", "slimmest", "stride", "convex", "rises"}
 """Switches over the tables, written per backend."""
 
 
@@ -67,7 +67,7 @@ ALL_KINDS = Kinds(
     warps=tuple(range(len(WARPS))),
     warp_registers=4,
 )
-CHOOSERS: list[Any] = [partials, slope, warp_forward, warp_pullback, warp_stretch]
+CHOOSERS: list[Any] = [partials, rises, slope, warp_forward, warp_pullback, warp_stretch]
 
 
 # -- arguments ------------------------------------------------------------------------------------------
@@ -106,6 +106,12 @@ def units(rng: np.random.Generator, count: int) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
+def units_or_none(rng: np.random.Generator, count: int) -> Array:
+    vectors = units(rng, count)
+    vectors[::5] = 0.0
+    return vectors
+
+
 def beside(*draws: Draw) -> Draw:
     """A vector whose components are drawn by these."""
     return lambda rng, count: np.column_stack([draw(rng, count) for draw in draws])
@@ -119,7 +125,7 @@ place, ball = uniform(-2.0, 2.0, 3), beside(uniform(-2.0, 2.0, 3), uniform(0.3, 
 share, field, four = uniform(0.0, 1.0), uniform(0.0, 3.0), uniform(-3.0, 3.0, 4)
 
 BY_NAME: dict[str, Draw] = {
-    "a": field, "b": field, "max_a": field, "max_b": field, "slope_a": uniform(0, 5),
+    "a": field, "aim": units_or_none, "b": field, "max_a": field, "max_b": field, "slope_a": uniform(0, 5),
     "slope_b": uniform(0, 5),
     "at": whole(0, (TEXELS - 8) // 2, step=2), "apart": place,
     "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
@@ -137,16 +143,18 @@ BY_NAME: dict[str, Draw] = {
     "operator": whole(0, len(OPERATORS)), "origin": place,
     "phi": share, "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
     "rim": share,
+    "speed": uniform(0.1, 3.0),
     "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3), "v": four, "w": place,
     "z": uniform(0.0, 1.5),
 }  # fmt: skip
 BY_FUNCTION: dict[str, dict[str, Draw]] = {
-    "bound_combine": {"a": beside(field, uniform(0, 5)), "b": beside(field, uniform(0, 5))},
+    "bound_combine": {key: beside(field, uniform(-2, 5), uniform(0, 5)) for key in "ab"},
     "gradient_combine": {"a": beside(field, uniform(-3, 3, 3)), "b": beside(field, uniform(-3, 3, 3))},
     "color_combine": {"a": beside(field, uniform(0, 1, 3)), "b": beside(field, uniform(0, 1, 3))},
-    "bound_unstretch": {"f": uniform(0, 3, 2)},
+    "turned_to_local": {"v": place},
+    "bound_unstretch": {"f": uniform(0, 3, 3)},
     "gradient_unstretch": {"f": four},
-    "bound_unwarp": {"f": uniform(0, 3, 2)},
+    "bound_unwarp": {"f": uniform(0, 3, 3)},
     "gradient_unwarp": {"f": uniform(-1.0, 1.0, 4), "q": uniform(-1.0, 1.0, 3)},
     "color_unwarp": {"f": four},
     "color_unstretch": {"f": four},
@@ -289,25 +297,27 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
 
 TREES = random_trees(seed=31, count=24)
 MAIN = """
-uniform sampler2D points; uniform ivec2 part; uniform int reading;
+uniform sampler2D points; uniform ivec2 part; uniform int reading; uniform vec3 heading;
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     vec4 q = texelFetch(points, here, 0);
     vec4 result = vec4(0.0);
-    if (reading == 0) result.xy = field_bound(q.xyz, q.w, tape, part);
+    if (reading == 0) result.xyz = field_bound(q.xyz, heading, q.w, tape, part);
     if (reading == 1) result = field_gradient(q.xyz, tape, part);
-    if (reading == 2) result = interpret_color(q.xyz, 0.0, tape, part);
+    if (reading == 2) result = interpret_color(q.xyz, vec3(0.0), 0.0, tape, part);
     g_position = result;
 }
 """
 BOUND_AND_VALUE, GRADIENT, COLOR = range(3)
 
 
-def read_tape(context: Context, tree: Node, reading: int, points: Array) -> Array:
+def read_tape(
+    context: Context, tree: Node, reading: int, points: Array, heading: tuple[float, ...] = (0.0, 0.0, 0.0)
+) -> Array:
     """What the tracing shader's own functions give for `tree`, in place of a picture."""
     shader, _, _ = tracing_shader(ALL_KINDS).text.partition("void main()")
     textures = {"tape": tree.tape.data, "points": padded(points)}
-    uniforms = {"reading": reading, "part": (0, len(tree.tape.data))}
+    uniforms = {"reading": reading, "part": (0, len(tree.tape.data)), "heading": heading}
     return run_program(context, shader + MAIN, len(points), textures, uniforms)
 
 
@@ -336,6 +346,11 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int
         reach = (10.0 ** rng.uniform(-3.0, 0.5, 500)).astype(np.float32)
         seen = read_tape(context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]))
         assert_close(seen[:, :2], bounds_at(tree.tape, points, reach))
+        heading = units(rng, 4)[3]
+        seen = read_tape(
+            context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist())
+        )
+        assert_close(seen[:, :3], bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach))
         field = oracle.evaluate(tree, points)
         smooth = field.margin > 1e-5
         assert_close(
