@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .sizing import Sizing
     from .surface import Surface
     from .vertex_density import vertex_density
+    from .vtk import show
     from .window import EditWindow, view
 
 __all__ = [
@@ -93,6 +94,7 @@ __all__ = [
     "read_mesh",
     "save_scene",
     "seed",
+    "show",
     "vertex_density",
     "view",
 ]
@@ -134,6 +136,7 @@ _HOMES = {
     "sizing": ("Sizing",),
     "surface": ("Surface",),
     "vertex_density": ("vertex_density",),
+    "vtk": ("show",),
     "window": ("EditWindow", "view"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

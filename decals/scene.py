@@ -3,16 +3,18 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from PIL import Image
 
 from blobtree import Node
 
 from .camera import Camera
-from .errors import InvalidScene
+from .errors import InvalidScene, NoGraphics
 from .images import load_image
 from .implicit_surface import ImplicitSurface
 from .mesh_surface import MeshSurface
@@ -20,6 +22,9 @@ from .model import Decals
 
 Color = tuple[float, float, float]
 Box = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+PICTURE = (640, 480)
+"""Size of the picture that a notebook shows of a scene."""
 
 CLAY: Color = (0.72, 0.68, 0.62)
 """Colour of a mesh that brings none of its own."""
@@ -169,6 +174,18 @@ class Scene:
     def bounds(self) -> Box:
         """Lower and upper corner of all objects together, float32[3] each."""
         return bounds_of(self.objects)
+
+    def _repr_png_(self) -> bytes | None:
+        """What a notebook shows: a picture, or None (then it shows text) where there is no OpenGL."""
+        from .render import render
+
+        try:
+            pixels = render(self, size=PICTURE)
+        except NoGraphics:
+            return None
+        file = BytesIO()
+        Image.fromarray(pixels).save(file, "png")
+        return file.getvalue()
 
     def replace(
         self,

@@ -5,5 +5,6 @@ Once the package is installed pyvista finds the component by itself; importing t
 
 from decals.vtk.component import Component
 from decals.vtk.stage import Hit, Stage
+from decals.vtk.viewer import show
 
-__all__ = ["Component", "Hit", "Stage"]
+__all__ = ["Component", "Hit", "Stage", "show"]
