@@ -3,6 +3,12 @@
 The field, so the rim and the contact lines, depends on the chord |q − p| alone; a mapping only turns the
 direction in which the image is read (the paper's equation 4 does it by projection). The corrected map is
 exact on planes, spheres and cylinders.
+
+What is drawn therefore has the map's direction and the chord's length, which on an arc of angle ψ falls
+short of the arc's by ψ²/24: an RMS error of 0.016 (ρ/R)² of a decal of radius ρ where the surface curves with
+radius R, and within half a per cent up to ρ = R/2. The map's length is no field: it depends on the normal at
+q, so rims and lines of contact would break where the normal jumps, at creases and from object to object, the
+cells of radial contact would not be convex, and a decal that spills would change size with what it meets.
 """
 
 # mypy: ignore-errors

@@ -25,10 +25,9 @@ FOLD_SLACK = 0.0
 Figures = dict[str, float]
 
 
-def frames(size: tuple[int, int], few: Scene, many: Scene) -> Figures:
-    """Time of a frame under 100,000 decals over that under 100, at equal coverage."""
-    assert (len(few.decals), len(many.decals)) == (100, 100_000)
-    times: dict[int, list[float]] = {100: [], 100_000: []}
+def frames(size: tuple[int, int], few: Scene, many: Scene) -> dict[int, list[float]]:
+    """Seconds of frames under few and many decals at equal coverage, by their number, in turn."""
+    times: dict[int, list[float]] = {len(few.decals): [], len(many.decals): []}
     with Renderer() as renderer:
         for run in range(RUNS + 1):
             for scene in (few, many):
@@ -36,7 +35,28 @@ def frames(size: tuple[int, int], few: Scene, many: Scene) -> Figures:
                 seconds = renderer.time_frame(scene, size=size)
                 if run:
                     times[len(scene.decals)].append(seconds)
-    return {"frame_100k_over_100": statistics.median(times[100_000]) / statistics.median(times[100])}
+    return times
+
+
+def frame_ratio(size: tuple[int, int], few: Scene, many: Scene) -> Figures:
+    """Time of a frame under 100,000 decals over that under 100."""
+    hundred, most = (statistics.median(seconds) for seconds in frames(size, few, many).values())
+    return {"frame_100k_over_100": most / hundred}
+
+
+def million(size: tuple[int, int]) -> Figures:
+    """Frame time under 1,000,000 decals over that under 100, at equal coverage; index and memory."""
+    few, many = (bench_scene("knot", count, size) for count in (100, 1_000_000))
+    begin = time.perf_counter()
+    built = DecalIndex.of(many.decals)
+    seconds = time.perf_counter() - begin
+    hundred, most = (statistics.median(seconds) for seconds in frames(size, few, many).values())
+    return {
+        "index_1m_s": seconds,
+        "memory_1m_mb": 1e-6 * (built.nbytes + many.decals.packed().nbytes),
+        "frame_1m_ms": 1e3 * most,
+        "frame_1m_over_100": most / hundred,
+    }
 
 
 def index(decals: Decals) -> Figures:
@@ -133,7 +153,7 @@ def measure(*, quick: bool) -> Figures:
     size, samples, some = ((320, 240), 100_000, 1000) if quick else ((800, 600), 1_000_000, 4000)
     few, many = (bench_scene("knot", count, size) for count in (100, 100_000))
     parts: list[Callable[[], Figures]] = [
-        lambda: frames(size, few, many),
+        lambda: frame_ratio(size, few, many),
         lambda: index(many.decals),
         lambda: edits(many.decals),
         lambda: contact(samples),

@@ -5,6 +5,7 @@ alternate, errors against the float64 oracles of the tests. Figures whose subjec
 it is said. Other parts of it, each alone:
 
     --only index [--device cuda:0]   building the index of 100,000 and 1,000,000 decals; no graphics needed
+    --only million                   1,000,000 decals rendered
     --peers                          mesh-clipped decals, log maps and uv at vertices beside ours
 """
 
@@ -70,6 +71,16 @@ def index_alone(device: str) -> Figures:
     return figures
 
 
+def rendered_million(*, quick: bool) -> Figures:
+    """Draw a million decals, and print."""
+    from tests.bench import decal_figures
+
+    figures = decal_figures.million((320, 240) if quick else (800, 600))
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
+    print(*(f"{name:28} {value:12.4g}" for name, value in figures.items()), sep="\n")
+    return figures
+
+
 def peers(*, quick: bool) -> Figures:
     """Measure what one would pick instead, and print."""
     from tests.bench import decal_peers
@@ -91,11 +102,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench.decals", description=__doc__)
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
-    parser.add_argument("--only", choices=["index"], help="one part alone")
+    parser.add_argument("--only", choices=["index", "million"], help="one part alone")
     parser.add_argument("--peers", action="store_true", help="what one would pick instead, in one run")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
-    if options.only:
+    if options.only == "million":
+        figures = rendered_million(quick=options.quick)
+    elif options.only:
         figures = index_alone(options.device)
     elif options.peers:
         figures = peers(quick=options.quick)

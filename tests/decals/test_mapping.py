@@ -6,7 +6,9 @@ import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from decals.evaluate import evaluate
 from decals.mapping import Mapping, surface_offset, tangent_coordinates
+from decals.model import Decals
 
 wp.set_module_options({"enable_backward": False})
 
@@ -184,6 +186,28 @@ def test_error_on_curved_surfaces(points, gradient, limit):
     assert rms(corrected) <= limit
     assert rms(projected) > 5 * rms(corrected)
     assert (np.linalg.norm(corrected, axis=1) >= 0.99 * np.linalg.norm(w, axis=1)).all()
+
+
+@pytest.mark.parametrize(
+    ("points", "gradient", "radius"),
+    [(torus_points, torus_gradient, 0.2), (ellipsoid_points, ellipsoid_gradient, 0.1)],
+)
+def test_what_is_drawn_of_decals_up_to_half_the_radius_of_curvature(points, gradient, radius):
+    """The field takes the chord for a length; the least radii of curvature are 0.4 and 0.45²."""
+    rng, errors = np.random.default_rng(4), []
+    for p in points(rng, 60):
+        start = np.repeat(p[None], 50, axis=0)
+        n_p = unit(gradient(start))
+        log = tangents(rng, n_p) * rng.uniform(0, radius, (50, 1))
+        length = np.linalg.norm(log, axis=1, keepdims=True)
+        q = walk(gradient, start, log / length, length, steps=40)
+        one = Decals(start[:1], n_p[:1], log[:1], [radius])
+        uv = evaluate(one, q, unit(gradient(q)), device="cpu").uv.astype(np.float64)
+        axes = np.stack([one.tangents[0], one.bitangents[0]]).astype(np.float64)
+        errors.append(2 * radius * (uv - 0.5) - log @ axes.T)
+    rms = np.sqrt((np.concatenate(errors) ** 2).sum(axis=1).mean()) / radius
+    print(f"{points.__name__}: drawn {rms:.3%} of the radius")
+    assert rms <= 0.005
 
 
 # -- hostile ----------------------------------------------------------------------------------------
