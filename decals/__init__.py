@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .camera import Camera
+    from .choosing import ImageChoice
     from .contact import Contact
     from .cover import cover
     from .edit import EditSession
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from .images import BUILTIN_IMAGES, generate_image, load_image
     from .implicit_surface import ImplicitSurface
     from .index import DecalIndex
+    from .jitter import Jitter
+    from .laying import lay
     from .mapping import Mapping
     from .mesh_file import read_mesh
     from .mesh_surface import MeshSurface
@@ -59,6 +62,7 @@ __all__ = [
     "DecalsError",
     "EditSession",
     "EditWindow",
+    "ImageChoice",
     "ImplicitSurface",
     "Interaction",
     "InvalidDecals",
@@ -68,6 +72,7 @@ __all__ = [
     "InvalidPoints",
     "InvalidScene",
     "InvalidSeeding",
+    "Jitter",
     "Mapping",
     "MeshObject",
     "MeshSurface",
@@ -89,6 +94,7 @@ __all__ = [
     "evaluate",
     "generate_image",
     "gradient_of",
+    "lay",
     "load_image",
     "load_scene",
     "read_mesh",
@@ -101,6 +107,7 @@ __all__ = [
 
 _HOMES = {
     "camera": ("Camera",),
+    "choosing": ("ImageChoice",),
     "contact": ("Contact",),
     "cover": ("cover",),
     "edit": ("EditSession",),
@@ -122,6 +129,8 @@ _HOMES = {
     "images": ("BUILTIN_IMAGES", "generate_image", "load_image"),
     "implicit_surface": ("ImplicitSurface",),
     "index": ("DecalIndex",),
+    "jitter": ("Jitter",),
+    "laying": ("lay",),
     "mapping": ("Mapping",),
     "mesh_file": ("read_mesh",),
     "mesh_surface": ("MeshSurface",),

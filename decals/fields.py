@@ -21,8 +21,27 @@ DIFFERENCE = 1e-3
 def curvature_directions(positions: Floats, normals: Floats) -> NDArray[np.float64]:
     """Tangents along the principal curvature of larger magnitude, ``float64[n, 3]``; the sign is arbitrary.
 
-    The shape operator at each point is fitted to how normals change toward its neighbours (least squares).
     Zero where there are too few neighbours, or no direction is more curved than another.
+    """
+    first, second = frames(normals.astype(np.float64))
+    values, vectors = np.linalg.eigh(_shape_operators(positions, normals))
+    strongest = np.abs(values).argmax(axis=1)
+    chosen = np.take_along_axis(vectors, strongest[:, None, None], axis=2)[..., 0]
+    directions: NDArray[np.float64] = chosen[:, :1] * first + chosen[:, 1:] * second
+    directions[values[:, 1] - values[:, 0] <= 1e-6 * np.abs(values).max(axis=1)] = 0.0
+    return directions
+
+
+def bends(positions: Floats, normals: Floats) -> NDArray[np.float64]:
+    """Larger of the two principal curvatures, without its sign, ``float64[n]``; 0 without neighbours."""
+    found: NDArray[np.float64] = np.abs(np.linalg.eigvalsh(_shape_operators(positions, normals))).max(axis=1)
+    return found
+
+
+def _shape_operators(positions: Floats, normals: Floats) -> NDArray[np.float64]:
+    """How normals change along the surface, in each point's `frames`, ``float64[n, 2, 2]``.
+
+    Fitted to how normals change toward the neighbours (least squares).
     """
     wide = normals.astype(np.float64)
     first, second = frames(wide)
@@ -45,13 +64,8 @@ def curvature_directions(positions: Floats, normals: Floats) -> NDArray[np.float
         axis=1,
     )
     entries = np.einsum("nij,nj->ni", np.linalg.pinv(left, rcond=1e-8, hermitian=True), right)
-    operators = np.stack([entries[:, [0, 1]], entries[:, [1, 2]]], axis=1)
-    values, vectors = np.linalg.eigh(operators)
-    strongest = np.abs(values).argmax(axis=1)
-    chosen = np.take_along_axis(vectors, strongest[:, None, None], axis=2)[..., 0]
-    directions: NDArray[np.float64] = chosen[:, :1] * first + chosen[:, 1:] * second
-    directions[values[:, 1] - values[:, 0] <= 1e-6 * np.abs(values).max(axis=1)] = 0.0
-    return directions
+    operators: NDArray[np.float64] = np.stack([entries[:, [0, 1]], entries[:, [1, 2]]], axis=1)
+    return operators
 
 
 def smooth_crosses(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blobtree.launch import launch
 from decals.ground import Scalars, Vectors
-from decals.mesh_queries import closest_points, first_hits, mark_inside
+from decals.mesh_queries import closest_faces, closest_points, first_hits, mark_inside
 from decals.surface import Floats
 
 
@@ -59,6 +59,11 @@ class MeshGround:
         """Write the closest points and the normals of their faces."""
         inputs = [*self.backing, points, reaches]
         launch(closest_points, len(points), inputs, [positions, normals], device=self.device)
+
+    def locate(self, points: Vectors, faces: Scalars, weights: Any) -> None:
+        """Write the closest of the sound faces, and the weights of its first two corners there."""
+        inputs = [self._mesh.id, *self._ball, points]
+        launch(closest_faces, len(points), inputs, [faces, weights], device=self.device)
 
     def hit(self, origins: Vectors, directions: Vectors, distances: Scalars) -> None:
         """Write the distance to the first face that each ray meets, infinity for a miss."""

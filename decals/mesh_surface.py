@@ -117,6 +117,16 @@ class MeshSurface:
         reaches = np.zeros(len(queries), np.float32) if within is None else within.astype(np.float32)
         return asked(self.on(self.device), queries, reaches, self.device)
 
+    def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Rows of the faces closest to the points, and the weights of their corners there, ``[n, 3]``."""
+        queries = as_points(points)
+        faces: Any = wp.zeros(len(queries), dtype=wp.int32, device=self.device)
+        weights: Any = wp.zeros(len(queries), dtype=wp.vec2, device=self.device)
+        if len(queries):
+            self.on(self.device).locate(vectors(queries, self.device), faces, weights)
+        first, second = weights.numpy().reshape(-1, 2).astype(np.float64).T
+        return self.sound[faces.numpy()], np.stack([first, second, 1.0 - first - second], axis=1)
+
     def normal(self, points: ArrayLike) -> Floats:
         """Return the normals of the faces closest to the points."""
         return self.project(points)[1]

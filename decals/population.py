@@ -84,6 +84,12 @@ class World:
         self.areas = np.array([area for area, _ in measures])
         self.masses = np.array([mass for _, mass in measures])
 
+    def deformed(self, surfaces: Sequence[Surface]) -> "World":
+        """Other surfaces in place of these, one for one, under the same rules."""
+        if len(surfaces) != len(self.surfaces):
+            raise InvalidSeeding(f"expected {len(self.surfaces)} surfaces as before, got {len(surfaces)}")
+        return World(surfaces, self._seed, density=self._density, mask=self._mask, device=self.device)
+
     @property
     def area(self) -> float:
         """Visible area of all surfaces together."""
@@ -146,8 +152,10 @@ class World:
         if self._is_whole(number):
             return surface.sample(count, seed)
         wanted = count if self.uniform else CHOICE * count
-        tries = int(np.ceil(1.1 * wanted * surface.area / self.areas[number])) + 16
-        for _ in range(ROUNDS):
+        tries = (
+            int(np.ceil(1.1 * wanted * surface.area / max(self.areas[number], surface.area / SCOUTS))) + 16
+        )
+        for _ in range(ROUNDS if self.areas[number] > 0 else 0):
             positions, normals = surface.sample(tries, seed)
             visible = np.flatnonzero(~self.barred(number, positions, normals))
             if len(visible) >= wanted:
@@ -157,7 +165,7 @@ class World:
                 return positions[chosen], normals[chosen]
             tries *= 2
         raise InvalidSeeding(
-            f"expected visible area on surface {number}, got none in {tries} samples; move it"
+            f"expected visible area on surface {number}, got none in {max(tries, SCOUTS)} samples; move it"
         )
 
     def _measure(self, number: int) -> tuple[float, float]:

@@ -6,18 +6,13 @@ A projection is a function of ``points[n, 3]`` to ``uv[n, 2]``: u runs from 0 at
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree.launch import launch
 from decals.errors import InvalidSeeding
-from decals.ground import vectors
-from decals.mesh_queries import closest_faces
 from decals.mesh_surface import MeshSurface
-from decals.surface import Floats, Surface, as_points
+from decals.surface import Floats, Surface
 
 Wide = NDArray[np.float64]
 Projection = Callable[[Floats], Wide]
@@ -192,20 +187,10 @@ class TextureCoordinates:
                 f"got {list(given.shape)}"
             )
         self._surface = surface
-        corners = given[surface.faces] if given.ndim == 2 else given
-        self._corners = corners[surface.sound]
+        self._corners = given[surface.faces] if given.ndim == 2 else given
 
     def __call__(self, points: Floats) -> Wide:
         """Place in the image of the closest point of the mesh."""
-        places, device = as_points(points), self._surface.device
-        if len(places) == 0:
-            return np.zeros((0, 2))
-        faces: Any = wp.zeros(len(places), dtype=wp.int32, device=device)
-        weights: Any = wp.zeros(len(places), dtype=wp.vec2, device=device)
-        mesh, _, *ball = self._surface.on(device).backing
-        inputs = [mesh, *ball, vectors(places, device)]
-        launch(closest_faces, len(places), inputs, [faces, weights], device=device)
-        first, second = weights.numpy().astype(np.float64).T
-        shares = np.stack([first, second, 1.0 - first - second], axis=1)
-        found: Wide = np.einsum("nk,nki->ni", shares, self._corners[faces.numpy()])
+        faces, weights = self._surface.locate(points)
+        found: Wide = np.einsum("nk,nki->ni", weights, self._corners[faces])
         return found

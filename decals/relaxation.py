@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
+from decals.carrying import carried, freed
 from decals.crowd import Crowd
 from decals.errors import InvalidSeeding
 from decals.evenness import Spacing, evenness, ideal_spacing
@@ -13,12 +14,13 @@ from decals.homes import Homes
 from decals.local_relaxation import relax_near
 from decals.looking import Lookout
 from decals.neighbours import FacingTree
+from decals.placing import check, count_of, nobody, placed, remaining
 from decals.polishing import CLOSE, polish
 from decals.population import Density, Mask, Sites, World, shares
 from decals.refilling import crowded, refill
 from decals.repulsion import CUTOFF, Law
 from decals.scouting import Scouts
-from decals.surface import Flags, Floats, Surface, as_points
+from decals.surface import Flags, Floats, Surface
 
 EXPONENTS = (2.0, 3.0)
 """Power law of the repulsion at the first and the last step."""
@@ -34,6 +36,9 @@ REFILLS = (0.1, 0.8, 0.05)
 
 RARELY = 6
 """Steps at least between two such times, for the moved to find their rest."""
+
+SETTLING = 60
+"""Steps after a deformation within which crowded particles still move to bare places."""
 
 POLISHING = 150
 """Rounds at most that part the last close pairs."""
@@ -93,24 +98,24 @@ class Relaxation:
         fixed: ArrayLike | None = None,
         device: str = "cpu",
     ) -> None:
-        _check("seed", seed, 0)
-        _check("iterations", iterations, 1)
+        check("seed", seed, 0)
+        check("iterations", iterations, 1)
         self.iterations = iterations
         self.steps = 0
         self._seed = seed
         self.world = World(surfaces, seed, density=density, mask=mask, device=device)
-        count = _count(count, spacing, self.world.mass)
+        count = count_of(count, spacing, self.world.mass)
         self.spacing = ideal_spacing(self.world.mass, count)
-        placed = _placed(self.world, fixed)
-        if len(placed) > count:
+        given = placed(self.world, fixed)
+        if len(given) > count:
             raise InvalidSeeding(
-                f"fixed: expected at most the count of {count}, got {len(placed)}; raise the count"
+                f"fixed: expected at most the count of {count}, got {len(given)}; raise the count"
             )
-        counts = _remaining(shares(self.world.masses, count), placed)
-        others = self.world.sample(counts, stream=1) if count else _nobody()
-        joined = Sites.joined([placed, others])
+        counts = remaining(shares(self.world.masses, count), given)
+        others = self.world.sample(counts, stream=1) if count else nobody()
+        joined = Sites.joined([given, others])
         order = np.argsort(joined.surface_ids, kind="stable")
-        self._fixed: Flags = (np.arange(count) < len(placed))[order]
+        self._fixed: Flags = (np.arange(count) < len(given))[order]
         self._sites: Sites | None = joined[order]
         first, last, step = (int(part * iterations) for part in REFILLS)
         self._refills = set(range(max(first, 1), last + 1, max(step, RARELY)))
@@ -235,7 +240,7 @@ class Relaxation:
         InvalidSeeding
             If the surface closest to the point is barred there.
         """
-        site = _placed(self.world, np.reshape(np.asarray(point, dtype=np.float32), (1, -1)))
+        site = placed(self.world, np.reshape(np.asarray(point, dtype=np.float32), (1, -1)))
         if not self.world.settle(site)[1].all():
             raise InvalidSeeding(f"expected a place that is neither hidden nor masked, got {point!r:.60}")
         row = int(np.searchsorted(self.surface_ids, site.surface_ids[0], side="right"))
@@ -258,6 +263,27 @@ class Relaxation:
         sites = Sites.joined([self.sites[:number], self.sites[number + 1 :]])
         self._fixed = np.delete(self._fixed, number)
         self._relax_near(sites, place)
+
+    def deform(self, surfaces: Sequence[Surface]) -> None:
+        """Take other surfaces in place of those there are, one for one, and carry the particles along.
+
+        On a mesh with the same faces each stays at its place in its face; elsewhere it is put onto the new
+        surface where that is closest, on a tree along the field. Who ends up hidden or barred starts again at
+        random. Counts stay, of each surface too; the spacing follows the area. A few calls of `step` even
+        out what was stretched; nothing else changes, so a viewer may show every one.
+
+        Raises
+        ------
+        InvalidSeeding
+            If there are not as many surfaces as before, or particles have no visible area to lie on.
+        """
+        world = self.world.deformed(surfaces)
+        sites = freed(world, carried(self.world, world, self.sites), self._fixed, stream=self.steps)
+        self.world = world
+        self.spacing = ideal_spacing(world.mass, self.count)
+        self._scouts = Scouts(world, self.sizes_at)
+        self._refills |= {self.steps + k for k in range(RARELY, SETTLING + 1, RARELY)}
+        self._sites, self._crowd, self._homes = sites, None, Homes(self.sizes_at)
 
     def _relax_near(self, sites: Sites, place: Floats) -> None:
         """Take other particles, and let those around the place find their rest."""
@@ -315,55 +341,3 @@ class Relaxation:
             sites = self.sites
             self._crowd = Crowd(self.world, sites, ~self._fixed, self.sizes_at(sites.positions))
         return self._crowd
-
-
-def _nobody() -> Sites:
-    none = np.zeros((0, 3), np.float32)
-    return Sites(none, none, np.zeros(0, np.int32))
-
-
-def _check(name: str, value: int, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise InvalidSeeding(f"{name}: expected a whole number, got {value!r}")
-    if value < least:
-        raise InvalidSeeding(f"{name}: expected at least {least}, got {value}")
-
-
-def _count(count: int | None, spacing: float | None, mass: float) -> int:
-    """Count that was wished for, or follows from the spacing."""
-    if (count is None) == (spacing is None):
-        raise InvalidSeeding("expected either a count or a spacing, got both or none; give one of them")
-    if count is not None:
-        _check("count", count, 0)
-        return int(count)
-    assert spacing is not None
-    if not (np.isfinite(spacing) and spacing > 0):
-        raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
-    return int(round(2.0 * mass / (np.sqrt(3.0) * spacing**2)))
-
-
-def _placed(world: World, fixed: ArrayLike | None) -> Sites:
-    """Put fixed particles onto the surfaces that they are closest to, in the surfaces' order."""
-    if fixed is None or np.size(fixed) == 0:
-        return _nobody()
-    if not world.surfaces:
-        raise InvalidSeeding("fixed: expected a surface for them to lie on, got none")
-    points = as_points(fixed, "fixed")
-    found = [surface.project(points) for surface in world.surfaces]
-    gaps = np.stack([np.linalg.norm(positions - points, axis=1) for positions, _ in found])
-    nearest = gaps.argmin(axis=0)
-    rows = np.arange(len(points))
-    return Sites(
-        np.stack([positions for positions, _ in found])[nearest, rows],
-        np.stack([normals for _, normals in found])[nearest, rows],
-        nearest.astype(np.int32),
-    )
-
-
-def _remaining(counts: NDArray[np.int64], placed: Sites) -> NDArray[np.int64]:
-    """What is left of each surface's share after the fixed particles; the sum stays exact."""
-    left = counts - np.bincount(placed.surface_ids, minlength=len(counts))
-    while (left < 0).any():
-        left[int(left.argmax())] -= 1
-        left[int(left.argmin())] += 1
-    return left

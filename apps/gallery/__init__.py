@@ -9,6 +9,7 @@ EXAMPLES = (
     "spanning",
     "touching",
     "particles",
+    "deforming",
     "models",
     "dragon",
     "interactions",

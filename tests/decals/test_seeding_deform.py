@@ -1,0 +1,129 @@
+"""Particles and decals that are carried along while surfaces deform."""
+
+import numpy as np
+import pytest
+
+from blobtree import Point, Segment
+from decals.errors import InvalidSeeding
+from decals.implicit_surface import ImplicitSurface
+from decals.laying import lay
+from decals.mesh_surface import MeshSurface
+from decals.relaxation import Relaxation
+from tests.decals.meshes import box, plane, sphere
+from tests.oracles.coats import covered, nearest_facing
+
+
+def stretched(ball, factors):
+    return MeshSurface(ball.vertices * np.float32(factors), ball.faces)
+
+
+def test_on_a_mesh_everybody_stays_in_its_face():
+    ball = sphere()
+    relaxation = Relaxation([ball], count=300)
+    relaxation.run()
+    before = relaxation.positions
+    relaxation.deform([stretched(ball, (2.0, 1.0, 0.5))])
+    assert relaxation.positions == pytest.approx(before * [2.0, 1.0, 0.5], abs=1e-5)
+    assert relaxation.count == 300
+
+
+def test_a_mesh_that_turns_takes_everybody_with_it():
+    """Half a turn: the closest place of the new mesh would be quite another one."""
+    slab = box((2.0, 1.0, 0.3))
+    relaxation = Relaxation([slab], count=200, iterations=40)
+    relaxation.run()
+    before = relaxation.positions
+    relaxation.deform([stretched(slab, (-1.0, -1.0, 1.0))])
+    assert relaxation.positions == pytest.approx(before * [-1.0, -1.0, 1.0], abs=1e-5)
+
+
+def test_a_few_steps_even_out_what_was_stretched():
+    ball = sphere(level=5)
+    relaxation = Relaxation([ball], count=1000)
+    relaxation.run()
+    for frame in range(1, 9):
+        relaxation.deform([stretched(ball, (1.0 + 0.15 * frame, 1.0, 1.0))])
+        for _ in range(4):
+            relaxation.step()
+        assert relaxation.statistics().rho > 0.6
+    for _ in range(40):
+        relaxation.step()
+    found = relaxation.statistics()
+    assert relaxation.spacing == pytest.approx(found.ideal)
+    assert found.rho > 0.8
+    assert found.cv < 0.03
+
+
+def blob(shift):
+    return ImplicitSurface(
+        Point((shift, 0, 0), radius=1.0) + Segment((shift, 0, 0), (shift + 1.5, 0.5, 0), radius=0.4)
+    )
+
+
+def test_on_a_tree_everybody_follows_the_field():
+    relaxation = Relaxation([blob(0.0)], count=400)
+    relaxation.run()
+    for frame in range(1, 6):
+        moved = blob(0.1 * frame)
+        relaxation.deform([moved])
+        relaxation.step()
+        positions = relaxation.positions
+        assert (
+            np.linalg.norm(moved.project(positions)[0] - positions, axis=1).max() < 1e-4 * relaxation.spacing
+        )
+    for _ in range(30):
+        relaxation.step()
+    assert relaxation.statistics().rho > 0.75
+    assert positions[:, 0].max() > 1.5
+
+
+def test_who_gets_hidden_starts_again_elsewhere_and_fixed_ones_stay():
+    slab = plane(4.0)
+    relaxation = Relaxation([slab, sphere(center=(0, 0, 3.0))], count=400, fixed=[(0.0, 0.0, 0.0)])
+    relaxation.run()
+    counts = np.bincount(relaxation.surface_ids)
+    ball = sphere(center=(0, 0, 0.2))
+    relaxation.deform([slab, ball])
+    own = (relaxation.surface_ids == 0) & ~relaxation.fixed
+    assert not ball.contains(relaxation.positions[own]).any()
+    assert np.array_equal(np.bincount(relaxation.surface_ids), counts)
+    assert np.abs(relaxation.positions[relaxation.fixed]).max() < 1e-6
+    for _ in range(60):
+        relaxation.step()
+    assert not ball.contains(relaxation.positions[own]).any()
+    nearest = nearest_facing(relaxation.positions[own], relaxation.normals[own])
+    assert nearest.min() > 0.5 * np.median(nearest)
+
+
+def test_the_same_deformation_gives_the_same_bytes():
+    def run():
+        relaxation = Relaxation([blob(0.0), sphere(center=(0, 2.5, 0))], count=150, iterations=20)
+        relaxation.run()
+        relaxation.deform([blob(0.2), sphere(center=(0, 1.5, 0))])
+        relaxation.step()
+        return relaxation.positions.tobytes()
+
+    assert run() == run()
+
+
+def test_decals_lie_on_the_deformed_surface_without_gaps():
+    ball = sphere(level=4)
+    relaxation = Relaxation([ball], count=150)
+    relaxation.run()
+    longer = stretched(ball, (1.5, 1.0, 1.0))
+    relaxation.deform([longer])
+    for _ in range(10):
+        relaxation.step()
+    decals = lay(relaxation, seed=1)
+    assert covered(decals, *longer.sample(4000, seed=3)).all()
+
+
+def test_impossible_deformations_are_refused():
+    relaxation = Relaxation([sphere(center=(5, 0, 0)), plane()], count=50, iterations=2)
+    with pytest.raises(InvalidSeeding, match="2 surfaces as before, got 1"):
+        relaxation.deform([sphere()])
+    with pytest.raises(InvalidSeeding, match="visible area"):
+        relaxation.deform([sphere(), plane(0.1)])
+    empty = Relaxation([plane()], count=0)
+    empty.deform([plane(2.0)])
+    assert empty.count == 0
