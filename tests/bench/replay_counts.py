@@ -20,7 +20,7 @@ import warp as wp
 
 from blobtree.glsl import TEXTURE_WIDTH_BITS
 from decals.index import DeviceIndex
-from decals.model import Decals
+from decals.model import RECORD, Decals
 from tests.bench.replay import Replay, milliseconds
 
 WIDTH = 1 << TEXTURE_WIDTH_BITS
@@ -28,6 +28,9 @@ COVERAGE = 2.5
 """Area of all rims over that of the surface; random decals leave a twelfth of it bare."""
 
 COUNTS = (100, 10_000, 100_000, 1_000_000)
+LISTS, LIST = 24, 12
+"""Lists that a moved decal leaves and enters, and decals in one."""
+
 Figures = dict[str, float]
 
 
@@ -85,6 +88,21 @@ class CountedReplay(Replay):
                 one["uniforms"] |= {name: v for name, v in numbers.items() if name in one["uniforms"]}
         return {"index_ms": 1e3 * seconds, "mb": 1e-6 * sum(array.nbytes for array in arrays.values())}
 
+    def upload_ms(self, runs: int) -> float:
+        """Median milliseconds to send what one edit changes: a record, and a dozen lists of a cell."""
+        records, ids = self._made["decal_records"], self._made["index_ids"]
+        rng, times = np.random.default_rng(0), []
+        for _ in range(runs):
+            rows = rng.integers(0, ids.size[1], LISTS)
+            self.gl.finish()
+            begin = time.perf_counter()
+            records.write(bytes(16 * RECORD), viewport=(0, int(rng.integers(0, records.size[1])), RECORD, 1))
+            for row in rows.tolist():
+                ids.write(bytes(4 * LIST), viewport=(0, row, LIST, 1))
+            self.gl.finish()
+            times.append(1e3 * (time.perf_counter() - begin))
+        return float(np.median(times))
+
     def painted(self) -> float:
         """Share of the objects' pixels that decals recolour."""
         bare, painted = (
@@ -119,6 +137,7 @@ def measure(gl: moderngl.Context, path: Path, counts: list[int], runs: int, devi
             paint = replay.pass_(entry, "paint.glsl", "g_paint")
             figures[f"decals_{entry}_{count}"] = milliseconds(gl, paint, runs)
         figures[f"painted_{count}"] = replay.painted()
+        figures[f"upload_ms_{count}"] = replay.upload_ms(runs)
     for entry in replay.settings["passes"]:
         first, last = (figures.get(f"decals_{entry}_{count}") for count in (counts[0], counts[-1]))
         if first and last:

@@ -58,6 +58,7 @@ def test_a_recording_under_other_decals(tmp_path: Path, gl: moderngl.Context) ->
     assert figures["painted_50"] == pytest.approx(1 - np.exp(-replay_counts.COVERAGE), abs=0.1)
     assert figures["painted_5000"] == pytest.approx(1 - np.exp(-replay_counts.COVERAGE), abs=0.03)
     assert figures["decals_fragment_5000_over_50"] > 0
+    assert 0 < figures["upload_ms_5000"] < 1000
 
 
 def test_random_coats_cover_equally() -> None:
