@@ -21,6 +21,7 @@ import warp as wp
 from .errors import InvalidNode, InvalidResolution
 from .grid import BRANCHING, CHILDREN, Grid
 from .launch import launch
+from .memory import demand_memory
 from .refine import inherit, match, measure, take_over, write
 from .scan import everything, starts_of, where_negative
 from .tape import Tape
@@ -28,6 +29,8 @@ from .vocabulary import Vocabulary
 
 MOST_BLOCKS = 1 << 21
 """Blocks of a level, at most; a mesh in as many takes a few gigabytes, and 3000 cells span a ball."""
+
+TEXEL_BYTES = 16
 
 MOST_TEXELS = 1 << 24
 """Texels of a tape that float32 can count."""
@@ -170,6 +173,7 @@ class _Refinement:
                 f"the surface crosses {blocks:,} blocks of {BRANCHING}³ cells, at most {MOST_BLOCKS:,} are "
                 "made; take larger cells"
             )
+        demand_memory(TEXEL_BYTES * total, device, f"the tapes of {blocks:,} blocks")
         new = Level(
             wp.empty(blocks, dtype=wp.vec3i, device=device),
             wp.empty(blocks, dtype=wp.int64, device=device),

@@ -23,6 +23,9 @@ DEFAULT_RESOLUTION = 64
 FINEST_RESOLUTION = 1 << 20
 """Cells along a side beyond which their places do not fit into 32 bits."""
 
+SMALLEST_MODEL, LARGEST_MODEL = 1e-15, 1e15
+"""Sizes between which squared distances, in cells too, neither vanish nor overflow in float32."""
+
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
@@ -188,6 +191,11 @@ def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> f
         cell_size = longest / int(cells)
     if not 0.0 < cell_size < np.inf:
         raise InvalidResolution(f"cell_size: expected a finite size above 0, got {cell_size!r}")
+    if not SMALLEST_MODEL < longest < LARGEST_MODEL:
+        raise InvalidResolution(
+            f"the model is {longest:.3g} long; between {SMALLEST_MODEL:g} and {LARGEST_MODEL:g} float32 can "
+            "square its distances: scale it"
+        )
     if longest / cell_size > FINEST_RESOLUTION:
         raise InvalidResolution(
             f"cell_size: {cell_size:g} makes {longest / cell_size:.3g} cells along the model, at most "

@@ -15,6 +15,7 @@ from .cells import SparseCells
 from .dual import SAMPLES, classify_cells, connect_vertices, sample_blocks, settle_rows
 from .grid import CHILDREN
 from .launch import launch
+from .memory import demand_memory
 from .patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
 from .progress import Progress
 from .reuse import (
@@ -33,6 +34,11 @@ from .vertices import list_patches, place_vertices
 Array = Any
 
 WORD = 16
+
+SAMPLE_BYTES = 4
+
+BLOCK_BYTES = 64 * 4 + 13 * (3 * 12 + 4) + 13 * 24
+"""What a block holds in the end: codes, rows and offsets of 64 cells, some 13 vertices and 26 triangles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +102,8 @@ class _Extraction:
         """Sample, place, connect."""
         report("sampling the field", 0.0)
         anew, rest = self._changed_blocks()
+        needed = len(anew) * SAMPLES * SAMPLE_BYTES + self._count * BLOCK_BYTES
+        demand_memory(needed, self._device, f"the surface in {self._count:,} blocks of cells")
         codes, rows, offsets = (
             self._empty(self._count * CHILDREN, dtype) for dtype in (wp.uint8, wp.int16, wp.uint8)
         )
