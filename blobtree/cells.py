@@ -17,7 +17,9 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
+from .cull import count_reaching, name_children, pieces_of, write_reaching
 from .errors import InvalidNode, InvalidResolution
 from .grid import BRANCHING, CHILDREN, Grid
 from .launch import launch
@@ -97,7 +99,8 @@ def build_cells(
         previous = None
     levels = [_root(tape, grid, previous, place)]
     for number in range(1, grid.depth + 1):
-        levels.append(_Refinement(levels[-1], number, grid, previous, place, tape.vocabulary).level())
+        step = _Refinement(levels[-1], number, grid, previous, place, tape.vocabulary)
+        levels.append(step.level(pieces_of(tape, place) if number == 1 else None))
     return SparseCells(grid, tuple(levels), place, tape)
 
 
@@ -159,8 +162,10 @@ class _Refinement:
         x, y, z = (a - b for a, b in zip(ours, theirs, strict=True))
         return previous.levels[number], (x, y, z)
 
-    def level(self) -> Level:
-        """The level below."""
+    def level(self, pieces: NDArray[np.int32] | None) -> Level:
+        """The level below; `pieces` of the root's tape, where many threads are to look at it."""
+        if pieces is not None and len(self._fresh):
+            return self._culled(wp.array(pieces, dtype=wp.vec4i, device=self._device))
         above, device = self._above, self._device
         count = len(above) * CHILDREN
         children: Any = wp.empty(count, dtype=wp.int32, device=device)
@@ -173,16 +178,24 @@ class _Refinement:
                 f"the surface crosses {blocks:,} blocks of {BRANCHING}³ cells, at most {MOST_BLOCKS:,} are "
                 "made; take larger cells"
             )
-        demand_memory(TEXEL_BYTES * total, device, f"the tapes of {blocks:,} blocks")
-        new = Level(
-            wp.empty(blocks, dtype=wp.vec3i, device=device),
-            wp.empty(blocks, dtype=wp.int64, device=device),
-            wp.empty(blocks, dtype=wp.vec2i, device=device),
-            wp.empty(total, dtype=wp.vec4, device=device),
-            children,
-            wp.full(blocks, -1, dtype=wp.int32, device=device),
-        )
+        new = _empty_level(blocks, total, children, device)
         self._fill(new, places, starts)
+        return new
+
+    def _culled(self, pieces: Any) -> Level:
+        """The root's children, all that primitives reach."""
+        device, vocabulary, count = self._device, self._vocabulary, CHILDREN * len(pieces)
+        children: Any = wp.empty(CHILDREN, dtype=wp.int32, device=device)
+        kept, texels = (wp.zeros(n + 1, dtype=wp.int32, device=device) for n in (CHILDREN, count))
+        inputs = [pieces, self._above.tape, *self._geometry()[3:]]
+        launch(vocabulary.kernel(count_reaching), count, inputs, [kept, texels], device)
+        places, blocks = starts_of(kept, "blocks")
+        starts, total = starts_of(texels, "texels of the blocks' tapes")
+        new = _empty_level(blocks, total, children, device)
+        launch(vocabulary.kernel(write_reaching), count, [*inputs, starts], [new.tape], device)
+        outputs = [children, new.blocks, new.keys, new.spans]
+        launch(name_children, CHILDREN, [len(pieces), places, starts], outputs, device)
+        self._match(new, places)
         return new
 
     def _geometry(self) -> list[Any]:
@@ -209,8 +222,29 @@ class _Refinement:
         old, above = self._old, self._above
         if old is None:
             return
-        there = [old.keys, old.spans, old.tape.view(wp.vec4i)]
-        inputs = [self._fresh, places, new.blocks, new.spans, new.tape.view(wp.vec4i)]
-        launch(match, fresh, [*inputs, wp.vec3i(*self._shift), *there], [new.sources], self._device)
+        self._match(new, places)
         inputs = [self._same, above.sources, above.blocks, old.children, old.spans, old.tape, places, starts]
         launch(take_over, len(self._same) * CHILDREN, inputs, [*outputs, new.sources], self._device)
+
+    def _match(self, new: Level, places: Any) -> None:
+        """Which of the blocks made anew came out as before."""
+        old = self._old
+        if old is None:
+            return
+        there = [old.keys, old.spans, old.tape.view(wp.vec4i)]
+        inputs = [self._fresh, places, new.blocks, new.spans, new.tape.view(wp.vec4i)]
+        inputs += [wp.vec3i(*self._shift), *there]
+        launch(match, len(self._fresh) * CHILDREN, inputs, [new.sources], self._device)
+
+
+def _empty_level(blocks: int, texels: int, children: Any, device: str) -> Level:
+    """Room for a level."""
+    demand_memory(TEXEL_BYTES * texels, device, f"the tapes of {blocks:,} blocks")
+    return Level(
+        wp.empty(blocks, dtype=wp.vec3i, device=device),
+        wp.empty(blocks, dtype=wp.int64, device=device),
+        wp.empty(blocks, dtype=wp.vec2i, device=device),
+        wp.empty(texels, dtype=wp.vec4, device=device),
+        children,
+        wp.full(blocks, -1, dtype=wp.int32, device=device),
+    )

@@ -18,7 +18,7 @@ Everything of a primitive lies in one place, so a part of a tape is a tape.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -80,6 +80,8 @@ class Tape:
     warp_registers: int = 0
     vocabulary: Vocabulary = BUILT_IN
     """What the codes stand for."""
+    headers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Where in `data` the instructions begin."""
 
     def on(self, device: str | None = None) -> DeviceTape:
         """This tape on a Warp device, by default the current one."""
@@ -104,7 +106,8 @@ def compile_tape(program: list[Instruction]) -> Tape:
     skeletons = {run.skeleton for run in runs}
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
     vocabulary = vocabulary_of(skeletons, operators)
-    texels = [texels for step in program for texels in _texels(step, vocabulary)]
+    texels = [np.concatenate(list(_texels(step, vocabulary))) for step in program]
+    ends = np.cumsum([len(part) for part in texels])
     return Tape(
         data=np.concatenate(texels).astype(np.float32),
         registers=registers,
@@ -116,6 +119,7 @@ def compile_tape(program: list[Instruction]) -> Tape:
         ),
         warp_registers=warp_registers,
         vocabulary=vocabulary,
+        headers=np.concatenate([[0], ends[:-1]]).astype(np.int64),
     )
 
 

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from blobtree import Mesh, Node, Point, Sum, polygonize
+from blobtree import Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygonize
 from blobtree.cells import SparseCells, build_cells
+from blobtree.cull import split
 from blobtree.evaluate import bounds_at, values_at
 from blobtree.grid import BRANCHING, aligned_grid
 from blobtree.kernels import ISO, RIM
-from tests.blobtree.trees import random_trees
+from tests.blobtree.edits import edited
+from tests.blobtree.trees import random_leaf, random_trees
 from tests.oracles.dense_polygonize import polygonize as dense_polygonize
 
 CELLS_ALONG = 28
@@ -111,3 +113,47 @@ def test_few_cells_and_primitives_are_looked_at() -> None:
     crossing = len(polygonize(tree, cell_size=1.0 / 128.0).vertices)
     assert len(cells.leaves) * BRANCHING**3 <= 8.0 * crossing  # measured at twice this resolution: 4.8
     assert primitives.mean() <= 4.0
+
+
+def forced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many threads to the root's children, as on a graphics card, for tapes of any length."""
+    monkeypatch.setattr("blobtree.cells.pieces_of", lambda tape, _device: split(tape))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_culling_the_root_changes_no_triangle(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    shapes = [*random_trees(seed, 12), random_blobs(1000)[0], *flat_trees(seed)]
+    plain = [polygonize(tree, resolution=24) for tree in shapes]
+    forced(monkeypatch)
+    assert sum(split(tree.tape) is not None for tree in shapes) >= 6
+    for tree, expected in zip(shapes, plain, strict=True):
+        culled = polygonize(tree, resolution=24)
+        for name in ("vertices", "faces", "normals", "colors"):
+            assert np.array_equal(getattr(culled, name), getattr(expected, name))
+
+
+def test_edits_of_culled_trees_give_the_mesh_of_a_fresh_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    forced(monkeypatch)
+    rng = np.random.default_rng(8)
+    for tree in flat_trees(9):
+        polygonizer = Polygonizer(tree, resolution=32)
+        for _edit in range(4):
+            tree = edited(rng, tree)
+            ours, fresh = polygonizer.update(tree), polygonize(tree, cell_size=polygonizer.cell_size)
+            assert np.array_equal(ours.vertices, fresh.vertices)
+            assert np.array_equal(ours.faces, fresh.faces)
+
+
+def flat_trees(seed: int) -> list[Node]:
+    """Long runs of every kind under every operator, mapped, and with a tool."""
+    rng = np.random.default_rng(seed)
+    leaves = [random_leaf(rng) for _ in range(150)]
+    stretched = [leaf.scale((0.3, 0.4, 0.35)) for leaf in leaves]
+    small = [leaf.scale(0.3).translate(rng.uniform(-2.0, 2.0, 3)) for leaf in leaves]
+    return [
+        Sum(tuple(small)),
+        Union(tuple(small)) - small[0],
+        Ricci((*small, *stretched[:70]), exponent=2.0),
+        Sum(tuple(small)) & small[3].scale(3.0),
+        Union((Sum(tuple(small[:140])), small[141].twist(20.0))),
+    ]
