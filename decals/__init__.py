@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .choosing import ImageChoice
     from .contact import Contact
     from .cover import cover
+    from .creases import Creases
     from .edit import EditSession
     from .editor import DecalEditor
     from .errors import (
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from .painted_image import PaintedImage
     from .projections import Cylindrical, Planar, Spherical, TextureCoordinates
     from .relaxation import Relaxation
+    from .remeshing import remeshed_points
     from .scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
     from .scene_file import load_scene, save_scene
     from .seeding import seed
@@ -54,6 +56,7 @@ __all__ = [
     "BUILTIN_IMAGES",
     "Camera",
     "Contact",
+    "Creases",
     "Cylindrical",
     "DecalEditor",
     "DecalImage",
@@ -98,6 +101,7 @@ __all__ = [
     "load_image",
     "load_scene",
     "read_mesh",
+    "remeshed_points",
     "save_scene",
     "seed",
     "show",
@@ -111,6 +115,7 @@ _HOMES = {
     "contact": ("Contact",),
     "cover": ("cover",),
     "edit": ("EditSession",),
+    "creases": ("Creases",),
     "editor": ("DecalEditor",),
     "errors": (
         "DecalsError",
@@ -139,6 +144,7 @@ _HOMES = {
     "painted_image": ("PaintedImage",),
     "projections": ("Cylindrical", "Planar", "Spherical", "TextureCoordinates"),
     "relaxation": ("Relaxation",),
+    "remeshing": ("remeshed_points",),
     "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
     "scene_file": ("load_scene", "save_scene"),
     "seeding": ("seed",),
