@@ -11,7 +11,6 @@ arrive as by Newton's method.
 import warp as wp
 
 from .evaluate import field_bound, field_gradient
-from .grid import BRANCHING, BRANCHING_BITS, CHILDREN
 from .kernel_options import KERNEL_OPTIONS
 from .kernels import ISO
 from .refine import SURELY_INSIDE
@@ -25,6 +24,13 @@ MISS = -1.0
 
 MAX_BLOCKS = 4096
 """More than any ray can cross."""
+
+FARTHEST = 1e30
+"""Farther than any ray goes, and the largest number that is taken for 1 / 0."""
+
+EMPTY = -3
+"""An empty block is known by this, less the layers of blocks around it that are empty too; other blocks by
+SURELY_INSIDE, or by the first texel of their tape."""
 
 BLOCK_OVERLAP = 0.1
 """How far a ray reaches into the next block before it asks which one that is, in tolerances."""
@@ -97,22 +103,25 @@ def box_interval(origin: wp.vec3, direction: wp.vec3, lower: wp.vec3, upper: wp.
 
 
 @wp.func
-def find_node(place: wp.vec3i, depth: wp.int32, nodes: wp.array(dtype=wp.int32)) -> wp.vec2i:
-    """(what is known of the finest block at `place`, log₂ of the size of the block that it is known of).
+def reciprocal(direction: wp.vec3) -> wp.vec3:
+    """1 / each component, 0 where that is 0."""
+    inverse = wp.vec3()
+    for axis in range(3):
+        if direction[axis] != 0.0:
+            inverse[axis] = wp.clamp(1.0 / direction[axis], -FARTHEST, FARTHEST)
+    return inverse
 
-    Known is the first texel of a block's tape, or SURELY_OUTSIDE, SURELY_INSIDE.
-    """
-    node = int(0)
-    shift = BRANCHING_BITS * depth
-    for _level in range(depth):
-        shift -= BRANCHING_BITS
-        x = (place[0] >> shift) & (BRANCHING - 1)
-        y = (place[1] >> shift) & (BRANCHING - 1)
-        z = (place[2] >> shift) & (BRANCHING - 1)
-        node = nodes[node * CHILDREN + (x << (2 * BRANCHING_BITS)) + (y << BRANCHING_BITS) + z]
-        if node < 0:
-            return wp.vec2i(node, shift)
-    return wp.vec2i(node, shift)
+
+@wp.func
+def way_out(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3) -> wp.float32:
+    """Where a ray that is inside a box leaves it, `inverse` being the `reciprocal` of its direction."""
+    leave = float(FARTHEST)
+    for axis in range(3):
+        if inverse[axis] > 0.0:
+            leave = wp.min(leave, (upper[axis] - origin[axis]) * inverse[axis])
+        elif inverse[axis] < 0.0:
+            leave = wp.min(leave, (lower[axis] - origin[axis]) * inverse[axis])
+    return leave
 
 
 @wp.func
@@ -121,38 +130,35 @@ def trace_ray(
     direction: wp.vec3,
     lower: wp.vec3,
     block_size: wp.float32,
-    depth: wp.int32,
+    counts: wp.vec3i,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
-    nodes: wp.array(dtype=wp.int32),
+    blocks: wp.array(dtype=wp.int32),
 ) -> wp.vec3:
     """First hit of a ray: (distance or MISS, first texel of the tape that holds there, one past the last)."""
-    side = 1 << (BRANCHING_BITS * depth)
-    extent = block_size * float(side)
-    inside = box_interval(origin, direction, lower, lower + wp.vec3(extent, extent, extent))
+    extent = block_size * wp.vec3(float(counts[0]), float(counts[1]), float(counts[2]))
+    inside = box_interval(origin, direction, lower, lower + extent)
     entry = origin + direction * inside[0]  # distances are counted from here: an eye may be far away
     last = inside[1] - inside[0]
+    inverse = reciprocal(direction)
     t = float(0.0)
     for _block in range(MAX_BLOCKS):
         if t > last:
             return wp.vec3(MISS, 0.0, 0.0)
         p = (entry + direction * t - lower) / block_size
-        place = wp.vec3i(
-            wp.clamp(int(wp.floor(p[0])), 0, side - 1),
-            wp.clamp(int(wp.floor(p[1])), 0, side - 1),
-            wp.clamp(int(wp.floor(p[2])), 0, side - 1),
-        )
-        known = find_node(place, depth, nodes)
-        size = block_size * float(1 << known[1])
-        corner = lower + size * wp.vec3(
-            float(place[0] >> known[1]), float(place[1] >> known[1]), float(place[2] >> known[1])
-        )
-        leave = box_interval(entry, direction, corner, corner + wp.vec3(size, size, size))[1]
+        x = wp.clamp(int(wp.floor(p[0])), 0, counts[0] - 1)
+        y = wp.clamp(int(wp.floor(p[1])), 0, counts[1] - 1)
+        z = wp.clamp(int(wp.floor(p[2])), 0, counts[2] - 1)
+        known = blocks[(x * counts[1] + y) * counts[2] + z]
+        around = wp.max(EMPTY - known, 0)
+        corner = lower + block_size * wp.vec3(float(x - around), float(y - around), float(z - around))
+        size = block_size * float(2 * around + 1)
+        leave = way_out(entry, inverse, corner, corner + wp.vec3(size, size, size))
         leave = wp.max(leave, t) + BLOCK_OVERLAP * tolerance
-        if known[0] == SURELY_INSIDE:
+        if known == SURELY_INSIDE:
             return wp.vec3(inside[0] + t, 1.0, 1.0 + tape[0][0])
-        if known[0] >= 0:
-            span = wp.vec2i(known[0] + 1, known[0] + 1 + int(tape[known[0]][0]))
+        if known >= 0:
+            span = wp.vec2i(known + 1, known + 1 + int(tape[known][0]))
             hit = first_hit(entry, direction, t, leave, tolerance, tape, span)
             if hit >= 0.0:
                 return wp.vec3(inside[0] + hit, float(span[0]), float(span[1]))

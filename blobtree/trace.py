@@ -56,16 +56,16 @@ def _trace(
     directions: wp.array(dtype=wp.vec3),
     lower: wp.vec3,
     block_size: wp.float32,
-    depth: wp.int32,
+    counts: wp.vec3i,
     tolerance: wp.float32,
     tape: wp.array(dtype=wp.vec4),
-    nodes: wp.array(dtype=wp.int32),
+    blocks: wp.array(dtype=wp.int32),
     distances: wp.array(dtype=wp.float32),
     spans: wp.array(dtype=wp.vec2i),
 ) -> None:
     i = first + wp.tid()
     direction = wp.normalize(directions[i])
-    hit = trace_ray(origins[i], direction, lower, block_size, depth, tolerance, tape, nodes)
+    hit = trace_ray(origins[i], direction, lower, block_size, counts, tolerance, tape, blocks)
     t = hit[0]
     if t < 0.0:
         t = wp.inf

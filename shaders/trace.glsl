@@ -3,10 +3,10 @@
 //@ include surface.glsl
 // blobtree.tracing_cells.TracingCells
 uniform sampler2D tape;
-uniform isampler2D nodes;
+uniform isampler2D blocks;
 uniform vec3 grid_lower;
 uniform float block_size;
-uniform int grid_depth;
+uniform ivec3 grid_counts;
 uniform float tolerance;
 
 vec4 tape_texel(sampler2D data, int i) {
@@ -36,7 +36,7 @@ struct Hit {
 Hit trace_pixel(vec2 pixel) {
     vec3 origin = ray_origin(pixel);
     vec3 direction = normalize(ray_direction(pixel));
-    vec3 hit = trace_ray(origin, direction, grid_lower, block_size, grid_depth, tolerance, tape, nodes);
+    vec3 hit = trace_ray(origin, direction, grid_lower, block_size, grid_counts, tolerance, tape, blocks);
     vec3 position = origin + direction * hit.x;
     float depth = window_depth(position);
     if (depth < 0.0 || depth > 1.0) {

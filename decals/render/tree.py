@@ -42,8 +42,8 @@ class TreeDrawable:
         tree = thing.tree
         cells = tracing_cells(tree)
         self._bounds = tree.bounds
-        self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.nodes))
-        self._uniforms = {**tracing_uniforms(cells), "tape": 0, "nodes": 1}
+        self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
+        self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         tracer = _ComputeTracer if context.entry is Entry.COMPUTE else _FragmentTracer
         self._tracer: _FragmentTracer | _ComputeTracer = tracer(context, Kinds.of(tree.tape), tree.bounds)
 
@@ -76,7 +76,7 @@ def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
     return {
         "grid_lower": tuple(cells.lower.tolist()),
         "block_size": cells.block_size,
-        "grid_depth": cells.depth,
+        "grid_counts": cells.counts,
         "tolerance": cells.tolerance,
     }
 

@@ -49,10 +49,10 @@ class Replay:
             program = self.gl.program(
                 vertex_shader=self.settings["vertex"], fragment_shader=scene["fragment"]
             )
-        for name, value in {**scene["uniforms"], "tape": 0, "nodes": 1}.items():
+        for name, value in {**scene["uniforms"], "tape": 0, "blocks": 1}.items():
             if name in program:
                 program[name] = tuple(value) if isinstance(value, list) else value
-        textures = self._texture(f"tape/{count}", "f4"), self._texture(f"nodes/{count}", "i4")
+        textures = self._texture(f"tape/{count}", "f4"), self._texture(f"blocks/{count}", "i4")
         array = None if entry == "compute" else self.gl.vertex_array(program, [])
         part = scene["uniforms"]["rectangle"]
 

@@ -76,7 +76,7 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
         cells = tracing_cells(tree)
         kinds = Kinds.of(tree.tape)
         part = covered(tree.bounds, tile)
-        arrays[f"tape/{count}"], arrays[f"nodes/{count}"] = cells.tape, cells.nodes
+        arrays[f"tape/{count}"], arrays[f"blocks/{count}"] = cells.tape, cells.blocks
         arrays[f"distances/{count}"] = tree.raycast(*pixel_rays(size, CHECKED)).distances
         scenes[str(count)] = {
             "fragment": tracing_shader(kinds, Entry.FRAGMENT).text,

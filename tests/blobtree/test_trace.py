@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import InvalidPoints, Node, Point, Segment
-from blobtree.rays import box_interval
+from blobtree.rays import FARTHEST, box_interval, reciprocal, way_out
 from blobtree.trace import trace
 from blobtree.tracing_cells import trace_tolerance
 from tests.blobtree.trees import random_trees
@@ -251,3 +251,20 @@ def test_the_way_through_a_box() -> None:
     near = (np.abs(places - span[:, :1]) < 1e-5) | (np.abs(places - span[:, 1:]) < 1e-5)
     np.testing.assert_array_equal(claimed | near, inside | near)
     assert (span[:, 0] >= 0.0).all()
+
+
+def test_the_way_out_of_a_box() -> None:
+    rng = np.random.default_rng(4)
+    lower, upper = np.array([-1.0, -0.5, 0.0]), np.array([1.0, 2.0, 0.5])
+    origins, directions = rng.uniform(lower, upper, (1000, 3)), unit(rng.normal(size=(1000, 3)))
+    directions[::5, 0] = 0.0
+    directions[1::50] = [0.0, -1.0, 0.0]
+    inverse = call(reciprocal, direction=directions)
+    leave = call(way_out, origin=origins, inverse=inverse, lower=lower, upper=upper)
+    span = call(box_interval, origin=origins, direction=directions, lower=lower, upper=upper)
+    np.testing.assert_allclose(leave, span[:, 1], rtol=1e-4, atol=1e-6)
+
+
+def test_reciprocals_stay_numbers() -> None:
+    seen = call(reciprocal, direction=np.array([[0.0, -0.0, 1e-45], [-1e-38, 2.0, -0.5]], np.float32))
+    np.testing.assert_allclose(seen, [[0.0, 0.0, FARTHEST], [-FARTHEST, 0.5, -2.0]], rtol=1e-6)

@@ -54,7 +54,7 @@ WRITTEN_TWICE = {"closest", "slimmest", "stride", "convex", "rises"}
 def shared(module: str) -> list[TypedFunction]:
     """What both backends have from one source, save what reads a whole tape: that comes below."""
     functions = typed_functions(import_module(module))
-    whole_tapes = {"span", "nodes"}
+    whole_tapes = {"span", "blocks"}
     return [f for f in functions if f.name not in WRITTEN_TWICE and not whole_tapes & set(f.parameters)]
 
 
@@ -136,7 +136,8 @@ BY_NAME: dict[str, Draw] = {
     "p": uniform(-1.5, 1.5, 4), "slim": uniform(0.3, 2.5), "slimmest": uniform(0.3, 2.5),
     "e_k": uniform(0.0, 0.5), "e_i": share,
     "exponent": among(1.5, 2, 3, 7, 20, 100), "parameter": among(1.5, 2, 3, 7, 20, 100), "f": field,
-    "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3), "m": place,
+    "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3),
+    "inverse": uniform(-3.0, 3.0, 3), "m": place,
     "mapping": whole(0, 2), "n": units, "n_p": units, "n_q": units, "nearest": uniform(0.0, 1.5),
     "offset": beside(powers(-9, 9), powers(-9, 9)),
     "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
