@@ -48,6 +48,8 @@ For instance:
 implicit-decals polygonize spheres -o spheres.ply
 
 implicit-decals polygonize blob.json --cell-size 0.02 -o blob.obj
+
+implicit-decals polygonize part.json --chord-error 0.001 --creases -o part.stl
 """,
     "doctor": "Say what is here of what the project needs, and what to do about the rest.",
 }

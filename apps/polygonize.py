@@ -1,14 +1,11 @@
 """``implicit-decals polygonize``: an implicit model as a triangle mesh."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import pyvista as pv
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
-import blobtree
 from decals.scene import TreeObject
 
 from .errors import UsageError
@@ -18,14 +15,19 @@ from .output import MESH_SUFFIXES, check_output, replacing
 from .progress_bars import progress_bars
 from .warp_start import start_warp
 
+OptionalLength = Annotated[float | None, Parameter(show_default=False)]
+
 
 def polygonize(
     model: str,
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    resolution: OptionalWhole = None,
-    cell_size: Annotated[float | None, Parameter(show_default=False)] = None,
+    resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
+    cell_size: OptionalLength = None,
+    chord_error: OptionalLength = None,
+    creases: bool = False,
+    split_normals: bool = False,
 ) -> None:
     """Write an implicit model's surface as a triangle mesh.
 
@@ -39,6 +41,12 @@ def polygonize(
         Cells along the longest side. Default: 64.
     cell_size
         Side of a cell in the model's units, in place of the resolution.
+    chord_error
+        How far triangles may lie from the surface in the model's units, in place of either.
+    creases
+        Vertices lie on the edges and corners that unions, intersections and differences leave.
+    split_normals
+        The same, and each side of a crease has vertices and normals of its own, so that it looks sharp.
     """
     check_output(output, MESH_SUFFIXES)
     start_warp()
@@ -46,25 +54,26 @@ def polygonize(
     if not isinstance(loaded, TreeObject):
         raise UsageError(f"expected a BlobTree in JSON or a sample (creature, spheres), {model!r} is none")
     with progress_bars() as progress:
-        mesh = blobtree.polygonize(loaded.tree, resolution=resolution, cell_size=cell_size, progress=progress)
-        if len(mesh.faces) == 0:
+        surface = loaded.tree.mesh(
+            resolution=resolution,
+            cell_size=cell_size,
+            chord_error=chord_error,
+            creases=creases,
+            split_normals=split_normals,
+            progress=progress,
+        )
+        if surface.n_points == 0:
             raise UsageError(
                 f"{model!r} shows no surface in cells of this size: its parts may be smaller, or cut each "
                 "other away; take a higher --resolution"
             )
-        write_mesh(output, mesh)
+        write_mesh(output, surface)
 
 
-def write_mesh(path: Path, mesh: blobtree.Mesh) -> None:
-    """Write a mesh as the kind of file that the extension names."""
-    vertices: NDArray[Any] = mesh.vertices
-    faces: NDArray[Any] = mesh.faces
-    surface = pv.PolyData.from_regular_faces(vertices, faces)
-    rgb = np.rint(np.clip(mesh.colors, 0.0, 1.0) * 255.0).astype(np.uint8)
-    surface.point_data["RGB"] = rgb
-    surface.point_data.active_normals = mesh.normals
+def write_mesh(path: Path, surface: pv.PolyData) -> None:
+    """Write a mesh as the kind of file that the extension names, whole or not at all."""
     with replacing(path) as temporary:
         if path.suffix.lower() == ".ply":
-            surface.save(temporary, texture=rgb)
+            surface.save(temporary, texture=surface.point_data["RGB"])
         else:
             surface.save(temporary)

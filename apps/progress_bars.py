@@ -15,7 +15,8 @@ _COLUMNS = (TextColumn("{task.description:<34}"), BarColumn(), TextColumn("{task
 def progress_bars() -> Iterator[Report]:
     """Show the stages that the callback is told of, each with a bar and its time.
 
-    A stage that follows another completes it, so nobody need report the last percent.
+    A stage that follows another completes it, so nobody need report the last percent. Where the work fails
+    or is interrupted the bars go, and what went wrong is all that is left to read.
 
     Examples
     --------
@@ -32,6 +33,11 @@ def progress_bars() -> Iterator[Report]:
                 stages[stage] = bars.add_task(stage[:1].upper() + stage[1:], total=1.0)
             bars.update(stages[stage], completed=min(max(fraction, 0.0), 1.0))
 
-        yield report
+        try:
+            yield report
+        except BaseException:
+            bars.live.transient = True
+            bars.console.quiet = not bars.console.is_interactive  # or it ends with an empty line in a file
+            raise
         for task in stages.values():
             bars.update(task, completed=1.0)

@@ -5,11 +5,13 @@ The pipeline: tree → program → tape → value, gradient, colour → rays (`t
 
 from .errors import (
     BlobTreeError,
+    Cancelled,
     InvalidDefinition,
     InvalidFile,
     InvalidNode,
     InvalidPoints,
     InvalidResolution,
+    MissingPackage,
     UnknownKind,
     UntranslatableFunction,
 )
@@ -19,7 +21,7 @@ from .own_operator import OwnCombination, define_operator
 from .own_skeleton import OwnPrimitive, define_skeleton
 from .polygonize import Mesh, Polygonizer, polygonize
 from .primitives import Cone, Point, Segment
-from .progress import Progress
+from .progress import Cancel, Progress
 from .splitting import split_creases
 from .tape import Tape
 from .trace import Hits
@@ -39,6 +41,8 @@ __all__ = [
     "ISO",
     "RIM",
     "BlobTreeError",
+    "Cancel",
+    "Cancelled",
     "Cone",
     "Difference",
     "Hits",
@@ -49,6 +53,7 @@ __all__ = [
     "InvalidPoints",
     "InvalidResolution",
     "Mesh",
+    "MissingPackage",
     "Node",
     "Offset",
     "OwnCombination",

@@ -24,6 +24,7 @@ from .errors import InvalidNode, InvalidResolution
 from .grid import BRANCHING, CHILDREN, Grid
 from .launch import launch
 from .memory import demand_memory
+from .progress import Progress
 from .refine import inherit, match, measure, take_over, write
 from .scan import everything, starts_of, where_negative
 from .tape import Tape
@@ -78,7 +79,12 @@ class SparseCells:
 
 
 def build_cells(
-    tape: Tape, grid: Grid, *, device: str | None = None, previous: SparseCells | None = None
+    tape: Tape,
+    grid: Grid,
+    *,
+    device: str | None = None,
+    previous: SparseCells | None = None,
+    report: Progress = lambda _stage, _fraction: None,
 ) -> SparseCells:
     """The sparse cells of a tape, level by level; blocks that `previous` has just so are taken from there.
 
@@ -99,8 +105,10 @@ def build_cells(
         previous = None
     levels = [_root(tape, grid, previous, place)]
     for number in range(1, grid.depth + 1):
+        report("finding the surface", (number - 1) / grid.depth)
         step = _Refinement(levels[-1], number, grid, previous, place, tape.vocabulary)
         levels.append(step.level(pieces_of(tape, place) if number == 1 else None))
+    report("finding the surface", 1.0)
     return SparseCells(grid, tuple(levels), place, tape)
 
 

@@ -6,6 +6,7 @@ meet. What is connected with what does not change, so the mesh stays closed and 
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,18 +16,20 @@ from numpy.typing import NDArray
 from .crease_kernels import SMOOTH, find_choices, place_on_creases, turn_diagonals
 from .grid import CHILDREN
 from .launch import launch
+from .progress import Progress
 from .surface import Surface, tables
 from .visible import Cells
 
 
-def sharpened(surface: Surface) -> tuple[Surface, NDArray[np.uint8]]:
+def sharpened(surface: Surface, report: Progress) -> tuple[Surface, NDArray[np.uint8]]:
     """`surface` with its vertices on creases, and how many smooth branches meet in each of them (n,).
 
     1 is a vertex of a smooth patch, 2 one on a crease, 3 or 4 one in a corner, 0 one whose patch touches
     several branches that were not found to meet nearby; that one stays where it was.
     """
+    report("finding creases", 0.0)
     device, vocabulary = surface.cells.device, surface.cells.tape.vocabulary
-    cells = _cells(surface)
+    cells = cells_of(surface)
     count = len(surface.cells.leaves)
     choosing = wp.empty(count, dtype=wp.uint8, device=device)
     launch(vocabulary.kernel(find_choices), count, [cells.spans, cells.tape], [choosing], device)
@@ -38,14 +41,16 @@ def sharpened(surface: Surface) -> tuple[Surface, NDArray[np.uint8]]:
     inputs = [cells, choosing, surface.rows, patches.patch_count, patches.patch_of_edge]
     inputs += [surface.offsets, surface.vertex_starts]
     outputs = [vertices, normals, colors, meetings]
-    launch(vocabulary.kernel(place_on_creases), count * CHILDREN, inputs, outputs, device)
+    step = partial(report, "finding creases")
+    launch(vocabulary.kernel(place_on_creases), count * CHILDREN, inputs, outputs, device, step=step)
     inputs = [cells, vertices, meetings]
     launch(vocabulary.kernel(turn_diagonals), len(faces) // 2, inputs, [faces], device)
+    report("finding creases", 1.0)
     sharp = replace(surface, vertices=vertices, normals=normals, colors=colors, faces=faces)
     return sharp, meetings.numpy()
 
 
-def _cells(surface: Surface) -> Any:
+def cells_of(surface: Surface) -> Any:
     """What kernels need to know of a surface's cells."""
     cells: Any = Cells()
     leaves, grid = surface.cells.leaves, surface.cells.grid

@@ -7,6 +7,8 @@ BlobTreeError (ValueError)
 ├── InvalidFile         a file that holds no BlobTree
 ├── InvalidDefinition   an own skeleton or operator is not what its definition claims
 ├── UnknownKind         a node of an own kind that this process has no definition of
+├── MissingPackage      a package that this one call needs is not installed (also an ImportError)
+├── Cancelled           the caller's `cancel` stopped the work
 └── UntranslatableFunction   a typed function outside the subset that GLSL shares
 """
 
@@ -37,6 +39,14 @@ class InvalidDefinition(BlobTreeError):
 
 class UnknownKind(BlobTreeError):
     """A node of a user's kind that this process has no definition of."""
+
+
+class MissingPackage(BlobTreeError, ImportError):
+    """A package that this one call needs is not installed."""
+
+
+class Cancelled(BlobTreeError):
+    """The caller's `cancel` stopped the work; nothing has changed."""
 
 
 class UntranslatableFunction(BlobTreeError):

@@ -1,7 +1,7 @@
 """Launching kernels on every core: Warp runs a CPU launch on one thread, but lets several run at once."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
@@ -11,6 +11,9 @@ import warp as wp
 SLICES_PER_THREAD = 4
 """More slices than threads even out slices of unequal cost."""
 
+WATCHED_SLICES_PER_THREAD = 32
+"""Still more of them where somebody watches, so that reports come often and a cancelled launch ends soon."""
+
 SMALLEST_SLICE = 256
 
 
@@ -19,14 +22,26 @@ def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix="blobtree")
 
 
-def launch(kernel: wp.Kernel, count: int, inputs: Sequence[Any], outputs: Sequence[Any], device: str) -> None:
-    """Run `kernel` for the indices below `count`; its first parameter is the index that a slice starts at."""
+def launch(
+    kernel: wp.Kernel,
+    count: int,
+    inputs: Sequence[Any],
+    outputs: Sequence[Any],
+    device: str,
+    *,
+    step: Callable[[float], None] | None = None,
+) -> None:
+    """Run `kernel` for the indices below `count`; its first parameter is the index that a slice starts at.
+
+    `step` is told the fraction done; what it raises ends the launch with the slices under way.
+    """
     if count == 0:
         return
     if not wp.get_device(device).is_cpu:
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
-    slices = min((os.cpu_count() or 1) * SLICES_PER_THREAD, -(-count // SMALLEST_SLICE))
+    per_thread = SLICES_PER_THREAD if step is None else WATCHED_SLICES_PER_THREAD
+    slices = min((os.cpu_count() or 1) * per_thread, -(-count // SMALLEST_SLICE))
     bounds = [count * i // slices for i in range(slices + 1)]
     wp.load_module(kernel.module, device=device)
 
@@ -35,5 +50,8 @@ def launch(kernel: wp.Kernel, count: int, inputs: Sequence[Any], outputs: Sequen
 
     if slices == 1:
         run(0, count)
-    else:
-        list(_threads().map(run, bounds[:-1], bounds[1:]))
+        return
+    done = _threads().map(run, bounds[:-1], bounds[1:])
+    for number, _ in enumerate(done, 1):
+        if step is not None:
+            step(number / slices)

@@ -12,10 +12,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from .cells import build_cells
+from .chord import FIRST_RESOLUTION, MOST_PASSES, SMALLEST, finer, largest_error
 from .creases import sharpened
 from .errors import InvalidResolution
 from .grid import Grid, aligned_grid
-from .progress import Progress
+from .progress import Cancel, Progress, watched
 from .surface import Surface, extract_surface
 from .tree import Node
 
@@ -25,6 +26,15 @@ FINEST_RESOLUTION = 1 << 20
 
 SMALLEST_MODEL, LARGEST_MODEL = 1e-15, 1e15
 """Sizes between which squared distances, in cells too, neither vanish nor overflow in float32."""
+_STAGES = (
+    "finding the surface",
+    "sampling the field",
+    "placing vertices",
+    "connecting vertices",
+    "finding creases",
+    "measuring chords",
+)
+"""What work reports, in order."""
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -50,9 +60,11 @@ def polygonize(
     *,
     resolution: int | None = None,
     cell_size: float | None = None,
+    chord_error: float | None = None,
     creases: bool = False,
     device: str | None = None,
     progress: Progress | None = None,
+    cancel: Cancel | None = None,
 ) -> Mesh:
     """The surface of `tree` as closed, consistently oriented triangles (counter-clockwise from outside).
 
@@ -62,19 +74,69 @@ def polygonize(
         Cells along the longest side of the tree's box; 64 by default.
     cell_size
         Side of a cell in the model's units, in place of `resolution`; thinner features may be lost.
+    chord_error
+        In place of either, how far the triangles may lie from the surface, in the model's units. Passes with
+        smaller and smaller cells are measured at seven samples in every triangle, until none lies farther.
+        Parts of the model thinner than a 32nd of its box may be lost, as in any cells of that size.
     creases
         Vertices lie on the edges and corners that unions, intersections and differences leave.
     device
         Warp device that does the work, by default the current one.
+    progress
+        Called with a stage in plain words and the fraction done.
+    cancel
+        Asked many times whether to stop.
 
     Raises
     ------
     InvalidResolution
-        Both or a senseless value were given, or more cells than can be counted.
+        Several or senseless sizes were given, more cells than can be counted, or none that are small enough.
+    Cancelled
+        `cancel` said so.
     """
-    return Polygonizer(
-        tree, resolution=resolution, cell_size=cell_size, creases=creases, device=device, progress=progress
-    ).mesh
+    if chord_error is None:
+        return Polygonizer(
+            tree,
+            resolution=resolution,
+            cell_size=cell_size,
+            creases=creases,
+            device=device,
+            progress=progress,
+            cancel=cancel,
+        ).mesh
+    if resolution is not None or cell_size is not None:
+        raise InvalidResolution(
+            "expected one of resolution, cell_size and chord_error, got several; drop the others"
+        )
+    if not 0.0 < chord_error < np.inf:
+        raise InvalidResolution(f"chord_error: expected a finite length above 0, got {chord_error!r}")
+    smallest = SMALLEST * float(np.abs(tree.bounds).max())
+    if chord_error < smallest:
+        raise InvalidResolution(
+            f"chord_error: {chord_error:g} is below what float32 can tell there; allow {smallest:.2g} or more"
+        )
+    report = watched(progress, cancel)
+    tried: list[tuple[float, float]] = []
+    size = _cell_size(tree, FIRST_RESOLUTION, None)
+    for number in range(1, MOST_PASSES + 1):
+        passing = _numbered(report, number)
+        polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=passing)
+        error = largest_error(polygonizer.shown, passing)
+        if error <= chord_error:
+            return polygonizer.mesh
+        tried.append((size, error))
+        size = finer(tried, chord_error)
+    raise InvalidResolution(
+        f"chord_error: {chord_error:g} was not reached in {MOST_PASSES} passes, the last with cells of "
+        f"{tried[-1][0]:g} came to {tried[-1][1]:g}; allow more, or ask for creases where CSG cuts edges"
+    )
+
+
+def _numbered(report: Progress, number: int) -> Progress:
+    """Reports of one pass among several, its stages taken together."""
+    return lambda stage, fraction: report(
+        f"meshing, pass {number}", (_STAGES.index(stage) + fraction) / len(_STAGES)
+    )
 
 
 class Polygonizer:
@@ -92,7 +154,7 @@ class Polygonizer:
 
     Raises
     ------
-    InvalidResolution
+    InvalidResolution, Cancelled
         As for `polygonize`; the last mesh stays.
     """
 
@@ -105,11 +167,12 @@ class Polygonizer:
         creases: bool = False,
         device: str | None = None,
         progress: Progress | None = None,
+        cancel: Cancel | None = None,
     ) -> None:
         self._device = device
         self._creases = creases
         self._cell_size = _cell_size(tree, resolution, cell_size)
-        self._surface = self._extract(tree, None, progress)
+        self._surface, self._shown, self._meetings = self._extract(tree, None, watched(progress, cancel))
         self._tree = tree
         self._mesh: Mesh | None = None
 
@@ -129,31 +192,40 @@ class Polygonizer:
         return self._surface
 
     @property
+    def shown(self) -> Surface:
+        """The same with its vertices on creases, where these were asked for."""
+        return self._shown
+
+    @property
     def mesh(self) -> Mesh:
         """The triangles as NumPy arrays."""
         if self._mesh is None:
-            self._mesh = download(*sharpened(self._surface)) if self._creases else download(self._surface)
+            self._mesh = download(self._shown, self._meetings)
         return self._mesh
 
-    def update(self, tree: Node, *, progress: Progress | None = None) -> Mesh:
-        """The mesh of `tree`, the parts that are as before being taken over."""
-        self.update_surface(tree, progress=progress)
+    def update(self, tree: Node, *, progress: Progress | None = None, cancel: Cancel | None = None) -> Mesh:
+        """The mesh of `tree`, the parts that are as before being taken over; creases are found anew."""
+        self.update_surface(tree, progress=progress, cancel=cancel)
         return self.mesh
 
-    def update_surface(self, tree: Node, *, progress: Progress | None = None) -> Surface:
+    def update_surface(
+        self, tree: Node, *, progress: Progress | None = None, cancel: Cancel | None = None
+    ) -> Surface:
         """The same without bringing the triangles to the host."""
-        self._surface = self._extract(tree, self._surface, progress)
+        report = watched(progress, cancel)
+        self._surface, self._shown, self._meetings = self._extract(tree, self._surface, report)
         self._tree, self._mesh = tree, None
-        return self._surface
+        return self._shown
 
-    def _extract(self, tree: Node, previous: Surface | None, progress: Progress | None) -> Surface:
-        report = progress or (lambda _stage, _fraction: None)
-        report("finding the surface", 0.0)
+    def _extract(
+        self, tree: Node, previous: Surface | None, report: Progress
+    ) -> tuple[Surface, Surface, NDArray[np.uint8] | None]:
+        """The surface, how it is shown, and what meets in the vertices then."""
         grid = _grid(tree, self._cell_size)
         before = previous.cells if previous is not None else None
-        cells = build_cells(tree.tape, grid, device=self._device, previous=before)
-        report("finding the surface", 1.0)
-        return extract_surface(cells, report, previous)
+        cells = build_cells(tree.tape, grid, device=self._device, previous=before, report=report)
+        surface = extract_surface(cells, report, previous)
+        return (surface, *sharpened(surface, report)) if self._creases else (surface, surface, None)
 
 
 def download(surface: Surface, meetings: NDArray[np.uint8] | None = None) -> Mesh:

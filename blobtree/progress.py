@@ -1,6 +1,23 @@
-"""How long work reports itself: one callback type, used by every room."""
+"""How long work reports itself and is stopped: two callback types, used by every room."""
 
 from collections.abc import Callable
 
+from .errors import Cancelled
+
 Progress = Callable[[str, float], None]
 """Called with the stage in plain words and the fraction of it that is done, from 0 to 1."""
+
+Cancel = Callable[[], bool]
+"""Asked again and again whether to stop."""
+
+
+def watched(progress: Progress | None, cancel: Cancel | None) -> Progress:
+    """A callback that passes reports on and raises `Cancelled` at the first one after `cancel` says so."""
+
+    def report(stage: str, fraction: float) -> None:
+        if cancel is not None and cancel():
+            raise Cancelled(f"cancelled while {stage}")
+        if progress is not None:
+            progress(stage, fraction)
+
+    return report

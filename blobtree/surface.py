@@ -5,8 +5,9 @@ neighbours' vertices are placed anew too, and triangles of all blocks that use s
 is copied, in the order of a mesh made from nothing, so the two are the same bit for bit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import warp as wp
@@ -111,7 +112,9 @@ class _Extraction:
         self._copy_cells(rest, [codes, rows, offsets], counts)
         values = self._empty(len(anew) * SAMPLES, wp.float32)
         vocabulary = self._cells.tape.vocabulary
-        self._launch(vocabulary.kernel(sample_blocks), len(anew) * SAMPLES, [anew, *self._geometry], [values])
+        step = partial(report, "sampling the field")
+        inputs: list[Any] = [anew, *self._geometry]
+        self._launch(vocabulary.kernel(sample_blocks), len(anew) * SAMPLES, inputs, [values], step)
         self._launch(classify_cells, len(anew), [anew, values], [codes, counts[1]])
         found = [self._leaves.blocks, self._leaves.keys]
         inputs = [anew, *found, codes, self._tables.patch_count, self._tables.knotted_face]
@@ -121,7 +124,8 @@ class _Extraction:
         report("sampling the field", 1.0)
         report("placing vertices", 0.0)
         vertices, normals, colors = (self._empty(vertex_total, wp.vec3) for _ in range(3))
-        self._place(anew, values, rows, offsets, vertex_starts, [vertices, normals, colors])
+        step = partial(report, "placing vertices")
+        self._place(anew, values, rows, offsets, vertex_starts, [vertices, normals, colors], step)
         moved = self._copy_vertices(rest, vertex_starts, [vertices, normals, colors])
         report("placing vertices", 1.0)
         faces = self._empty(2 * quad_total, wp.vec3i)
@@ -141,8 +145,15 @@ class _Extraction:
     def _zeros(self, size: int) -> Array:
         return wp.zeros(size, dtype=wp.int32, device=self._device)
 
-    def _launch(self, kernel: wp.Kernel, count: int, inputs: list[Any], outputs: list[Any]) -> None:
-        launch(kernel, count, inputs, outputs, self._device)
+    def _launch(
+        self,
+        kernel: wp.Kernel,
+        count: int,
+        inputs: list[Any],
+        outputs: list[Any],
+        step: Callable[[float], None] | None = None,
+    ) -> None:
+        launch(kernel, count, inputs, outputs, self._device, step=step)
 
     def _changed_blocks(self) -> tuple[Array, Array]:
         """Blocks whose cells or rows may have changed, and the others."""
@@ -176,7 +187,14 @@ class _Extraction:
             self._launch(copy_counts, len(rest), [rest, sources, starts], [numbers])
 
     def _place(
-        self, anew: Array, values: Array, rows: Array, offsets: Array, starts: Array, outputs: list[Array]
+        self,
+        anew: Array,
+        values: Array,
+        rows: Array,
+        offsets: Array,
+        starts: Array,
+        outputs: list[Array],
+        step: Callable[[float], None],
     ) -> None:
         """The vertices of the blocks `anew`."""
         counts = self._zeros(len(anew) + 1)
@@ -186,7 +204,7 @@ class _Extraction:
         inputs = [anew, rows, self._tables.patch_count, list_starts]
         self._launch(list_patches, len(anew), inputs, [patches])
         inputs = [patches, anew, *self._geometry, values, rows, offsets, self._tables.patch_of_edge, starts]
-        self._launch(self._cells.tape.vocabulary.kernel(place_vertices), total, inputs, outputs)
+        self._launch(self._cells.tape.vocabulary.kernel(place_vertices), total, inputs, outputs, step)
 
     def _copy_vertices(self, rest: Array, starts: Array, arrays: list[Array]) -> Array:
         """The other blocks' vertices; gives the new numbers of old ones."""

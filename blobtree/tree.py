@@ -32,13 +32,14 @@ from .validation import (
     finite_vector,
     settle,
 )
+from .viewing import Viewing
 from .warps import TWIST, SpaceWarp
 
 LARGEST_EXPONENT = 100.0
 """Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
 
 
-class Node:
+class Node(Viewing):
     """Part of a BlobTree: a field that is 0 far away and larger than ISO inside.
 
     Every node is a value: it never changes, and equal nodes compare equal. All that Python asks of a value is

@@ -187,6 +187,44 @@ def test_polygonize_by_cell_size(folder: Path) -> None:
     assert pv.read(folder / "fine.ply").n_cells > 8 * pv.read(folder / "coarse.ply").n_cells
 
 
+def test_polygonize_by_chord_error_with_creases(folder: Path) -> None:
+    cut = Point((0, 0, 0), radius=1.0) - Point((0.8, 0, 0), radius=0.9)
+    blobtree.save(cut, folder / "cut.json")
+    wish = ["polygonize", "cut.json", "--chord-error", "0.01"]
+    assert run([*wish, "--creases", "-o", "closed.vtp"]) == 0
+    assert run([*wish, "--split-normals", "-o", "split.vtp"]) == 0
+    assert run(["polygonize", "cut.json", "--cells", "30", "--creases", "-o", "cells.stl"]) == 0
+    closed, split = pv.read(folder / "closed.vtp"), pv.read(folder / "split.vtp")
+    assert closed.is_manifold
+    assert (closed["meetings"] == 2).sum() > 20
+    assert split.n_points > closed.n_points
+    assert split.n_cells == closed.n_cells
+    assert pv.read(folder / "cells.stl").n_cells > 100
+
+
+@pytest.mark.parametrize("stage", ["placing vertices", "writing"])
+def test_an_interrupted_polygonize_leaves_no_file(
+    folder: Path, stage: str, monkeypatch: pytest.MonkeyPatch, capfd: Capture
+) -> None:
+    """Control-C while it computes, or while the file is half written."""
+
+    def report(_self: object, _task: object, **_state: object) -> None:
+        raise KeyboardInterrupt
+
+    def save(_self: object, path: Path, **_options: object) -> None:
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    if stage == "writing":
+        monkeypatch.setattr(pv.PolyData, "save", save)
+    else:
+        monkeypatch.setattr("rich.progress.Progress.update", report)
+    before = sorted(folder.iterdir())
+    assert run(["polygonize", "spheres", "-o", "half.ply"]) == 130
+    assert sorted(folder.iterdir()) == before
+    assert capfd.readouterr().err.split() == ["interrupted"]
+
+
 def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr("implicit_decals.apps.hatching.COUNT", 120)
     assert run(["demo", "--size", "80x60", "--samples", "1"]) == 0
@@ -257,6 +295,8 @@ def bad(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> Callab
         (["polygonize", "spheres", "-o", "b.ply", "--resolution", "0"], "resolution"),
         (["polygonize", "spheres", "-o", "b.ply", "--cell-size", "-1"], "cell_size"),
         (["polygonize", "spheres", "-o", "b.ply", "--cell-size", "1", "--resolution", "9"], "drop one"),
+        (["polygonize", "spheres", "-o", "b.ply", "--chord-error", "1", "--cells", "9"], "drop the others"),
+        (["polygonize", "spheres", "-o", "b.ply", "--chord-error", "-1"], "chord_error"),
         (["demo", "--size", "big"], "--size"),
         (["demo", "-o", "nowhere/deep"], "nowhere"),
         (["demo", "-o", "ball.ply"], "ball.ply"),
@@ -308,8 +348,7 @@ def test_a_tree_without_a_surface_is_no_mesh(folder: Path, capfd: Capture) -> No
     apart = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
     blobtree.save(apart, folder / "nothing.json")
     assert run(["polygonize", "nothing.json", "-o", "a.ply"]) == 2
-    lines = capfd.readouterr().err.strip().splitlines()
-    assert lines[-1].startswith("error: 'nothing.json' shows no surface")
+    assert capfd.readouterr().err.startswith("error: 'nothing.json' shows no surface")
     assert not (folder / "a.ply").exists()
 
 
