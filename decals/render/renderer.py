@@ -242,6 +242,7 @@ class Renderer:
         self, uploaded: _Uploaded, tile: Tile, targets: Targets, mapping: Mapping, contact: Contact
     ) -> None:
         self._camera.use(tile)
+        targets.picture = None
         targets.gbuffer.begin(tile.width, tile.height)
         for object_id, drawable in sorted(
             enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised

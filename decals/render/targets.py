@@ -14,6 +14,8 @@ class Targets:
 
     def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
         self.buffers = buffers
+        self.picture: object = None
+        """Whose picture is in here, as its owner notes; whatever is drawn next takes it away."""
         self.gbuffer = GBuffer(context, size)
         self.decal_pass = DecalPass(context, size, buffers=buffers)
         self.light_pass = LightPass(context, size)
@@ -21,6 +23,7 @@ class Targets:
 
     def release(self) -> None:
         """Give the memory back."""
+        self.picture = None
         self.gbuffer.release()
         self.decal_pass.release()
         self.light_pass.release()

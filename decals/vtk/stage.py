@@ -23,8 +23,8 @@ from decals.scene import SceneObject, bounds_of
 from decals.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
 from decals.vtk.camera import vtk_projection
-from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
+from decals.vtk.frame import Frame, Look
 from decals.vtk.injection import Injection
 from decals.vtk.modes import complaints
 
@@ -97,10 +97,11 @@ class Stage:
         self.frame_seconds, self.measure = 0.0, False
         self._scene: SceneLike | None = None
         self._context = context
-        self._tools: _Tools | None = None
+        self._frame: Frame | None = None
         self._failed: object = None
         me = weakref.ref(self)
         self._anchor = Anchor(renderer, lambda: _draw(me))
+        self._placed: tuple[object, ...] = ()
         self._injections: list[Injection] = []
         self._units: list[int] = []
         self._said: set[str] = set()
@@ -116,13 +117,22 @@ class Stage:
 
     @scene.setter
     def scene(self, scene: SceneLike | None) -> None:
-        before = None if self._scene is None else self._scene.objects
         self._scene = scene
         self._failed = None
-        if scene is None or not scene.objects:
+        self._follow_objects()
+
+    def _follow_objects(self) -> None:
+        """Stand around the scene's objects, if they are not those of before."""
+        objects = () if self._scene is None else tuple(self._scene.objects)
+        if len(objects) == len(self._placed) and all(
+            a is b for a, b in zip(objects, self._placed, strict=True)
+        ):
+            return
+        self._placed = objects
+        if objects:
+            self._anchor.place(bounds_of(cast(Sequence[SceneObject], objects)))
+        else:
             self._anchor.leave()
-        elif before is None or list(before) != list(scene.objects):
-            self._anchor.place(bounds_of(cast(Sequence[SceneObject], scene.objects)))
 
     @property
     def draw_scale(self) -> float:
@@ -163,6 +173,7 @@ class Stage:
         self._units = []
 
     def _prepare(self) -> None:
+        self._follow_objects()
         if self._scene is not None:
             for complaint in complaints(self.vtk_renderer):
                 if complaint not in self._said:
@@ -176,17 +187,22 @@ class Stage:
     @property
     def renderer(self) -> Renderer:
         """The renderer in the window's context; use it inside ``with stage.current():``."""
-        return self._use_tools().renderer
+        return self._use_frame().renderer
 
     @contextmanager
     def current(self) -> Iterator[None]:
         """Make the window's context current, and keep VTK's state, within a ``with`` block."""
-        with self._use_tools().context.current():
+        with self._use_frame().context.current():
             yield
 
     def viewpoint(self) -> Projection:
         """VTK's camera, as the renderer sees it."""
         return vtk_projection(self.vtk_renderer, self.frame())
+
+    @property
+    def drawn(self) -> bool:
+        """Whether the last frame was drawn; where nothing had changed, the one before was shown again."""
+        return self._frame is not None and self._frame.drawn
 
     def frame(self) -> Floats:
         """The scene's coordinates to the world's: identity, unless somebody moved or scaled the whole."""
@@ -194,7 +210,7 @@ class Stage:
 
     def viewport(self) -> tuple[int, int, int, int]:
         """Lower left corner and size of the part of the frame that VTK draws to now, in pixels."""
-        return self._use_tools().context.viewport()
+        return self._use_frame().context.viewport()
 
     def at(self, x: int, y: int) -> Hit | None:
         """Say what lies at a place in the window, in pixels from its lower left corner; None for nothing.
@@ -250,21 +266,12 @@ class Stage:
         self.frame_seconds = time.perf_counter() - begin
 
     def _draw(self, scene: SceneLike) -> None:
-        tools = self._use_tools()
-        viewport = tools.context.viewport()
+        frame = self._use_frame()
+        viewport = frame.context.viewport()
         size, samples = self._drawn_size(viewport[2:])
-        with tools.context.current():
-            targets = tools.renderer.draw(
-                scene,
-                size=size,
-                samples=max(samples, 1),
-                mapping=self.mapping,
-                contact=self.contact,
-                viewpoint=self.viewpoint(),
-            )
-            if self.measure:
-                tools.context.gl.finish()
-        tools.composite.draw(self.vtk_renderer.GetRenderWindow(), viewport, targets, samples)
+        look = Look(size, max(samples, 1), self.mapping, self.contact)
+        targets = frame.draw(scene, look, self.viewpoint(), wait=self.measure)
+        frame.composite(self.vtk_renderer.GetRenderWindow(), viewport, targets, samples)
 
     def _drawn_size(self, viewport: tuple[int, int]) -> tuple[tuple[int, int], int]:
         """Size in pixels and samples of what is drawn; 0 samples where it is to be magnified."""
@@ -274,41 +281,26 @@ class Stage:
         supersampled = viewport[0] > self.vtk_renderer.GetSize()[0]
         return viewport, 1 if supersampled else self.samples
 
-    def _use_tools(self) -> _Tools:
+    def _use_frame(self) -> Frame:
         """Give what draws; made anew where the window has another context than before."""
-        if self._tools is None or self._tools.context.stale:
-            self._tools = _Tools(self._context())
-        return self._tools
+        if self._frame is None or self._frame.context.stale:
+            self._frame = Frame(self._context())
+        return self._frame
 
     def release(self) -> None:
         """Leave the renderer and give everything back; the window must still be there. Twice is harmless."""
         self._anchor.release()
         for tag in self._tags:
             self.vtk_renderer.RemoveObserver(tag)
-        if self._tools is not None and not self._tools.context.stale:
+        if self._frame is not None and not self._frame.context.stale:
             with self.current():
                 for injection in self._injections:
                     injection.release()
         self._injections.clear()
-        if self._tools is not None and not self._tools.context.stale:
-            self._tools.release()
-        self._tools = None
+        if self._frame is not None and not self._frame.context.stale:
+            self._frame.release()
+        self._frame = None
         self._scene = None
-
-
-class _Tools:
-    """What a stage has in its window's context."""
-
-    def __init__(self, context: WindowContext) -> None:
-        self.context = context
-        with context.current():
-            self.renderer = Renderer(context)
-            self.composite = Composite(context)
-
-    def release(self) -> None:
-        with self.context.current():
-            self.renderer.release()
-            self.composite.release()
 
 
 def _prepare(stage: weakref.ref[Stage]) -> None:

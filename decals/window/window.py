@@ -141,9 +141,9 @@ class EditWindow:
     def _timed(self, *, begin: bool) -> None:
         if begin:
             self._began = time.perf_counter()
-        else:
-            drawn = self.stage.draw_scale * self.stage.samples
-            self.quality.saw(drawn, time.perf_counter() - self._began)
+        elif self.stage.drawn:
+            size = self.stage.draw_scale * self.stage.samples
+            self.quality.saw(size, time.perf_counter() - self._began)
 
     def _changed(self, change: Change) -> None:
         if change.parts_after.objects is not None:

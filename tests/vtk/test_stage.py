@@ -1,10 +1,18 @@
 """What a stage shows is what the batch renderer draws, and what it says lies there."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+import pyvista as pv
 
+from decals.contact import Contact
+from decals.editor import DecalEditor
 from decals.errors import NoGraphics
+from decals.mapping import Mapping
 from decals.render import TRANSPARENT
+from decals.scene import MeshObject
+from decals.vtk.component import triangles
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import both, shot
@@ -58,3 +66,75 @@ def test_before_the_first_frame_there_is_no_graphics(plotter: Factory) -> None:
     pl.decals.add_scene(both())
     with pytest.raises(NoGraphics, match="render it first"):
         pl.decals.stage.at(80, 60)
+
+
+def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    stage = pl.decals.stage
+    first = shot(pl)
+    np.testing.assert_array_equal(shot(pl), first)
+    assert not stage.drawn
+    ball = pl.add_mesh(pv.Sphere(radius=0.2, center=both().camera.target), reset_camera=False)
+    ball.position = 0.5 * (np.array(both().camera.position) - both().camera.target)
+    with_ball = shot(pl)
+    assert not stage.drawn
+    assert (with_ball != first).any()
+    assert (with_ball == first).mean() > 0.8
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda pl: setattr(pl.camera, "position", np.array(pl.camera.position) + 0.1),
+        lambda pl: setattr(pl.decals.stage, "samples", 1),
+        lambda pl: setattr(pl.decals.stage, "draw_scale", 0.5),
+        lambda pl: setattr(pl.decals.stage, "mapping", Mapping.CHORD),
+        lambda pl: setattr(pl.decals.stage, "contact", Contact.SMOOTH),
+        lambda pl: setattr(pl.decals, "scene", both().replace(decals=both().decals[:60])),
+        lambda pl: setattr(pl.decals, "scene", both().replace(objects=both().objects[:1])),
+        lambda pl: setattr(pl, "window_size", (150, 120)),
+    ],
+)
+def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[pv.Plotter], None]) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    change(pl)
+    seen = shot(pl)
+    assert seen.shape != first.shape or (seen != first).any()
+
+
+def test_the_stages_renderer_may_draw_other_things_in_between(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    stage = pl.decals.stage
+    first = shot(pl)
+    other = both().replace(objects=both().objects[:1])
+    for size in ((160, 120), (320, 240), (50, 40)):
+        with stage.current():
+            stage.renderer.render(other, size=size, samples=1)
+            stage.renderer.draw(other, size=size)
+        np.testing.assert_array_equal(shot(pl), first)
+
+
+def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
+    """Decals and objects that change in place, in a scene that stays the same thing."""
+
+    class Document:
+        camera, images = both().camera, both().images
+        objects, decals = both().objects, DecalEditor(both().decals)
+
+    document = Document()
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    pl.decals.scene = document
+    np.testing.assert_array_equal(shot(pl), first)
+    document.decals.delete(int(pl.decals.stage.at(80, 60).owner))
+    without = shot(pl)
+    assert (without != first).any()
+    np.testing.assert_array_equal(shot(pl), without)
+    document.objects = (*both().objects, MeshObject("ball", *triangles(pv.Sphere(center=(0, 0, 4)))))
+    shot(pl)
+    assert pl.bounds.z_max > 4.2
