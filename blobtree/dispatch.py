@@ -8,12 +8,13 @@ import warp as wp
 from .kernel_options import KERNEL_OPTIONS
 from .operators import OPERATORS
 from .skeletons import SKELETONS
+from .unroll import unrolled
 from .warps import WARPS
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 
-@wp.func
+@unrolled
 def closest(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """Closest point and influence of a skeleton of any kind."""
     result = wp.vec4()
@@ -23,7 +24,7 @@ def closest(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
     return result
 
 
-@wp.func
+@unrolled
 def slimmest(kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
     """Smallest influence on a skeleton of any kind."""
     result = float(0.0)
@@ -33,7 +34,7 @@ def slimmest(kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.
     return result
 
 
-@wp.func
+@unrolled
 def stride(kind: wp.int32) -> wp.int32:
     """Texels of a primitive of any kind: its parameters and its colour."""
     result = int(0)
@@ -43,7 +44,7 @@ def stride(kind: wp.int32) -> wp.int32:
     return result
 
 
-@wp.func
+@unrolled
 def convex(kind: wp.int32) -> wp.bool:
     """Whether a skeleton of this kind is `Skeleton.convex`."""
     result = bool(False)
@@ -53,7 +54,7 @@ def convex(kind: wp.int32) -> wp.bool:
     return result
 
 
-@wp.func
+@unrolled
 def rises(operator: wp.int32) -> wp.bool:
     """Whether an operator is `Operator.rises`."""
     result = bool(False)
@@ -63,7 +64,7 @@ def rises(operator: wp.int32) -> wp.bool:
     return result
 
 
-@wp.func
+@unrolled
 def partials(operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
     """Value and partial derivatives of any operator."""
     result = wp.vec3()
@@ -73,7 +74,7 @@ def partials(operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.flo
     return result
 
 
-@wp.func
+@unrolled
 def slope(
     operator: wp.int32,
     slope_a: wp.float32,
@@ -90,7 +91,7 @@ def slope(
     return result
 
 
-@wp.func
+@unrolled
 def warp_forward(kind: wp.int32, q: wp.vec3, p: wp.vec4) -> wp.vec3:
     """T(q) of any warp."""
     result = wp.vec3()
@@ -100,7 +101,7 @@ def warp_forward(kind: wp.int32, q: wp.vec3, p: wp.vec4) -> wp.vec3:
     return result
 
 
-@wp.func
+@unrolled
 def warp_pullback(kind: wp.int32, q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
     """Jᵀ g of any warp."""
     result = wp.vec3()
@@ -110,7 +111,7 @@ def warp_pullback(kind: wp.int32, q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3
     return result
 
 
-@wp.func
+@unrolled
 def warp_stretch(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
     """Bound on ‖J‖ of any warp over a ball."""
     result = float(1.0)

@@ -15,6 +15,7 @@ from .operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, S
 from .readings import to_local
 from .skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
 from .tape import POP, PREFIX, PUSH, REGISTERS, STRETCHED, UNWARP, WARP, WARP_REGISTERS
+from .unroll import unrolled
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -31,6 +32,14 @@ _OuterStarts = wp.types.vector(length=WARP_REGISTERS, dtype=wp.int32)
 
 
 @wp.func
+def widened(r: wp.vec2) -> wp.vec2:
+    """A range with room for rounding; 0 stays 0."""
+    if r[1] <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    return wp.vec2(wp.max(r[0] - ROUNDING, 0.0), r[1] + ROUNDING)
+
+
+@unrolled
 def primitive_range(
     kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec2:
@@ -52,15 +61,7 @@ def range_in_ball(
     return widened(falloff_range(distances[0], distances[1]))
 
 
-@wp.func
-def widened(r: wp.vec2) -> wp.vec2:
-    """A range with room for rounding; 0 stays 0."""
-    if r[1] <= 0.0:
-        return wp.vec2(0.0, 0.0)
-    return wp.vec2(wp.max(r[0] - ROUNDING, 0.0), r[1] + ROUNDING)
-
-
-@wp.func
+@unrolled
 def operator_range(operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
     """Range of any operator's result."""
     result = wp.vec2()
@@ -70,7 +71,7 @@ def operator_range(operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.flo
     return result
 
 
-@wp.func
+@unrolled
 def operator_choice(operator: wp.int32, a: wp.vec2, b: wp.vec2) -> wp.int32:
     """What any operator's result depends on."""
     result = int(KEEP_BOTH)
@@ -80,7 +81,7 @@ def operator_choice(operator: wp.int32, a: wp.vec2, b: wp.vec2) -> wp.int32:
     return result
 
 
-@wp.func
+@unrolled
 def first_operator(operator: wp.int32) -> wp.int32:
     """The operator that folds a first operand into the empty field, `operator` itself where it can."""
     result = int(SUM_CODE)

@@ -21,6 +21,7 @@ from .instantiate import rebound, references, typed
 from .kernel_options import KERNEL_OPTIONS
 from .operators import OPERATORS, Operator
 from .skeletons import SKELETONS, Skeleton
+from .unroll import original, unrolled
 from .warps import WARPS, SpaceWarp
 
 _TABLES = (SKELETONS, OPERATORS, WARPS)
@@ -59,18 +60,20 @@ class Vocabulary:
         """`kernel` in a Warp module of its own, so that no other kernel's coming compiles it again."""
         source = _python_function(kernel)
         module = self._module_of(source)
-        wp.get_module(module).options.update(self._options)
+        wp.get_module(module).options.update(KERNEL_OPTIONS)
         instance: wp.Kernel = wp.kernel(rebound(source, self._replaced(source), module=module))
         return instance
 
     def _instantiate(self, function: wp.Function) -> wp.Function:
         """`function` for this vocabulary; itself where no table is read below it."""
         if function not in self._functions:
-            source = _python_function(function)
+            loops_over_table = original(function)
+            source = loops_over_table or _python_function(function)
+            make = unrolled if loops_over_table else typed
             replaced = self._replaced(source)
             module = self._module_of(source)
             self._functions[function] = (
-                typed(rebound(source, replaced, module=module)) if replaced else function
+                make(rebound(source, replaced, module=module)) if replaced else function
             )
         return self._functions[function]
 
@@ -86,11 +89,6 @@ class Vocabulary:
         if isinstance(value, wp.Function) and not value.is_builtin():
             return self._instantiate(value)
         return value
-
-    @property
-    def _options(self) -> dict[str, Any]:
-        """How its kernels are compiled: anew where the functions behind its rows have changed."""
-        return {**KERNEL_OPTIONS, "vocabulary": self.digest}
 
     def _module_of(self, function: FunctionType) -> str:
         name = re.sub(r"\W+", "_", function.__qualname__)
