@@ -202,9 +202,9 @@ _SLOPE = '''\
 def {name}(
     slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, parameter: wp.float32
 ) -> wp.float32:
-    """|∇F| ≤ |∂F/∂a| |∇a| + |∂F/∂b| |∇b|."""
+    """|F'| ≤ |∂F/∂a| |a'| + |∂F/∂b| |b'|; an operand that falls makes no F rise that rises with it."""
     k = {steepest}
-    return k[0] * slope_a + k[1] * slope_b
+    return k[0] * wp.max(slope_a, 0.0) + k[1] * wp.max(slope_b, 0.0)
 '''
 
 _MONOTONE_RANGE = '''\
@@ -255,6 +255,7 @@ def _row(kind: str, digest: str, source: OwnSource, claims: Claims) -> Operator:
         cast("wp.Function", shape.choice),
         commutes=claims.order_free,
         starts_from_zero=claims.like == "blend",
+        rises=claims.monotone and claims.like != "difference",
         reach=shape.reach,
         digest=digest,
     )

@@ -15,7 +15,7 @@ do not go into them: a primitive under a map carries that map on the tape, and o
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, field
+from dataclasses import KW_ONLY, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
@@ -93,7 +93,11 @@ class OwnPrimitive(Primitive, metaclass=OwnKind):
 
 
 def define_skeleton(
-    function: Any, *, name: str | None = None, limits: Mapping[str, Limits] | None = None
+    function: Any,
+    *,
+    convex: bool = False,
+    name: str | None = None,
+    limits: Mapping[str, Limits] | None = None,
 ) -> type[OwnPrimitive]:
     """Make a kind of primitive from `function`, which gives the point of the skeleton closest to `q`.
 
@@ -103,6 +107,8 @@ def define_skeleton(
         ``(q: wp.vec3, parameters...) -> wp.vec3``, parameters being wp.float32, wp.int32, wp.vec2, wp.vec3 or
         wp.vec4; with or without ``@wp.func``. Of the constructs of Python it may use those that Warp and GLSL
         share (see `blobtree.glsl`).
+    convex
+        Straight lines between points of the skeleton stay in it; rays then take longer steps.
     name
         What files call the kind; by default the function's name. The class is called the same in CamelCase.
     limits
@@ -127,18 +133,18 @@ def define_skeleton(
         raise source.refusal("its first parameter is the place asked about; expected `q: wp.vec3`")
     parameters = parameters_of(source, own, limits, RESERVED)
     kind = kind_name(source, name)
-    digest = source.digest_with(kind, parameters)
+    digest = source.digest_with(kind, parameters, convex)
     known = registered(kind)
     if known is not None and issubclass(known, OwnPrimitive) and known.digest == digest:
         return known
-    try_skeleton(source, parameters)
-    node = _node_class(kind, digest, source, parameters)
+    try_skeleton(source, parameters, convex=convex)
+    node = _node_class(kind, digest, source, parameters, convex)
     register(node)
     return node
 
 
 def _node_class(
-    kind: str, digest: str, source: OwnSource, parameters: tuple[Parameter, ...]
+    kind: str, digest: str, source: OwnSource, parameters: tuple[Parameter, ...], convex: bool
 ) -> type[OwnPrimitive]:
     fields: list[Any] = [(parameter.name, Any) for parameter in parameters]
     fields += [("_", KW_ONLY), ("radius", float), ("color", Vector, field(default=DEFAULT_COLOR))]
@@ -147,7 +153,7 @@ def _node_class(
         "kind": kind,
         "digest": digest,
         "parameters": parameters,
-        "skeleton": _row(kind, digest, source, parameters),
+        "skeleton": replace(_row(kind, digest, source, parameters), convex=convex),
     }
     made: type[OwnPrimitive] = node_class(kind, source, fields, OwnPrimitive, namespace)
     return made

@@ -31,7 +31,7 @@ SINGLE_TOLERANCE = 1e-5
 """The same in single precision."""
 
 
-def try_skeleton(source: OwnSource, parameters: tuple[Parameter, ...]) -> None:
+def try_skeleton(source: OwnSource, parameters: tuple[Parameter, ...], *, convex: bool) -> None:
     """Try whether a function returns the closest point of some set.
 
     With c the closest point of q it must do so: c is closest to itself, and no closest point of another place
@@ -55,6 +55,8 @@ def try_skeleton(source: OwnSource, parameters: tuple[Parameter, ...]) -> None:
                 f"{_shown(found[worst])} is returned as a point of the skeleton, but asked about that very "
                 f"place it returns {_shown(again[worst])}; return the closest point of a fixed set{hint}"
             )
+        if convex:
+            _try_convexity(source, closest, found, arguments, values)
         distances = np.linalg.norm(places[:, None] - found[None], axis=2)
         excess = np.diagonal(distances)[:, None] - distances
         if excess.max() > TOLERANCE * scale:
@@ -82,6 +84,24 @@ def _try_single_precision(
             raise source.refusal(
                 f"for {where} it returns {_shown(other)}, in double precision {_shown(c)}; "
                 "avoid differences of large numbers and divisions by small ones"
+            )
+
+
+def _try_convexity(
+    source: OwnSource,
+    closest: Callable[..., Any],
+    found: Floats,
+    arguments: list[Any],
+    values: dict[str, Any],
+) -> None:
+    """The middle between two points of a convex skeleton belongs to it."""
+    for one, other in zip(found, np.roll(found, 1, axis=0), strict=True):
+        middle = 0.5 * (one + other)
+        apart = float(np.linalg.norm(_point(source, closest, middle, arguments, values) - middle))
+        if apart > TOLERANCE * (1.0 + np.abs(found).max()):
+            raise source.refusal(
+                f"convex: {_shown(one)} and {_shown(other)} belong to the skeleton, but the middle between "
+                f"them is {apart:.6g} away from it, with {values}"
             )
 
 

@@ -118,7 +118,7 @@ def swell(a: wp.float32, b: wp.float32) -> wp.vec3:
 
 
 Ring = define_skeleton(ring, limits={"axis": (1e-3, None), "size": (0.0, None)})
-Brick = define_skeleton(brick)
+Brick = define_skeleton(brick, convex=True)
 Path = define_skeleton(path)
 Soft = define_operator(soft, steepest=1.0, like="blend", monotone=True, limits={"hardness": (0.0, SOFTEST)})
 Carve = define_operator(carve, steepest=carve_steepest, like="difference", monotone=True)

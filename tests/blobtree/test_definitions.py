@@ -148,6 +148,13 @@ def test_a_circle_must_answer_on_its_axis_too() -> None:
         define_skeleton(off_at_the_axis, limits={"size": (0.5, None)})
 
 
+@pytest.mark.parametrize("function", [own_kinds.ring, own_kinds.path])
+def test_what_is_not_convex_does_not_pass_as_convex(function: object) -> None:
+    limits = {"axis": (1e-3, None), "size": (0.5, None)} if function is own_kinds.ring else None
+    with pytest.raises(InvalidDefinition, match="convex: .* the middle between"):
+        define_skeleton(function, name="bent", convex=True, limits=limits)
+
+
 def test_a_function_without_source_is_refused() -> None:
     scope: dict[str, object] = {"wp": wp}
     exec("def hidden(q: wp.vec3) -> wp.vec3:\n    return q * 0.0\n", scope)
