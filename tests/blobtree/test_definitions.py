@@ -151,7 +151,7 @@ def test_a_circle_must_answer_on_its_axis_too() -> None:
 @pytest.mark.parametrize("function", [own_kinds.ring, own_kinds.path])
 def test_what_is_not_convex_does_not_pass_as_convex(function: object) -> None:
     limits = {"axis": (1e-3, None), "size": (0.5, None)} if function is own_kinds.ring else None
-    with pytest.raises(InvalidDefinition, match="convex: .* the middle between"):
+    with pytest.raises(InvalidDefinition, match=r"convex: .* the middle between"):
         define_skeleton(function, name="bent", convex=True, limits=limits)
 
 
