@@ -2,14 +2,17 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from cyclopts import Parameter
 
 from blobtree.io import write_atomically
+from decals.choosing import ImageChoice
 from decals.model import Decals
 from decals.orientation import Orientation
+from decals.painted_image import PaintedImage
+from decals.projections import Planar
 from decals.scene import Scene
 from decals.seeding import seed as seed_decals
 from decals.sizing import Sizing
@@ -36,6 +39,11 @@ def seed(
     factor: float = 1.0,
     along: Annotated[Orientation | None, Parameter(show_default=False)] = None,
     images: Whole = 1,
+    choice: ImageChoice = ImageChoice.RANDOM,
+    painted: Annotated[Path | None, Parameter(show_default=False)] = None,
+    painted_along: Literal["x", "y", "z"] = "z",
+    black: float = 0.1,
+    regularity: float = 1.0,
     seed: Whole = 0,
 ) -> None:
     """Spread seeds over models and write the decals that lie on them.
@@ -60,7 +68,17 @@ def seed(
     along
         Where images point: curvature, or cross for a smooth field of quarter turns. Default: at random.
     images
-        How many images decals choose among at random.
+        How many images decals choose among.
+    choice
+        What decides which: chance, the decals' size, or how much the surface bends.
+    painted
+        An image that says how densely seeds lie, laid over the models: most where it is white.
+    painted_along
+        Axis along which it is thrown onto them.
+    black
+        Density where it is black, as a part of that where it is white.
+    regularity
+        From 0, places at random, to 1, as even as can be.
     seed
         The same number gives the same decals.
     """
@@ -77,15 +95,22 @@ def seed(
     objects = load_models(model)
     if isinstance(objects, Scene):
         raise UsageError("a saved scene brings its own decals; seed its models instead")
+    surfaces = [item.surface for item in objects]
+    density = None
+    if painted is not None:
+        density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
     with progress_bars() as progress:
         decals = seed_decals(
-            [item.surface for item in objects],
+            surfaces,
             count=count,
             spacing=spacing,
+            density=density,
+            regularity=regularity,
             sizing=sizing,
             factor=factor,
             direction=along,
             images=images,
+            choice=choice,
             seed=seed,
             progress=progress,
         )

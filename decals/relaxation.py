@@ -43,7 +43,7 @@ SETTLING = 60
 POLISHING = 150
 """Rounds at most that part the last close pairs."""
 
-CHECKS = 10
+CHECKS = 2
 """Steps after which it is measured whether the particles lie evenly enough."""
 
 
@@ -194,7 +194,7 @@ class Relaxation:
         progress
             Called with a stage in plain words and the fraction done.
         until
-            The rho that is enough: measured at every tenth step, and nothing is polished beyond it.
+            The rho that is enough: measured at every other step, and nothing is polished beyond it.
         cancel
             Asked before every step whether to stop; the particles stay as they are then.
         """

@@ -6,10 +6,12 @@ from numpy.typing import ArrayLike
 
 from blobtree.progress import Progress
 from decals.choosing import ImageChoice
+from decals.errors import InvalidSeeding
 from decals.jitter import Jitter
 from decals.laying import lay, wishes
 from decals.model import Decals
 from decals.orientation import Direction
+from decals.polishing import CLOSE
 from decals.population import Density, Mask
 from decals.relaxation import Relaxation
 from decals.sizing import Sizing
@@ -28,6 +30,7 @@ def seed(
     density: Density | None = None,
     mask: Mask | None = None,
     fixed: ArrayLike | None = None,
+    regularity: float = 1.0,
     sizing: Sizing = Sizing.COVERING,
     factor: float = 1.0,
     direction: Direction = None,
@@ -55,6 +58,9 @@ def seed(
         From 0 upward; the same one gives the same decals.
     density, mask, fixed
         How densely decals lie, where they may lie, and places that are given: see `Relaxation`.
+    regularity
+        From 0, places as they are drawn, to 1, as even as can be; between, seeds are spread until the least
+        distance is that part of what 1 comes to.
     sizing
         What decides how large decals are.
     factor
@@ -80,10 +86,12 @@ def seed(
     Raises
     ------
     InvalidSeeding
-        For a count, spacing, seed, density, mask, factor, direction, number of images or weights that make no
-        sense, or nothing to lie on.
+        For a count, spacing, seed, density, mask, regularity, factor, direction, number of images or weights
+        that make no sense, or nothing to lie on.
     """
     given = [surfaces] if isinstance(surfaces, Surface) else list(surfaces)
+    if not 0.0 <= regularity <= 1.0:
+        raise InvalidSeeding(f"regularity: expected a number from 0 to 1, got {regularity!r}")
     wishes(factor, images, weights)  # before the long work, not after it
     tell = progress or (lambda stage, fraction: None)
     relaxation = Relaxation(
@@ -96,7 +104,12 @@ def seed(
         fixed=fixed,
         device=device,
     )
-    relaxation.run(lambda stage, fraction: tell(stage, SPREADING * fraction), cancel=cancel)
+    if regularity > 0.0:
+        relaxation.run(
+            lambda stage, fraction: tell(stage, SPREADING * fraction),
+            until=None if regularity == 1.0 else regularity * CLOSE,
+            cancel=cancel,
+        )
     tell("measuring sizes", SPREADING)
     decals = lay(
         relaxation,

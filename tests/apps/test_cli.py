@@ -91,9 +91,23 @@ def test_seeds_by_spacing_and_rule(folder: Path) -> None:
     assert np.median(radii) == pytest.approx(0.25 * 0.2, rel=0.15)
 
 
+def test_seeds_follow_a_painted_image(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    Image.fromarray(np.uint8([[0, 255]]).repeat(8, axis=1)).save(folder / "half.png")
+    wish = ["--count", "200", "--painted", "half.png", "--painted-along", "y", "--black", "0.25"]
+    assert (
+        run(["seed", "ball.ply", *wish, "--choice", "curvature", "--regularity", "0.6", "-o", "seeds.json"])
+        == 0
+    )
+    places = np.array(json.loads((folder / "seeds.json").read_text())["positions"])
+    assert (places[:, 2] < 0).sum() == pytest.approx(40, abs=4)  # seen from +y, z runs to the right
+
+
 @pytest.mark.parametrize(
     ("wish", "says"),
     [
+        (["--regularity", "2", "-o", "a.json"], "regularity: expected a number from 0 to 1"),
+        (["--painted", "none.png", "-o", "a.json"], "found no file"),
         (["--count", "5", "--spacing", "0.1", "-o", "a.json"], "--count or --spacing"),
         (["--count", "-1", "-o", "a.json"], "--count: expected"),
         (["--spacing", "0", "-o", "a.json"], "spacing: expected a length above 0"),

@@ -227,3 +227,19 @@ def test_any_triangles_get_exactly_as_many_decals_as_wished(number, count, trian
     assert (decals.radii > 0).all()
     spacing = np.sqrt(soup.area / max(count, 1))
     assert np.allclose(soup.project(decals.positions)[0], decals.positions, atol=1e-4 * spacing)
+
+
+def test_regularity_runs_from_chance_to_a_tiling():
+    ball = sphere(level=5)
+    found = []
+    for regularity in (0.0, 0.3, 0.6, 0.9, 1.0):
+        decals = seed(ball, count=800, regularity=regularity)
+        found.append(rho(decals.positions, decals.normals, ball.area))
+        assert is_bare(decals, ball, 2000) == 0
+    assert found[0] < 0.2
+    assert np.array(found[1:4]) == pytest.approx(np.array([0.3, 0.6, 0.9]) * 0.89, abs=0.2)
+    assert (np.array(found[1:]) > np.array([0.3, 0.6, 0.9, 0.99]) * 0.88).all()
+    assert (np.diff(found) > 0).all()
+    for nonsense in (-0.1, 1.1, np.nan):
+        with pytest.raises(InvalidSeeding, match="regularity: expected"):
+            seed(ball, count=3, regularity=nonsense)
