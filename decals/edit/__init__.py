@@ -3,6 +3,7 @@
 No graphics and no window are needed here; `decals.window` brings both.
 """
 
+from decals.edit.actions import Actions
 from decals.edit.change import Change, Parts, Rows
 from decals.edit.commands import (
     Add,
@@ -18,12 +19,16 @@ from decals.edit.commands import (
     Turn,
 )
 from decals.edit.document import Document
+from decals.edit.jobs import Job, Worker
+from decals.edit.pick import Pick, outline, pick
 from decals.edit.places import Places, first_hit, nearest
 from decals.edit.population import Coat, Relax, Scatter
 from decals.edit.session import Command, EditSession
+from decals.edit.tools import Tools
 from decals.edit.trees import MovePrimitive, PaintPrimitive, ResizePrimitive, primitive_near, primitive_paths
 
 __all__ = [
+    "Actions",
     "Add",
     "AddImage",
     "Alter",
@@ -36,10 +41,12 @@ __all__ = [
     "Document",
     "Duplicate",
     "EditSession",
+    "Job",
     "Look",
     "MovePrimitive",
     "PaintPrimitive",
     "Parts",
+    "Pick",
     "Places",
     "Relax",
     "RemoveImage",
@@ -47,9 +54,13 @@ __all__ = [
     "Rows",
     "Scale",
     "Scatter",
+    "Tools",
     "Turn",
+    "Worker",
     "first_hit",
     "nearest",
+    "outline",
+    "pick",
     "primitive_near",
     "primitive_paths",
 ]

@@ -20,10 +20,17 @@ PAPER = 0.85
 """Opacity of what lies behind text."""
 
 
+LINE, LETTER = 1.3, 0.62
+"""Height of a line and width of a letter, in sizes of the font."""
+LARGEST = 18
+"""Size of the help's font, in pixels."""
+
+
 class Marks:
     """Outlines, status and help in a plotter."""
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
+        self._plotter: Any = plotter
         self._lines = pv.PolyData()
         self._actor = plotter.add_mesh(
             pv.Line((0, 0, 0), (0, 0, 0)),
@@ -67,8 +74,13 @@ class Marks:
         self._status.SetInput(text)
 
     def show_help(self, shown: bool) -> None:
-        """Show the help, or hide it."""
+        """Show the help, as large as the window allows, or hide it."""
         self._help.SetVisibility(shown)
+        width, height = self._plotter.window_size
+        lines = help_lines()
+        tall = (height - 60) / (LINE * len(lines))
+        wide = (width - 24) / (LETTER * max(map(len, lines)))
+        self._help.prop.SetFontSize(max(6, min(LARGEST, int(min(tall, wide)))))
 
     @property
     def status(self) -> str:

@@ -138,6 +138,17 @@ class EditWindow:
         self._moved = 0.0
         self.plotter.render()
 
+    def _refine(self) -> None:
+        """Draw better than now: first at the window's size, then, at the next tick, with all samples.
+
+        In between the window listens, so whoever goes on waits for one frame at most.
+        """
+        if self.stage.draw_scale < 1.0 < self.samples:
+            self.stage.draw_scale, self.stage.samples = 1.0, 1
+            self.plotter.render()
+        else:
+            self.rest()
+
     def _timed(self, *, begin: bool) -> None:
         if begin:
             self._began = time.perf_counter()
@@ -159,7 +170,7 @@ class EditWindow:
             self.marks.say(self._status())
             self.plotter.render()
         elif self._moved and time.perf_counter() - self._moved > REST and not self.tools.dragging:
-            self.rest()
+            self._refine()
 
     def _start(self, job: Job) -> None:
         if not self.worker.start(job):
@@ -249,8 +260,13 @@ def view(
 
 
 def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
-    """Make an empty window; its methods are wrapped in ways that type checkers do not follow."""
+    """Make an empty window; its methods are wrapped in ways that type checkers do not follow.
+
+    It does without VTK's multisampling: what we draw is smoothed by ourselves, and without a graphics card
+    half of the time of a frame would go there.
+    """
     plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
+    plotter.disable_anti_aliasing()
     return plotter
 
 

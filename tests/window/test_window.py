@@ -179,6 +179,19 @@ def test_things_that_move_are_drawn_smaller_where_the_card_is_slow(driver):
     assert window.stage.draw_scale == 1
 
 
+def test_what_rests_is_drawn_better_tick_by_tick(driver, monkeypatch):
+    window, drawn = driver.window, []
+    window.quality.saw(2.0, 10.0)
+    window.redraw(whole=False)
+    window.tick()
+    assert window.stage.draw_scale < 1
+    monkeypatch.setattr("decals.window.window.REST", 0.0)
+    for _ in range(3):
+        window.tick()
+        drawn.append((window.stage.draw_scale, window.stage.samples))
+    assert drawn == [(1.0, 1), (1.0, 2), (1.0, 2)]
+
+
 def test_saving_keeps_the_windows_camera(opened, tmp_path):
     driver = opened(path=tmp_path / "scene.json")
     driver.drag((3, 3), (40, 20))

@@ -1,0 +1,191 @@
+"""How soon the window answers: ``python -m tests.bench.window [--json PATH] [--quick] [--size WxH]``.
+
+A window without a screen is driven by synthetic events among 1,000 decals; each step runs from the event to
+the finished frame. Wall time counts what else the machine does; processor time (of all threads, llvmpipe's
+too) divided by the cores is what a quiet machine would take at the least.
+"""
+
+import argparse
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from decals.edit import EditSession
+from decals.window import EditWindow
+from tests.bench.scenes import bench_scene
+from tests.window.driver import Driver
+
+Figures = dict[str, float]
+
+TARGETS = {
+    "knot_drag_ms": "≤ 100",
+    "creature_drag_ms": "≤ 100",
+    "knot_turn_ms": "≤ 100",
+    "creature_turn_ms": "≤ 100",
+    "creature_primitive_ms": "≤ 100",
+    "creature_scatter_longest_ms": "≤ 100",
+}
+MODELS = ("knot", "creature")
+STEPS = 25
+WARM = 8
+"""Steps of each kind before those that count: programs are compiled and the size of frames found."""
+
+
+def timed(step: Callable[[], object]) -> tuple[float, float]:
+    """Wall and processor milliseconds of one step."""
+    wall, used = time.perf_counter(), time.process_time()
+    step()
+    cores = os.cpu_count() or 1
+    return 1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - used) / cores
+
+
+def medians(name: str, times: list[tuple[float, float]]) -> Figures:
+    """Give medians of the steps that count."""
+    wall, used = np.array(times[WARM:] or times).T
+    return {f"{name}_ms": float(np.median(wall)), f"{name}_busy_ms": float(np.median(used))}
+
+
+def around(at: tuple[int, int], steps: int, radius: float = 30.0) -> list[tuple[int, int]]:
+    """Places on a spiral around a pixel."""
+    turns = np.linspace(0, 4 * np.pi, steps)
+    return [
+        (int(at[0] + radius * t / 12 * np.cos(t)), int(at[1] + radius * t / 12 * np.sin(t))) for t in turns
+    ]
+
+
+def drag(driver: Driver, name: str, steps: int) -> Figures:
+    """Drag one decal among all."""
+    _, at = next(driver.visible())
+    driver.click(at)
+    driver.event("LeftButtonPressEvent", at)
+    times = [
+        timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
+        for place in around(at, steps + WARM)
+    ]
+    scale = driver.window.stage.draw_scale
+    driver.event("LeftButtonReleaseEvent", at)
+    driver.key("z", ctrl=True)
+    return medians(f"{name}_drag", times) | {f"{name}_drag_scale": scale}
+
+
+def turn(driver: Driver, name: str, steps: int) -> Figures:
+    """Turn the camera."""
+    driver.key("Escape")
+    driver.event("LeftButtonPressEvent", (4, 4))
+    places = [(4 + 5 * step, 4 + 2 * step) for step in range(steps + WARM)]
+    times = [
+        timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
+        for place in places
+    ]
+    driver.event("LeftButtonReleaseEvent", (4, 4))
+    return medians(f"{name}_turn", times)
+
+
+def primitive(driver: Driver, name: str, steps: int) -> Figures:
+    """Move a primitive by its handle."""
+    _, at = next(driver.visible())
+    driver.key("m", at)
+    grip = driver.window.grip
+    center = np.array(grip.widget.GetCenter())
+    reach = 0.002 * float(np.linalg.norm(np.subtract(*driver.document.scene.bounds)))
+
+    def move(step: int) -> None:
+        grip.widget.SetCenter(*np.add(center, (reach * step, 0, 0)).tolist())
+        grip.widget.InvokeEvent("InteractionEvent")
+
+    grip.widget.InvokeEvent("StartInteractionEvent")
+    times = [timed(lambda step=step: move(step)) for step in range(steps + WARM)]  # type: ignore[misc]
+    grip.widget.InvokeEvent("EndInteractionEvent")
+    driver.key("z", ctrl=True)
+    driver.key("m", at)
+    return medians(f"{name}_primitive", times)
+
+
+def scatter(driver: Driver, name: str, _steps: int) -> Figures:
+    """Make a new coat in the background, while the window is looked after and the camera turned."""
+    _, at = next(driver.visible())
+    begin = time.perf_counter()
+    times = [timed(lambda: driver.key("g", at))]
+    driver.event("LeftButtonPressEvent", (4, 4))
+    place = 4
+    while driver.window.worker.busy and driver.window.worker._thread.is_alive():
+        place = 4 + (place + 3) % 200
+        times.append(timed(lambda: driver.event("MouseMoveEvent", (place, 9))))  # noqa: B023
+    driver.event("LeftButtonReleaseEvent", (4, 4))
+    last = timed(driver.window.tick)[0]
+    longest = max(wall for wall, _ in times[1:])
+    return {
+        f"{name}_scatter_s": time.perf_counter() - begin,
+        f"{name}_scatter_median_ms": float(np.median([wall for wall, _ in times[1:]])),
+        f"{name}_scatter_longest_ms": longest,
+        f"{name}_scatter_put_on_ms": last,
+    }
+
+
+def whole(window: EditWindow, name: str) -> Figures:
+    """Draw a whole frame, one sample a pixel; then leave whole frames out: they belong to rest."""
+    times = [timed(EditWindow.rest.__get__(window)) for _ in range(2)]
+    return {f"{name}_whole_ms": times[-1][0], f"{name}_whole_busy_ms": times[-1][1]}
+
+
+def measure(models: tuple[str, ...], size: tuple[int, int], count: int, steps: int) -> Figures:
+    """Measure one model after another."""
+    figures: Figures = {}
+    for name in models:
+        session = EditSession(bench_scene(name, count, size, seeded=True))
+        with EditWindow(session, off_screen=True, size=size, samples=1) as window:
+            window.show()
+            figures |= whole(window, name)
+            window.rest = window.plotter.render  # type: ignore[method-assign]
+            driver = Driver(window)
+            kinds = (drag, turn, primitive, scatter) if name == "creature" else (drag, turn)
+            for kind in kinds:
+                window.moving()
+                figures |= kind(driver, name, steps)
+                print(f"{name}: {kind.__name__} done", file=sys.stderr, flush=True)
+    return figures
+
+
+def report(figures: Figures, machine: str) -> str:
+    """Lay figures out for people."""
+    lines = [f"python -m tests.bench.window {' '.join(sys.argv[1:])}".rstrip(), machine, ""]
+    for name, value in figures.items():
+        lines.append(f"{name:32} {value:>12.4g}  {TARGETS.get(name, '')}".rstrip())
+    return "\n".join(lines)
+
+
+def _machine() -> str:
+    packages = ", ".join(f"{name} {version(name)}" for name in ("vtk", "pyvista", "moderngl", "warp-lang"))
+    with EditWindow(bench_scene("knot", 10, (64, 48)), off_screen=True, size=(64, 48)) as window:
+        window.show()
+        card = window.stage.renderer.context.name
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    return f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f}; {card}; {packages}"
+
+
+def main() -> None:
+    """Measure, print, and write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--size", default="1200x800")
+    arguments = parser.parse_args()
+    width, height = (int(side) for side in arguments.size.split("x"))
+    machine = _machine()
+    figures = measure(MODELS, (width, height), 1000, 8 if arguments.quick else STEPS)
+    print(report(figures, machine))
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=1))
+
+
+if __name__ == "__main__":
+    main()
