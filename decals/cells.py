@@ -1,4 +1,7 @@
-"""Radial contact (decals/radial.py) through the index: whose cell holds a point, where on a ray it ends."""
+"""Radial contact (decals/radial.py) through the index: whose cell holds a point, where on a ray it ends.
+
+Where decals are not layered, all have one rank, and none is asked for.
+"""
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
 # mypy: ignore-errors
@@ -45,6 +48,7 @@ def in_cell(
     q: wp.vec3,
     n_q: wp.vec3,
     decal: wp.int32,
+    layered: wp.bool,
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
@@ -53,13 +57,19 @@ def in_cell(
     ids: wp.array(dtype=wp.int32),
 ) -> wp.bool:
     """Whether q, inside the rim of a contact decal, is on its side of all planes to its neighbours."""
-    rank = rank_of(decal, decals)
+    rank = wp.int32(0)
+    if layered:
+        rank = rank_of(decal, decals)
     own = power_of(q, decal, decals)
     for level in range(level_count):
         span = cell_range(q, level, levels, table, mask, ids)
-        for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
-            if rank_of(ids[j], decals) != rank:
-                break
+        start = span[0]
+        if layered:
+            start = end_of_lower(span, rank, 0, decals, ids)
+        for j in range(start, span[1]):
+            if layered:
+                if rank_of(ids[j], decals) != rank:
+                    break
             if complement_of(q, n_q, ids[j], decals) <= 0.5 and power_of(q, ids[j], decals) < own:
                 if not stacked(decal, ids[j], decals):
                     return False
@@ -72,6 +82,7 @@ def uppermost_over(
     n_q: wp.vec3,
     decal: wp.int32,
     above: wp.int32,
+    layered: wp.bool,
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
@@ -80,13 +91,19 @@ def uppermost_over(
     ids: wp.array(dtype=wp.int32),
 ) -> wp.int32:
     """Uppermost of those stacked over a decal whose rims hold q; if `above` is one, of those below it."""
-    rank = rank_of(decal, decals)
+    rank = wp.int32(0)
+    if layered:
+        rank = rank_of(decal, decals)
     upper = wp.int32(NOBODY)
     for level in range(level_count):
         span = cell_range(q, level, levels, table, mask, ids)
-        for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
-            if rank_of(ids[j], decals) != rank:
-                break
+        start = span[0]
+        if layered:
+            start = end_of_lower(span, rank, 0, decals, ids)
+        for j in range(start, span[1]):
+            if layered:
+                if rank_of(ids[j], decals) != rank:
+                    break
             if lies_over(ids[j], decal, decals) and complement_of(q, n_q, ids[j], decals) <= 0.5:
                 if upper < 0 or lies_over(ids[j], upper, decals):
                     if above < 0 or lies_over(above, ids[j], decals):
@@ -100,6 +117,7 @@ def cell_owner(
     q: wp.vec3,
     n_q: wp.vec3,
     rank: wp.int32,
+    layered: wp.bool,
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
@@ -110,24 +128,30 @@ def cell_owner(
     """Uppermost of the contact decals of one rank whose cells hold q; NOBODY outside all rims."""
     owner = wp.int32(NOBODY)
     least = wp.float32(0.0)
+    holders = wp.int32(0)
     for level in range(level_count):
         span = cell_range(q, level, levels, table, mask, ids)
-        for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
-            if rank_of(ids[j], decals) != rank:
-                break
+        start = span[0]
+        if layered:
+            start = end_of_lower(span, rank, 0, decals, ids)
+        for j in range(start, span[1]):
+            if layered:
+                if rank_of(ids[j], decals) != rank:
+                    break
             if complement_of(q, n_q, ids[j], decals) <= 0.5:
+                holders += 1
                 own = power_of(q, ids[j], decals)
                 if owner < 0 or own < least or (own == least and lies_over(ids[j], owner, decals)):
                     least = own
                     owner = ids[j]
-    if owner < 0:
+    if holders < 2:
         return owner
     # Whoever shares q with the nearest cell is stacked with it: from the uppermost down, who does?
-    upper = uppermost_over(q, n_q, owner, NOBODY, decals, level_count, levels, table, mask, ids)
+    upper = uppermost_over(q, n_q, owner, NOBODY, layered, decals, level_count, levels, table, mask, ids)
     while upper >= 0:
-        if in_cell(q, n_q, upper, decals, level_count, levels, table, mask, ids):
+        if in_cell(q, n_q, upper, layered, decals, level_count, levels, table, mask, ids):
             return upper
-        upper = uppermost_over(q, n_q, owner, upper, decals, level_count, levels, table, mask, ids)
+        upper = uppermost_over(q, n_q, owner, upper, layered, decals, level_count, levels, table, mask, ids)
     return owner
 
 
@@ -136,6 +160,7 @@ def radial_complement(
     q: wp.vec3,
     n_q: wp.vec3,
     owner: wp.int32,
+    layered: wp.bool,
     decals: wp.array(dtype=wp.vec4),
     level_count: wp.int32,
     levels: wp.array(dtype=wp.vec4),
@@ -148,7 +173,9 @@ def radial_complement(
     A convex cell is left before the rim only through planes to those that hold the ray's point on the rim,
     and these are in the index's list there.
     """
-    rank = rank_of(owner, decals)
+    rank = wp.int32(0)
+    if layered:
+        rank = rank_of(owner, decals)
     centre = xyz(decals[RECORD * owner])
     radius = visible_radius(owner, decals)
     distance = wp.length(q - centre)
@@ -159,9 +186,13 @@ def radial_complement(
     end = radius
     for level in range(level_count):
         span = cell_range(edge, level, levels, table, mask, ids)
-        for j in range(end_of_lower(span, rank, 0, decals, ids), span[1]):
-            if rank_of(ids[j], decals) != rank:
-                break
+        start = span[0]
+        if layered:
+            start = end_of_lower(span, rank, 0, decals, ids)
+        for j in range(start, span[1]):
+            if layered:
+                if rank_of(ids[j], decals) != rank:
+                    break
             if ids[j] != owner and faces(n_q, ids[j], decals):
                 if not stacked(owner, ids[j], decals):
                     other = visible_radius(ids[j], decals)

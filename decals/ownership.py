@@ -47,6 +47,9 @@ def owner_below(
     Of a sheet it is the decal of highest field, the lowest number among equals (in radial contact, the
     uppermost whose cell holds q).
     """
+    if contact == Contact.RADIAL:
+        if not layered:
+            return cell_owner(q, n_q, 0, False, decals, level_count, levels, table, mask, ids)
     owner = wp.int32(NOBODY)
     top = wp.int32(-1)
     least = wp.float32(0.5)
@@ -83,7 +86,9 @@ def owner_below(
                         break
     if contact == Contact.RADIAL and owner >= 0:
         if is_sheet(top):
-            return cell_owner(q, n_q, rank_of(owner, decals), decals, level_count, levels, table, mask, ids)
+            return cell_owner(
+                q, n_q, rank_of(owner, decals), True, decals, level_count, levels, table, mask, ids
+            )
     return owner
 
 
@@ -164,7 +169,7 @@ def complement_at(
         if not is_sheet(rank_of(owner, decals)):
             return complement_of(q, n_q, owner, decals)
     if contact == Contact.RADIAL:
-        return radial_complement(q, n_q, owner, decals, level_count, levels, table, mask, ids)
+        return radial_complement(q, n_q, owner, layered, decals, level_count, levels, table, mask, ids)
     return pushed_complement(q, n_q, owner, contact, layered, decals, level_count, levels, table, mask, ids)
 
 

@@ -9,32 +9,48 @@ neighbours' pushes. Shaders keep them in two vectors, which are registers; an in
 
 import warp as wp
 
-from decals.contact import NOWHERE, add_push, contact_complement, contact_push
+from decals.contact import (
+    NOWHERE,
+    SMALLEST_COMPLEMENT,
+    SMALLEST_SPAN,
+    add_push,
+    contact_complement,
+    log_of_rest,
+)
 from decals.lookup import cell_range
 from decals.ownership import NOBODY, pushed_complement
 from decals.records import complement_of
 
 wp.set_module_options({"enable_backward": False})
 
+ALMOST_ONE = 0.99999994
+
 KEPT = 8
 """Complements that are kept; where more decals act, the index is walked a second time."""
 
 
 @wp.func
-def push_of(e: wp.float32, least: wp.float32) -> wp.float32:
-    """Push φ of a neighbour; none of the owner, whose complement is the least."""
-    if e <= least:
+def push_of(e: wp.float32, least: wp.float32, per_span: wp.float32, per_least: wp.float32) -> wp.float32:
+    """Push φ of a neighbour (`contact_push`, divisions done before); none of the owner, whose e is least."""
+    if e <= least or e + least >= 1.0:
         return 0.0
-    return contact_push(e, least)
+    return wp.exp(log_of_rest(wp.min((e - least) * per_span, ALMOST_ONE)) * per_least)
 
 
 @wp.func
-def add_pushes(push: wp.float32, e: wp.vec4, least: wp.float32, contact: wp.int32) -> wp.float32:
+def add_pushes(
+    push: wp.float32,
+    e: wp.vec4,
+    least: wp.float32,
+    per_span: wp.float32,
+    per_least: wp.float32,
+    contact: wp.int32,
+) -> wp.float32:
     """Extend 1 − ∏(1 − φ), or the largest φ, by four neighbours."""
-    first = add_push(push, push_of(e[0], least), contact)
-    second = add_push(first, push_of(e[1], least), contact)
-    third = add_push(second, push_of(e[2], least), contact)
-    return add_push(third, push_of(e[3], least), contact)
+    first = add_push(push, push_of(e[0], least, per_span, per_least), contact)
+    second = add_push(first, push_of(e[1], least, per_span, per_least), contact)
+    third = add_push(second, push_of(e[2], least, per_span, per_least), contact)
+    return add_push(third, push_of(e[3], least, per_span, per_least), contact)
 
 
 @wp.func
@@ -82,9 +98,12 @@ def sheet_at(
             q, n_q, owner, contact, False, decals, level_count, levels, table, mask, ids
         )
         return wp.vec2(float(owner), deformed)
+    per_span = 1.0 / wp.max(1.0 - 2.0 * least, SMALLEST_SPAN)
+    per_least = 1.0 / wp.max(least, SMALLEST_COMPLEMENT)
     push = wp.float32(0.0)
-    push = add_pushes(push, a, least, contact)
-    push = add_pushes(push, b, least, contact)
+    push = add_pushes(push, a, least, per_span, per_least, contact)
+    if count > 4:
+        push = add_pushes(push, b, least, per_span, per_least, contact)
     if ties > 1:  # on a line of contact
         push = 1.0
     return wp.vec2(float(owner), contact_complement(least, push))
