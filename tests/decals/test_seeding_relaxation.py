@@ -295,6 +295,15 @@ def test_density_on_vertices():
             vertex_density(ball.vertices, values)
 
 
+def test_density_on_the_vertices_of_a_mesh_is_linear_in_its_faces():
+    ball = sphere()
+    density = vertex_density(ball, 2.0 + ball.vertices[:, 0])
+    points, _ = ball.sample(300, seed=0)
+    assert density(points) == pytest.approx(2.0 + points[:, 0], abs=1e-5)
+    with pytest.raises(InvalidSeeding, match="values: expected"):
+        vertex_density(ball, [1.0])
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(
     ("surface", "density", "regions"),
