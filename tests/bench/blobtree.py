@@ -289,13 +289,13 @@ def main() -> None:
     if options.device == "cpu":
         figures = meshing(options.quick) | remeshing() | cost_of_quality() | quality() | tracing() | peak()
         figures |= curve(quick=options.quick)
-        packages = ("warp-lang", "numpy", "vtk")
+        versions = f", vtk {version('vtk')}"
     else:
         figures = on_device(options.device, quick=options.quick)
-        packages = ("warp-lang", "numpy")
+        versions = ""
     print(f"{wp.get_device(options.device).name}, {os.cpu_count()} cores ({platform.machine()})")
     print(f"python -m {' '.join(['tests.bench.blobtree', *sys.argv[1:]])}")
-    print(", ".join(f"{package} {version(package)}" for package in packages))
+    print(f"warp-lang {wp.config.version}, numpy {np.__version__}{versions}")
     for name, number in figures.items():
         print(f"  {name:28} {number:12.6g}")
     if options.device == "cpu":
