@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
+from itertools import chain
 from typing import ClassVar
 
 import numpy as np
@@ -40,7 +41,10 @@ class Primitive(Node):
     @classmethod
     def hulls(cls, primitives: Sequence["Primitive"]) -> Floats:
         """Points (n, k, 3) whose convex hulls hold the skeletons of n primitives of this kind."""
-        return np.array([primitive.control_points for primitive in primitives])
+        count = len(primitives[0].control_points)
+        points = chain.from_iterable(primitive.control_points for primitive in primitives)
+        size = 3 * count * len(primitives)
+        return np.fromiter(chain.from_iterable(points), np.float64, size).reshape(-1, count, 3)
 
     @classmethod
     def packed(cls, primitives: Sequence["Primitive"], influences: Floats, matrices: Floats | None) -> Floats:

@@ -9,7 +9,7 @@ first, so a tree of n leaves needs at most log₂ n registers and a spine of any
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from . import affine
 from .errors import InvalidNode
 from .operators import RICCI, SUM, Operator, Reach
 from .skeletons import Skeleton
-from .traversal import postorder
+from .traversal import branches
 from .warps import SpaceWarp
 
 if TYPE_CHECKING:
@@ -63,9 +63,15 @@ class PlacedPrimitive(NamedTuple):
     placement: Placement
 
 
+_PlacedNode = tuple["Node", Placement]
+"""Another node and where it stands."""
+
+
 def distinct_placements(primitives: list[PlacedPrimitive]) -> tuple[list[Placement], NDArray[np.intp]]:
     """The placements of `primitives`, each object once, and which one each primitive has."""
-    identities = np.array([id(placed.placement) for placed in primitives])
+    identities = np.fromiter((id(placed.placement) for placed in primitives), np.int64, len(primitives))
+    if (identities == identities[0]).all():
+        return [primitives[0].placement], np.zeros(len(primitives), np.intp)
     _, first, placed_by = np.unique(identities, return_index=True, return_inverse=True)
     placements = [primitives[i].placement for i in first]
     return placements, placed_by
@@ -169,11 +175,10 @@ def _weights(root: "Node") -> dict[int, int]:
     """Weight of every node that has children; refuses trees that use their subtrees too often."""
     weights: dict[int, int] = {}
     counts: dict[int, int] = {}
-    for node in postorder(root):
-        if node.children:
-            children = [id(child) for child in node.children]
-            counts[id(node)] = sum([counts.get(child, 1) for child in children])
-            weights[id(node)] = _weight(node, [weights.get(child, SIMPLE) for child in children])
+    for node in branches(root):
+        children = [id(child) for child in node.children]
+        counts[id(node)] = sum([counts.get(child, 1) for child in children])
+        weights[id(node)] = _weight(node, [weights.get(child, SIMPLE) for child in children])
     if counts.get(id(root), 1) > MOST_PRIMITIVES:
         raise InvalidNode(
             f"tree: its subtrees, counted as often as they are used, exceed {MOST_PRIMITIVES:,} primitives"
@@ -222,16 +227,14 @@ def _expand_commutative(
     step: _Emit, node: "Combination", weights: dict[int, int]
 ) -> Iterator[_Emit | Instruction]:
     """Heaviest operand first; the primitives fold in at the end, kind by kind."""
-    from .primitives import Primitive
-
     operator, parameter = _operation(node)
-    subtrees: list[tuple[Node, Placement]] = []
+    subtrees: list[_PlacedNode] = []
     primitives: list[PlacedPrimitive] = []
-    for operand, placement in _flatten(node, step.placement):
-        if isinstance(operand, Primitive):
-            primitives.append(PlacedPrimitive(operand, placement))
+    for placed in _flatten(node, step.placement):
+        if isinstance(placed, PlacedPrimitive):
+            primitives.append(placed)
         else:
-            subtrees.append((operand, placement))
+            subtrees.append(placed)
     subtrees.sort(key=lambda subtree: -weights[id(subtree[0])])
     for number, (operand, placement) in enumerate(subtrees):
         if number == 0:
@@ -309,19 +312,29 @@ def _strip(node: "Node", placement: Placement) -> tuple["Node", Placement]:
     return node, placement
 
 
-def _flatten(root: "Combination", place: Placement) -> Iterator[tuple["Node", Placement]]:
+def _flatten(root: "Combination", place: Placement) -> Iterator[PlacedPrimitive | _PlacedNode]:
     """Operands of `root`, those of nested combinations by the same associative operator among them."""
     from .tree import Combination
 
     operation = _operation(root)
-    pending: list[tuple[Node, Placement]] = [(child, place) for child in reversed(root.children)]
+    pending = _placed(root.children, place)
     while pending:
-        node, placement = pending.pop()
-        if not node.children:
-            yield node, placement
+        placed = pending.pop()
+        if isinstance(placed, PlacedPrimitive):
+            yield placed
             continue
-        node, placement = _strip(node, placement)
+        node, placement = _strip(*placed)
         if isinstance(node, Combination) and _operation(node) == operation:
-            pending.extend((child, placement) for child in reversed(node.children))
-        else:
+            pending.extend(_placed(node.children, placement))
+        elif node.children:
             yield node, placement
+        else:
+            yield PlacedPrimitive(cast("Primitive", node), placement)
+
+
+def _placed(nodes: tuple["Node", ...], placement: Placement) -> list[PlacedPrimitive | _PlacedNode]:
+    """`nodes` and where they stand, the last one first."""
+    return [
+        (node, placement) if node.children else PlacedPrimitive(cast("Primitive", node), placement)
+        for node in reversed(nodes)
+    ]

@@ -20,6 +20,7 @@ Everything of a primitive lies in one place, so a part of a tape is a tape.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 import warp as wp
@@ -173,7 +174,8 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
         grown = grown * scales[:, None]
     parameters = nodes[0].packed(nodes, grown, matrices)
     colors = np.ones((len(nodes), 1, 4))
-    colors[:, 0, :3] = [node.color for node in nodes]
+    components = chain.from_iterable(node.color for node in nodes)
+    colors[:, 0, :3] = np.fromiter(components, np.float64, 3 * len(nodes)).reshape(-1, 3)
     parts = [parameters, colors]
     if stretched:
         parts.insert(0, np.array([_map_texels(placement.matrix) for placement in placements])[placed_by])
@@ -182,7 +184,9 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
 
 def _grown_influences(primitives: list[PlacedPrimitive]) -> NDArray[np.float64]:
     """Influences (n, k) of primitives under the offsets above them."""
-    influences = np.array([placed.primitive.influences for placed in primitives])
+    count = len(primitives[0].primitive.influences)
+    numbers = chain.from_iterable(placed.primitive.influences for placed in primitives)
+    influences = np.fromiter(numbers, np.float64, count * len(primitives)).reshape(-1, count)
     placements, placed_by = distinct_placements(primitives)
     growth = np.array([placement.growth for placement in placements])[placed_by] / RIM
     grown: NDArray[np.float64] = influences + growth[:, None]

@@ -32,6 +32,22 @@ def postorder(root: "Node", *, into: Callable[["Node"], bool] = lambda _node: Tr
     return order
 
 
+def branches(root: "Node") -> list["Node"]:
+    """Every distinct node object that has children, below and including `root`, children before parents."""
+    order: list[Node] = []
+    seen: set[int] = set()
+    pending: list[tuple[Node, bool]] = [(root, False)]
+    while pending:
+        node, children_done = pending.pop()
+        if children_done:
+            order.append(node)
+        elif node.children and id(node) not in seen:
+            seen.add(id(node))
+            pending.append((node, True))
+            pending.extend([(child, False) for child in reversed(node.children) if child.children])
+    return order
+
+
 def fold(root: "Node", combine: Callable[["Node", list[Result]], Result]) -> Result:
     """Value of `root`, a node's being `combine(node, values of its children)`; shared nodes count once."""
     values: dict[int, Result] = {}
