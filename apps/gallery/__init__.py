@@ -18,6 +18,7 @@ EXAMPLES = (
     "size_ratio",
     "mapping_modes",
     "own_nodes",
+    "creases",
 )
 """Names of the examples."""
 
