@@ -4,10 +4,12 @@ Two definitions may use the same names, and a shader has one space of names for 
 function and everything that it calls are made anew under names that carry a digest of their sources.
 """
 
+import ast
 import hashlib
 import inspect
 import linecache
 import re
+import textwrap
 from dataclasses import dataclass, make_dataclass
 from types import FunctionType
 from typing import Any
@@ -18,6 +20,7 @@ import warp as wp
 from .errors import InvalidDefinition
 from .glsl import translate_library
 from .instantiate import rebound, references, typed
+from .loop_constants import changed_constants
 from .reference import Precision, reference
 from .tree import Node
 
@@ -82,6 +85,7 @@ def own_source(function: Any, *, returns: Any) -> OwnSource:
     digest = hashlib.sha256("\n".join(_sources(python, ())).encode()).hexdigest()[:12]
     made = _renamed(python, digest, {})
     translate_library([made])
+    _require_variables(python)
     return OwnSource(python.__name__, {name: hints[name] for name in names}, made, python, digest)
 
 
@@ -158,6 +162,21 @@ def _require_plain_names(python: FunctionType) -> None:
                 f"{python.__code__.co_filename}:{python.__code__.co_firstlineno}: {python.__name__}: "
                 f"the name {name!r} does not exist in GLSL; use plain letters, digits and single underscores"
             )
+
+
+def _require_variables(python: FunctionType) -> None:
+    """No loop changes what Warp takes for a constant, here and in what is called."""
+    lines, first = inspect.getsourcelines(python)
+    (definition,) = ast.parse(textwrap.dedent("".join(lines))).body
+    assert isinstance(definition, ast.FunctionDef)
+    for name, line in changed_constants(definition):
+        raise InvalidDefinition(
+            f"{python.__code__.co_filename}:{first + line - 1}: {python.__name__}: a loop changes {name!r}, "
+            f"which Warp takes for a constant; write `{name} = float(...)` or `int(...)` before the loop"
+        )
+    for callee in _typed_callees(python).values():
+        assert isinstance(callee.func, FunctionType)
+        _require_variables(callee.func)
 
 
 def _typed_callees(python: FunctionType) -> dict[str, wp.Function]:

@@ -4,6 +4,9 @@ A typed function is Python already. `reference` gives it a `wp` whose maths is N
 the formula runs as it is written, at once and without a compile.
 """
 
+import ast
+import inspect
+import textwrap
 from collections.abc import Callable
 from functools import partial
 from types import FunctionType
@@ -13,7 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from .instantiate import rebound, references
+from .instantiate import references
 
 Precision = type[np.float64] | type[np.float32]
 
@@ -74,6 +77,57 @@ _MATHS: dict[str, Callable[..., Any]] = {
 """Warp's names, as far as GLSL shares them (`glsl_builtins`)."""
 
 
+def divided(a: Any, b: Any) -> Any:
+    """A / b as devices have it: whole numbers lose what is behind the point, and 0 is no error."""
+    if isinstance(a, int | np.integer) and isinstance(b, int | np.integer):
+        return int(np.trunc(a / b)) if b else 0
+    return np.divide(a, b)
+
+
+def remainder(a: Any, b: Any) -> Any:
+    """A % b as devices have it: with the sign of a."""
+    if isinstance(a, int | np.integer) and isinstance(b, int | np.integer):
+        return a - b * divided(a, b)
+    return np.fmod(a, b)
+
+
+_ARITHMETIC = {"_divided": divided, "_remainder": remainder}
+_WORDS: dict[type[ast.operator], str] = {ast.Div: "_divided", ast.Mod: "_remainder"}
+
+
+class _Arithmetic(ast.NodeTransformer):
+    """Operators that mean something else in Python than on devices become calls."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        if type(node.op) not in _WORDS:
+            return node
+        return ast.Call(ast.Name(_WORDS[type(node.op)], ast.Load()), [node.left, node.right], [])
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        if type(node.op) not in _WORDS:
+            self.generic_visit(node)
+            return node
+        read = ast.parse(ast.unparse(node.target), mode="eval").body
+        return self.visit(ast.Assign([node.target], ast.BinOp(read, node.op, node.value)))  # type: ignore[no-any-return]
+
+
+def _in_words(function: FunctionType, scope: dict[str, Any]) -> FunctionType:
+    """`function` over `scope`, at the same lines, with a device's arithmetic."""
+    lines, first = inspect.getsourcelines(function)
+    tree = ast.parse(textwrap.dedent("".join(lines)))
+    (definition,) = tree.body
+    assert isinstance(definition, ast.FunctionDef)
+    definition.decorator_list = []
+    definition.returns = None
+    for argument in definition.args.args:
+        argument.annotation = None
+    ast.increment_lineno(_Arithmetic().visit(tree), first - 1)
+    exec(compile(ast.fix_missing_locations(tree), function.__code__.co_filename, "exec"), scope)
+    result: FunctionType = scope[function.__name__]
+    return result
+
+
 class _Warp:
     """What a function sees in place of the module `warp`."""
 
@@ -98,8 +152,8 @@ class _Reading:
     def function(self, function: FunctionType) -> FunctionType:
         if function not in self._made:
             seen = {name: self._substitute(value) for name, value in references(function).items()}
-            replaced = {**seen, "float": self._float}
-            self._made[function] = rebound(function, replaced, module=function.__module__)
+            scope = {**function.__globals__, **seen, "float": self._float, **_ARITHMETIC}
+            self._made[function] = _in_words(function, scope)
         return self._made[function]
 
     def _substitute(self, value: Any) -> Any:

@@ -105,6 +105,25 @@ def single_precision_is_not_enough(q: wp.vec3) -> wp.vec3:
     return (q + far) * 0.0 + wp.vec3(((q[0] + 1.0e7) - 1.0e7) - q[0], 0.0, 0.0)
 
 
+def changes_a_constant(q: wp.vec3) -> wp.vec3:
+    x = 0.0
+    for _i in range(40):
+        x += 0.1
+    return wp.vec3(x, 0.0, 0.0)
+
+
+@wp.func
+def changes_one_below(q: wp.vec3) -> wp.vec3:
+    x = -1.0
+    while x < q[0]:
+        x = x + 1.0
+    return wp.vec3(x, 0.0, 0.0)
+
+
+def calls_what_changes_a_constant(q: wp.vec3) -> wp.vec3:
+    return changes_one_below(q) * 0.0
+
+
 def off_at_the_axis(q: wp.vec3, size: wp.float32) -> wp.vec3:
     flat = wp.vec3(q[0], q[1], 0.0)
     return wp.normalize(flat) * size
@@ -127,6 +146,8 @@ REFUSED_SKELETONS = [
     (not_the_closest, "is nearer"),
     (nowhere_in_the_middle, "expected 3 finite numbers"),
     (single_precision_is_not_enough, "single precision"),
+    (changes_a_constant, r"x = float\(...\)"),
+    (calls_what_changes_a_constant, "a loop changes 'x'"),
     (lambda q: q, "lambda has no types"),
     (print, "write it with `def`"),
     ("a ring", "write it with `def`"),

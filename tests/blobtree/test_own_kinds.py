@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from warp._src.context import user_modules
 
-from blobtree import ISO, Node, Point, polygonize
+from blobtree import ISO, Node, Point, Polygonizer, polygonize
 from blobtree.evaluate import bounds_at, gradients_at
 from blobtree.kernels import RIM
 from blobtree.trace import trace
@@ -159,6 +159,31 @@ def assert_on_torus(vertices: NDArray[np.float32]) -> None:
     x, y, z = vertices.astype(np.float64).T
     assert len(z) > 500
     np.testing.assert_allclose(np.hypot(np.hypot(x, y) - 1.0, z), 0.2, atol=2e-6)
+
+
+def test_every_way_to_a_mesh_knows_own_kinds() -> None:
+    half = 0.02
+    mesh = polygonize(UNIT_RING, chord_error=half * 0.2)
+    assert_closed(mesh)
+    middles = mesh.vertices[mesh.faces].astype(np.float64).mean(axis=1)
+    tube = np.hypot(np.hypot(*middles[:, :2].T) - 1.0, middles[:, 2])
+    assert np.abs(tube - 0.2).max() <= half * 0.2
+    cut = UNIT_RING - Brick((1, 0, 0), (0.2, 3, 3), radius=0.1)
+    creased = polygonize(cut, resolution=40, creases=True)
+    assert_closed(creased)
+    faces = creased.vertices[(np.abs(creased.vertices[:, 0] - 0.8) < 1e-5)]
+    assert len(faces) > 10  # the flat walls of the cut, up to their rims
+    hits = UNIT_RING.raycast([[5, 0, 0]], [[-1, 0, 0]])
+    np.testing.assert_allclose(hits.normals, [[1, 0, 0]], atol=1e-5)
+
+
+def test_an_edit_from_built_in_kinds_to_own_ones_and_back_is_a_fresh_start() -> None:
+    ball = Point((1, 0, 0), radius=0.4)
+    solver = Polygonizer(ball | Point((-1, 0, 0), radius=0.4), cell_size=0.06)
+    for tree in (ball | UNIT_RING, ball.translate((0, 0.3, 0)) | UNIT_RING, ball | ball.translate((0, 1, 0))):
+        mesh, fresh = solver.update(tree), Polygonizer(tree, cell_size=0.06).mesh
+        np.testing.assert_array_equal(mesh.vertices, fresh.vertices)
+        np.testing.assert_array_equal(mesh.faces, fresh.faces)
 
 
 @pytest.mark.parametrize("away", [0.0, 100.0])
