@@ -1,7 +1,7 @@
 """Variables that Warp takes for constants: what GLSL and Python allow and Warp does not.
 
-`x = 0.0` is a constant to Warp, which a loop may not change; `x = float(0.0)` is a variable. Warp says so when
-it compiles, which may be much later than a function was written.
+`x = 0.0` is a constant to Warp, which a loop may not change; `x = float(0.0)` is a variable. Warp says so
+when a kernel is compiled, which may be long after the function was written.
 """
 
 import ast
