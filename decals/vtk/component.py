@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from blobtree import Node
 from decals.camera import Camera
+from decals.errors import InvalidScene
 from decals.model import PLAIN, Decals
 from decals.render import SceneLike
 from decals.scene import CLAY, Color, DecalImage, MeshObject, Scene, SceneObject, TreeObject
@@ -53,9 +54,22 @@ class Component:
 
     @property
     def scene(self) -> Scene:
-        """Objects, decals and images of the active subplot; set it to exchange all of them."""
+        """Objects, decals and images of the active subplot; set it to exchange all of them.
+
+        Raises
+        ------
+        InvalidScene
+            The subplot shows something that changes in place, such as what an `EditWindow` edits.
+        """
         scene = self.stage.scene
-        return scene if isinstance(scene, Scene) else Scene(objects=(), camera=NOWHERE)
+        if scene is None:
+            return Scene(objects=(), camera=NOWHERE)
+        if not isinstance(scene, Scene):
+            raise InvalidScene(
+                f"expected a Scene to add to, but the subplot shows a {type(scene).__name__}; "
+                "change that itself, or give the stage another scene"
+            )
+        return scene
 
     @scene.setter
     def scene(self, scene: SceneLike) -> None:

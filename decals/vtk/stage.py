@@ -19,9 +19,10 @@ from decals.contact import Contact
 from decals.errors import InvalidScene
 from decals.mapping import Mapping
 from decals.render import Renderer, SceneLike
-from decals.scene import SceneObject, bounds_of
+from decals.scene import Box, SceneObject, bounds_of
 from decals.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
+from decals.vtk.boxes import box_around
 from decals.vtk.camera import vtk_projection
 from decals.vtk.context import WindowContext
 from decals.vtk.frame import Frame, Look
@@ -119,9 +120,9 @@ class Stage:
     def scene(self, scene: SceneLike | None) -> None:
         self._scene = scene
         self._failed = None
-        self._follow_objects()
+        self._follow_objects(bounds_of)
 
-    def _follow_objects(self) -> None:
+    def _follow_objects(self, box: Callable[[Sequence[SceneObject]], Box]) -> None:
         """Stand around the scene's objects, if they are not those of before."""
         objects = () if self._scene is None else tuple(self._scene.objects)
         if len(objects) == len(self._placed) and all(
@@ -130,7 +131,7 @@ class Stage:
             return
         self._placed = objects
         if objects:
-            self._anchor.place(bounds_of(cast(Sequence[SceneObject], objects)))
+            self._anchor.place(box(cast(Sequence[SceneObject], objects)))
         else:
             self._anchor.leave()
 
@@ -173,7 +174,7 @@ class Stage:
         self._units = []
 
     def _prepare(self) -> None:
-        self._follow_objects()
+        self._follow_objects(box_around)  # what changes in place may do so with every frame
         if self._scene is not None:
             for complaint in complaints(self.vtk_renderer):
                 if complaint not in self._said:

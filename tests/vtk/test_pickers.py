@@ -1,6 +1,7 @@
 """VTK's own pickers work as if we were not there; depth under the mouse is ours too."""
 
 import numpy as np
+import pytest
 import pyvista as pv
 from vtkmodules.vtkRenderingCore import (
     vtkCellPicker,
@@ -9,11 +10,10 @@ from vtkmodules.vtkRenderingCore import (
     vtkWorldPointPicker,
 )
 
+from decals.seeding import seed
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import shot
 from tests.vtk.test_composition import BALL, lying_behind, place
-
-PIXEL = 40, 30
 
 
 def filled(plotter: Factory, *, ours: bool) -> tuple[pv.Plotter, pv.Actor]:
@@ -28,11 +28,15 @@ def filled(plotter: Factory, *, ours: bool) -> tuple[pv.Plotter, pv.Actor]:
     return pl, actor
 
 
-def test_hardware_selection_finds_actors_behind_us(plotter: Factory) -> None:
+@pytest.mark.parametrize("applied", [False, True])
+def test_hardware_selection_finds_actors_behind_us_and_under_decals(plotter: Factory, applied: bool) -> None:
     found = []
     for ours in (False, True):
         pl, actor = filled(plotter, ours=ours)
-        pl.decals.stage  # noqa: B018
+        if ours and applied:
+            pl.decals.add(seed([BALL.surface], count=20), images=["scale"])
+            pl.decals.apply(actor)
+            shot(pl)
         selector = vtkHardwareSelector()
         selector.SetRenderer(pl.renderer)
         selector.SetArea(0, 0, 159, 119)

@@ -1,0 +1,135 @@
+"""What users type: objects, decals and images of a plotter, and what they get back."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from blobtree import Point
+from decals.errors import InvalidDecals, InvalidImage, InvalidScene
+from decals.model import PLAIN, Decals
+from decals.scene import DecalImage, MeshObject, TreeObject
+from tests.decals.shapes import View
+from tests.vtk.conftest import Factory
+from tests.vtk.scenes import both, shot
+
+TREE = Point((0, 0, 0), radius=1.0)
+
+
+def decals_at(*images: int) -> Decals:
+    count = len(images)
+    along = np.linspace(-0.5, 0.5, count)
+    return Decals(
+        positions=np.column_stack([along, np.zeros(count), np.ones(count)]),
+        normals=[[0, 0, 1]] * count,
+        tangents=[[1, 0, 0]] * count,
+        radii=np.full(count, 0.2),
+        images=list(images),
+    )
+
+
+def test_objects_get_names_of_their_own(plotter: Factory) -> None:
+    pl = plotter()
+    first = pl.decals.add_implicit(TREE)
+    second = pl.decals.add_mesh(pv.Cube(), color=(1, 0, 0))
+    third = pl.decals.add_implicit(TREE.translate((3, 0, 0)), name="moved")
+    assert isinstance(first, TreeObject)
+    assert isinstance(second, MeshObject)
+    assert pl.decals.scene.objects == (first, second, third)
+    assert len({thing.name for thing in pl.decals.scene.objects}) == 3
+    assert second.color == (1.0, 0.0, 0.0)
+    with pytest.raises(InvalidScene, match="'moved' twice"):
+        pl.decals.add_implicit(TREE, name="moved")
+    assert len(pl.decals.scene.objects) == 3
+
+
+def test_a_mesh_is_any_dataset_with_a_surface(plotter: Factory) -> None:
+    pl = plotter()
+    quads = pl.decals.add_mesh(pv.Cube())
+    assert len(quads.faces) == 12
+    solid = pv.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid()
+    assert len(pl.decals.add_mesh(solid).faces) == 48
+    own = MeshObject("own", quads.vertices, quads.faces)
+    assert pl.decals.add_mesh(own) is own
+
+
+def test_decals_are_added_to_those_that_are_there(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add(decals_at(0, 1, PLAIN), images=["scale", "rock"])
+    together = pl.decals.add(decals_at(0), images=[np.full((4, 4, 4), 9, np.uint8)])
+    assert together.images.tolist() == [0, 1, PLAIN, 2]
+    again = pl.decals.add(decals_at(1))  # without images of their own they count those of before
+    assert again.images.tolist() == [0, 1, PLAIN, 2, 1]
+    assert [image.source for image in pl.decals.scene.images[:2]] == ["scale", "rock"]
+    known = DecalImage.load("tile")
+    assert pl.decals.add(decals_at(0), images=[known]).images.tolist()[-1] == 3
+    assert pl.decals.scene.images[3] is known
+
+
+def test_bad_input_changes_nothing(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add(decals_at(0), images=["scale"])
+    before = pl.decals.scene
+    with pytest.raises(InvalidScene, match="shows image 7"):
+        pl.decals.add(decals_at(7))
+    with pytest.raises(InvalidImage):
+        pl.decals.add(decals_at(0), images=["nowhere/at all.png"])
+    with pytest.raises(InvalidScene, match="uint8 pixels"):
+        pl.decals.add(decals_at(0), images=[np.zeros((4, 4), np.uint8)])
+    with pytest.raises(InvalidDecals):
+        pl.decals.add(decals_at(0).replace(radii=[-1.0]))
+    assert pl.decals.scene is before
+
+
+def test_what_changes_in_place_is_not_added_to(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.scene = View(both().objects, both().camera)
+    with pytest.raises(InvalidScene, match="the subplot shows a View"):
+        pl.decals.add_implicit(TREE)
+
+
+def test_the_camera_of_a_scene_is_the_plotters(plotter: Factory) -> None:
+    pl = plotter()
+    pl.enable_parallel_projection()
+    pl.decals.add_scene(both())
+    camera = both().camera
+    np.testing.assert_allclose(pl.camera.position, camera.position)
+    np.testing.assert_allclose(pl.camera.focal_point, camera.target)
+    assert pl.camera.view_angle == pytest.approx(camera.fov)
+    assert not pl.camera.parallel_projection
+    other = plotter()
+    other.camera_position = [(5, 5, 5), (0, 0, 0), (0, 0, 1)]
+    other.decals.add_scene(both(), camera=False)
+    np.testing.assert_allclose(other.camera.position, (5, 5, 5))
+
+
+def test_bounds_and_camera_know_of_our_objects(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_implicit(TREE)
+    np.testing.assert_allclose(pl.bounds, (-1, 1, -1, 1, -1, 1), atol=0.05)
+    seen = shot(pl)
+    covered = (seen != seen[0, 0]).any(axis=-1)
+    assert 0.15 < covered.mean() < 0.8
+    assert not covered[[0, -1]].any()
+
+
+def test_a_scaled_plotter_scales_us(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_implicit(TREE)
+    pl.view_xz()
+    shot(pl)
+    pl.set_scale(zscale=0.5, reset_camera=False)
+    seen = shot(pl)
+    covered = (seen != seen[0, 0]).any(axis=-1)
+    high, wide = np.ptp(np.flatnonzero(covered.any(axis=1))), np.ptp(np.flatnonzero(covered.any(axis=0)))
+    assert high == pytest.approx(0.5 * wide, abs=3)
+
+
+def test_a_cleared_plotter_takes_scenes_again(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    pl.clear()
+    assert (shot(pl) == shot(pl)[0, 0]).all()
+    pl.decals.clear()
+    pl.decals.add_scene(both())
+    np.testing.assert_array_equal(shot(pl), first)
