@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
+from rich.console import Console
 
 from decals.scene import Scene
 from decals.window import EditWindow
@@ -72,3 +73,5 @@ def view(
             scene = coat.scene(loaded, where, pixels, progress)
     with EditWindow(scene, path=path, size=pixels) as window:
         window.show()
+        if window.session.modified:
+            Console(stderr=True).print("closed without saving what was changed last", highlight=False)

@@ -11,7 +11,6 @@ import pyvista as pv
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
 from decals.camera import Camera
 from decals.edit.actions import Actions
-from decals.edit.change import Change
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
 from decals.edit.tools import Ray, Tools
@@ -93,7 +92,6 @@ class EditWindow:
         self.stage.scene = self.document
         self.stage.measure, self.stage.samples = True, self.samples
         me = weakref.ref(self)
-        self.session.listen(lambda change: _pass_on(me, change))
         self._began = 0.0
         self.plotter.renderer.AddObserver("StartEvent", lambda *_: _timed(me, begin=True))
         self.plotter.renderer.AddObserver("EndEvent", lambda *_: _timed(me, begin=False))
@@ -155,11 +153,6 @@ class EditWindow:
         elif self.stage.drawn:
             size = self.stage.draw_scale * self.stage.samples
             self.quality.saw(size, time.perf_counter() - self._began)
-
-    def _changed(self, change: Change) -> None:
-        if change.parts_after.objects is not None:
-            self.stage.scene = None  # so that it looks at the bounds anew
-            self.stage.scene = self.document
 
     # -- what goes on -----------------------------------------------------------------------------------
 
@@ -268,12 +261,6 @@ def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
     plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
     plotter.disable_anti_aliasing()
     return plotter
-
-
-def _pass_on(me: "weakref.ref[EditWindow]", change: Change) -> None:
-    window = me()
-    if window is not None and not window._closed:
-        window._changed(change)
 
 
 def _timed(me: "weakref.ref[EditWindow]", *, begin: bool) -> None:

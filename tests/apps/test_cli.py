@@ -482,6 +482,21 @@ def test_view_opens_models_and_scenes(folder: Path, windows: list[EditWindow]) -
     assert windows[1].actions.path == Path("scene.json")
 
 
+def test_view_says_what_was_not_saved(
+    folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+
+    def show(window: EditWindow) -> None:
+        window.tools.key("a", 0, 0, ctrl=True)
+        window.tools.key("d", 0, 0)
+
+    monkeypatch.setattr(EditWindow, "show", show)
+    assert run(["view", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
+    assert len(windows[0].document.decals) == 10
+    assert "without saving" in capsys.readouterr().err
+
+
 def test_view_says_what_is_wrong(folder: Path, windows: list[EditWindow], capsys: Capture) -> None:
     save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "scene.json")
     for wrong, message in (

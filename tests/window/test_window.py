@@ -8,8 +8,10 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
+from decals.camera import Camera
 from decals.edit.population import lying_on
 from decals.errors import NoGraphics
+from decals.scene import Scene
 from decals.scene_file import load_scene
 from decals.window import EditWindow, view
 from tests.edit.scenes import scene
@@ -179,6 +181,14 @@ def test_things_that_move_are_drawn_smaller_where_the_card_is_slow(driver):
     assert window.stage.draw_scale == 1
 
 
+def test_frames_that_are_shown_again_say_nothing_of_the_machine(driver):
+    driver.shot()
+    driver.window.quality.saw(2.0, 10.0)
+    driver.window.rest()
+    assert not driver.window.stage.drew
+    assert driver.window.quality.expected(2.0) == pytest.approx(10.0)
+
+
 def test_what_rests_is_drawn_better_tick_by_tick(driver, monkeypatch):
     window, drawn = driver.window, []
     window.quality.saw(2.0, 10.0)
@@ -253,6 +263,16 @@ def test_opening_and_closing_keeps_no_memory(warm, rounds):
         [sys.executable, "-c", MEMORY, str(warm), str(rounds)], capture_output=True, text=True, check=True
     )
     assert float(run.stdout.split()[-1]) < (1.0 if rounds < 50 else 0.1)
+
+
+def test_an_empty_scene_can_be_opened_and_nothing_breaks(opened):
+    driver = opened(Scene(objects=(), camera=Camera((0, 0, 5))))
+    for key in "adikoxgmtc":
+        driver.key(key, (90, 60))
+    driver.click((90, 60), ctrl=True)
+    driver.drag((20, 20), (40, 40))
+    driver.key("z", ctrl=True)
+    assert driver.session.labels == ()
 
 
 def test_two_windows_at_once(opened):
