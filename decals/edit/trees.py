@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree import ISO, Node
+from blobtree import ISO, Cone, Node, Point, Segment
 from blobtree.primitives import Primitive
 from blobtree.tree import Combination, Transform
 from decals.edit.change import Change
@@ -22,8 +22,11 @@ Path = tuple[int, ...]
 
 Doubles = NDArray[np.float64]
 
-STEP = 1e-3
-"""Of the differences that tell how the surface follows a primitive, in its radii."""
+_PLACES = {Point: ("center",), Segment: ("start", "end"), Cone: ("start", "end")}
+"""Parameters of primitives that move along with them; other nodes are wrapped in a map."""
+
+STEP = 2.5e-4
+"""Of the differences that tell how the surface follows a node, in lengths of its box."""
 
 FIELD_ERROR = 1e-5
 """A decal stays where it is as long as the field there is no farther from ISO."""
@@ -52,12 +55,27 @@ def _down(tree: Node, path: Path) -> Iterator[Node]:
         yield node
 
 
-def primitive_at(tree: Node, path: Path) -> Primitive:
-    """Give the primitive that a path leads to, or `InvalidEdit`."""
+def node_at(tree: Node, path: Path) -> Node:
+    """Give the node that a path leads to, or `InvalidEdit`."""
     *_, node = _down(tree, path)
+    return node
+
+
+def primitive_at(tree: Node, path: Path) -> Primitive:
+    """Give the primitive at the end of a path, past affine maps, or `InvalidEdit`."""
+    node = node_at(tree, to_primitive(tree, path))
+    assert isinstance(node, Primitive)
+    return node
+
+
+def to_primitive(tree: Node, path: Path) -> Path:
+    """Lengthen a path through affine maps to the primitive below them, or `InvalidEdit`."""
+    node = node_at(tree, path)
+    while isinstance(node, Transform):
+        path, node = (*path, 0), node.child
     if not isinstance(node, Primitive):
         raise InvalidEdit(f"expected the path of a primitive, {path} leads to a {type(node).__name__}")
-    return node
+    return path
 
 
 def primitive_near(tree: Node, point: ArrayLike) -> Path:
@@ -92,7 +110,7 @@ def _with_child(parent: Node, step: int, child: Node) -> Node:
 
 
 def alone(tree: Node, path: Path) -> Node:
-    """Give the primitive at a path as it lies in the world, without what it is combined with."""
+    """Give the node at a path as it lies in the world, without what it is combined with."""
     nodes = list(_down(tree, path))
     result = nodes[-1]
     for parent, step in zip(reversed(nodes[:-1]), reversed(path), strict=True):
@@ -118,17 +136,18 @@ def world_matrix(tree: Node, path: Path) -> Doubles:
     return matrix
 
 
-def moved(primitive: Primitive, offset: ArrayLike) -> Node:
-    """Give a primitive moved in its own space."""
+def moved(node: Node, offset: ArrayLike) -> Node:
+    """Give a node moved in the space around it; it stays of its kind if its kind says where it is."""
     shift = np.asarray(offset, np.float64)
+    if isinstance(node, Transform):
+        matrix = np.array(node.matrix, np.float64)
+        matrix[:3, 3] += shift
+        return node.child.transform(matrix)
     points = {
-        field.name: tuple((np.asarray(value) + shift).tolist())
-        for field in fields(primitive)  # type: ignore[arg-type]  # every node is a dataclass
-        if field.name != "color" and (value := getattr(primitive, field.name)) in primitive.control_points
+        name: tuple((np.asarray(getattr(node, name)) + shift).tolist())
+        for name in _PLACES.get(type(node), ())
     }
-    if len(points) < len(primitive.control_points):
-        return primitive.translate(shift)
-    return replace(primitive, **points)  # type: ignore[type-var]
+    return replace(node, **points) if points else node.translate(shift)  # type: ignore[type-var]
 
 
 def resized(primitive: Primitive, factor: float) -> Primitive:
@@ -197,26 +216,19 @@ def _within(points: NDArray[np.float32], *nodes: Node) -> NDArray[np.bool_]:
 
 
 def following(tree: Node, path: Path, points: Doubles) -> Doubles:
-    """How far the surface at each point goes along with a primitive, from 0 to 1.
+    """How far the surface at each point goes along with a node, from 0 to 1.
 
-    Where fields blend, a primitive moves the surface by its part of the field's change: with f the field
-    and t the primitive's position, the surface moves along its normal n by −(∂f/∂t)/|∇f|, a rigid one by n.
+    Where fields blend, a node moves the surface by its part of the field's change: with f the field
+    and t the node's position, the surface moves along its normal n by −(∂f/∂t)/|∇f|, a rigid one by n.
     """
     if not len(points):
         return np.zeros(0)
-    primitive = primitive_at(tree, path)
-    step = STEP * primitive.radius
+    low, high = alone(tree, path).bounds
+    step = STEP * float((high - low).min())
     inverse = np.linalg.inv(world_matrix(tree, path))
-    change = np.stack(
-        [
-            (
-                _shifted(tree, path, primitive, inverse @ axis)(points)
-                - _shifted(tree, path, primitive, -inverse @ axis)(points)
-            )
-            for axis in step * np.eye(3)
-        ],
-        axis=1,
-    ) / (2.0 * step)
+    offsets = [inverse @ axis for axis in step * np.eye(3)]
+    differences = [_shifted(tree, path, way)(points) - _shifted(tree, path, -way)(points) for way in offsets]
+    change = np.stack(differences, axis=1) / (2.0 * step)
     slope = tree.gradient(points).astype(np.float64)
     squared = np.einsum("ni,ni->n", slope, slope)
     shares = -np.einsum("ni,ni->n", change, slope) / np.where(squared > 0, squared, 1.0)
@@ -224,13 +236,13 @@ def following(tree: Node, path: Path, points: Doubles) -> Doubles:
     return weights
 
 
-def _shifted(tree: Node, path: Path, primitive: Primitive, offset: Doubles) -> Node:
-    return with_node(tree, path, moved(primitive, offset))
+def _shifted(tree: Node, path: Path, offset: Doubles) -> Node:
+    return with_node(tree, path, moved(node_at(tree, path), offset))
 
 
 @dataclass(frozen=True, eq=False)
 class MovePrimitive(OfPrimitive):
-    """Move a primitive by an offset in the world; decals go along with their part of the surface."""
+    """Move a primitive, or a whole branch, by an offset in the world; decals go along with their surface."""
 
     offset: ArrayLike
     label: ClassVar[str] = "move a primitive"
@@ -242,7 +254,7 @@ class MovePrimitive(OfPrimitive):
         if offset.shape != (3,) or not np.isfinite(offset).all():
             raise InvalidEdit(f"offset: expected three finite numbers, got {self.offset!r:.60}")
         own = np.linalg.solve(world_matrix(tree, self.path), offset)
-        return self.exchanged(document, moved(primitive_at(tree, self.path), own), offset)
+        return self.exchanged(document, moved(node_at(tree, self.path), own), offset)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +268,9 @@ class ResizePrimitive(OfPrimitive):
         """Exchange the tree, and put the decals back onto it."""
         if not (math.isfinite(self.factor) and self.factor > 0):
             raise InvalidEdit(f"factor: expected a number above 0, got {self.factor!r}")
-        return self.exchanged(document, resized(primitive_at(self.tree(document), self.path), self.factor))
+        tree = self.tree(document)
+        whole = replace(self, path=to_primitive(tree, self.path))
+        return whole.exchanged(document, resized(primitive_at(tree, self.path), self.factor))
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +283,8 @@ class PaintPrimitive(OfPrimitive):
     def change(self, document: Document) -> Change:
         """Exchange the tree; its shape stays."""
         tree = self.tree(document)
-        primitive = replace(primitive_at(tree, self.path), color=self.color)  # type: ignore[type-var]
-        item = TreeObject(document.objects[self.object].name, with_node(tree, self.path, primitive))
+        path = to_primitive(tree, self.path)
+        primitive = replace(primitive_at(tree, path), color=self.color)  # type: ignore[type-var]
+        item = TreeObject(document.objects[self.object].name, with_node(tree, path, primitive))
         objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
         return document.with_parts(objects=objects)

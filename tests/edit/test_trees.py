@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
-from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment
+from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment, define_skeleton
 from decals.camera import Camera
 from decals.edit import (
     EditSession,
@@ -44,7 +45,7 @@ def test_paths_name_every_primitive_and_exchange_it():
         other = with_node(NESTED, path, Point((9, 9, 9), radius=1))
         assert primitive_at(other, path) == Point((9, 9, 9), radius=1)
         assert sum(primitive_at(other, at) != primitive_at(NESTED, at) for at in paths) == 1
-    for path in ((7,), (0, 0, 0), (0,)):
+    for path in ((7,), (0, 0, 0), (1,)):
         with pytest.raises(InvalidEdit):
             primitive_at(NESTED, path)
 
@@ -62,6 +63,49 @@ def test_moving_keeps_what_a_primitive_is():
     assert moved(C, (1, 0, 0)).end_radius == 0.2
     black = Point((0, 0, 0), radius=1, color=(0, 0, 0))
     assert moved(black, (1, 2, 3)) == Point((1, 2, 3), radius=1, color=(0, 0, 0))
+    turned = B.rotate((0, 0, 1), 30)
+    assert moved(moved(turned, (1, 0, 0)), (0, 2, 0)) == turned.child.transform(
+        np.array(turned.matrix) + np.outer([1, 2, 0], [0, 0, 0, 1])
+    )
+
+
+@wp.func
+def rod(q: wp.vec3, half: wp.float32) -> wp.vec3:
+    return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
+
+
+def test_skeletons_of_ones_own_move_again_and_again_by_the_same_path():
+    own = define_skeleton(rod, convex=True)
+    session = session_of(A + own(0.5, radius=0.4).translate((0.8, 0, 0)) + own(1.0, radius=0.3))
+    first = digest(session.document)
+    for path in ((1,), (2,)):
+        before = alone(session.document.objects[0].tree, path)
+        for _ in range(3):
+            session.do(MovePrimitive(0, path, (0.0, 0.1, 0.2)))
+        session.do(ResizePrimitive(0, path, 1.1))
+        session.do(ResizePrimitive(0, path, 1 / 1.1))
+        session.do(PaintPrimitive(0, path, (1, 0, 0)))
+        after = alone(session.document.objects[0].tree, path)
+        points = np.random.default_rng(0).uniform(*before.bounds, (300, 3)).astype(np.float32)
+        there = np.add(points, (0, 0.3, 0.6))
+        np.testing.assert_allclose(after(there), before(points), atol=1e-4)
+        assert after.colors(there).max() == 1
+        decals, item = session.document.decals.decals, session.document.objects[0]
+        assert np.abs(item.tree(decals.positions) - ISO).max() < 1e-4
+    while session.undo():
+        pass
+    assert digest(session.document) == first
+
+
+def test_a_branch_moves_as_a_whole():
+    tree = (A + B).rotate((0, 0, 1), 20) | Point((0, 0, 5), radius=1)
+    session = session_of(tree)
+    before = session.document.decals.decals
+    session.do(MovePrimitive(0, (0,), (0.5, 0, 0)))
+    after = session.document.decals.decals
+    low = before.positions[:, 2] < 2
+    np.testing.assert_allclose(after.positions[low], before.positions[low] + (0.5, 0, 0), atol=1e-4)
+    np.testing.assert_array_equal(after.positions[~low], before.positions[~low])
 
 
 @pytest.mark.parametrize("path", [(0,), (1, 0, 0)])
