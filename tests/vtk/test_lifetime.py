@@ -76,13 +76,16 @@ def test_memory_stays_flat(plotter: Factory) -> None:
 
 @pytest.mark.slow
 def test_memory_stays_flat_for_long(plotter: Factory) -> None:
-    """No more than what VTK itself leaves behind, but for a few kilobytes of noise."""
+    """No more than what VTK itself leaves behind, but for what a driver keeps of each program ever compiled.
+
+    Mesa 22.3 keeps one to two kilobytes of each, without any window or VTK too, and a window has ten.
+    """
     plotter()
     if not STATUS.exists():
         pytest.skip("this system does not say how large the process is")
     ours, vtks = grown(200, ours=True), grown(200, ours=False)
     print(f"{ours:.0f} bytes a window with decals, {vtks:.0f} without")
-    assert ours < vtks + 15_000
+    assert ours < vtks + 30_000
 
 
 def test_a_renderer_of_its_own_outlives_windows(plotter: Factory) -> None:
@@ -136,3 +139,15 @@ def test_a_plotter_without_decals_has_nothing_of_ours(plotter: Factory) -> None:
         shot(pl)
     assert "decals" not in pl.__dict__
     assert "decals" not in pl.renderer.actors
+
+
+def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    pl.decals.apply(pl.add_mesh(pv.Sphere(), show_edges=True))
+    for width in (160, 170, 150):
+        pl.window_size = width, 120
+        shot(pl)
+        pl.decals.stage.at(80, 60)
+        pl.render_window.MakeCurrent()
+        assert pl.decals.stage.renderer.context.gl.error == "GL_NO_ERROR"
