@@ -6,7 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 SLICES_PER_THREAD = 4
 """More slices than threads even out slices of unequal cost."""
@@ -15,6 +17,11 @@ WATCHED_SLICES_PER_THREAD = 32
 """Still more of them where somebody watches, so that reports come often and a cancelled launch ends soon."""
 
 SMALLEST_SLICE = 256
+
+PAGE = 4096
+"""Bytes that the system hands out at once, on most machines."""
+
+PAGES_WORTH_SHARING = 1024
 
 
 @cache
@@ -55,3 +62,15 @@ def launch(
     for number, _ in enumerate(done, 1):
         if step is not None:
             step(number / slices)
+
+
+def fresh_memory(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """An array whose pages are there already: all threads ask the system for them, which takes it long.
+
+    What is copied into memory that was never touched waits for page after page.
+    """
+    array = np.empty(shape, dtype)
+    pages = array.reshape(-1).view(np.uint8)[::PAGE]
+    if len(pages) > PAGES_WORTH_SHARING:
+        list(_threads().map(lambda part: part.fill(0), np.array_split(pages, os.cpu_count() or 1)))
+    return array

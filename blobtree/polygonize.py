@@ -16,6 +16,7 @@ from .chord import FIRST_RESOLUTION, MOST_PASSES, SMALLEST, finer, largest_error
 from .creases import sharpened
 from .errors import InvalidResolution
 from .grid import Grid, aligned_grid
+from .launch import fresh_memory
 from .progress import Cancel, Progress, watched
 from .surface import Surface, extract_surface
 from .tree import Node
@@ -236,13 +237,10 @@ def download(surface: Surface, meetings: NDArray[np.uint8] | None = None) -> Mes
 
 
 def _on_host(array: Any) -> Any:
-    """A device's vectors as NumPy array; the CPU's own memory is handed out as it is.
-
-    NumPy takes large arrays in large pages, which a graphics card fills far faster than Warp's small ones.
-    """
+    """A device's vectors as NumPy array; the CPU's own memory is handed out as it is."""
     if array.device.is_cpu:
         return array.numpy()
-    host = np.empty((len(array), 3), np.int32 if array.dtype == wp.vec3i else np.float32)
+    host = fresh_memory((len(array), 3), np.int32 if array.dtype == wp.vec3i else np.float32)
     wp.copy(wp.array(host, dtype=array.dtype, device="cpu", copy=False), array)
     wp.synchronize_device(array.device)
     return host
