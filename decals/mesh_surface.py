@@ -87,12 +87,16 @@ class MeshSurface:
     def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
         """Points uniform by area, one in each ``1/count`` of it along the order of the faces.
 
-        Within a face they follow a sequence of low discrepancy, so that parts of large faces get their share.
+        Within a face they lie around a sequence of low discrepancy, so that parts of large faces get their
+        share, but what is near each is chance.
         """
         rng = np.random.default_rng(seed)
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)
-        square = (rng.random(2) + np.arange(count)[:, None] * EVEN_STEPS) % 1.0
+        even = rng.random(2) + np.arange(count)[:, None] * EVEN_STEPS
+        areas = np.diff(self._cumulative, prepend=0.0)[face]
+        apart = 1.0 / np.sqrt(np.maximum(count * areas / self.area, 1.0))
+        square = (even + apart[:, None] * rng.uniform(-1.0, 1.0, (count, 2))) % 1.0
         root, along = np.sqrt(square[:, :1]), square[:, 1:]
         a, b, c = np.moveaxis(self.vertices[self._corners[face]].astype(np.float64), 1, 0)
         positions = (1 - root) * a + root * ((1 - along) * b + along * c)

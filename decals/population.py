@@ -23,7 +23,7 @@ ROUNDS = 12
 CHOICE = 8
 """Samples from which one is chosen where density varies."""
 
-EDGE = 1.3
+EDGE = 1.2
 """Particles stay within this factor of the density at which they began."""
 
 CURVE_BITS = 16

@@ -181,3 +181,18 @@ def test_samples_lie_on_the_surface_at_any_scale_and_place(seed, scale, shift):
     positions, normals = soup.sample(20, seed)
     assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
     assert closest_points(positions, soup.vertices, faces).max() <= 1e-6 * (scale + abs(shift))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_parts_of_large_faces_get_their_share_and_neighbours_are_chance(seed):
+    square = plane(2.0)
+    positions, _ = square.sample(4096, seed)
+    cells = np.floor((positions[:, :2] + 1.0) * 2.0).clip(0, 3).astype(int) @ [4, 1]
+    counts = np.bincount(cells, minlength=16)
+    # of points without any order a cell would get 256 give or take 15.5
+    assert np.abs(counts - 256).max() < 24
+    assert counts.std() < 10
+    distances = np.linalg.norm(positions[:1500, None] - positions[:1500], axis=2)
+    np.fill_diagonal(distances, np.inf)
+    nearest = distances.min(axis=1)
+    assert nearest.std() / nearest.mean() > 0.35
