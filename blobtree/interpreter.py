@@ -39,7 +39,34 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
     contribution = reading.type
 
     @wp.func
-    def interpret(
+    def fold(
+        before: contribution,
+        header: wp.vec4,
+        place: wp.vec3,
+        aim: wp.vec3,
+        speed: wp.float32,
+        reach: wp.float32,
+        tape: wp.array(dtype=wp.vec4),
+        first: wp.int32,
+    ) -> contribution:
+        accumulator = before
+        code = int(header[0])
+        operator = int(header[1])
+        v = aim
+        if not convex(code):
+            v = wp.vec3()
+        texels = stride(code)
+        at = first
+        for _i in range(int(header[2])):
+            c = closest(code, place, tape, at)
+            slim = slimmest(code, tape, at)
+            at += texels
+            f = leaf(place, v, speed, reach, c, slim, tape[at - 1])
+            accumulator = combine(operator, accumulator, f, reach, header[3])
+        return accumulator
+
+    @wp.func
+    def walk(
         q: wp.vec3, heading: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
     ) -> contribution:
         accumulator = empty()
@@ -71,15 +98,8 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
                     accumulator = combine(operator, accumulator, unstretch(f, tape, at), reach, parameter)
                     at = end
             elif code >= 0:
-                v = aim
-                if not convex(code):
-                    v = wp.vec3()
-                for _i in range(count):
-                    c = closest(code, place, tape, at)
-                    slim = slimmest(code, tape, at)
-                    at += stride(code)
-                    f = leaf(place, v, speed, reach, c, slim, tape[at - 1])
-                    accumulator = combine(operator, accumulator, f, reach, parameter)
+                accumulator = fold(accumulator, header, place, aim, speed, reach, tape, at)
+                at += count * stride(code)
             elif code == PUSH:
                 registers[count] = accumulator
                 accumulator = empty()
@@ -104,6 +124,18 @@ def make_interpreter(reading: Reading, registers_type: Any) -> wp.Function:
                 accumulator = unwarp(operator, accumulator, place, tape, at)
                 at += PREFIX
         return accumulator
+
+    @wp.func
+    def interpret(
+        q: wp.vec3, heading: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+    ) -> contribution:
+        if span[0] < span[1]:  # a single run asks for no registers: on a GPU they cost more than the run
+            header = tape[span[0]]
+            code = int(header[0])
+            end = span[0] + 1 + int(header[2]) * stride(code)
+            if code >= 0 and code < STRETCHED and end == span[1]:
+                return fold(empty(), header, q, heading, 1.0, reach, tape, span[0] + 1)
+        return walk(q, heading, reach, tape, span)
 
     return interpret
 
