@@ -58,6 +58,8 @@ class Actions:
         Object and path of the primitive that is held, if any.
     camera
         Gives the camera to save with the scene; None for the document's.
+    interrupt
+        Stops long work.
     """
 
     def __init__(
@@ -73,6 +75,7 @@ class Actions:
         self.help = False
         self.grip: tuple[int, Path] | None = None
         self.camera: Callable[[], Camera | None] = lambda: None
+        self.interrupt: Callable[[], None] = lambda: None
         self._run = run or self._do_at_once
         self._coats = 0
         self._series: tuple[str, object] | None = None
@@ -148,6 +151,7 @@ class Actions:
         self.message = f"{len(self.selection)} decals"
 
     def _let_go(self, _cursor: Cursor) -> None:
+        self.interrupt()
         self.session.cancel()
         self.selection, self.message = (), ""
 

@@ -36,7 +36,7 @@ BINDINGS = (
     Binding("pick", ("Click",), "select the decal under the cursor", Group.DECALS),
     Binding("pick_also", ("Shift+Click",), "select one more, or one less", Group.DECALS),
     Binding("pick_all", ("Ctrl+a",), "select all", Group.DECALS),
-    Binding("let_go", ("Escape",), "select none; during a drag: take it back", Group.DECALS),
+    Binding("let_go", ("Escape",), "select none; take a drag back; stop long work", Group.DECALS),
     Binding("move", ("Drag",), "on a selected decal: move what is selected over the surfaces", Group.DECALS),
     Binding("place", ("Ctrl+Click", "a"), "a new decal under the cursor", Group.DECALS),
     Binding("duplicate", ("d",), "duplicate", Group.DECALS),

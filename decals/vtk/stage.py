@@ -136,11 +136,6 @@ class Stage:
             self._anchor.leave()
 
     @property
-    def drew(self) -> bool:
-        """Whether our part of the last frame was drawn for it, not shown again."""
-        return self._frame is not None and self._frame.drawn
-
-    @property
     def draw_scale(self) -> float:
         """Size of what is drawn relative to the window's.
 

@@ -9,6 +9,7 @@ from typing import Any
 import pyvista as pv
 
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
+from blobtree import BlobTreeError
 from decals.camera import Camera
 from decals.edit.actions import Actions
 from decals.edit.jobs import Job, Worker
@@ -75,7 +76,7 @@ class EditWindow:
         self.samples = samples
         self.worker, self.quality = Worker(), Quality()
         self.actions = Actions(self.session, path=path, run=self._start)
-        self.actions.camera = self._camera
+        self.actions.camera, self.actions.interrupt = self._camera, self.worker.cancel
         self.plotter = _plotter(off_screen, size)
         self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
         self.tools = Tools(self.actions, self._ray)
@@ -84,6 +85,7 @@ class EditWindow:
         self.grip = Grip(self.plotter, self.actions, lambda whole: self.redraw(whole=whole))
         self._bindings = Bindings(self, self.plotter.iren.interactor)
         self._moved = 0.0
+        self._whole: tuple[int, ...] = self._shown
         self._closed = False
 
     def _open_stage(self) -> None:
@@ -107,8 +109,15 @@ class EditWindow:
         elif self.plotter.off_screen:
             self.rest()
         else:
-            self.moving()  # `tick` draws the whole frame a little later
+            if self._whole != self._shown:
+                self.moving()  # `tick` draws the whole frame a little later
             self.plotter.render()
+
+    @property
+    def _shown(self) -> tuple[int, ...]:
+        """Tells apart what the scene's pictures show."""
+        document = self.document
+        return id(document.objects), id(document.images), document.decals.version
 
     def actions_shown(self) -> None:
         """Bring outlines, handle, help and status up to date."""
@@ -133,7 +142,7 @@ class EditWindow:
     def rest(self) -> None:
         """Draw a whole frame."""
         self.stage.draw_scale, self.stage.samples = 1.0, self.samples
-        self._moved = 0.0
+        self._moved, self._whole = 0.0, self._shown
         self.plotter.render()
 
     def _refine(self) -> None:
@@ -158,12 +167,14 @@ class EditWindow:
 
     def tick(self) -> None:
         """Look after the background work, and draw a whole frame once nothing moves."""
-        if self.worker.busy:
+        busy = self.worker.busy
+        if busy:
             self._finish()
             self.marks.say(self._status())
-            self.plotter.render()
-        elif self._moved and time.perf_counter() - self._moved > REST and not self.tools.dragging:
+        if self._moved and time.perf_counter() - self._moved > REST and not self.tools.dragging:
             self._refine()
+        elif busy:
+            self.plotter.render()
 
     def _start(self, job: Job) -> None:
         if not self.worker.start(job):
@@ -172,7 +183,7 @@ class EditWindow:
     def _finish(self) -> None:
         try:
             command = self.worker.take()
-        except DecalsError as error:
+        except (DecalsError, BlobTreeError) as error:
             self.actions.message = str(error)
             return
         if command is not None:

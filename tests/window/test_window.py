@@ -162,6 +162,34 @@ def test_scattering_goes_on_in_the_background(driver):
     assert driver.session.labels == ("scatter",)
 
 
+def test_escape_stops_what_goes_on_in_the_background(driver):
+    state = driver.state
+    at = next(at for n, at in driver.visible() if n in lying_on(driver.document, [0]))
+    driver.key("g", at)
+    driver.key("Escape", at)
+    while driver.window.worker.busy:
+        driver.window.worker._thread.join(30)
+        driver.window.tick()
+    assert driver.state == state
+    assert driver.session.labels == ()
+
+
+def test_on_a_screen_what_only_selects_keeps_the_whole_frame(driver):
+    window = driver.window
+    driver.shot()
+    window.quality.saw(2.0, 10.0)
+    window.plotter.off_screen = False
+    number, at = next(driver.visible())
+    window.tools.press(*at)
+    window.tools.release(*at)
+    window.redraw(whole=True)
+    assert window.actions.selection == (number,)
+    assert window.stage.draw_scale == 1
+    window.tools.key("Delete", *at)
+    window.redraw(whole=True)
+    assert window.stage.draw_scale < 1
+
+
 def test_things_that_move_are_drawn_smaller_where_the_card_is_slow(driver):
     window = driver.window
     window.quality.saw(2.0, 10.0)
@@ -185,7 +213,7 @@ def test_frames_that_are_shown_again_say_nothing_of_the_machine(driver):
     driver.shot()
     driver.window.quality.saw(2.0, 10.0)
     driver.window.rest()
-    assert not driver.window.stage.drew
+    assert not driver.window.stage.drawn
     assert driver.window.quality.expected(2.0) == pytest.approx(10.0)
 
 
