@@ -15,7 +15,6 @@ VIEWPORT = 0x0BA2
 FRAMEBUFFER = 0x8D40
 """GL_FRAMEBUFFER."""
 
-
 _idle: dict[str, list[moderngl.Context]] = {}
 """What windows that are gone leave behind, by driver: moderngl never gives all of its memory back."""
 
@@ -28,12 +27,17 @@ def _driver(window: Any) -> str:
 
 def _attach(window: Any) -> moderngl.Context:
     """Give moderngl's view of the context that is current: one for each window, while it is open."""
-    window.GetState().vtkglBindFramebuffer(
-        FRAMEBUFFER, 0
-    )  # moderngl asks what is bound; some it cannot describe
+    # moderngl looks at the framebuffer that is bound, and cannot describe all of VTK's.
+    window.GetState().vtkglBindFramebuffer(FRAMEBUFFER, 0)
     idle = _idle.get(_driver(window), [])
     if not idle:
-        loader: Any = DefaultLoader()
+        try:
+            loader: Any = DefaultLoader()
+        except RuntimeError as error:
+            raise NoGraphics(
+                f"expected a window that draws through EGL, GLX, WGL or macOS, got a {window.GetClassName()} "
+                f"({error}); set the environment variable VTK_DEFAULT_OPENGL_WINDOW to another kind"
+            ) from error
         return moderngl.create_context(context=loader)
     gl = idle.pop()
     gl.fbo = gl.detect_framebuffer()  # as create_context does: the old window's is gone
@@ -54,7 +58,7 @@ class WindowContext(Context):
     Raises
     ------
     NoGraphics
-        The window has made no context yet.
+        The window has made no context yet, or one of a kind that cannot be shared.
     """
 
     def __init__(self, window: Any) -> None:

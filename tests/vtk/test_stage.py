@@ -138,3 +138,17 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
     document.objects = (*both().objects, MeshObject("ball", *triangles(pv.Sphere(center=(0, 0, 4)))))
     shot(pl)
     assert pl.bounds.z_max > 4.2
+
+
+def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> None:
+        raise RuntimeError("Cannot detect window with OpenGL support")
+
+    pl = plotter()
+    pl.add_mesh(pv.Sphere())
+    shot(pl)
+    monkeypatch.setattr("decals.vtk.context._idle", {})
+    monkeypatch.setattr("decals.vtk.context.DefaultLoader", none)
+    pl.decals.stage.scene = both()
+    with pytest.raises(NoGraphics, match=r"EGL, GLX, WGL or macOS, got a vtk\w+Window"):
+        pl.decals.stage.at(80, 60)
