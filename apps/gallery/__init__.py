@@ -10,6 +10,7 @@ EXAMPLES = (
     "touching",
     "particles",
     "deforming",
+    "painted",
     "models",
     "dragon",
     "interactions",
