@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.typing import NDArray
 from warp._src.context import user_modules
 
@@ -175,6 +176,18 @@ def test_every_way_to_a_mesh_knows_own_kinds() -> None:
     assert len(faces) > 10  # the flat walls of the cut, up to their rims
     hits = UNIT_RING.raycast([[5, 0, 0]], [[-1, 0, 0]])
     np.testing.assert_allclose(hits.normals, [[1, 0, 0]], atol=1e-5)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("number", range(6))
+def test_a_graphics_card_gives_the_same_surface(number: int) -> None:
+    tree = [tree for tree in OWN_TREES if tree.tape.vocabulary is not BUILT_IN][number]
+    with wp.ScopedDevice("cuda:0"):
+        there = polygonize(tree, resolution=24, device="cuda:0")
+        points = points_around(np.random.default_rng(1), tree, POINTS)
+        np.testing.assert_allclose(tree(points), oracle.value(tree, points), atol=5e-5)
+    assert_valid(there)
+    assert_closed(there)
 
 
 def test_an_edit_from_built_in_kinds_to_own_ones_and_back_is_a_fresh_start() -> None:
