@@ -23,7 +23,8 @@ def spiral() -> NDArray[np.float64]:
     """Paint a white spiral on black, ``float64[h, w]``."""
     y, x = np.indices((PIXELS, PIXELS)) / (PIXELS - 1.0) - 0.5
     turns = 2.4 * np.hypot(x, y) - np.arctan2(y, x) / (2.0 * np.pi)
-    return np.clip(0.5 + 3.0 * np.sin(2.0 * np.pi * turns), 0.0, 1.0)
+    grey: NDArray[np.float64] = np.clip(0.5 + 3.0 * np.sin(2.0 * np.pi * turns), 0.0, 1.0)
+    return grey
 
 
 def panels() -> Sequence[Panel]:
