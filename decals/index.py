@@ -86,12 +86,12 @@ class DecalIndex:
         return self.levels.nbytes + self.table.nbytes + self.ids.nbytes
 
     @property
-    def longest_walk(self) -> int:
-        """Most candidates that any point can have: the longest lists of all levels together."""
+    def longest_lists(self) -> Wide:
+        """Most decals of any cell, for each level; together, the most candidates that a point can have."""
         cells = self.table[self.table[:, 0] >= 0]
-        longest = np.zeros(1 + int(cells[:, 0].max(initial=0) >> LEVEL_SHIFT), np.int64)
+        longest = np.zeros(self.level_count, np.int64)
         np.maximum.at(longest, cells[:, 0] >> LEVEL_SHIFT, self.ids[cells[:, 3]])
-        return int(longest.sum())
+        return longest
 
     def on(self, device: Any = None) -> DeviceIndex:
         """Copy the arrays to a Warp device."""

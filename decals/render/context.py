@@ -21,9 +21,9 @@ BASELINE = 330
 ANISOTROPY = 8.0
 """How much longer than wide a pixel's footprint in an image may be before it blurs."""
 
-SOFTWARE_WALK = 4000
-"""Most candidates of one pixel in Mesa's software rasteriser: it ends all loops of a pixel after 65,535 turns
-together (LP_MAX_TGSI_LOOP_ITERATIONS), without a word, and every candidate may take a dozen."""
+SOFTWARE_TURNS = 65_535
+"""Turns after which Mesa's software rasteriser ends all loops of a pixel together, without a word
+(LP_MAX_TGSI_LOOP_ITERATIONS)."""
 
 
 class _Entered(threading.local):
@@ -92,7 +92,7 @@ class Context:
         self._wished_entry = checked_entry(self, entry) if entry else None
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         self.anisotropy = _anisotropy(gl)
-        self.longest_walk = SOFTWARE_WALK if _is_software(gl) else None
+        self.most_turns = SOFTWARE_TURNS if _is_software(gl) else None
 
     @classmethod
     def standalone(cls, *, entry: str | None = None) -> "Context":

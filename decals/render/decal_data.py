@@ -22,6 +22,9 @@ from decals.stack import number_below
 FUNCTIONS = (sheet_at, owner_at, owner_below, number_below, complement_at, uv_at, tangent_coordinates)
 """What ``shaders/decals.glsl`` calls."""
 
+WALKS, SEARCH = 8, 3
+"""Walks over all candidates of a pixel, at most; turns of a search beside its halvings."""
+
 
 class DecalData:
     """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
@@ -40,7 +43,7 @@ class DecalData:
                 "index_table": index.table,
                 "index_ids": index.ids,
             }
-        _check_walk(context, index)
+        _check_turns(context, index, layered=decals.layered)
         self._textures = {name: DataTexture(context, array) for name, array in arrays.items()}
         self._describe(decals, index)
 
@@ -86,12 +89,19 @@ class DecalData:
             texture.release()
 
 
-def _check_walk(context: Context, index: DecalIndex) -> None:
-    most = context.longest_walk
-    if most is not None and len(index.ids) > most and index.longest_walk > most:
+def _check_turns(context: Context, index: DecalIndex, *, layered: bool) -> None:
+    """Refuse what a driver would cut off: the most turns of loops that a pixel may take."""
+    if context.most_turns is None:
+        return
+    lists = index.longest_lists
+    candidates = int(lists.sum())
+    each = WALKS
+    if layered:  # a search in each level's list for every decal from the top down
+        each += sum(int(count).bit_length() + SEARCH for count in lists)
+    if each * candidates > context.most_turns:
         raise TooMuchData(
-            f"{index.longest_walk:,} decals reach the same place; expected at most {most:,} on this software "
-            "rasteriser, which would cut them off; spread them, draw on a graphics card, or use evaluate"
+            f"{candidates:,} decals reach the same place; expected at most {context.most_turns // each:,}: "
+            "software rendering cuts off the rest; spread them, draw on a graphics card, or use evaluate"
         )
 
 

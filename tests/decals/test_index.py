@@ -200,6 +200,20 @@ def test_lists_are_in_drawing_order():
     assert index.levels[:, 2:].tolist() == [[0, 4]] * 2
 
 
+def test_longest_lists_are_what_points_find():
+    """As many as any point has candidates, level by level, and together no fewer."""
+    rng = np.random.default_rng(8)
+    positions = np.float32(rng.random((3000, 3)))
+    influence = np.float32(10.0 ** rng.uniform(-2, -0.5, 3000))
+    index = DecalIndex.build(positions, influence)
+    assert len(index.longest_lists) == index.level_count > 3
+    offsets, _ = index.candidates(np.float32(rng.random((20_000, 3))))
+    most = np.diff(offsets).max()
+    assert index.longest_lists.max() <= most <= index.longest_lists.sum()
+    assert DecalIndex.build(np.zeros((0, 3)), np.zeros(0)).longest_lists.sum() == 0
+    assert DecalIndex.build(np.zeros((70, 3)), np.ones(70)).longest_lists.tolist() == [70]
+
+
 def test_hundreds_of_thousands_in_one_point():
     index = DecalIndex.build(np.zeros((200_000, 3)), np.full(200_000, 0.7))
     ids = index.candidates([[0.1, 0.1, 0.1]])[1]

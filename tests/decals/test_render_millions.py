@@ -96,9 +96,9 @@ def test_thousands_on_one_point(renderer: Renderer) -> None:
 
 def test_a_million_on_one_point(renderer: Renderer) -> None:
     """Right, or, where the driver would end the loop before its end, refused; then all is as it was."""
-    if renderer.context.longest_walk is None:
+    if renderer.context.most_turns is None:
         check_one_point(renderer.buffers(one_point(MILLION), size=(24, 18)))
         return
-    with pytest.raises(TooMuchData, match=r"1,000,000 decals reach the same place; expected at most 4,000"):
+    with pytest.raises(TooMuchData, match=r"1,000,000 decals reach the same place; expected at most 8,191"):
         renderer.buffers(one_point(MILLION), size=(24, 18))
     check_one_point(renderer.buffers(one_point(3), size=(24, 18)))

@@ -7,11 +7,13 @@ import pytest
 
 from decals.camera import Camera
 from decals.contact import Contact
+from decals.errors import TooMuchData
 from decals.mapping import Mapping
 from decals.model import Decals
 from decals.render.renderer import Renderer
 from tests.decals.shapes import View, torus
-from tests.decals.test_render_decals import WHITE, compare
+from tests.decals.test_render_decals import WHITE, compare, plain_colors, quarters, wall
+from tests.oracles.decals import colors_at
 
 CENTRE = (0, -1.4, 0)
 
@@ -35,3 +37,33 @@ def test_stacks(renderer: Renderer, count: int, order: str, contact: Contact) ->
     view = View((shape,), camera, Decals(**arrays), (WHITE,))
     owned = compare(view, renderer.buffers(view, size=(32, 24), contact=contact), Mapping.CORRECTED, contact)
     assert owned.sum() > 60
+
+
+@pytest.mark.parametrize("count", [1000, 3000, 6000])
+def test_deep_stacks_in_layers_are_whole_or_refused(renderer: Renderer, count: int) -> None:
+    """Translucent plain decals over each other: all of them in the colour, or a clear error."""
+    rng = np.random.default_rng(count)
+    view = wall(quarters(), color=(0, 0, 0))
+    arrays: dict[str, Any] = {
+        "positions": np.zeros((count, 3)),
+        "normals": [[0, 0, 1]] * count,
+        "tangents": [[1, 0, 0]] * count,
+        "radii": rng.choice([2.0, 4.5], count),
+        "interactions": rng.integers(0, 2, count) * 2,
+        "layers": rng.integers(-9, 9, count),
+        "images": np.full(count, -1),
+        "tints": rng.random((count, 3)),
+        "opacities": np.full(count, 0.5 / count),
+    }
+    decals = Decals(**arrays)
+    try:
+        seen = renderer.render(View(view.objects, view.camera, decals), size=(16, 12), samples=1)
+    except TooMuchData:
+        assert count > 1500
+        return
+    points, normals = np.zeros((1, 3)), np.array([[0, 0, 1.0]])
+    color = colors_at(decals, points, normals, lambda i, uv: plain_colors(decals, i))[0]
+    srgb = 1.055 * color[:3] ** (1 / 2.4) - 0.055
+    painted = wall(quarters(), color=tuple(srgb.tolist()))
+    plain = renderer.render(View(painted.objects, painted.camera), size=(16, 12), samples=1)
+    np.testing.assert_allclose(seen.astype(int), plain, atol=1)
