@@ -5,9 +5,11 @@ from operator import and_
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.typing import NDArray
 
-from blobtree import Mesh, Node, Point, Polygonizer, Segment, polygonize, split_creases
+from blobtree import Mesh, Node, Point, Polygonizer, Segment, define_skeleton, polygonize, split_creases
+from tests.bench import creases as creases_bench
 from tests.blobtree.test_polygonize import assert_closed, assert_valid, crosses, volume
 from tests.blobtree.trees import random_trees
 from tests.oracles.creases import circle, meeting_points, to_two_surfaces
@@ -259,3 +261,35 @@ def test_split_creases_have_the_normals_and_colours_of_their_sides(pair: Node) -
 def test_only_a_mesh_with_creases_is_split() -> None:
     plain = polygonize(A | B, resolution=16)
     assert split_creases(A | B, plain) is plain
+
+
+# -- kinds of one's own, and graphics cards -------------------------------------------------------------
+
+
+@wp.func
+def _dot(q: wp.vec3, center: wp.vec3) -> wp.vec3:
+    """A point, as its user would write it."""
+    return center
+
+
+@pytest.mark.slow
+def test_creases_of_own_skeletons() -> None:
+    """A vocabulary of its own compiles kernels of its own, which takes most of a minute."""
+    dot = define_skeleton(_dot, name="crease_dot")
+    first, second = (dot(tuple(c), radius=r) for c, r in zip(CENTERS.tolist(), RADII, strict=True))
+    for tree in (first | second, first - second):
+        _, points, cell = sharp(tree, 32)
+        assert len(points) > 40
+        assert RING.distances(points).max() <= NEAR * cell
+    mesh = polygonize(first - second, chord_error=0.01, creases=True)
+    assert len(mesh.faces) > 1000
+
+
+@pytest.mark.gpu
+def test_creases_on_a_graphics_card() -> None:
+    figures = creases_bench.errors("cuda:0")
+    assert figures["crease_error_h"] <= NEAR
+    assert figures["unmet"] == 0
+    assert figures["met"] > 500
+    close = polygonize(A - B, chord_error=0.01, creases=True, device="cuda:0")
+    assert 2000 < len(close.faces) < 8000

@@ -1,0 +1,93 @@
+"""How exact creases are, and what they cost over plain meshes of the same cells.
+
+    python -m tests.bench.creases                     # all cores
+    python -m tests.bench.creases --device cuda:0     # a graphics card; the host needs NumPy and Warp alone
+
+Two balls united, intersected and subtracted, whose crease is a known circle, in cells of three sizes; and the
+times of a bored block and of a union of 1,000 balls, medians, compiles and the first run left out.
+"""
+
+import argparse
+import json
+from functools import reduce
+from operator import and_
+from pathlib import Path
+
+import numpy as np
+import warp as wp
+
+from blobtree import Node, Point, Segment, Union, polygonize
+from tests.bench.blobtree import blobs, median_time
+from tests.oracles.creases import circle
+
+CENTERS, RADII = ((0.0, 0.0, 0.0), (0.8, 0.13, 0.07)), (1.0, 0.9)
+RESOLUTIONS = (16, 40, 100)
+TIMED_RESOLUTION = 128
+FAR = 6.0
+
+
+def errors(device: str) -> dict[str, float]:
+    """Largest distance to the circle in cells, vertices on it, and patches whose branches were not met."""
+    first, second = (Point(center, radius=radius) for center, radius in zip(CENTERS, RADII, strict=True))
+    ring = circle(CENTERS[0], RADII[0], CENTERS[1], RADII[1])
+    worst, met, unmet = 0.0, 0, 0
+    for tree in (first | second, first & second, first - second):
+        for resolution in RESOLUTIONS:
+            mesh = polygonize(tree, resolution=resolution, creases=True, device=device)
+            assert mesh.meetings is not None
+            cell = float((tree.bounds[1] - tree.bounds[0]).max()) / resolution
+            worst = max(worst, float(ring.distances(mesh.vertices[mesh.meetings > 1]).max()) / cell)
+            met, unmet = met + int((mesh.meetings > 1).sum()), unmet + int((mesh.meetings == 0).sum())
+    return {"crease_error_h": worst, "met": met, "unmet": unmet}
+
+
+def block() -> Node:
+    """Six large balls make a block with two bores."""
+    ways = [sign * FAR * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+    sides: list[Node] = [Point(tuple(way.tolist()), radius=FAR + 1.0) for way in ways]
+    bored = reduce(and_, sides) - Segment((0, 0, -3), (0, 0, 3), radius=0.5)
+    return (bored - Segment((-3, 0, 0), (3, 0, 0), radius=0.35)).rotate((1, 2, 0), 20.0)
+
+
+def times(device: str, runs: int) -> dict[str, float]:
+    """Milliseconds without and with creases, and their ratio."""
+    figures = {}
+    for name, tree in (("block", block()), ("union_1000", Union(tuple(blobs(1000))))):
+        plain, sharp = (
+            median_time(
+                lambda tree=tree, creases=creases: polygonize(  # type: ignore[misc]
+                    tree, resolution=TIMED_RESOLUTION, creases=creases, device=device
+                ),
+                runs,
+            )
+            for creases in (False, True)
+        )
+        figures |= {
+            f"{name}_ms": 1e3 * plain,
+            f"{name}_creases_ms": 1e3 * sharp,
+            f"{name}_ratio": sharp / plain,
+        }
+    return figures
+
+
+def main() -> None:
+    """Read the command line and measure."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.bench.creases",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0")
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
+    options = parser.parse_args()
+    figures = errors(options.device) | times(options.device, options.runs)
+    print(f"{wp.get_device(options.device).name}, warp-lang {wp.__version__}")
+    for name, number in figures.items():
+        print(f"  {name:24} {number:12.6g}")
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
