@@ -35,8 +35,6 @@ from .validation import finite_number, settle
 
 Like = Literal["blend", "intersection", "difference"]
 
-RESERVED = ("operands", "operator", "parameter", "children", "kind", "digest", "tape", "bounds")
-
 
 class OwnCombination(AssociativeCombination, metaclass=OwnKind):
     """A combination by a user's operator: what `define_operator` makes is a subclass of this."""
@@ -149,7 +147,7 @@ def _parameters(source: OwnSource, limits: Mapping[str, Limits] | None) -> tuple
     floats = all(hint in (wp.float32, float) for hint in source.parameters.values())
     if not floats or len(names) not in (2, 3):
         raise source.refusal("expected (a: wp.float32, b: wp.float32), and at most one wp.float32 more")
-    return parameters_of(source, names[2:], limits, RESERVED)
+    return parameters_of(source, names[2:], limits, OwnCombination)
 
 
 def _steepness(source: OwnSource, steepest: Any) -> "float | OwnSource":
@@ -229,7 +227,7 @@ def _row(kind: str, digest: str, source: OwnSource, claims: Claims) -> Operator:
     """The row of the table, its functions generated around the user's."""
     shape, bound = _SHAPES[claims.like], claims.steepest
     extra = ", parameter" if len(source.parameters) == 3 else ""
-    names = {part: f"{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
+    names = {part: f"own_{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
     if isinstance(bound, float):
         steepest = f"wp.vec2({bound!r}, {bound!r})"
         scope: dict[str, Any] = {}

@@ -35,9 +35,6 @@ from .validation import Vector, color_triple, positive_number, settle
 
 Floats = NDArray[np.float64]
 
-RESERVED = ("radius", "color", "skeleton", "children", "kind", "digest", "tape", "bounds")
-"""What nodes call their own things."""
-
 INFLUENCE = 3
 """Where on the tape, in floats, the influence stands among the parameters: where points have it."""
 
@@ -131,7 +128,7 @@ def define_skeleton(
     first, *own = list(source.parameters) or [""]
     if source.parameters.get(first) is not wp.vec3:
         raise source.refusal("its first parameter is the place asked about; expected `q: wp.vec3`")
-    parameters = parameters_of(source, own, limits, RESERVED)
+    parameters = parameters_of(source, own, limits, OwnPrimitive)
     kind = kind_name(source, name)
     digest = source.digest_with(kind, parameters, convex)
     known = registered(kind)
@@ -162,7 +159,7 @@ def _node_class(
 def _row(kind: str, digest: str, source: OwnSource, parameters: tuple[Parameter, ...]) -> Skeleton:
     """The row of the table, its functions generated around the user's."""
     texels = max(1, -(-(1 + sum(parameter.size for parameter in parameters)) // 4))
-    closest_name = f"{kind}_closest_{digest}"
+    closest_name = f"own_{kind}_closest_{digest}"
     closest = generated(
         closest_name,
         _CLOSEST.format(
@@ -173,7 +170,7 @@ def _row(kind: str, digest: str, source: OwnSource, parameters: tuple[Parameter,
         ),
         {source.function.key: source.function},
     )
-    box_name = f"{kind}_box_{digest}"
+    box_name = f"own_{kind}_box_{digest}"
     box = generated(
         box_name,
         _BOX.format(name=box_name, closest=closest_name),

@@ -10,6 +10,7 @@ import warp as wp
 
 from .errors import InvalidNode
 from .own_source import OwnSource
+from .tree import Node
 from .validation import finite_number
 
 _SIZES: dict[Any, int] = {
@@ -98,7 +99,7 @@ class Parameter:
 
 
 def parameters_of(
-    source: OwnSource, own: Sequence[str], limits: Mapping[str, Limits] | None, reserved: Sequence[str]
+    source: OwnSource, own: Sequence[str], limits: Mapping[str, Limits] | None, base: type[Node]
 ) -> tuple[Parameter, ...]:
     """The parameters `own` of a user's function.
 
@@ -107,6 +108,7 @@ def parameters_of(
     InvalidDefinition
         One has a type that fits on no tape or a name that every node has, or limits that allow nothing.
     """
+    taken = {"_", *dir(base), "radius", "color", "operands"}
     given = dict(limits or {})
     parameters = []
     for name in own:
@@ -116,7 +118,7 @@ def parameters_of(
                 f"parameter {name!r}: expected wp.float32, wp.int32, wp.vec2, wp.vec3 or wp.vec4, "
                 f"got {hint!r}"
             )
-        if name in reserved:
+        if name in taken:
             raise source.refusal(f"parameter {name!r}: every node has one of that name; choose another")
         low, high = _limits(source, name, given.pop(name, (None, None)))
         parameters.append(Parameter(name, _SIZES[hint], hint in (wp.int32, int), low, high))

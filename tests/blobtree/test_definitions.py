@@ -55,6 +55,10 @@ def takes_a_radius(q: wp.vec3, radius: wp.float32) -> wp.vec3:
     return q * 0.0
 
 
+def takes_a_scale(q: wp.vec3, scale: wp.float32) -> wp.vec3:
+    return q * 0.0
+
+
 def no_place(size: wp.float32) -> wp.vec3:
     return wp.vec3(size, 0.0, 0.0)
 
@@ -135,6 +139,7 @@ REFUSED_SKELETONS = [
     (returns_a_number, "expected it to return wp.vec3"),
     (takes_text, "no type that GLSL knows"),
     (takes_a_radius, "every node has one of that name"),
+    (takes_a_scale, "'scale': every node has one of that name"),
     (no_place, "expected `q: wp.vec3`"),
     (no_arguments, "expected `q: wp.vec3`"),
     (makes_a_list, "List expression"),
