@@ -60,6 +60,8 @@ class Actions:
         Gives the camera to save with the scene; None for the document's.
     interrupt
         Stops long work.
+    release
+        Lets go of the session, which may outlive this.
     """
 
     def __init__(
@@ -79,7 +81,7 @@ class Actions:
         self._run = run or self._do_at_once
         self._coats = 0
         self._series: tuple[str, object] | None = None
-        session.listen(lambda _change: self._forget_deleted())
+        self.release = session.listen(lambda _change: self._forget_deleted())
 
     # -- doing ------------------------------------------------------------------------------------------
 

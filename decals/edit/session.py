@@ -138,9 +138,18 @@ class EditSession:
 
     # -- around it --------------------------------------------------------------------------------------
 
-    def listen(self, listener: Callable[[Change], None]) -> None:
-        """Call a function after every change, with the change (or the one that was taken back)."""
+    def listen(self, listener: Callable[[Change], None]) -> Callable[[], None]:
+        """Call a function after every change, with the change (or the one that was taken back).
+
+        What comes back ends it; calling that twice is harmless.
+        """
         self._listeners.append(listener)
+
+        def stop() -> None:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+
+        return stop
 
     def _tell(self, change: Change) -> None:
         for listener in self._listeners:

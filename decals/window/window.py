@@ -237,6 +237,7 @@ class EditWindow:
         self._closed = True
         self.worker.cancel()
         self.session.end()
+        self.actions.release()
         self.grip.release()
         self._bindings.release()
         self.plotter.close()

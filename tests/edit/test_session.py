@@ -106,12 +106,15 @@ def test_what_does_nothing_leaves_no_entry(session):
 
 def test_listeners_hear_of_every_change(session):
     heard = []
-    session.listen(lambda change: heard.append(change.after.numbers.tolist()))
+    stop = session.listen(lambda change: heard.append(change.after.numbers.tolist()))
     session.do(Scale([1, 4], 2.0))
     session.undo()
     session.redo()
     with pytest.raises(InvalidDecals):
         session.do(Delete([99]))
+    stop()
+    stop()
+    session.do(Scale([2], 2.0))
     assert heard == [[1, 4]] * 3
 
 

@@ -246,6 +246,7 @@ def test_a_session_goes_on_in_another_window(opened):
     first.click(at)
     first.key("Delete")
     first.window.close()
+    assert first.session._listeners == []
     second = opened(first.session)
     assert len(second.document.decals) == 59
     second.key("z", ctrl=True)
