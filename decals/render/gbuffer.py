@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.render.context import Context
+from decals.render.entry import GROUP, Entry
 from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
 from implicit_decals.shaders import compose
 
@@ -32,15 +33,28 @@ class GBuffer:
         self._depth_alone = context.gl.framebuffer([], self.depth)
         self._depth_program = attach_camera(context.program(compose("screen.vert"), compose("depth.frag")))
         self._screen = context.gl.vertex_array(self._depth_program, [])
+        self._clearing = _clearing(context) if context.entry is Entry.COMPUTE else None
         self._gl = context.gl
 
     def begin(self, width: int, height: int) -> None:
         """Clear the lower left part of this size, and let the next draws fall there."""
-        self._framebuffer.use()
+        self._framebuffer.use()  # before anything is cleared: it ends the scissors that others left on
         self._framebuffer.viewport = (0, 0, width, height)
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
-        self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        if self._clearing is None:
+            self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        else:
+            self._clear_by_compute(self._clearing, width, height)
+            self._depth_alone.clear(depth=1.0)
+            self._framebuffer.use()
+
+    def _clear_by_compute(self, program: moderngl.ComputeShader, width: int, height: int) -> None:
+        for unit, texture in enumerate((self.position, self.normal, self.color)):
+            texture.bind_to_image(unit, read=False, write=True)
+        set_uniform(program, "target_size", (width, height))
+        program.run(-(-width // GROUP), -(-height // GROUP))
+        self._gl.memory_barrier()
 
     def complete_depth(self, width: int, height: int) -> None:
         """Give the surface that is no rasterised object's its depth too, in the lower left part of this size.
@@ -71,3 +85,7 @@ class GBuffer:
         framebuffers = self._framebuffer, self._depth_alone
         for resource in (self._screen, *framebuffers, self.position, self.normal, self.color, self.depth):
             resource.release()
+
+
+def _clearing(context: Context) -> moderngl.ComputeShader:
+    return context.compute_program(compose("clear.comp", defines={"GROUP": GROUP}, version="430 core"))

@@ -4,7 +4,8 @@ Needs moderngl and NumPy alone, and nothing of this project:
 
     python tests/bench/replay_tracing.py tracing.npz --runs 20 --json times.json
 
-Times are medians of OpenGL timer queries, in milliseconds, of clearing the G-buffer and tracing into it.
+Times are medians of OpenGL timer queries, in milliseconds, of clearing the G-buffer and tracing into it;
+`clear_ms` and `clear_compute_ms` are of clearing alone, as each entry point does it.
 `apart` is the share of the checked pixels where the depth differs from Warp's by more than 1e-4 of the cube,
 `entries_apart` the share of all pixels where the two entry points differ by more than 1e-6.
 """
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 WIDTH = 4096
 WARM_UP = 3
 BOX_VERTICES = 36
+COMPUTE = 430
 ENTRIES = ("fragment", "compute")
 
 
@@ -37,7 +39,12 @@ class Replay:
         self.camera = gl.buffer(self.arrays["camera"].tobytes())
         self.camera.bind_to_uniform_block(0)
         self.targets = [gl.texture(self.size, 4, dtype=dtype) for dtype in ("f4", "f4", "f2")]
-        self.surface = gl.framebuffer(self.targets, gl.depth_texture(self.size))
+        depth = gl.depth_texture(self.size)
+        self.surface = gl.framebuffer(self.targets, depth)
+        self.depth_alone = gl.framebuffer([], depth)
+        if gl.version_code >= COMPUTE:
+            self.clearing = gl.compute_shader(self.settings["clear"])
+            self.clearing["target_size"] = self.size
 
     def entry(self, entry: str, count: str) -> Callable[[], None]:
         """Compile a scene's tracer; what is returned clears the G-buffer and runs it."""
@@ -56,11 +63,12 @@ class Replay:
         array = None if entry == "compute" else self.gl.vertex_array(program, [])
         part = scene["uniforms"]["rectangle"]
 
+        clear = self.clear_by_compute if entry == "compute" else self.clear
+
         def run() -> None:
-            self.surface.use()
+            clear()
             self.gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             self.gl.cull_face = "front"
-            self.surface.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
             for unit, texture in enumerate(textures):
                 texture.use(unit)
             if array is not None:
@@ -69,6 +77,21 @@ class Replay:
                 self._dispatch(program, part)
 
         return run
+
+    def clear(self) -> None:
+        """Empty the G-buffer through its framebuffer."""
+        self.surface.use()
+        self.surface.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+
+    def clear_by_compute(self) -> None:
+        """The same through a compute shader, the depth apart."""
+        group = self.settings["group"]
+        for unit, target in enumerate(self.targets):
+            target.bind_to_image(unit, read=False, write=True)
+        self.clearing.run(-(-self.size[0] // group), -(-self.size[1] // group))
+        self.gl.memory_barrier()
+        self.depth_alone.clear(depth=1.0)
+        self.surface.use()
 
     def _dispatch(self, program: Any, part: list[int]) -> None:
         for unit, target in enumerate(self.targets):
@@ -121,11 +144,13 @@ def milliseconds(gl: moderngl.Context, work: Callable[[], None], runs: int) -> f
 def measure(gl: moderngl.Context, path: Path, runs: int) -> dict[str, float]:
     """Time a recording's scenes through both entry points."""
     replay = Replay(gl, path)
-    figures: dict[str, float] = {}
+    figures = {"clear_ms": milliseconds(gl, replay.clear, runs)}
+    if gl.version_code >= COMPUTE:
+        figures["clear_compute_ms"] = milliseconds(gl, replay.clear_by_compute, runs)
     for count in replay.settings["scenes"]:
         seen = []
         for entry in ENTRIES:
-            if entry == "compute" and gl.version_code < 430:
+            if entry == "compute" and gl.version_code < COMPUTE:
                 continue
             run = replay.entry(entry, count)
             figures[f"{entry}_{count}_ms"] = milliseconds(gl, run, runs)

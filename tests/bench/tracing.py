@@ -94,6 +94,7 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
         "checked": CHECKED,
         "group": GROUP,
         "vertex": compose("box.vert").text,
+        "clear": compose("clear.comp", defines={"GROUP": GROUP}, version="430 core").text,
         "scenes": scenes,
     }
     np.savez_compressed(path, settings=np.array(json.dumps(settings)), **arrays)  # type: ignore[arg-type]

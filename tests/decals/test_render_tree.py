@@ -163,6 +163,20 @@ def test_a_tree_out_of_sight_changes_nothing(fragment: Renderer, compute: Render
     assert_same(*seen)
 
 
+def test_what_was_drawn_before_is_gone(compute: Renderer) -> None:
+    """Targets are kept from picture to picture, and are emptied by a compute shader."""
+    first = framed(objects(), (0.3, 0.5, 1.0))
+    second = View((TreeObject("ball", BALL),), Camera((0, 0, 8)))
+    fresh = compute.buffers(second, size=(53, 37))
+    compute.buffers(first, size=(53, 37))
+    again = compute.buffers(second, size=(53, 37))
+    assert_same(fresh, again)
+    background = again.object_id < 0
+    assert background.any()
+    assert (again.position[background] == 0.0).all()
+    assert (again.normal[background] == 0.0).all()
+
+
 def test_tiles_and_odd_sizes(fragment: Renderer, compute: Renderer) -> None:
     view = framed(objects(), (0.3, 0.5, 1.0))
     whole = compute.buffers(view, size=(53, 37))
