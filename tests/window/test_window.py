@@ -274,24 +274,32 @@ def used():
     gc.collect()
     return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize() / 2**20
 
-warm, rounds = int(sys.argv[1]), int(sys.argv[2])
+warm, rounds, chunks = int(sys.argv[1]), int(sys.argv[2]), 5
 for _ in range(warm):
     once()
-before = used()
-for _ in range(rounds):
-    once()
-print((used() - before) / rounds)
+marks = [used()]
+for _ in range(chunks):
+    for _ in range(rounds // chunks):
+        once()
+    marks.append(used())
+grown = sorted(after - before for before, after in zip(marks, marks[1:]))
+print(grown[chunks // 2] * chunks / rounds, marks[-1] - marks[0])
 """
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory is read from /proc")  # noqa: PTH110
-@pytest.mark.parametrize(("warm", "rounds"), [(3, 6), pytest.param(20, 200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("warm", "rounds"), [(3, 10), pytest.param(20, 200, marks=pytest.mark.slow)])
 def test_opening_and_closing_keeps_no_memory(warm, rounds):
-    """In a process of its own: megabytes kept by each window."""
+    """In a process of its own: megabytes kept by each window, and by all.
+
+    The first is a median of five chunks: allocators and drivers take memory in steps of many megabytes.
+    """
     run = subprocess.run(
         [sys.executable, "-c", MEMORY, str(warm), str(rounds)], capture_output=True, text=True, check=True
     )
-    assert float(run.stdout.split()[-1]) < (1.0 if rounds < 50 else 0.1)
+    each, together = map(float, run.stdout.split()[-2:])
+    assert each < (1.0 if rounds < 50 else 0.1)
+    assert together < 60.0
 
 
 def test_an_empty_scene_can_be_opened_and_nothing_breaks(opened):
