@@ -9,9 +9,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from decals.index import DecalIndex
+from decals.grid.index import DecalIndex
 from decals.render import Renderer
-from decals.scene import DecalImage, Scene
+from decals.scenes.scene import DecalImage, Scene
 
 from .coats import even_coat
 from .errors import UsageError

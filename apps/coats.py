@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from decals.coat.orientation import tangents
 from decals.model import Decals
-from decals.orientation import tangents
-from decals.surface import Surface
+from decals.surfaces.surface import Surface
 
 COVERAGE = 1.6
 """Area of all rims together over the area of the surface: about what gap-free seeding comes to."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Progress
-from decals.camera import Camera
+from decals.coat.seeding import seed
 from decals.model import Decals
-from decals.scene import DecalImage, MeshObject, Scene, TreeObject
-from decals.seeding import seed
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject
 
 from .creature import creature
 from .shapes import egg

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.mesh_file import MeshArrays
+from decals.scenes.mesh_file import MeshArrays
 
 Floats = NDArray[np.floating[Any]]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from blobtree import BlobTreeError, from_json
 from decals.errors import DecalsError
-from decals.mesh_file import read_mesh
-from decals.paths import is_file
-from decals.scene import MeshObject, Scene, SceneObject, TreeObject
-from decals.scene_file import is_scene, load_scene
+from decals.scenes.mesh_file import read_mesh
+from decals.scenes.paths import is_file
+from decals.scenes.scene import MeshObject, Scene, SceneObject, TreeObject
+from decals.scenes.scene_file import is_scene, load_scene
 
 from .errors import UsageError
 from .samples import SAMPLES, sample, sample_mesh

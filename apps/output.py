@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from blobtree.io import write_atomically
+from blobtree.nodes.io import write_atomically
 
 from .errors import UsageError
 

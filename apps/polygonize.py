@@ -6,7 +6,7 @@ from typing import Annotated
 import pyvista as pv
 from cyclopts import Parameter
 
-from decals.scene import TreeObject
+from decals.scenes.scene import TreeObject
 
 from .errors import UsageError
 from .models import load_model

@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from blobtree import Progress
+from decals.coat.seeding import seed as seed_decals
 from decals.render import Renderer
-from decals.scene import DecalImage, Scene, SceneObject
-from decals.scene_file import save_scene
-from decals.seeding import seed as seed_decals
+from decals.scenes.scene import DecalImage, Scene, SceneObject
+from decals.scenes.scene_file import save_scene
 
 from .errors import UsageError
 from .models import load_models

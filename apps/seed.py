@@ -7,15 +7,15 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from blobtree.io import write_atomically
-from decals.choosing import ImageChoice
+from blobtree.nodes.io import write_atomically
+from decals.coat.choosing import ImageChoice
+from decals.coat.orientation import Orientation
+from decals.coat.seeding import seed as seed_decals
+from decals.coat.sizing import Sizing
 from decals.model import Decals
-from decals.orientation import Orientation
-from decals.painted_image import PaintedImage
-from decals.projections import Planar
-from decals.scene import Scene
-from decals.seeding import seed as seed_decals
-from decals.sizing import Sizing
+from decals.scenes.scene import Scene
+from decals.seeds.painted_image import PaintedImage
+from decals.seeds.projections import Planar
 
 from .errors import UsageError
 from .models import load_models

@@ -4,7 +4,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
-from decals.mesh_file import MeshArrays
+from decals.scenes.mesh_file import MeshArrays
 
 _SUBDIVISIONS = 5
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from blobtree import Point, Ricci
-from decals.camera import Camera
 from decals.model import Decals
-from decals.scene import DecalImage, MeshObject, Scene, TreeObject
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject
 
 from .shapes import rounded_box
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 from rich.console import Console
 
-from decals.scene import Scene
+from decals.scenes.scene import Scene
 from decals.window import EditWindow
 
 from .errors import UsageError

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.camera import Camera
 from decals.errors import DecalsError
-from decals.scene import MeshObject, SceneObject, bounds_of
+from decals.scenes.camera import Camera
+from decals.scenes.scene import MeshObject, SceneObject, bounds_of
 
 from .errors import UsageError
 

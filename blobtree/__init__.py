@@ -15,17 +15,12 @@ from .errors import (
     UnknownKind,
     UntranslatableFunction,
 )
-from .io import from_json, load, save, to_json
-from .kernels import ISO, RIM
-from .own_operator import OwnCombination, define_operator
-from .own_skeleton import OwnPrimitive, define_skeleton
-from .polygonize import Mesh, Polygonizer, polygonize
-from .primitives import Cone, Point, Segment
-from .progress import Cancel, Progress
-from .splitting import split_creases
-from .tape import Tape
-from .trace import Hits
-from .tree import (
+from .formulas.kernels import ISO, RIM
+from .meshing.polygonize import Mesh, Polygonizer, polygonize
+from .meshing.splitting import split_creases
+from .nodes.io import from_json, load, save, to_json
+from .nodes.primitives import Cone, Point, Segment
+from .nodes.tree import (
     Difference,
     Intersection,
     Node,
@@ -36,6 +31,11 @@ from .tree import (
     Twist,
     Union,
 )
+from .own.operator import OwnCombination, define_operator
+from .own.skeleton import OwnPrimitive, define_skeleton
+from .progress import Cancel, Progress
+from .tapes.tape import Tape
+from .tracing.trace import Hits
 
 __all__ = [
     "ISO",

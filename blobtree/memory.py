@@ -5,7 +5,7 @@ from pathlib import Path
 
 import warp as wp
 
-from .errors import InvalidResolution
+from blobtree.errors import InvalidResolution
 
 MEMINFO = Path("/proc/meminfo")
 """Where Linux says it; elsewhere nothing is known and nothing refused."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from .errors import Cancelled
+from blobtree.errors import Cancelled
 
 Progress = Callable[[str, float], None]
 """Called with the stage in plain words and the fraction of it that is done, from 0 to 1."""

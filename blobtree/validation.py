@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InvalidNode, InvalidPoints
+from blobtree.errors import InvalidNode, InvalidPoints
 
 Vector = tuple[float, float, float]
 Matrix = tuple[tuple[float, ...], ...]

@@ -8,13 +8,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .camera import Camera
-    from .choosing import ImageChoice
-    from .contact import Contact
-    from .cover import cover
-    from .creases import Creases
+    from .coat.choosing import ImageChoice
+    from .coat.fields import gradient_of
+    from .coat.jitter import Jitter
+    from .coat.laying import lay
+    from .coat.orientation import Orientation
+    from .coat.seeding import seed
+    from .coat.sizing import Sizing
     from .edit import EditSession
-    from .editor import DecalEditor
     from .errors import (
         DecalsError,
         InvalidDecals,
@@ -27,28 +28,27 @@ if TYPE_CHECKING:
         NoGraphics,
         TooMuchData,
     )
-    from .evaluate import Samples, evaluate
-    from .fields import gradient_of
+    from .field.contact import Contact
+    from .field.evaluate import Samples, evaluate
+    from .field.mapping import Mapping
+    from .grid.editor import DecalEditor
+    from .grid.index import DecalIndex
     from .images import BUILTIN_IMAGES, generate_image, load_image
-    from .implicit_surface import ImplicitSurface
-    from .index import DecalIndex
-    from .jitter import Jitter
-    from .laying import lay
-    from .mapping import Mapping
-    from .mesh_file import read_mesh
-    from .mesh_surface import MeshSurface
     from .model import Decals, Interaction
-    from .orientation import Orientation
-    from .painted_image import PaintedImage
-    from .projections import Cylindrical, Planar, Spherical, TextureCoordinates
-    from .relaxation import Relaxation
-    from .remeshing import remeshed_points
-    from .scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
-    from .scene_file import load_scene, save_scene
-    from .seeding import seed
-    from .sizing import Sizing
-    from .surface import Surface
-    from .vertex_density import vertex_density
+    from .scenes.camera import Camera
+    from .scenes.cover import cover
+    from .scenes.mesh_file import read_mesh
+    from .scenes.scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
+    from .scenes.scene_file import load_scene, save_scene
+    from .seeds.creases import Creases
+    from .seeds.painted_image import PaintedImage
+    from .seeds.projections import Cylindrical, Planar, Spherical, TextureCoordinates
+    from .seeds.relaxation import Relaxation
+    from .seeds.remeshing import remeshed_points
+    from .seeds.vertex_density import vertex_density
+    from .surfaces.implicit import ImplicitSurface
+    from .surfaces.mesh import MeshSurface
+    from .surfaces.surface import Surface
     from .vtk import show
     from .window import EditWindow, view
 
@@ -110,13 +110,13 @@ __all__ = [
 ]
 
 _HOMES = {
-    "camera": ("Camera",),
-    "choosing": ("ImageChoice",),
-    "contact": ("Contact",),
-    "cover": ("cover",),
+    "scenes.camera": ("Camera",),
+    "coat.choosing": ("ImageChoice",),
+    "field.contact": ("Contact",),
+    "scenes.cover": ("cover",),
     "edit": ("EditSession",),
-    "creases": ("Creases",),
-    "editor": ("DecalEditor",),
+    "seeds.creases": ("Creases",),
+    "grid.editor": ("DecalEditor",),
     "errors": (
         "DecalsError",
         "InvalidDecals",
@@ -129,28 +129,28 @@ _HOMES = {
         "NoGraphics",
         "TooMuchData",
     ),
-    "evaluate": ("Samples", "evaluate"),
-    "fields": ("gradient_of",),
+    "field.evaluate": ("Samples", "evaluate"),
+    "coat.fields": ("gradient_of",),
     "images": ("BUILTIN_IMAGES", "generate_image", "load_image"),
-    "implicit_surface": ("ImplicitSurface",),
-    "index": ("DecalIndex",),
-    "jitter": ("Jitter",),
-    "laying": ("lay",),
-    "mapping": ("Mapping",),
-    "mesh_file": ("read_mesh",),
-    "mesh_surface": ("MeshSurface",),
+    "surfaces.implicit": ("ImplicitSurface",),
+    "grid.index": ("DecalIndex",),
+    "coat.jitter": ("Jitter",),
+    "coat.laying": ("lay",),
+    "field.mapping": ("Mapping",),
+    "scenes.mesh_file": ("read_mesh",),
+    "surfaces.mesh": ("MeshSurface",),
     "model": ("Decals", "Interaction"),
-    "orientation": ("Orientation",),
-    "painted_image": ("PaintedImage",),
-    "projections": ("Cylindrical", "Planar", "Spherical", "TextureCoordinates"),
-    "relaxation": ("Relaxation",),
-    "remeshing": ("remeshed_points",),
-    "scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
-    "scene_file": ("load_scene", "save_scene"),
-    "seeding": ("seed",),
-    "sizing": ("Sizing",),
-    "surface": ("Surface",),
-    "vertex_density": ("vertex_density",),
+    "coat.orientation": ("Orientation",),
+    "seeds.painted_image": ("PaintedImage",),
+    "seeds.projections": ("Cylindrical", "Planar", "Spherical", "TextureCoordinates"),
+    "seeds.relaxation": ("Relaxation",),
+    "seeds.remeshing": ("remeshed_points",),
+    "scenes.scene": ("DecalImage", "MeshObject", "Scene", "TreeObject", "bounds_of"),
+    "scenes.scene_file": ("load_scene", "save_scene"),
+    "coat.seeding": ("seed",),
+    "coat.sizing": ("Sizing",),
+    "surfaces.surface": ("Surface",),
+    "seeds.vertex_density": ("vertex_density",),
     "vtk": ("show",),
     "window": ("EditWindow", "view"),
 }

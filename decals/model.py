@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree.kernels import RIM
+from blobtree.formulas.kernels import RIM
 from decals.columns import (
     Bools,
     Ints,
@@ -195,7 +195,7 @@ class Decals:
         """Lay out the record that devices read: float32[4n, 4], RECORD rows a decal.
 
         Rows are (position, s), (normal, rank), (tangent, image) and (tint in linear light, opacity). The rank
-        of a decal that spills is a half more: decals/ownership.py reads both.
+        of a decal that spills is a half more: decals/field/ownership.py reads both.
         """
         record = np.empty((len(self), RECORD, 4), np.float32)
         record[:, 0, :3] = self.positions

@@ -5,8 +5,8 @@
 
 import warp as wp
 
-from blobtree.kernels import RIM
-from decals.contact import NOWHERE, REACH, field_complement
+from blobtree.formulas.kernels import RIM
+from decals.field.contact import NOWHERE, REACH, field_complement
 from decals.model import FACING_LIMIT as MODEL_FACING_LIMIT
 from decals.model import RECORD as MODEL_RECORD
 from decals.model import Interaction

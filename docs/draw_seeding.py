@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from decals.evenness import ideal_spacing
-from decals.mesh_surface import MeshSurface
-from decals.neighbours import FacingTree
-from decals.relaxation import Relaxation
+from decals.coat.neighbours import FacingTree
+from decals.seeds.evenness import ideal_spacing
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.mesh import MeshSurface
 
 COUNT = 6000
 SIDE = 1.0

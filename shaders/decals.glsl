@@ -1,5 +1,5 @@
 // Which decals show at a surface point, where in their images the point lies, and what colour that is. All formulas
-// and loops are those of decals/ownership.py; GLSL adds the image look-up.
+// and loops are those of decals/field/ownership.py; GLSL adds the image look-up.
 //@ include footprint.glsl
 uniform sampler2D decal_records;  // decal i: 4i (position, s), 4i + 1 (normal, rank), (u, image), (tint, opacity)
 uniform sampler2D index_levels;

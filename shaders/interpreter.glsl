@@ -1,4 +1,4 @@
-// The tape's interpreter, blobtree/interpreter.py in GLSL: one composition per reading. Defines:
+// The tape's interpreter, blobtree/tapes/interpreter.py in GLSL: one composition per reading. Defines:
 // INTERPRET, FIELD (its type), LEAF, UNSTRETCH, UNWARP, COMBINE, PRIMITIVE_COLOR (what LEAF gets for it).
 // Slots: the registers, and a case per instruction that occurs (decals/render/tape_shader.py).
 FIELD INTERPRET(vec3 q, vec3 heading, float reach, sampler2D tape, ivec2 span) {

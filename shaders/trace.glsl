@@ -1,7 +1,7 @@
-// What the ray through a pixel sees of an implicit object (blobtree/rays.py); body of trace.frag and trace.comp.
+// What the ray through a pixel sees of an implicit object (blobtree/tracing/rays.py); body of trace.frag and trace.comp.
 //@ include camera.glsl
 //@ include surface.glsl
-// blobtree.tracing_cells.TracingCells
+// blobtree.tracing.cells.TracingCells
 uniform sampler2D tape;
 uniform isampler2D blocks;
 uniform vec3 grid_lower;

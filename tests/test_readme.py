@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from decals.mesh_file import read_mesh
-from decals.scene_file import load_scene
+from decals.scenes.mesh_file import read_mesh
+from decals.scenes.scene_file import load_scene
 
 README = Path(__file__).parent.parent / "README.md"
 

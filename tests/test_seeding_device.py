@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.implicit_surface import ImplicitSurface
-from decals.mesh_surface import MeshSurface
-from decals.relaxation import Relaxation
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import sphere
 
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]

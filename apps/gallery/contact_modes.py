@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from decals.contact import Contact
+from decals.field.contact import Contact
 from decals.model import Decals
-from decals.scene import Scene
+from decals.scenes.scene import Scene
 
 from .panels import Panel, main
 from .stage import checker, plane, straight_down

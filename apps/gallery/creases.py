@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from blobtree import Mesh, Node, Point, Segment, polygonize, split_creases
-from decals.scene import MeshObject, Scene
+from decals.scenes.scene import MeshObject, Scene
 
 from .panels import Panel, main
 from .stage import CLAY, looking

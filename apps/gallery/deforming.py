@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from blobtree import Node, Point, Segment
-from decals.implicit_surface import ImplicitSurface
-from decals.laying import lay
+from decals.coat.laying import lay
 from decals.model import Decals
-from decals.relaxation import Relaxation
-from decals.scene import DecalImage, Scene, TreeObject
+from decals.scenes.scene import DecalImage, Scene, TreeObject
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.implicit import ImplicitSurface
 
 from .panels import Panel, main
 from .stage import CLAY, looking

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.camera import Camera
+from decals.coat.seeding import seed
 from decals.model import PLAIN, Decals, Interaction
-from decals.scene import DecalImage, Scene, SceneObject
-from decals.seeding import seed
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, Scene, SceneObject
 
 from ..samples import axes_of, sample
 from ..views import frame, parse_view

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from decals.scene import MeshObject, Scene
+from decals.scenes.scene import MeshObject, Scene
 
 from .panels import Panel, decal, main
 from .stage import CLAY, box, bumps, checker, looking, plate

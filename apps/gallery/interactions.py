@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from decals.model import Decals, Interaction
-from decals.scene import Scene
+from decals.scenes.scene import Scene
 
 from .panels import Panel, decal, main
 from .stage import plane, rings, straight_down

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from decals.model import PLAIN, Decals, Interaction
-from decals.scene import DecalImage, Scene
+from decals.scenes.scene import DecalImage, Scene
 
 from .panels import Panel, main
 from .stage import plane, straight_down

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from blobtree import Segment
-from decals.mapping import Mapping
-from decals.scene import Scene, TreeObject
+from decals.field.mapping import Mapping
+from decals.scenes.scene import Scene, TreeObject
 
 from .panels import Panel, decal, main
 from .stage import CLAY, checker, looking

@@ -7,7 +7,7 @@ import warp as wp
 
 from blobtree import Node, Point, Union, define_operator, define_skeleton
 from decals.model import Decals
-from decals.scene import DecalImage, Scene, TreeObject
+from decals.scenes.scene import DecalImage, Scene, TreeObject
 
 from .panels import Panel, decal, main
 from .stage import CLAY, looking, rings

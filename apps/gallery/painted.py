@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Point, Segment
-from decals.implicit_surface import ImplicitSurface
-from decals.painted_image import PaintedImage
-from decals.projections import Planar
-from decals.scene import DecalImage, Scene, TreeObject
-from decals.seeding import seed
+from decals.coat.seeding import seed
+from decals.scenes.scene import DecalImage, Scene, TreeObject
+from decals.seeds.painted_image import PaintedImage
+from decals.seeds.projections import Planar
+from decals.surfaces.implicit import ImplicitSurface
 
 from .panels import Panel, main
 from .stage import CLAY, looking, rings

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from decals.contact import Contact
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.model import Decals
 from decals.render import Renderer
-from decals.scene import Scene
+from decals.scenes.scene import Scene
 
 from ..output import write_picture
 from ..warp_start import start_warp

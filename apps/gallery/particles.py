@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from decals.scene import DecalImage, Scene
-from decals.seeding import seed
+from decals.coat.seeding import seed
+from decals.scenes.scene import DecalImage, Scene
 
 from ..samples import axes_of, sample
 from ..views import frame, parse_view

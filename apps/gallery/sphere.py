@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from blobtree import Point
-from decals.scene import DecalImage, Scene, TreeObject
+from decals.scenes.scene import DecalImage, Scene, TreeObject
 
 from .panels import Panel, decal, main
 from .stage import CLAY, looking, plane, straight_down

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.camera import Camera, Vector
-from decals.mesh_file import MeshArrays
-from decals.scene import DecalImage, MeshObject
+from decals.scenes.camera import Camera, Vector
+from decals.scenes.mesh_file import MeshArrays
+from decals.scenes.scene import DecalImage, MeshObject
 
 Floats = NDArray[np.floating[Any]]
 

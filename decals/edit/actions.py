@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
-from decals.camera import Camera
+from decals.coat.orientation import tangents
 from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
 from decals.edit.jobs import Job
 from decals.edit.keys import BINDINGS, CAMERA
@@ -17,9 +17,9 @@ from decals.edit.session import Command, EditSession
 from decals.edit.trees import MovePrimitive, PaintPrimitive, Path, ResizePrimitive, alone, primitive_near
 from decals.errors import DecalsError, InvalidEdit
 from decals.model import LAYERS, PLAIN, Decals
-from decals.orientation import tangents
-from decals.scene import TreeObject
-from decals.surface import Floats
+from decals.scenes.camera import Camera
+from decals.scenes.scene import TreeObject
+from decals.surfaces.surface import Floats
 
 LARGER, TURN, FAINTER, THICKER = 1.1, 7.5, 0.8, 1.05
 """What one step of the wheel or a key does: factors, and degrees."""

@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.editor import DecalEditor
+from decals.grid.editor import DecalEditor
 from decals.model import Decals
 
 Numbers = NDArray[np.int64]

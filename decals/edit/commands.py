@@ -7,15 +7,15 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from decals.camera import Camera
 from decals.edit.change import Change, Numbers
 from decals.edit.document import Document
 from decals.edit.places import Places, carried, nearest, turns
 from decals.errors import InvalidEdit
+from decals.grid.rows import as_numbers
 from decals.model import PLAIN, Decals
-from decals.rows import as_numbers
-from decals.scene import DecalImage
-from decals.surface import Floats, unit_rows
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage
+from decals.surfaces.surface import Floats, unit_rows
 
 NEXT_TO = 1.0
 """How far a duplicate lies from what it was made of, in radii."""

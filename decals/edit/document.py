@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from decals.camera import Camera
 from decals.edit.change import NOTHING, Change, Numbers, Parts, Rows
-from decals.editor import DecalEditor
 from decals.errors import InvalidEdit
+from decals.grid.editor import DecalEditor
 from decals.model import Decals
-from decals.scene import DecalImage, Scene, SceneObject
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, Scene, SceneObject
 
 
 class Document:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from decals.contact import Contact
 from decals.edit.document import Document
 from decals.edit.places import Doubles, first_hit, nearest
-from decals.evaluate import evaluate
-from decals.surface import Floats
+from decals.field.contact import Contact
+from decals.field.evaluate import evaluate
+from decals.surfaces.surface import Floats
 
 ANGLES, RINGS = 48, 12
 """Directions in which an outline is sought, and steps on the way out."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.model import Decals
-from decals.scene import SceneObject
-from decals.surface import Floats, as_points, unit_rows
+from decals.scenes.scene import SceneObject
+from decals.surfaces.surface import Floats, as_points, unit_rows
 
 Ints = NDArray[np.int32]
 Doubles = NDArray[np.float64]

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
+from decals.coat.seeding import seed
 from decals.edit.change import Change
 from decals.edit.document import Document
 from decals.edit.places import Places, carried, nearest
 from decals.errors import InvalidEdit
-from decals.local_relaxation import relax_near
 from decals.model import Decals
-from decals.population import Sites, World
-from decals.relaxation import EXPONENTS, STIFFNESS
-from decals.repulsion import Law
-from decals.scene import SceneObject
-from decals.seeding import seed
+from decals.scenes.scene import SceneObject
+from decals.seeds.local_relaxation import relax_near
+from decals.seeds.population import Sites, World
+from decals.seeds.relaxation import EXPONENTS, STIFFNESS
+from decals.seeds.repulsion import Law
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours in an even coat without gaps, in radii: `sizing.MARGIN` is in the radii."""

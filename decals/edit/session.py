@@ -6,11 +6,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
-from decals.camera import Camera
 from decals.edit.change import Change
 from decals.edit.document import Document
-from decals.scene import Scene
-from decals.scene_file import save_scene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
+from decals.scenes.scene_file import save_scene
 
 
 class Command(Protocol):

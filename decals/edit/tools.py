@@ -10,7 +10,7 @@ from decals.edit.commands import Carry
 from decals.edit.keys import action_of
 from decals.edit.pick import Pick, pick
 from decals.edit.places import first_hit, nearest, turns
-from decals.surface import Floats
+from decals.surfaces.surface import Floats
 
 Ray = tuple[ArrayLike, ArrayLike]
 """Origin and direction in the scene's coordinates."""

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import ISO, Cone, Node, Point, Segment
-from blobtree.primitives import Primitive
-from blobtree.tree import Combination, Transform
+from blobtree.nodes.primitives import Primitive
+from blobtree.nodes.tree import Combination, Transform
 from decals.edit.change import Change
 from decals.edit.document import Document
 from decals.edit.places import Places, carried, nearest
 from decals.errors import InvalidEdit
-from decals.scene import TreeObject
+from decals.scenes.scene import TreeObject
 
 Path = tuple[int, ...]
 """Which child to take, from the root down."""

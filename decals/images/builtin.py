@@ -6,7 +6,8 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidImage
+from decals.errors import InvalidImage
+
 from . import eye, rivet, rock, scale, tile
 from .canvas import Color, draw, rgb
 

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
-from ..errors import InvalidImage
-from ..paths import is_file
+from decals.errors import InvalidImage
+from decals.scenes.paths import is_file
+
 from .builtin import BUILTIN_IMAGES, generate_image, is_builtin
 
 MAX_IMAGE_EDGE = 8192

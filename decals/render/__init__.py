@@ -3,8 +3,8 @@
 `render` makes one picture. `Renderer` is the thing to keep where many pictures of a scene are wanted.
 """
 
-from decals.contact import Contact
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.render.canvas import Buffers
 from decals.render.context import Context
 from decals.render.drawables import register
@@ -15,7 +15,7 @@ from decals.render.scene_like import SceneLike
 from decals.render.shortcuts import render, render_buffers
 from decals.render.targets import Size
 from decals.render.tree import TreeDrawable
-from decals.scene import MeshObject, TreeObject
+from decals.scenes.scene import MeshObject, TreeObject
 
 register(MeshObject, MeshDrawable)
 register(TreeObject, TreeDrawable)

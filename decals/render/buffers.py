@@ -1,6 +1,6 @@
 """Arrays on the graphics card: textures of 4096 texels a row, read with ``texelFetch``.
 
-Element ``i`` lies at ``ivec2(i & 4095, i >> 12)``: the form into which `blobtree.glsl` translates arrays.
+Element ``i`` lies at ``ivec2(i & 4095, i >> 12)``: `blobtree.typed.glsl` translates arrays into that form.
 """
 
 import math
@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree.glsl import TEXTURE_WIDTH_BITS
+from blobtree.typed.glsl import TEXTURE_WIDTH_BITS
 from decals.errors import TooMuchData
 from decals.render.context import Context
 

@@ -3,21 +3,21 @@
 from collections.abc import Sequence
 from functools import cache
 
-from blobtree.glsl import translate_library
-from blobtree.kernels import RIM
-from decals.contact import Contact
-from decals.editor import DecalEditor
+from blobtree.formulas.kernels import RIM
+from blobtree.typed.glsl import translate_library
 from decals.errors import TooMuchData
-from decals.index import DecalIndex
-from decals.mapping import tangent_coordinates
+from decals.field.contact import Contact
+from decals.field.mapping import tangent_coordinates
+from decals.field.ownership import complement_at, owner_at, owner_below, uv_at
+from decals.field.sheet import sheet_at
+from decals.field.stack import number_below
+from decals.grid.editor import DecalEditor
+from decals.grid.index import DecalIndex
 from decals.model import Decals
-from decals.ownership import complement_at, owner_at, owner_below, uv_at
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import Program
 from decals.render.tile import set_uniform
-from decals.sheet import sheet_at
-from decals.stack import number_below
 
 FUNCTIONS = (sheet_at, owner_at, owner_below, number_below, complement_at, uv_at, tangent_coordinates)
 """What ``shaders/decals.glsl`` calls."""

@@ -6,8 +6,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.contact import Contact
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.render.context import Context
 from decals.render.decal_data import DecalData, library
 from decals.render.entry import PixelPass, Program, pixel_pass

@@ -7,7 +7,7 @@ from decals.errors import InvalidScene
 from decals.render.context import Context
 from decals.render.gbuffer import GBuffer
 from decals.render.tile import Tile
-from decals.viewpoint import Bounds
+from decals.scenes.viewpoint import Bounds
 
 
 class Drawable(Protocol):

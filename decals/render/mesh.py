@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from decals.render.context import Context
 from decals.render.gbuffer import GBuffer
 from decals.render.tile import Tile, attach_camera, set_uniform
-from decals.viewpoint import Bounds
+from decals.scenes.viewpoint import Bounds
 from implicit_decals.shaders import compose
 
 

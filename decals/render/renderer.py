@@ -11,10 +11,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.contact import Contact
-from decals.editor import DecalEditor
 from decals.errors import InvalidScene
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
+from decals.grid.editor import DecalEditor
 from decals.render.canvas import BufferCanvas, Buffers, Canvas
 from decals.render.context import Context
 from decals.render.decal_data import DecalData
@@ -26,7 +26,7 @@ from decals.render.scene_like import SceneLike
 from decals.render.targets import Size, Targets
 from decals.render.textures import ImageArray
 from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Rectangle, Tile, largest_tile, tiles
-from decals.viewpoint import Bounds, Viewpoint
+from decals.scenes.viewpoint import Bounds, Viewpoint
 
 AMBIENT_RADIUS = 0.1
 """How far away surroundings may be to keep light out, relative to the scene's diagonal."""

@@ -1,4 +1,4 @@
-"""What is read of a scene; `decals.scene.Scene` is one.
+"""What is read of a scene; `decals.scenes.scene.Scene` is one.
 
 Its decals may be a `DecalEditor`: then what was edited since the last picture alone goes to the card.
 """
@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.camera import Camera
-from decals.editor import DecalEditor
+from decals.grid.editor import DecalEditor
 from decals.model import Decals
+from decals.scenes.camera import Camera
 
 
 class ImageLike(Protocol):
@@ -22,7 +22,7 @@ class ImageLike(Protocol):
 
 
 class SceneLike(Protocol):
-    """What is read of a scene (`decals.scene.Scene`)."""
+    """What is read of a scene (`decals.scenes.scene.Scene`)."""
 
     @property
     def objects(self) -> Sequence[object]: ...  # noqa: D102

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from blobtree.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
-from blobtree.evaluate import field_bound, field_gradient
-from blobtree.glsl import translate_choice, translate_library
-from blobtree.rays import trace_ray
-from blobtree.readings import BOUND, COLOR, GRADIENT, Reading, to_local, turned_to_local
-from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
-from blobtree.vocabulary import BUILT_IN, Vocabulary
+from blobtree.formulas.vocabulary import BUILT_IN, Vocabulary
+from blobtree.tapes.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.tapes.evaluate import field_bound, field_gradient
+from blobtree.tapes.readings import BOUND, COLOR, GRADIENT, Reading, to_local, turned_to_local
+from blobtree.tapes.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
+from blobtree.tracing.rays import trace_ray
+from blobtree.typed.glsl import translate_choice, translate_library
 from decals.render.entry import GROUP, Entry
 from implicit_decals.shaders import Source, compose
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from decals.render.context import Context
 from decals.render.entry import Program
-from decals.viewpoint import Bounds, Floats, Rays, Viewpoint
+from decals.scenes.viewpoint import Bounds, Floats, Rays, Viewpoint
 
 Compiled = TypeVar("Compiled", bound=Program)
 

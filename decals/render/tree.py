@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Node
-from blobtree.tracing_cells import TracingCells, tracing_cells
+from blobtree.tracing.cells import TracingCells, tracing_cells
 from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import GROUP, Entry, Program
 from decals.render.gbuffer import GBuffer
 from decals.render.tape_shader import Kinds, tracing_shader
 from decals.render.tile import Rectangle, Tile, attach_camera, set_uniform
-from decals.viewpoint import Bounds
+from decals.scenes.viewpoint import Bounds
 from implicit_decals.shaders import compose
 
 BOX_VERTICES = 36

@@ -7,7 +7,7 @@ import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkCommand, vtkObject
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from decals.viewpoint import Bounds, Floats
+from decals.scenes.viewpoint import Bounds, Floats
 from decals.vtk.camera import matrix_of
 
 NAME = "decals"

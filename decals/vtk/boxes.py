@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from blobtree.tracing_cells import tracing_cells
-from decals.scene import Box, SceneObject, TreeObject, bounds_of
+from blobtree.tracing.cells import tracing_cells
+from decals.scenes.scene import Box, SceneObject, TreeObject, bounds_of
 
 
 def box_around(objects: Iterable[SceneObject]) -> Box:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from decals.viewpoint import Floats, Projection
+from decals.scenes.viewpoint import Floats, Projection
 
 
 def matrix_of(actor: Any) -> Floats:

@@ -10,11 +10,11 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import Node
-from decals.camera import Camera
 from decals.errors import InvalidScene
 from decals.model import PLAIN, Decals
 from decals.render import SceneLike
-from decals.scene import CLAY, Color, DecalImage, MeshObject, Scene, SceneObject, TreeObject
+from decals.scenes.camera import Camera
+from decals.scenes.scene import CLAY, Color, DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.vtk.context import WindowContext
 from decals.vtk.modes import restore_exports, warn_of_exports
 from decals.vtk.stage import Stage

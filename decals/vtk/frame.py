@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from decals.contact import Contact
-from decals.editor import DecalEditor
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
+from decals.grid.editor import DecalEditor
 from decals.render import Renderer, SceneLike, Size
 from decals.render.targets import Targets
-from decals.viewpoint import Projection
+from decals.scenes.viewpoint import Projection
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
 

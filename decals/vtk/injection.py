@@ -11,11 +11,11 @@ from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
-from decals.contact import Contact
+from decals.field.contact import Contact
 from decals.render.decal_data import DecalData, library
 from decals.render.textures import ImageArray
 from decals.render.tile import CameraBuffer, Picture, Rectangle
-from decals.viewpoint import Floats
+from decals.scenes.viewpoint import Floats
 from decals.vtk.camera import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, SmoothNormals, polygon_mapper
 from implicit_decals.shaders import compose

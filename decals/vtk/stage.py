@@ -15,12 +15,12 @@ import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkCommand
 
-from decals.contact import Contact
 from decals.errors import InvalidScene
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.render import Renderer, SceneLike
-from decals.scene import Box, SceneObject, bounds_of
-from decals.viewpoint import Floats, Projection
+from decals.scenes.scene import Box, SceneObject, bounds_of
+from decals.scenes.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
 from decals.vtk.boxes import box_around
 from decals.vtk.camera import vtk_projection

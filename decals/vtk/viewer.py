@@ -5,7 +5,7 @@ from typing import Any
 
 import pyvista as pv
 
-from decals.scene import Scene
+from decals.scenes.scene import Scene
 from decals.vtk.component import Component
 
 REMOTE = "server"

@@ -8,7 +8,7 @@ import numpy as np
 import pyvista as pv
 
 from decals.edit.actions import Actions
-from decals.surface import Floats
+from decals.surfaces.surface import Floats
 
 SIZE = 0.03
 """Radius of the handle, in diagonals of the scene."""

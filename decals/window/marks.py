@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from decals.contact import Contact
 from decals.edit.document import Document
 from decals.edit.keys import help_lines
 from decals.edit.pick import outline, rims
-from decals.surface import Floats
+from decals.field.contact import Contact
+from decals.surfaces.surface import Floats
 
 MOST = 64
 """Of the selected decals that are outlined; the last one by what is seen of it, others by their rims."""

@@ -10,14 +10,14 @@ import pyvista as pv
 
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
 from blobtree import BlobTreeError
-from decals.camera import Camera
 from decals.edit.actions import Actions
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
 from decals.edit.tools import Ray, Tools
 from decals.errors import DecalsError, NoGraphics
 from decals.render.libraries import require_gl
-from decals.scene import Scene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
 from decals.window.bindings import Bindings
 from decals.window.grip import Grip
 from decals.window.marks import Marks

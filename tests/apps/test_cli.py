@@ -14,10 +14,10 @@ from PIL import Image
 
 import blobtree
 from blobtree import Point
-from decals.camera import Camera
 from decals.errors import NoGraphics
-from decals.scene import Scene, TreeObject
-from decals.scene_file import save_scene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene, TreeObject
+from decals.scenes.scene_file import save_scene
 from decals.window import EditWindow
 from implicit_decals.apps import demo as demo_module
 from implicit_decals.apps import render as render_module

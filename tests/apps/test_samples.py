@@ -6,9 +6,9 @@ import pytest
 import pyvista as pv
 from numpy.typing import NDArray
 
-from blobtree import polygonize
-from decals.mesh_file import MeshArrays
-from decals.scene import MeshObject, TreeObject
+from blobtree.meshing import polygonize
+from decals.scenes.mesh_file import MeshArrays
+from decals.scenes.scene import MeshObject, TreeObject
 from implicit_decals.apps.errors import UsageError
 from implicit_decals.apps.hatching import hatching, mosaic
 from implicit_decals.apps.knot import torus_knot

@@ -27,11 +27,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Union
-from blobtree.cells import SparseCells, build_cells
-from blobtree.grid import BRANCHING, aligned_grid
-from blobtree.polygonize import download
-from blobtree.surface import Surface, extract_surface
-from blobtree.trace import trace
+from blobtree.meshing.polygonize import download
+from blobtree.meshing.surface import Surface, extract_surface
+from blobtree.sparse.cells import SparseCells, build_cells
+from blobtree.sparse.grid import BRANCHING, aligned_grid
+from blobtree.tracing.trace import trace
 from tests.bench.marching_cubes import marching_cubes
 
 RUNS = 5

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import warp as wp
 
-from decals.contact import Contact
-from decals.editor import DecalEditor
-from decals.index import DecalIndex
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
+from decals.grid.editor import DecalEditor
+from decals.grid.index import DecalIndex
 from decals.model import Decals
 from decals.render import Renderer
 from decals.render.decal_data import DecalData
-from decals.scene import Scene
+from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
 from tests.decals import test_contact, test_mapping, test_radial
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree.kernels import RIM
-from decals.editor import DecalEditor
-from decals.index import DeviceIndex
-from decals.index_build import build_index
+from blobtree.formulas.kernels import RIM
+from decals.grid.build import build_index
+from decals.grid.editor import DecalEditor
+from decals.grid.index import DeviceIndex
 from decals.model import Decals
 
 Figures = dict[str, float]

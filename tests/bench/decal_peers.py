@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.evaluate import evaluate
-from decals.index import DecalIndex
+from decals.field.evaluate import evaluate
+from decals.grid.index import DecalIndex
 from decals.model import Decals
 from decals.render import Renderer
-from decals.scene import DecalImage, MeshObject, Scene
+from decals.scenes.scene import DecalImage, MeshObject, Scene
 from implicit_decals.apps.coats import even_coat
 from implicit_decals.apps.errors import UsageError
 from implicit_decals.apps.knot import torus_knot

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.evaluate import evaluate
-from decals.mapping import Mapping
+from decals.field.evaluate import evaluate
+from decals.field.mapping import Mapping
 from decals.model import Decals
 from tests.bench.on_meshes import Locator, SmoothMesh
 

@@ -12,15 +12,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.blocks import child_number, child_place, find_block, grid_point
-from blobtree.cells import SparseCells
-from blobtree.dual import SAMPLES, classify_cells, corner_place, corner_sample, sample_blocks
-from blobtree.grid import BRANCHING, CHILDREN
+from blobtree.formulas.kernels import ISO
 from blobtree.kernel_options import KERNEL_OPTIONS
-from blobtree.kernels import ISO
 from blobtree.launch import launch
-from blobtree.patches import EDGES, FACES
-from blobtree.scan import everything, starts_of
+from blobtree.meshing.dual import SAMPLES, classify_cells, corner_place, corner_sample, sample_blocks
+from blobtree.meshing.patches import EDGES, FACES
+from blobtree.meshing.scan import everything, starts_of
+from blobtree.sparse.blocks import child_number, child_place, find_block, grid_point
+from blobtree.sparse.cells import SparseCells
+from blobtree.sparse.grid import BRANCHING, CHILDREN
 
 wp.set_module_options(KERNEL_OPTIONS)
 

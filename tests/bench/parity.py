@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from decals.contact import REACH, Contact
-from decals.index import DeviceIndex
-from decals.mapping import Mapping
+from decals.field.contact import REACH, Contact
+from decals.field.mapping import Mapping
+from decals.grid.index import DeviceIndex
 from tests.bench import parity_kernels as kernels
 from tests.bench.parity_report import worst_points
 from tests.bench.parity_worlds import MEMBERS, World, make_world

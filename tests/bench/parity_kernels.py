@@ -4,9 +4,9 @@
 
 import warp as wp
 
-from decals.contact import rim_distance
-from decals.ownership import NOBODY, complement_at, owner_at, uv_at
-from decals.sheet import sheet_at
+from decals.field.contact import rim_distance
+from decals.field.ownership import NOBODY, complement_at, owner_at, uv_at
+from decals.field.sheet import sheet_at
 from tests.oracles.parallel import Members, rim_of, wide
 
 wp.set_module_options({"enable_backward": False})

@@ -19,14 +19,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.contact import Contact
+from decals.field.contact import Contact
 from decals.render import entry
 from decals.render.context import Context
 from decals.render.entry import Entry
 from decals.render.mesh import mesh_rows
 from decals.render.renderer import Renderer
 from decals.render.tile import CameraBuffer, Tile
-from decals.scene import MeshObject, Scene
+from decals.scenes.scene import MeshObject, Scene
 from implicit_decals.shaders import compose
 
 Arrays = dict[str, NDArray[Any]]

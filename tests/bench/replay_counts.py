@@ -18,8 +18,8 @@ import moderngl
 import numpy as np
 import warp as wp
 
-from blobtree.glsl import TEXTURE_WIDTH_BITS
-from decals.index import DeviceIndex
+from blobtree.typed.glsl import TEXTURE_WIDTH_BITS
+from decals.grid.index import DeviceIndex
 from decals.model import RECORD, Decals
 from tests.bench.replay import Replay, milliseconds
 

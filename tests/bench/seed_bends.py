@@ -12,10 +12,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from decals.evenness import BEYOND
+from decals.coat.neighbours import FacingTree
 from decals.model import FACING_LIMIT
-from decals.neighbours import FacingTree
-from decals.relaxation import Relaxation
+from decals.seeds.evenness import BEYOND
+from decals.seeds.relaxation import Relaxation
 from tests.bench.seeds import MODELS, model
 
 AROUND = 1.5

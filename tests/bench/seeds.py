@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 
 from blobtree import Node, Point, polygonize
+from decals.coat.neighbours import FacingTree
 from decals.errors import InvalidSeeding
-from decals.evenness import Spacing, evenness, ideal_spacing
-from decals.implicit_surface import ImplicitSurface
-from decals.mesh_surface import MeshSurface
-from decals.neighbours import FacingTree
-from decals.relaxation import Relaxation
+from decals.seeds.evenness import Spacing, evenness, ideal_spacing
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
 from implicit_decals.apps.errors import UsageError
 from implicit_decals.apps.knot import torus_knot
 from implicit_decals.apps.samples import sample_mesh

@@ -17,9 +17,9 @@ import numpy as np
 import warp as wp
 
 from blobtree import Node, Point, polygonize
-from decals.implicit_surface import ImplicitSurface
-from decals.mesh_surface import MeshSurface
-from decals.relaxation import Relaxation
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
 
 SCHEDULES = (60, 100, 150)
 """Lengths of the schedule; the last is the default."""

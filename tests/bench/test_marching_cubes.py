@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from blobtree import Mesh
-from blobtree.cells import build_cells
-from blobtree.grid import aligned_grid
+from blobtree.sparse.cells import build_cells
+from blobtree.sparse.grid import aligned_grid
 from tests.bench.marching_cubes import TRIANGLE_COUNT, marching_cubes
 from tests.blobtree.test_polygonize import BALL, assert_closed, ring, volume
 

@@ -7,10 +7,10 @@ import moderngl
 import numpy as np
 import pytest
 
-from decals.contact import Contact
 from decals.errors import NoGraphics
+from decals.field.contact import Contact
 from decals.render.context import Context
-from decals.scene import DecalImage, MeshObject, Scene
+from decals.scenes.scene import DecalImage, MeshObject, Scene
 from implicit_decals.apps.coats import even_coat
 from tests.bench import record, replay, replay_counts
 from tests.bench.scenes import in_layers

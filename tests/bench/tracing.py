@@ -18,9 +18,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import Sum
-from blobtree.trace import trace_arrays
-from blobtree.tracing_cells import tracing_cells
-from decals.camera import Camera
+from blobtree.tracing.cells import tracing_cells
+from blobtree.tracing.trace import trace_arrays
+from decals.scenes.camera import Camera
 from tests.bench.blobtree import UNIT_BOX, blobs, median_time
 
 COUNTS = (100, 1_000, 10_000)

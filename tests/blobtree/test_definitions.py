@@ -22,9 +22,9 @@ from blobtree import (
     define_operator,
     define_skeleton,
     from_json,
-    registry,
     to_json,
 )
+from blobtree.own import registry
 from tests.blobtree import own_kinds
 from tests.blobtree.own_kinds import OWN_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import InvalidPoints, Node, Point, Segment, Transform
-from blobtree.evaluate import bounds_along, bounds_at, colors_at, gradients_at, values_at
-from blobtree.traversal import postorder
+from blobtree.nodes.traversal import postorder
+from blobtree.tapes.evaluate import bounds_along, bounds_at, colors_at, gradients_at, values_at
 from tests.blobtree.trees import KINDS, points_around, random_trees
 from tests.oracles import blobtree as oracle
 

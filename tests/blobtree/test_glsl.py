@@ -9,8 +9,8 @@ import warp as wp
 
 import blobtree
 from blobtree import UntranslatableFunction
-from blobtree.glsl import TEXTURE_WIDTH_BITS, translate_library
-from blobtree.glsl_builtins import BUILTINS, RESERVED_WORDS
+from blobtree.typed.builtins import BUILTINS, RESERVED_WORDS
+from blobtree.typed.glsl import TEXTURE_WIDTH_BITS, translate_library
 from tests.blobtree import glsl_samples as samples
 
 glsl_samples: Any = samples  # to mypy, whatever Warp has decorated is still a plain function
@@ -70,7 +70,7 @@ def test_what_lies_outside_the_subset_is_refused_by_file_and_line(name: str) -> 
     message = str(refusal.value)
     assert message.startswith(f"{glsl_samples.__file__}:{line_of(name, code)}: ")
     assert re.search(reason, message), message
-    assert message.endswith("stay within the subset that Warp and GLSL share (see blobtree/glsl.py)")
+    assert message.endswith("stay within the subset that Warp and GLSL share (see blobtree/typed/glsl.py)")
 
 
 def test_every_sample_outside_the_subset_is_tried() -> None:

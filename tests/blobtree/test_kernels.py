@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import ISO, RIM
-from blobtree.kernels import (
+from blobtree.formulas.kernels import (
     STEEPEST_DISTANCE,
     STEEPEST_SLOPE,
     falloff,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blobtree.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION, Operator
+from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION, Operator
 from tests.blobtree.warp_functions import call
 
 Floats = NDArray[np.float64]

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 from warp._src.context import user_modules
 
 from blobtree import ISO, Node, Point, Polygonizer, polygonize
-from blobtree.evaluate import bounds_at, gradients_at
-from blobtree.kernels import RIM
-from blobtree.trace import trace
-from blobtree.traversal import postorder
-from blobtree.vocabulary import BUILT_IN
+from blobtree.formulas.kernels import RIM
+from blobtree.formulas.vocabulary import BUILT_IN
+from blobtree.nodes.traversal import postorder
+from blobtree.tapes.evaluate import bounds_at, gradients_at
+from blobtree.tracing.trace import trace
 from tests.blobtree.own_kinds import EVERYTHING, KINDS, OWN, OWN_TREES, Brick, Mean, Path, Ring, Soft
 from tests.blobtree.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.test_sparse_cells import assert_same_surface

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree.patches import EDGES, FACES, FLIPPED, PATCH_COUNT, PATCH_OF_EDGE
+from blobtree.meshing.patches import EDGES, FACES, FLIPPED, PATCH_COUNT, PATCH_OF_EDGE
 
 CODES = pytest.mark.parametrize("code", range(256))
 

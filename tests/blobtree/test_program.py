@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 
 from blobtree import InvalidNode, Node, Point, Ricci, Segment, Sum, Union
-from blobtree.operators import INTERSECTION, SUM, UNION
-from blobtree.program import Pop, Push, Run, compile_program, registers_needed
-from blobtree.traversal import postorder
+from blobtree.formulas.operators import INTERSECTION, SUM, UNION
+from blobtree.nodes.traversal import postorder
+from blobtree.tapes.program import Pop, Push, Run, compile_program, registers_needed
 from tests.blobtree.trees import trees
 
 
@@ -144,7 +144,7 @@ def test_transforms_multiply_from_the_outside_in() -> None:
 
 
 def test_a_tree_that_needs_more_registers_than_there_are_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blobtree.tape.REGISTERS", 3)
+    monkeypatch.setattr("blobtree.tapes.tape.REGISTERS", 3)
     assert balanced(4, add, unite).tape.registers == 3
     with pytest.raises(InvalidNode, match="tree: needs 4 registers, at most 3 exist; group its operands"):
         _ = balanced(5, add, unite).tape

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blobtree import ISO, Point, Segment
-from blobtree.project import project
+from blobtree.tapes.project import project
 from tests.blobtree.trees import points_around, random_trees
 
 

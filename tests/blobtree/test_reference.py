@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree.glsl_builtins import BUILTINS
-from blobtree.reference import reference, vector
+from blobtree.typed.builtins import BUILTINS
+from blobtree.typed.reference import reference, vector
 from tests.blobtree import own_kinds
 from tests.blobtree.warp_functions import call, typed_functions
 
@@ -68,7 +68,11 @@ def loops(x: wp.float32, y: wp.float32) -> wp.float32:
 
 FUNCTIONS = [
     *(f for f in typed_functions(import_module(__name__))),
-    *(f for name in ("kernels", "operators") for f in typed_functions(import_module(f"blobtree.{name}"))),
+    *(
+        f
+        for name in ("kernels", "operators")
+        for f in typed_functions(import_module(f"blobtree.formulas.{name}"))
+    ),
     *(f for f in typed_functions(own_kinds)),
 ]
 INTERVALS = ("range", "choice")

@@ -5,11 +5,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 from blobtree import Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygonize
-from blobtree.cells import SparseCells, build_cells
-from blobtree.cull import split
-from blobtree.evaluate import bounds_at, values_at
-from blobtree.grid import BRANCHING, aligned_grid
-from blobtree.kernels import ISO, RIM
+from blobtree.formulas.kernels import ISO, RIM
+from blobtree.sparse.cells import SparseCells, build_cells
+from blobtree.sparse.cull import split
+from blobtree.sparse.grid import BRANCHING, aligned_grid
+from blobtree.tapes.evaluate import bounds_at, values_at
 from tests.blobtree.edits import edited
 from tests.blobtree.trees import random_leaf, random_trees
 from tests.oracles.dense_polygonize import polygonize as dense_polygonize
@@ -117,7 +117,7 @@ def test_few_cells_and_primitives_are_looked_at() -> None:
 
 def forced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many threads to the root's children, as on a graphics card, for tapes of any length."""
-    monkeypatch.setattr("blobtree.cells.pieces_of", lambda tape, _device: split(tape))
+    monkeypatch.setattr("blobtree.sparse.cells.pieces_of", lambda tape, _device: split(tape))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -5,9 +5,9 @@ import pytest
 import warp as wp
 
 from blobtree import RIM, InvalidNode, Node, Point, Segment
-from blobtree.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
-from blobtree.skeletons import POINT, SEGMENT, SKELETONS
-from blobtree.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
+from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
+from blobtree.formulas.skeletons import POINT, SEGMENT, SKELETONS
+from blobtree.tapes.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from tests.blobtree.trees import random_trees
 
 CODES = {skeleton: code for code, skeleton in enumerate(SKELETONS)}

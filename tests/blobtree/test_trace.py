@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import InvalidPoints, Node, Point, Segment
-from blobtree.rays import FARTHEST, box_interval, reciprocal, way_out
-from blobtree.trace import trace
-from blobtree.tracing_cells import trace_tolerance
+from blobtree.tracing.cells import trace_tolerance
+from blobtree.tracing.rays import FARTHEST, box_interval, reciprocal, way_out
+from blobtree.tracing.trace import trace
 from tests.blobtree.trees import random_trees
 from tests.blobtree.warp_functions import call
 from tests.oracles import blobtree as oracle

@@ -5,11 +5,11 @@ import pytest
 from scipy.ndimage import distance_transform_cdt
 
 from blobtree import ISO, Node, Point
-from blobtree.evaluate import values_at
-from blobtree.rays import EMPTY
-from blobtree.refine import SURELY_INSIDE
-from blobtree.tape import Tape
-from blobtree.tracing_cells import BLOCKS_ALONG, MOST_LAYERS, TracingCells, tracing_cells
+from blobtree.sparse.refine import SURELY_INSIDE
+from blobtree.tapes.evaluate import values_at
+from blobtree.tapes.tape import Tape
+from blobtree.tracing.cells import BLOCKS_ALONG, MOST_LAYERS, TracingCells, tracing_cells
+from blobtree.tracing.rays import EMPTY
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle
 

@@ -28,8 +28,8 @@ from blobtree import (
     Transform,
     Union,
 )
-from blobtree.program import Run, compile_program
-from blobtree.skeletons import POINT
+from blobtree.formulas.skeletons import POINT
+from blobtree.tapes.program import Run, compile_program
 from tests.blobtree.trees import random_trees, trees
 
 A = Point((0, 0, 0), radius=1.0)

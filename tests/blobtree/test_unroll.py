@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import dispatch, operators
-from blobtree.instantiate import rebound, references
-from blobtree.unroll import original, unrolled
+from blobtree.formulas import operators
+from blobtree.tapes import dispatch
+from blobtree.typed.instantiate import rebound, references
+from blobtree.typed.unroll import original, unrolled
 
 TABLE = ((2.0, operators.sum_partials), (5.0, operators.union_partials))
 

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.glsl_builtins import type_name
+from blobtree.typed.builtins import type_name
 from decals.render.buffers import WIDTH, DataTexture
 from decals.render.context import Context
 from tests.blobtree.warp_functions import TypedFunction

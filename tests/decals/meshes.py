@@ -3,7 +3,7 @@
 import numpy as np
 import pyvista as pv
 
-from decals.mesh_surface import MeshSurface
+from decals.surfaces.mesh import MeshSurface
 
 
 def mesh(data: pv.PolyData) -> MeshSurface:

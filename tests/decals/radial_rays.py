@@ -4,8 +4,8 @@
 
 import warp as wp
 
-from decals.contact import Contact, rim_distance
-from decals.ownership import NOBODY, complement_at, owner_at
+from decals.field.contact import Contact, rim_distance
+from decals.field.ownership import NOBODY, complement_at, owner_at
 from decals.records import RECORD, RIM_RADIUS, xyz
 
 wp.set_module_options({"enable_backward": False})

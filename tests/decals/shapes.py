@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from decals.camera import Camera, Vector
 from decals.model import Decals
 from decals.render.drawables import register
 from decals.render.mesh import MeshDrawable
+from decals.scenes.camera import Camera, Vector
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from decals.camera import NEAR_OVER_FAR, Bounds, Camera, Vector
 from decals.errors import InvalidScene
+from decals.scenes.camera import NEAR_OVER_FAR, Bounds, Camera, Vector
 
 coordinate = st.floats(-100, 100)
 vector = st.tuples(coordinate, coordinate, coordinate)

@@ -6,7 +6,7 @@ import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from decals.contact import (
+from decals.field.contact import (
     NOWHERE,
     REACH,
     Contact,

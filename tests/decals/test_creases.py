@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from decals.creases import Creases
+from decals.coat.seeding import seed
 from decals.errors import InvalidSeeding
-from decals.mesh_surface import MeshSurface
-from decals.relaxation import Relaxation
-from decals.seeding import seed
+from decals.seeds.creases import Creases
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 
 

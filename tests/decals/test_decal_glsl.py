@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree.glsl import translate_library
-from decals.contact import contact_complement, contact_push, contact_uv, field_complement, rim_distance
-from decals.index import DecalIndex
-from decals.lookup import cell_hash, cell_range
-from decals.mapping import Mapping, surface_offset, tangent_coordinates
+from blobtree.typed.glsl import translate_library
+from decals.field.contact import contact_complement, contact_push, contact_uv, field_complement, rim_distance
+from decals.field.mapping import Mapping, surface_offset, tangent_coordinates
+from decals.grid.index import DecalIndex
+from decals.grid.lookup import cell_hash, cell_range
 
 wp.set_module_options({"enable_backward": False})
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from decals.editor import IDS, RECORDS, TABLE, DecalEditor
 from decals.errors import InvalidDecals
-from decals.evaluate import evaluate
-from decals.index import DecalIndex
-from decals.journal import Journal
+from decals.field.evaluate import evaluate
+from decals.grid.editor import IDS, RECORDS, TABLE, DecalEditor
+from decals.grid.index import DecalIndex
+from decals.grid.journal import Journal
 from decals.model import Decals
 
 

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from decals.contact import REACH
 from decals.errors import InvalidPoints
-from decals.evaluate import evaluate
-from decals.index import DecalIndex
-from decals.mapping import Mapping
+from decals.field.contact import REACH
+from decals.field.evaluate import evaluate
+from decals.field.mapping import Mapping
+from decals.grid.index import DecalIndex
 from decals.model import Decals
 from tests.oracles.decals import decals_at
 

@@ -11,22 +11,22 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import Node, Point, Segment
-from blobtree.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
-from blobtree.evaluate import bounds_along, bounds_at, colors_at, gradients_at
-from blobtree.glsl import translate_library
-from blobtree.operators import OPERATORS
-from blobtree.skeletons import SKELETONS
-from blobtree.trace import trace
-from blobtree.warps import WARPS
-from decals.camera import Camera
-from decals.index import DecalIndex
+from blobtree.formulas.operators import OPERATORS
+from blobtree.formulas.skeletons import SKELETONS
+from blobtree.formulas.warps import WARPS
+from blobtree.tapes.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.tapes.evaluate import bounds_along, bounds_at, colors_at, gradients_at
+from blobtree.tracing.trace import trace
+from blobtree.typed.glsl import translate_library
+from decals.field.ownership import owner_at
+from decals.grid.index import DecalIndex
 from decals.model import RECORD
-from decals.ownership import owner_at
 from decals.render.context import Context
 from decals.render.drawables import register
 from decals.render.renderer import Renderer
 from decals.render.tape_shader import Kinds, _dispatch, tracing_shader
 from decals.render.tree import TreeDrawable
+from decals.scenes.camera import Camera
 from tests.blobtree.trees import points_around, random_trees
 from tests.blobtree.warp_functions import TypedFunction, call, element, numpy_type, typed_functions
 from tests.decals.glsl_functions import run_program, through_glsl
@@ -41,12 +41,22 @@ TEXELS = 4096
 DECALS = 300
 
 MODULES = (
-    "blobtree.kernels", "blobtree.skeletons", "blobtree.operators", "blobtree.dispatch",
-    "blobtree.readings", "blobtree.rays",
-    "blobtree.warps",
-    "decals.contact", "decals.mapping", "decals.lookup", "decals.radial", "decals.records", "decals.stack",
-    "decals.cells", "decals.ownership",
-)  # fmt: skip
+    "blobtree.formulas.kernels",
+    "blobtree.formulas.skeletons",
+    "blobtree.formulas.operators",
+    "blobtree.tapes.dispatch",
+    "blobtree.tapes.readings",
+    "blobtree.tracing.rays",
+    "blobtree.formulas.warps",
+    "decals.field.contact",
+    "decals.field.mapping",
+    "decals.grid.lookup",
+    "decals.field.radial",
+    "decals.records",
+    "decals.field.stack",
+    "decals.field.cells",
+    "decals.field.ownership",
+)
 WRITTEN_TWICE = {"closest", "slimmest", "stride", "convex", "rises"}
 """Switches over the tables, written per backend."""
 

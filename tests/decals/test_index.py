@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from decals.contact import REACH
-from decals.index import DecalIndex, DeviceIndex
+from decals.field.contact import REACH
+from decals.grid.index import DecalIndex, DeviceIndex
 from decals.model import Decals
 
 

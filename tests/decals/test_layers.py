@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from decals.contact import Contact
 from decals.errors import InvalidImage
-from decals.evaluate import evaluate
+from decals.field.contact import Contact
+from decals.field.evaluate import evaluate
 from decals.model import Decals, Interaction, linear_light
 from tests.oracles.contact import RIM
 from tests.oracles.decals import colors_at, decals_at

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.choosing import ImageChoice, by_rank, odds
+from decals.coat.choosing import ImageChoice, by_rank, odds
+from decals.coat.fields import bends
+from decals.coat.jitter import Jitter
+from decals.coat.laying import lay
+from decals.coat.sizing import Sizing
 from decals.errors import InvalidSeeding
-from decals.fields import bends
-from decals.jitter import Jitter
-from decals.laying import lay
-from decals.relaxation import Relaxation
-from decals.sizing import Sizing
+from decals.seeds.relaxation import Relaxation
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.coats import covered
 

@@ -6,8 +6,8 @@ import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from decals.evaluate import evaluate
-from decals.mapping import Mapping, surface_offset, tangent_coordinates
+from decals.field.evaluate import evaluate
+from decals.field.mapping import Mapping, surface_offset, tangent_coordinates
 from decals.model import Decals
 
 wp.set_module_options({"enable_backward": False})

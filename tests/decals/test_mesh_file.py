@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 from decals.errors import InvalidMesh
-from decals.mesh_file import read_mesh, surface_triangles
+from decals.scenes.mesh_file import read_mesh, surface_triangles
 
 HEADER = """ply
 format {form} 1.0

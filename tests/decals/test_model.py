@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blobtree.kernels import RIM
+from blobtree.formulas.kernels import RIM
 from decals.errors import DecalsError, InvalidDecals
 from decals.model import LARGEST, LAYERS, RECORD, SMALLEST_RADIUS, Decals, Interaction
 

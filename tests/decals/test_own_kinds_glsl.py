@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from blobtree.evaluate import bounds_at, colors_at, gradients_at
-from blobtree.trace import trace
-from decals.camera import Camera
+from blobtree.tapes.evaluate import bounds_at, colors_at, gradients_at
+from blobtree.tracing.trace import trace
 from decals.render.context import Context
 from decals.render.renderer import Renderer
 from decals.render.tape_shader import Kinds, tracing_shader
+from decals.scenes.camera import Camera
 from tests.blobtree.own_kinds import EVERYTHING, OWN_TREES, Brick, Carve, Path, Ring, Soft
 from tests.blobtree.trees import points_around
 from tests.decals.glsl_functions import run_program

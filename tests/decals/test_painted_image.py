@@ -3,10 +3,10 @@ import pytest
 from PIL import Image
 
 from decals.errors import InvalidImage, InvalidSeeding
-from decals.mesh_surface import MeshSurface
-from decals.painted_image import PaintedImage
-from decals.projections import Cylindrical, Planar, Spherical, TextureCoordinates
-from decals.relaxation import Relaxation
+from decals.seeds.painted_image import PaintedImage
+from decals.seeds.projections import Cylindrical, Planar, Spherical, TextureCoordinates
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 
 SQUARE = Planar((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))

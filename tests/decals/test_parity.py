@@ -6,8 +6,8 @@ The float64 kernel that can answer so many is itself held against the NumPy orac
 import numpy as np
 import pytest
 
-from decals.contact import REACH, Contact
-from decals.mapping import Mapping
+from decals.field.contact import REACH, Contact
+from decals.field.mapping import Mapping
 from tests.bench.parity import LIMITS, Chunk, parity
 from tests.bench.parity_report import worst_points
 from tests.bench.parity_worlds import make_world

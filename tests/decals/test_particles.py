@@ -3,8 +3,8 @@ import pytest
 import warp as wp
 
 from decals.model import FACING_LIMIT
-from decals.particles import CLOSEST, ISOTROPY
-from decals.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsion
+from decals.seeds.particles import CLOSEST, ISOTROPY
+from decals.seeds.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsion
 from tests.oracles.repulsion import moves as expected_moves
 from tests.oracles.repulsion import total_energy
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from decals.contact import Contact
-from decals.evaluate import evaluate
-from decals.index import DecalIndex
+from decals.field.contact import Contact
+from decals.field.evaluate import evaluate
+from decals.grid.index import DecalIndex
 from decals.model import Decals
 from tests.decals.radial_rays import rims_of_points, slopes_of_rays
 from tests.oracles.contact import RIM

@@ -3,9 +3,9 @@ import sys
 import numpy as np
 import pytest
 
+from decals.coat.seeding import seed
 from decals.errors import InvalidSeeding
-from decals.remeshing import remeshed_points
-from decals.seeding import seed
+from decals.seeds.remeshing import remeshed_points
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.coats import nearest_facing
 

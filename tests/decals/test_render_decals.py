@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.camera import Camera
-from decals.contact import Contact
-from decals.evaluate import evaluate
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.evaluate import evaluate
+from decals.field.mapping import Mapping
 from decals.model import Decals, linear_light
 from decals.render import tile
 from decals.render.context import Context
 from decals.render.renderer import Buffers, Renderer
 from decals.render.scene_like import SceneLike
+from decals.scenes.camera import Camera
 from tests.decals.shapes import Picture, Shape, View, torus
 from tests.oracles.decals import colors_at, decals_at
 

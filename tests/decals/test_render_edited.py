@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.camera import DIRECTION, Camera
-from decals.editor import DecalEditor
+from decals.coat.seeding import seed
+from decals.grid.editor import DecalEditor
 from decals.model import Interaction
 from decals.render.decal_data import DecalData
 from decals.render.renderer import Renderer
-from decals.scene import DecalImage, Scene, TreeObject
-from decals.seeding import seed
+from decals.scenes.camera import DIRECTION, Camera
+from decals.scenes.scene import DecalImage, Scene, TreeObject
 
 
 @dataclass

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from decals.editor import DecalEditor
+from decals.grid.editor import DecalEditor
 from decals.model import Decals
 from decals.render.buffers import DataTexture
 from decals.render.context import Context

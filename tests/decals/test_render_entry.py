@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from decals.errors import NoGraphics
-from decals.mapping import Mapping
+from decals.field.mapping import Mapping
 from decals.render import entry as entries
 from decals.render.context import Context
 from decals.render.entry import COMPUTE_BASELINE, OVERRIDE, Entry, measure

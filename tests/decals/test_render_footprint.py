@@ -6,10 +6,10 @@ import moderngl
 import numpy as np
 import pytest
 
-from decals.camera import Camera
 from decals.render.context import Context
 from decals.render.tile import CameraBuffer, Picture, attach_camera, set_uniform
-from decals.viewpoint import Projection, Viewpoint
+from decals.scenes.camera import Camera
+from decals.scenes.viewpoint import Projection, Viewpoint
 from implicit_decals.shaders import compose
 from implicit_decals.shaders.compose import DIRECTORY
 

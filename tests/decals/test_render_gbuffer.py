@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from decals.camera import Camera
 from decals.errors import InvalidScene
 from decals.render.mesh import vertex_normals
 from decals.render.renderer import Renderer
+from decals.scenes.camera import Camera
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.raster import cast, edges
 

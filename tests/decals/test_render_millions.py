@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from decals.camera import Camera
 from decals.errors import TooMuchData
 from decals.model import Decals
 from decals.render.renderer import Buffers, Renderer
+from decals.scenes.camera import Camera
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.decals import decals_at
 

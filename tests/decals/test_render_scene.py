@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from blobtree import Point, Segment, polygonize
-from blobtree.trace import trace
-from decals.camera import Camera
-from decals.mapping import Mapping
+from blobtree.tracing.trace import trace
+from decals.coat.seeding import seed
+from decals.field.mapping import Mapping
 from decals.model import Decals
 from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers, tile
 from decals.render.context import Context
-from decals.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
-from decals.seeding import seed
-from decals.viewpoint import Projection
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
+from decals.scenes.viewpoint import Projection
 from tests.decals.shapes import torus
 from tests.decals.test_render_decals import compare
 from tests.oracles.raster import edges

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.camera import Camera
-from decals.contact import Contact
 from decals.errors import TooMuchData
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.model import Decals
 from decals.render.renderer import Renderer
+from decals.scenes.camera import Camera
 from tests.decals.shapes import View, torus
 from tests.decals.test_render_decals import WHITE, compare, plain_colors, quarters, wall
 from tests.oracles.decals import colors_at

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from blobtree import Node, Point, Segment
-from decals.camera import Camera
 from decals.render.context import Context
 from decals.render.entry import COMPUTE_BASELINE
 from decals.render.renderer import Buffers, Renderer
 from decals.render.tile import Picture, tiles
 from decals.render.tree import covered
-from decals.scene import MeshObject, TreeObject
-from decals.viewpoint import Projection, Viewpoint
+from decals.scenes.camera import Camera
+from decals.scenes.scene import MeshObject, TreeObject
+from decals.scenes.viewpoint import Projection, Viewpoint
 from tests.blobtree.trees import random_trees
 from tests.decals.shapes import View, torus
 from tests.oracles.raster import edges

@@ -8,12 +8,12 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import BlobTreeError, Node, Point, Segment
-from decals.camera import Camera
 from decals.errors import DecalsError, InvalidImage, InvalidMesh, InvalidScene
 from decals.images import generate_image
 from decals.model import Decals
-from decals.scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
-from decals.scene_file import from_json, is_scene, load_scene, save_scene, to_json
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
+from decals.scenes.scene_file import from_json, is_scene, load_scene, save_scene, to_json
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32) * np.float32(0.1)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)

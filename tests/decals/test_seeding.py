@@ -5,11 +5,11 @@ from hypothesis import strategies as st
 from scipy.spatial import SphericalVoronoi
 
 from blobtree import Point, Segment
+from decals.coat.seeding import seed
+from decals.coat.sizing import Sizing
 from decals.errors import InvalidSeeding
-from decals.implicit_surface import ImplicitSurface
-from decals.mesh_surface import MeshSurface
-from decals.seeding import seed
-from decals.sizing import Sizing
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.coats import covered, rho
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from blobtree import Point, Segment
+from decals.coat.laying import lay
 from decals.errors import InvalidSeeding
-from decals.implicit_surface import ImplicitSurface
-from decals.laying import lay
-from decals.mesh_surface import MeshSurface
-from decals.relaxation import Relaxation
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.coats import covered, nearest_facing
 

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blobtree import Point, Segment
-from decals.implicit_surface import ImplicitSurface
-from decals.mesh_surface import MeshSurface
-from decals.neighbours import FacingTree
-from decals.relaxation import Relaxation
+from decals.coat.neighbours import FacingTree
+from decals.seeds.relaxation import Relaxation
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.triangles import closest_points
 

@@ -1,17 +1,17 @@
 import numpy as np
 import pytest
 
-from decals.crowd import Crowd
+from decals.coat.neighbours import FacingTree
 from decals.errors import InvalidSeeding
 from decals.model import FACING_LIMIT
-from decals.neighbours import FacingTree
-from decals.particles import CLOSEST
-from decals.polishing import polish
-from decals.population import Sites, World, shares
-from decals.refilling import crowded, refill
-from decals.relaxation import Relaxation
-from decals.repulsion import CORE, CUTOFF, Law
-from decals.vertex_density import vertex_density
+from decals.seeds.crowd import Crowd
+from decals.seeds.particles import CLOSEST
+from decals.seeds.polishing import polish
+from decals.seeds.population import Sites, World, shares
+from decals.seeds.refilling import crowded, refill
+from decals.seeds.relaxation import Relaxation
+from decals.seeds.repulsion import CORE, CUTOFF, Law
+from decals.seeds.vertex_density import vertex_density
 from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.coats import nearest_facing, rho
 from tests.oracles.repulsion import total_energy

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from decals.fields import gradient_of
-from decals.orientation import Orientation, tangents
-from decals.population import Sites
-from decals.sizing import MARGIN, covering_radii, delaunay_radii, touching_radii
+from decals.coat.fields import gradient_of
+from decals.coat.orientation import Orientation, tangents
+from decals.coat.sizing import MARGIN, covering_radii, delaunay_radii, touching_radii
+from decals.seeds.population import Sites
 from tests.decals.meshes import plane
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from decals.contact import Contact
-from decals.index import DecalIndex
+from decals.field.contact import Contact
+from decals.field.ownership import complement_at, owner_at
+from decals.field.sheet import sheet_at
+from decals.grid.index import DecalIndex
 from decals.model import Decals
-from decals.ownership import complement_at, owner_at
-from decals.sheet import sheet_at
 
 wp.set_module_options({"enable_backward": False})
 

@@ -3,8 +3,8 @@ import pytest
 
 from blobtree import Point, Segment
 from decals.errors import InvalidMesh, InvalidPoints
-from decals.implicit_surface import ImplicitSurface
-from decals.surface import Surface
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.surface import Surface
 
 
 def directions(count, seed=0):

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decals.errors import InvalidMesh, InvalidPoints
-from decals.mesh_surface import MeshSurface
-from decals.surface import Surface
+from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.surface import Surface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.triangles import closest_points, first_hits
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from decals.camera import Camera
 from decals.edit import (
     Add,
     AddImage,
@@ -22,7 +21,8 @@ from decals.edit import (
     Turn,
 )
 from decals.edit.trees import primitive_paths
-from decals.scene import DecalImage, TreeObject
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, TreeObject
 from tests.edit.scenes import one
 
 PICTURES = (DecalImage.load("rivet"), DecalImage.load("tile"))

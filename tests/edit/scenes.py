@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 
 from blobtree import Point, Segment
-from decals.camera import Camera
+from decals.coat.seeding import seed
 from decals.edit import Document
 from decals.model import Decals
-from decals.scene import DecalImage, MeshObject, Scene, TreeObject
-from decals.seeding import seed
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject
 
 TREE = Point((0, 0, 0), radius=1.0) + Segment((0.9, 0.5, 0), (1.4, 1.3, 0), radius=0.5, color=(0.9, 0.5, 0.2))
 CARVED = TREE - Point((0, -0.9, 0.6), radius=0.5)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from decals.coat.neighbours import FacingTree
 from decals.edit import (
     Add,
     AddImage,
@@ -23,8 +24,7 @@ from decals.edit import (
 )
 from decals.edit.population import lying_on
 from decals.errors import InvalidDecals, InvalidEdit
-from decals.neighbours import FacingTree
-from decals.scene import DecalImage
+from decals.scenes.scene import DecalImage
 from tests.edit.scenes import digest, one, scene
 
 

@@ -63,7 +63,7 @@ def test_random_commands_and_back(seed, count):
 
 
 def test_the_index_is_that_of_a_fresh_build_after_random_commands():
-    from decals.evaluate import evaluate
+    from decals.field.evaluate import evaluate
 
     session = EditSession(scene())
     play(session, Monkey(2, session.document, scene(200).decals), 150)

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.camera import Camera
 from decals.edit import EditSession
 from decals.edit.document import Document
 from decals.edit.pick import LIFT, outline, pick, rims
-from decals.evaluate import evaluate
+from decals.field.evaluate import evaluate
 from decals.model import Interaction
 from decals.render.renderer import Renderer
-from decals.scene import DecalImage, Scene, TreeObject
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, Scene, TreeObject
 from tests.edit.scenes import one, scene
 
 SIZE = 120, 90

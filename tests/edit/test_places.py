@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from blobtree import Point
 from decals.edit.places import Places, carried, first_hit, nearest, turns
 from decals.errors import InvalidPoints
-from decals.scene import MeshObject, TreeObject
+from decals.scenes.scene import MeshObject, TreeObject
 from tests.edit.scenes import box, one
 
 BALL = TreeObject("ball", Point((0, 0, 0), radius=1.0))

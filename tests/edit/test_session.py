@@ -5,7 +5,7 @@ import pytest
 
 from decals.edit import Add, Alter, Carry, Delete, EditSession, Scale
 from decals.errors import InvalidDecals, InvalidScene
-from decals.scene_file import load_scene
+from decals.scenes.scene_file import load_scene
 from tests.edit.scenes import digest, one, scene
 
 

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment, define_skeleton
-from decals.camera import Camera
+from decals.coat.seeding import seed
 from decals.edit import (
     EditSession,
     MovePrimitive,
@@ -16,8 +16,8 @@ from decals.edit import (
 )
 from decals.edit.trees import alone, following, moved, primitive_at, with_node
 from decals.errors import InvalidEdit, InvalidMesh
-from decals.scene import DecalImage, Scene, TreeObject
-from decals.seeding import seed
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, Scene, TreeObject
 from tests.edit.scenes import digest
 
 A, B = Point((0, 0, 0), radius=1.0), Segment((1, 0, 0), (2, 0, 0), radius=0.5)

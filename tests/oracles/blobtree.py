@@ -28,7 +28,7 @@ from blobtree import (
     Twist,
     Union,
 )
-from blobtree.operators import Reach
+from blobtree.formulas.operators import Reach
 
 from . import own_kinds
 

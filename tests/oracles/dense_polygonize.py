@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Mesh, Node
-from blobtree.evaluate import colors_at, values_at
-from blobtree.kernels import ISO
-from blobtree.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
-from blobtree.project import project
+from blobtree.formulas.kernels import ISO
+from blobtree.meshing.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
+from blobtree.tapes.evaluate import colors_at, values_at
+from blobtree.tapes.project import project
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -28,7 +28,7 @@ class _Grid:
 
 
 def polygonize(tree: Node, *, cell_size: float) -> Mesh:
-    """The surface of `tree` over the same grid as `blobtree.polygonize`."""
+    """The surface of `tree` over the same grid as `blobtree.meshing.polygonize`."""
     grid = _make_grid(tree, cell_size)
     values = values_at(tree.tape, grid.points(np.argwhere(np.ones(grid.shape, bool)))).reshape(grid.shape)
     vertices, quads = _dual_surface(values, grid)

@@ -6,9 +6,9 @@ import numpy as np
 import pyvista as pv
 
 from blobtree import Point, Segment
-from decals.camera import Camera
-from decals.scene import DecalImage, MeshObject, Scene, TreeObject
-from decals.seeding import seed
+from decals.coat.seeding import seed
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject
 from tests.decals.shapes import torus
 
 TREE = Segment((-0.8, 0, 0), (0.5, 0, 0), radius=0.4, color=(0.8, 0.2, 0.1)) + Point(

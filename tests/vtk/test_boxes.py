@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from blobtree import Point, Segment
-from blobtree.tracing_cells import BLOCKS_ALONG
-from decals.scene import MeshObject, TreeObject, bounds_of
+from blobtree.tracing.cells import BLOCKS_ALONG
+from decals.scenes.scene import MeshObject, TreeObject, bounds_of
 from decals.vtk.boxes import box_around
 from tests.decals.shapes import torus
 

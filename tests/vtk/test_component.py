@@ -7,7 +7,7 @@ import pyvista as pv
 from blobtree import Point
 from decals.errors import InvalidDecals, InvalidImage, InvalidScene
 from decals.model import PLAIN, Decals
-from decals.scene import DecalImage, MeshObject, TreeObject
+from decals.scenes.scene import DecalImage, MeshObject, TreeObject
 from tests.decals.shapes import View
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import both, shot

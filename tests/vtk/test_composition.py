@@ -7,7 +7,7 @@ from scipy.ndimage import binary_erosion
 
 from blobtree import Point
 from decals.render import Buffers
-from decals.scene import TreeObject
+from decals.scenes.scene import TreeObject
 from decals.vtk import Stage
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from decals.camera import Camera
-from decals.contact import Contact
 from decals.errors import InvalidScene
+from decals.field.contact import Contact
 from decals.model import Decals
 from decals.render import Buffers
-from decals.scene import MeshObject, Scene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import MeshObject, Scene
 from decals.vtk import injection
 from decals.vtk.component import triangles
 from tests.decals.test_render_decals import in_layers, scattered

@@ -10,7 +10,7 @@ from vtkmodules.vtkRenderingCore import (
     vtkWorldPointPicker,
 )
 
-from decals.seeding import seed
+from decals.coat.seeding import seed
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import shot
 from tests.vtk.test_composition import BALL, lying_behind, place

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from decals.contact import Contact
-from decals.editor import DecalEditor
 from decals.errors import NoGraphics
-from decals.mapping import Mapping
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
+from decals.grid.editor import DecalEditor
 from decals.render import TRANSPARENT
-from decals.scene import MeshObject
+from decals.scenes.scene import MeshObject
 from decals.vtk.component import triangles
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory

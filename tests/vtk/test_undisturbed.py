@@ -9,8 +9,8 @@ import pyvista as pv
 from scipy.ndimage import binary_dilation
 
 from blobtree import Point
-from decals.scene import TreeObject
-from decals.seeding import seed
+from decals.coat.seeding import seed
+from decals.scenes.scene import TreeObject
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import shot
 

@@ -8,11 +8,11 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
-from decals.camera import Camera
 from decals.edit.population import lying_on
 from decals.errors import NoGraphics
-from decals.scene import Scene
-from decals.scene_file import load_scene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
+from decals.scenes.scene_file import load_scene
 from decals.window import EditWindow, view
 from tests.edit.scenes import scene
 

@@ -1,0 +1,1 @@
+"""Immutable nodes: what people write, combine, print and save."""

@@ -1,0 +1,1 @@
+"""Kinds of nodes of one's own, each from one typed function."""

@@ -1,0 +1,1 @@
+"""Rays through sparse cells, with a proven step bound."""

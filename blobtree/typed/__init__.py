@@ -1,0 +1,1 @@
+"""Typed functions as source: to GLSL, to plain Python, made anew for other tables."""

@@ -1,0 +1,1 @@
+"""Meshes and slices as pyvista objects."""

@@ -1,0 +1,1 @@
+"""Particles to decals: sizes, tangents, images, disorder."""

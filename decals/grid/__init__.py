@@ -1,0 +1,1 @@
+"""Which decals can reach a point: a hierarchical hash grid, and edits of its own bytes."""

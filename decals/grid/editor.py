@@ -1,0 +1,300 @@
+"""Editing some decals among many: records and index change by their own bytes, in memory and on the card.
+
+    editor = DecalEditor(decals)
+    number = editor.add(one)                       one: Decals of length 1
+    editor.change(number, positions=[[1, 2, 3]])   move, resize, re-layer, ...
+    editor.delete(number)
+    editor.changes(since=version)                  {"index_ids": [(first, past last), ...], ...}
+
+Look-ups give exactly what an index that is built anew would give. Numbers stay: a deleted decal leaves a gap,
+which `put` alone fills again.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from decals.errors import InvalidDecals
+from decals.grid import edit_kernels as kernels
+from decals.grid.cells import FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
+from decals.grid.index import DecalIndex
+from decals.grid.journal import Journal, Range
+from decals.grid.rows import DecalRows, as_numbers, with_spare
+from decals.model import RECORD, Decals
+
+MOST_LEVELS = 128
+FEW = 64
+"""So many decals are always put into the index one by one."""
+
+RECORDS, LEVELS, TABLE, IDS = "decal_records", "index_levels", "index_table", "index_ids"
+ROOMS = "rooms"
+_TYPES = {RECORDS: wp.vec4, LEVELS: wp.vec4, TABLE: wp.vec4i, IDS: wp.int32}
+
+
+class DecalEditor:
+    """Decals and their index as arrays that change in place.
+
+    Parameters
+    ----------
+    decals
+        What there is at first; their numbers are their rows.
+
+    Attributes
+    ----------
+    arrays
+        "decal_records", "index_levels", "index_table" and "index_ids", with spare rows at the end, as
+        `Decals.packed` and `DecalIndex` lay them out. An edit may put another array in place of a full one.
+    """
+
+    def __init__(self, decals: Decals) -> None:
+        self._rows = DecalRows(decals)
+        self.arrays: dict[str, NDArray[Any]] = {}
+        self._journal = Journal()
+        self._shared: dict[str, Any] = {}
+        self._state, self._wp_state = _shared(np.zeros(4, np.int32), wp.int32)
+        self._ranges, self._wp_ranges = _shared(np.zeros((NEIGHBOURHOOD, 2), np.int32), wp.vec2i)
+        self._slots, self._wp_slots = _shared(np.zeros(NEIGHBOURHOOD, np.int32), wp.int32)
+        self._put(RECORDS, _records(decals.packed(), len(decals)))
+        self._rebuild()
+
+    # -- what there is ----------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return self._rows.count
+
+    def __getitem__(self, number: int) -> Decals:
+        """Give one decal, as `Decals` of length 1."""
+        return self._rows.take(number)
+
+    def take(self, numbers: ArrayLike) -> Decals:
+        """Give the decals of these numbers, in their order."""
+        return self._rows.take(numbers)
+
+    def has(self, numbers: ArrayLike) -> NDArray[np.bool_]:
+        """Whether there is a decal of each of these numbers, ``bool[n]``."""
+        return self._rows.there(numbers)
+
+    @property
+    def numbers(self) -> NDArray[np.int64]:
+        """Numbers of the decals that there are, ascending."""
+        return self._rows.numbers
+
+    @property
+    def next_number(self) -> int:
+        """Number of the next decal that is added."""
+        return self._rows.end
+
+    @property
+    def decals(self) -> Decals:
+        """All decals, in the order of `numbers`."""
+        return self._rows.take(self.numbers)
+
+    @property
+    def level_count(self) -> int:
+        """Number of levels of the index."""
+        return len(self._level_of)
+
+    @property
+    def layered(self) -> bool:
+        """Whether decals lie over each other, as `Decals.layered`."""
+        return self._rows.layered
+
+    @property
+    def index(self) -> DecalIndex:
+        """Give the index as it is now: no copy, so the next edit changes it."""
+        return DecalIndex(self.arrays[LEVELS][: self.level_count], self.arrays[TABLE], self.arrays[IDS])
+
+    # -- edits ------------------------------------------------------------------------------------------
+
+    def add(self, one: Decals) -> int:
+        """Add a decal on top of those of its rank; its number."""
+        _check_one(one)
+        number = self.next_number
+        self.put([number], one)
+        return number
+
+    def change(self, number: int, **arrays: ArrayLike) -> None:
+        """Exchange some of a decal's values (each an array of length 1, as in `Decals.replace`).
+
+        Raises
+        ------
+        InvalidDecals
+            No such decal, or values that are none; nothing changes then.
+        """
+        after = self[number].replace(**arrays)
+        _check_one(after)
+        self.put([number], after)
+
+    def delete(self, numbers: ArrayLike) -> None:
+        """Delete decals; `add` does not use their numbers again.
+
+        Raises
+        ------
+        InvalidDecals
+            One of them is not there; nothing changes then.
+        """
+        rows = self._rows.check(numbers)
+        many = self._are_many(rows)
+        if not many:
+            for number in rows.tolist():
+                self._take_out(number)
+        self._rows.drop(rows)
+        if many:
+            self._rebuild()
+
+    def put(self, numbers: ArrayLike, decals: Decals) -> None:
+        """Give these numbers these decals, whether they had one before, were deleted, or are new.
+
+        Raises
+        ------
+        InvalidDecals
+            Not a decal for each number, a number twice, one below 0, or one far beyond the last; nothing
+            changes then.
+        """
+        rows = self._checked(numbers, decals)
+        many = self._are_many(rows)
+        if not many:
+            for number in rows[self._rows.there(rows)].tolist():
+                self._take_out(number)
+        self._write_records(rows, decals)
+        self._rows.put(rows, decals)
+        done = many or all(map(self._put_in, rows.tolist(), decals.ranks.tolist()))
+        if many or not done:
+            self._rebuild()
+
+    @property
+    def version(self) -> int:
+        """Counts the changes of arrays; see `changes`."""
+        return self._journal.version
+
+    def changes(self, since: int) -> dict[str, list[Range]]:
+        """Rows of each array that changed since a version: disjoint (first, past last), ascending."""
+        known = self._journal.since(since)
+        return {name: [(0, len(array))] for name, array in self.arrays.items()} if known is None else known
+
+    # -- how --------------------------------------------------------------------------------------------
+
+    def _checked(self, numbers: ArrayLike, decals: Decals) -> NDArray[np.int64]:
+        rows = as_numbers(numbers)
+        if len(rows) != len(decals):
+            raise InvalidDecals(f"expected a decal for each of {len(rows)} numbers, got {len(decals)}")
+        if len(np.unique(rows)) < len(rows):
+            raise InvalidDecals(f"expected each number once, got {rows.tolist()!s:.80}; drop the repeats")
+        most = self.next_number + len(rows)
+        wrong = rows[(rows < 0) | (rows >= most)]
+        if len(wrong):
+            raise InvalidDecals(f"expected numbers from 0 to {most - 1}, got {wrong[0]}")
+        return rows
+
+    def _are_many(self, rows: NDArray[np.int64]) -> bool:
+        """Whether a new index costs less than one change after another."""
+        return len(rows) > max(FEW, len(self) // 8)
+
+    def _take_out(self, number: int) -> None:
+        exponent = self._exponent(number)
+        arrays = [self._shared[name] for name in (RECORDS, TABLE, IDS)]
+        where = [number, exponent, self._level_of[exponent]]
+        wp.launch(kernels.take_out, 1, [*where, *arrays, self._wp_state, self._wp_ranges], device="cpu")
+        self._note()
+
+    def _write_records(self, rows: NDArray[np.int64], decals: Decals) -> None:
+        count = int(rows.max(initial=-1)) + 1
+        if RECORD * count > len(self.arrays[RECORDS]):
+            self._put(RECORDS, _records(self.arrays[RECORDS], count))
+        self.arrays[RECORDS].reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
+        for first, last in _runs(rows):
+            self._journal.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
+
+    def _put_in(self, number: int, rank: int) -> bool:
+        """Put a decal into the lists of the index; False where they have no room for it."""
+        exponent = self._exponent(number)
+        self._widen(exponent, float(rank))
+        arrays = [self._shared[name] for name in (RECORDS, TABLE, ROOMS, IDS)]
+        where = [number, exponent, self._level_of[exponent]]
+        inputs = [*where, *arrays, self._wp_state, self._wp_ranges, self._wp_slots]
+        wp.launch(kernels.put_in, 1, inputs, device="cpu")
+        if not self._state[3]:
+            return False
+        for slot in self._slots[: self._state[2]].tolist():
+            if slot >= 0:
+                self._journal.add(TABLE, (slot, slot + 1))
+        self._note()
+        return True
+
+    def _widen(self, exponent: int, rank: float) -> None:
+        """Make sure of a level for this size that knows of this rank."""
+        levels = self.arrays[LEVELS]
+        level = self._level_of.get(exponent)
+        if level is None:
+            level = self._level_of[exponent] = len(self._level_of)
+            levels[level] = 2.0**-exponent, 2.0**exponent, rank, rank
+        elif levels[level, 2] <= rank <= levels[level, 3]:
+            return
+        levels[level, 2:] = min(levels[level, 2], rank), max(levels[level, 3], rank)
+        self._journal.add(LEVELS, (level, level + 1))
+
+    def _exponent(self, number: int) -> int:
+        """As `index_cells.cell_exponent`, from the record."""
+        x, y, z, influence = self.arrays[RECORDS][RECORD * number].tolist()
+        reach = influence * REACH_WITH_SLACK
+        farthest = max(abs(x), abs(y), abs(z)) + reach
+        return max(math.frexp(reach)[1], math.frexp(farthest)[1] - FINEST)
+
+    def _rebuild(self) -> None:
+        """Lay the index out anew, with spare room."""
+        numbers = self.numbers
+        records = self.arrays[RECORDS].reshape(-1, RECORD, 4)[numbers]
+        ranks = np.floor(records[:, 1, 3]).astype(np.int32)
+        index = DecalIndex.build(records[:, 0, :3], records[:, 0, 3], ranks)
+        levels = np.zeros((MOST_LEVELS, 4), np.float32)
+        levels[: index.level_count] = index.levels
+        self._level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
+        table, ids = index.table.copy(), index.ids.copy()
+        full = np.flatnonzero(table[:, 0] >= 0)
+        heads = table[full, 3]
+        rooms = np.zeros(len(table), np.int32)
+        rooms[full] = ids[heads]
+        listed = np.ones(len(ids), bool)
+        listed[heads] = False
+        ids[listed] = numbers[ids[listed]]
+        self._state[:2] = len(ids), len(full)
+        self._put(LEVELS, levels)
+        self._put(TABLE, table)
+        self._put(IDS, with_spare(ids))
+        _, self._shared[ROOMS] = _shared(rooms, wp.int32)
+
+    def _put(self, name: str, array: NDArray[Any]) -> None:
+        self.arrays[name], self._shared[name] = _shared(array, _TYPES[name])
+        self._journal.add(name, (0, len(array)), new=True)
+
+    def _note(self) -> None:
+        for first, end in self._ranges[: self._state[2]].tolist():
+            self._journal.add(IDS, (first, end))
+
+
+def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:
+    """Give an array, and the same memory as Warp has it."""
+    held = np.ascontiguousarray(array)
+    return held, wp.array(held, dtype=dtype, device="cpu", copy=False)
+
+
+def _records(array: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """Copy records to more of them, at least so many."""
+    return with_spare(array.reshape(-1, RECORD, 4), count).reshape(-1, 4)
+
+
+def _runs(rows: NDArray[np.int64]) -> list[Range]:
+    """First and last number of each run of numbers that follow each other."""
+    ordered = np.sort(rows)
+    breaks = np.flatnonzero(np.diff(ordered) > 1)
+    firsts = ordered[np.concatenate([[0], breaks + 1])] if len(ordered) else ordered
+    lasts = ordered[np.concatenate([breaks, [-1]])] if len(ordered) else ordered
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+
+
+def _check_one(one: Decals) -> None:
+    if len(one) != 1:
+        raise InvalidDecals(f"expected one decal, got {len(one)}; `put` takes several")

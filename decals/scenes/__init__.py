@@ -1,0 +1,1 @@
+"""What a picture shows: objects, decals, images and camera, and their files."""

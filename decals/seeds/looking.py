@@ -1,0 +1,84 @@
+"""Looking around on one device: how near the nearest particle is, and who stands out."""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree.launch import launch
+from decals.model import FACING_LIMIT
+from decals.seeds.crowd import Crowd
+from decals.seeds.repulsion import WIDENING, make_grid
+from decals.seeds.search_kernels import nearest_facing, peaks
+from decals.surfaces.ground import Scalars, Vectors, vectors
+from decals.surfaces.surface import Flags, Floats
+
+
+class Lookout:
+    """Sees who is near any point, among the particles of a crowd as they lie now.
+
+    Parameters
+    ----------
+    crowd
+        The particles.
+    reach
+        How far it sees, in spacings.
+    """
+
+    def __init__(self, crowd: Crowd, reach: float) -> None:
+        self._crowd, self._reach = crowd, reach
+        self._grid = make_grid(crowd.count, crowd.device)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Particles have moved."""
+        self._grid.build(self._crowd.positions, self._reach * self._crowd.spacing)
+
+    def nearness(
+        self, points: Vectors, normals: Vectors, sizes: Scalars, own: Scalars, *, enough: float = 0.0
+    ) -> Scalars:
+        """Distance of each point to the nearest particle that faces it, in their spacing, on the device.
+
+        At most the reach. `own` are particles that do not count, -1 for none; below `enough` any number
+        serves that is not larger than that.
+        """
+        crowd = self._crowd
+        found: Any = wp.empty(len(points), dtype=wp.float32, device=crowd.device)
+        widening = WIDENING if crowd.varied else 1.0
+        inputs = [self._grid.id, crowd.positions, crowd.normals, crowd.sizes, FACING_LIMIT, self._reach]
+        inputs += [widening, enough, own, points, normals, sizes]
+        launch(nearest_facing, len(points), inputs, [found], device=crowd.device)
+        return found
+
+    def nearness_of(self, rows: NDArray[np.int64]) -> Floats:
+        """The same for some particles of the crowd, ``float32[k]``."""
+        crowd = self._crowd
+        own = whole_numbers(rows, crowd.device)
+        places, ways, sizes = crowd.positions, crowd.normals, crowd.sizes
+        if len(rows) < crowd.count:
+            places, ways, sizes = (array[own].contiguous() for array in (places, ways, sizes))
+        found: Floats = self.nearness(places, ways, sizes, own).numpy()
+        return found
+
+
+def outstanding(points: Floats, values: Floats, radii: Floats, *, device: str) -> Flags:
+    """Whether each point has the largest value within its radius, ``bool[n]``; of equals the first has."""
+    if len(points) == 0:
+        return np.zeros(0, np.bool_)
+    places = vectors(np.ascontiguousarray(points), device)
+    grid = make_grid(len(points), device)
+    grid.build(places, float(np.median(radii)))
+    given: list[Any] = [
+        wp.array(np.ascontiguousarray(rows, dtype=np.float32), dtype=wp.float32, device=device)
+        for rows in (values, radii)
+    ]
+    flags: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+    launch(peaks, len(points), [grid.id, places, *given], [flags], device=device)
+    found: Flags = flags.numpy() == 1
+    return found
+
+
+def whole_numbers(rows: NDArray[np.int64], device: str) -> Scalars:
+    """Rows as an array of a device."""
+    return wp.array(rows.astype(np.int32), dtype=wp.int32, device=device)

@@ -1,0 +1,62 @@
+"""How many particles there are, and where those lie that are given."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from decals.errors import InvalidSeeding
+from decals.seeds.population import Sites, World
+from decals.surfaces.surface import as_points
+
+
+def nobody() -> Sites:
+    """No sites at all."""
+    none = np.zeros((0, 3), np.float32)
+    return Sites(none, none, np.zeros(0, np.int32))
+
+
+def check(name: str, value: int, least: int) -> None:
+    """Raise `InvalidSeeding` unless the value is a whole number of at least so much."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InvalidSeeding(f"{name}: expected a whole number, got {value!r}")
+    if value < least:
+        raise InvalidSeeding(f"{name}: expected at least {least}, got {value}")
+
+
+def count_of(count: int | None, spacing: float | None, mass: float) -> int:
+    """Count that was wished for, or follows from the spacing."""
+    if (count is None) == (spacing is None):
+        raise InvalidSeeding("expected either a count or a spacing, got both or none; give one of them")
+    if count is not None:
+        check("count", count, 0)
+        return int(count)
+    assert spacing is not None
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
+    return int(round(2.0 * mass / (np.sqrt(3.0) * spacing**2)))
+
+
+def placed(world: World, fixed: ArrayLike | None) -> Sites:
+    """Put fixed particles onto the surfaces that they are closest to, in the surfaces' order."""
+    if fixed is None or np.size(fixed) == 0:
+        return nobody()
+    if not world.surfaces:
+        raise InvalidSeeding("fixed: expected a surface for them to lie on, got none")
+    points = as_points(fixed, "fixed")
+    found = [surface.project(points) for surface in world.surfaces]
+    gaps = np.stack([np.linalg.norm(positions - points, axis=1) for positions, _ in found])
+    nearest = gaps.argmin(axis=0)
+    rows = np.arange(len(points))
+    return Sites(
+        np.stack([positions for positions, _ in found])[nearest, rows],
+        np.stack([normals for _, normals in found])[nearest, rows],
+        nearest.astype(np.int32),
+    )
+
+
+def remaining(counts: NDArray[np.int64], given: Sites) -> NDArray[np.int64]:
+    """What is left of each surface's share after the fixed particles; the sum stays exact."""
+    left = counts - np.bincount(given.surface_ids, minlength=len(counts))
+    while (left < 0).any():
+        left[int(left.argmax())] -= 1
+        left[int(left.argmin())] += 1
+    return left
