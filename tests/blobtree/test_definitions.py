@@ -32,6 +32,14 @@ HERE = File(__file__).name
 BALL = Point((0, 0, 0), radius=1.0)
 
 
+@pytest.fixture(autouse=True)
+def names_are_ours() -> None:
+    """Another test's definitions may have taken the names of these kinds."""
+    for kind in vars(own_kinds).values():
+        if isinstance(kind, registry.OwnKind):
+            registry.register(kind)
+
+
 # -- functions that are no skeleton ---------------------------------------------------------------------
 
 
