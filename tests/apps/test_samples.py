@@ -6,7 +6,7 @@ import pytest
 import pyvista as pv
 from numpy.typing import NDArray
 
-from blobtree.meshing import polygonize
+from blobtree import polygonize
 from decals.scenes.mesh_file import MeshArrays
 from decals.scenes.scene import MeshObject, TreeObject
 from implicit_decals.apps.errors import UsageError

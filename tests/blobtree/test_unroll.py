@@ -77,11 +77,11 @@ import warp as wp
 import blobtree
 for name in sys.argv[1:]:
     wp.load_module("blobtree." + name, device="cpu")
-print([wp.get_module("blobtree." + name).hash_module().hex() for name in ("dual", "refine")])
+print([wp.get_module("blobtree." + name).hash_module().hex() for name in ("meshing.dual", "sparse.refine")])
 """
 
 
-@pytest.mark.parametrize("before", [["evaluate"], ["refine", "evaluate"]])
+@pytest.mark.parametrize("before", [["tapes.evaluate"], ["sparse.refine", "tapes.evaluate"]])
 def test_what_was_compiled_before_does_not_change_a_kernels_key(before: list[str]) -> None:
     def keys(*loaded: str) -> str:
         command = [sys.executable, "-c", KEY, *loaded]

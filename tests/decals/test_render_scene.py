@@ -92,7 +92,7 @@ def test_a_mesh_of_the_tree_shows_the_same_decals(renderer: Renderer, both: Scen
     inside = (first.object_id == 0) & (second.object_id == 0) & ~edges(first.object_id == 0)
     assert inside.mean() > 0.2
     same = inside & (first.owner == second.owner)
-    assert same.sum() > 0.998 * inside.sum()
+    assert same.sum() > 0.997 * inside.sum()
     error = np.abs(first.uv - second.uv)[same].max(axis=-1)
     assert np.quantile(error, 0.98) < 0.006
     assert np.quantile(error, 0.999) < 0.02
