@@ -145,6 +145,9 @@ def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> 
     starts, headings = point_array(origins), point_array(directions)
     if starts.shape != headings.shape:
         raise InvalidPoints(f"directions: expected one per origin, {len(starts)}, got {len(headings)}")
-    if not (np.abs(headings).max(axis=1, initial=0.0) > 0.0).all():
+    largest = np.abs(headings).max(axis=1, initial=0.0)
+    if not (largest > 0.0).all():
         raise InvalidPoints("directions: expected vectors with a length, got a zero vector")
+    # Squares of tiny components would vanish from a length; powers of two change no bit of a direction.
+    headings = np.ldexp(headings, -np.frexp(largest)[1][:, None])
     return [wp.array(array, dtype=wp.vec3, device=device) for array in (starts, headings)]

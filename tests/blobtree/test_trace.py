@@ -227,6 +227,13 @@ def test_no_rays_give_no_hits() -> None:
     assert len(BALL.raycast(np.zeros((0, 3)), np.zeros((0, 3)))) == 0
 
 
+@pytest.mark.parametrize("length", [1e-44, 1e-30, 1e-22, 1e-18, 1e17])
+def test_tiny_and_huge_directions_are_directions(length: float) -> None:
+    directions = np.float32(length) * np.float32([[0, 0, -1], [0, 1, -1]])
+    expected = cast(BALL, [[0, 0, 5], [0, -4.5, 5]], np.sign(directions))
+    np.testing.assert_array_equal(cast(BALL, [[0, 0, 5], [0, -4.5, 5]], directions), expected)
+
+
 def test_senseless_rays_are_refused() -> None:
     with pytest.raises(InvalidPoints, match="directions: expected vectors with a length, got a zero vector"):
         cast(BALL, [[0, 0, 5], [0, 0, 5]], [[0, 0, 1], [0, 0, 0]])
