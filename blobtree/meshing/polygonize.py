@@ -5,7 +5,7 @@ surface's area; vertices lie on the surface as exactly as float32 can tell.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -109,8 +109,7 @@ def polygonize(
         raise InvalidResolution(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"
         )
-    if not 0.0 < chord_error < np.inf:
-        raise InvalidResolution(f"chord_error: expected a finite length above 0, got {chord_error!r}")
+    chord_error = _above_zero("chord_error", "length", chord_error)
     smallest = SMALLEST * float(np.abs(tree.bounds).max())
     if chord_error < smallest:
         raise InvalidResolution(
@@ -259,8 +258,7 @@ def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> f
                 f"resolution: expected a whole number of cells from 1, got {resolution!r}"
             )
         cell_size = longest / int(cells)
-    if not 0.0 < cell_size < np.inf:
-        raise InvalidResolution(f"cell_size: expected a finite size above 0, got {cell_size!r}")
+    cell_size = _above_zero("cell_size", "size", cell_size)
     if not SMALLEST_MODEL < longest < LARGEST_MODEL:
         raise InvalidResolution(
             f"the model is {longest:.3g} long; between {SMALLEST_MODEL:g} and {LARGEST_MODEL:g} float32 can "
@@ -271,7 +269,18 @@ def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> f
             f"cell_size: {cell_size:g} makes {longest / cell_size:.3g} cells along the model, at most "
             f"{FINEST_RESOLUTION:,} can be counted; take larger cells"
         )
-    return float(cell_size)
+    return cell_size
+
+
+def _above_zero(name: str, noun: str, value: object) -> float:
+    """`value` as a finite number above zero; InvalidResolution otherwise."""
+    try:
+        number = float(cast(Any, value))
+    except (TypeError, ValueError):
+        number = np.nan
+    if not 0.0 < number < np.inf:
+        raise InvalidResolution(f"{name}: expected a finite {noun} above 0, got {value!r}")
+    return number
 
 
 def _grid(tree: Node, cell_size: float) -> Grid:

@@ -92,6 +92,8 @@ def _polydata(points: NDArray[Any], faces: NDArray[Any]) -> "pv.PolyData":
 
 
 def _levels(values: Iterable[float]) -> list[float]:
+    if not isinstance(values, Iterable):
+        raise InvalidPoints(f"values: expected several field values, got {values!r}; put it in a list")
     levels = sorted({finite_number("values", value) for value in values})
     if levels and levels[0] <= 0.0:
         raise InvalidPoints(

@@ -175,6 +175,8 @@ def test_the_same_call_gives_the_same_mesh() -> None:
         ({"cell_size": -1.0}, "cell_size: expected a finite size above 0, got -1.0"),
         ({"cell_size": float("nan")}, "cell_size: expected a finite size above 0, got nan"),
         ({"cell_size": float("inf")}, "cell_size: expected a finite size above 0, got inf"),
+        ({"cell_size": "fine"}, "cell_size: expected a finite size above 0, got 'fine'"),
+        ({"chord_error": "fine"}, "chord_error: expected a finite length above 0, got 'fine'"),
         ({"cell_size": 1e-12}, "take larger cells"),
         ({"resolution": 10**9}, "take larger cells"),
         ({"resolution": 20_000}, "take larger cells"),

@@ -123,6 +123,7 @@ def test_lines_only_where_they_are_wished() -> None:
         ({"normal": (0, np.nan, 0)}, "normal: expected three finite numbers"),
         ({"origin": "here"}, "origin: expected three finite numbers"),
         ({"values": [0.5, 0.0]}, "values: expected field values above 0"),
+        ({"values": 0.5}, "values: expected several field values, got 0.5; put it in a list"),
         ({"values": [np.inf]}, "values: expected a finite number"),
     ],
 )
