@@ -17,6 +17,7 @@ from blobtree.tapes.program import (
     Push,
     Run,
     distinct_placements,
+    vanished,
 )
 
 Box = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -54,12 +55,20 @@ def influence_bounds(program: list[Instruction]) -> tuple[NDArray[np.float32], N
 
 
 def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
-    """Boxes (n, 3), (n, 3) of balls swept over the primitives' skeletons, under their maps."""
+    """Boxes (n, 3), (n, 3) of balls swept over the primitives' skeletons, under their maps.
+
+    Raises
+    ------
+    InvalidNode
+        An offset leaves nothing of a primitive.
+    """
     points = primitives[0].primitive.hulls([placed.primitive for placed in primitives])
     placements, placed_by = distinct_placements(primitives)
     matrices = np.array([placement.matrix for placement in placements])[placed_by]
     growth = np.array([placement.growth for placement in placements])[placed_by] / RIM
     influences = np.array([max(placed.primitive.influences) for placed in primitives]) + growth
+    if (influences <= 0.0).any():
+        raise vanished(primitives[int(np.argmin(influences))])
     placed_points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
     margins = influences[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)
     return placed_points.min(axis=1) - margins, placed_points.max(axis=1) + margins

@@ -77,6 +77,11 @@ def distinct_placements(primitives: list[PlacedPrimitive]) -> tuple[list[Placeme
     return placements, placed_by
 
 
+def vanished(placed: PlacedPrimitive) -> InvalidNode:
+    """What to raise where an offset leaves nothing of a primitive."""
+    return InvalidNode(f"offset: {placed.placement.growth:g} leaves nothing of {placed.primitive!r}")
+
+
 @dataclass(frozen=True)
 class Run:
     """Fold `primitives`, one after the other, into the accumulator."""

@@ -39,6 +39,7 @@ from blobtree.tapes.program import (
     Run,
     distinct_placements,
     registers_needed,
+    vanished,
     warp_registers_needed,
 )
 
@@ -191,6 +192,5 @@ def _grown_influences(primitives: list[PlacedPrimitive]) -> NDArray[np.float64]:
     growth = np.array([placement.growth for placement in placements])[placed_by] / RIM
     grown: NDArray[np.float64] = influences + growth[:, None]
     if (grown <= 0.0).any():
-        worst = primitives[int(np.argmin(grown.min(axis=1)))]
-        raise InvalidNode(f"offset: {worst.placement.growth:g} leaves nothing of {worst.primitive!r}")
+        raise vanished(primitives[int(np.argmin(grown.min(axis=1)))])
     return grown

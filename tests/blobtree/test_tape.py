@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import RIM, InvalidNode, Node, Point, Segment
+from blobtree import RIM, InvalidNode, Node, Point, Segment, polygonize
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
 from blobtree.formulas.skeletons import POINT, SEGMENT, SKELETONS
 from blobtree.tapes.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
@@ -130,3 +130,11 @@ def test_an_offset_folds_into_the_radii_and_shrinks_tools() -> None:
     assert tool * RIM == pytest.approx(2.0 * 0.3 - 0.1, rel=1e-6)
     with pytest.raises(InvalidNode, match="leaves nothing of Point"):
         _ = BALL.offset(-0.6).tape
+
+
+@pytest.mark.parametrize("distance", [-1.5, -10.0])
+def test_what_an_offset_eats_up_has_no_box_and_no_mesh(distance: float) -> None:
+    eaten = BALL.offset(distance)
+    for ask in (lambda: eaten.bounds, lambda: polygonize(eaten), lambda: polygonize(eaten, cell_size=0.1)):
+        with pytest.raises(InvalidNode, match="leaves nothing of Point"):
+            ask()
