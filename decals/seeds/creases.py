@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from decals.errors import InvalidSeeding
+from decals.seeds.placing import MOST_SEEDS
 from decals.seeds.population import Mask
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Floats
@@ -73,6 +74,8 @@ class Creases:
 
     def mask(self, *, apart: float) -> Mask:
         """Places at least so far from all lines: with half a spacing no decal straddles one."""
+        if not 0.0 <= apart < np.inf:
+            raise InvalidSeeding(f"apart: expected a length from 0 upward, got {apart!r}")
         return lambda points: self.distance(points) >= apart
 
     def points(self, spacing: float) -> Floats:
@@ -83,6 +86,10 @@ class Creases:
         """
         if not (np.isfinite(spacing) and spacing > 0):
             raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
+        if spacing < self.length / MOST_SEEDS:
+            raise InvalidSeeding(
+                f"spacing: {spacing:g} makes more than {MOST_SEEDS:,} places; take a larger one"
+            )
         lines = _lines(self._vertices, self._edges)
         places = [_along(self._vertices[line], spacing) for line in lines]
         if not places:

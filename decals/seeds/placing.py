@@ -1,11 +1,16 @@
 """How many particles there are, and where those lie that are given."""
 
+from typing import Any, cast
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidSeeding
 from decals.seeds.population import Sites, World
 from decals.surfaces.surface import as_points
+
+MOST_SEEDS = 100_000_000
+"""Seeds in one population; some hundred bytes are needed for each."""
 
 
 def nobody() -> Sites:
@@ -28,11 +33,20 @@ def count_of(count: int | None, spacing: float | None, mass: float) -> int:
         raise InvalidSeeding("expected either a count or a spacing, got both or none; give one of them")
     if count is not None:
         check("count", count, 0)
+        if count > MOST_SEEDS:
+            raise InvalidSeeding(f"count: expected at most {MOST_SEEDS:,}, got {count:,}")
         return int(count)
-    assert spacing is not None
-    if not (np.isfinite(spacing) and spacing > 0):
+    try:
+        length = float(cast(Any, spacing))
+    except (TypeError, ValueError):
+        length = np.nan
+    if not 0.0 < length < np.inf:
         raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
-    return int(round(2.0 * mass / (np.sqrt(3.0) * spacing**2)))
+    if length < np.sqrt(2.0 * mass / (np.sqrt(3.0) * MOST_SEEDS)):
+        raise InvalidSeeding(
+            f"spacing: {length:g} makes more than {MOST_SEEDS:,} seeds; take a larger one, or a count"
+        )
+    return int(round(2.0 * mass / (np.sqrt(3.0) * length**2)))
 
 
 def placed(world: World, fixed: ArrayLike | None) -> Sites:

@@ -92,3 +92,8 @@ def test_impossible_wishes_are_refused():
             Creases(box(), angle=angle)
     with pytest.raises(InvalidSeeding, match="spacing: expected"):
         Creases(box()).points(0.0)
+    with pytest.raises(InvalidSeeding, match="makes more than 100,000,000 places"):
+        Creases(box()).points(1e-9)
+    for apart in (np.nan, -1.0, np.inf):
+        with pytest.raises(InvalidSeeding, match="apart: expected"):
+            Creases(box()).mask(apart=apart)
