@@ -42,7 +42,7 @@ def lay(
     InvalidSeeding
         For a factor, direction, number of images or weights that make no sense.
     """
-    shares, disorder = wishes(factor, images, weights), jitter or Jitter()
+    shares, disorder = wishes(factor, images, weights, sizing, choice, jitter), jitter or Jitter()
     if relaxation.count == 0:
         return Decals.empty()
     spacings = relaxation.sizes_at(relaxation.positions)
@@ -64,8 +64,21 @@ def lay(
     )
 
 
-def wishes(factor: float, images: int, weights: ArrayLike | None) -> NDArray[np.float64]:
+def wishes(
+    factor: float,
+    images: int,
+    weights: ArrayLike | None,
+    sizing: Sizing,
+    choice: ImageChoice,
+    jitter: Jitter | None,
+) -> NDArray[np.float64]:
     """Share of each image; `InvalidSeeding` if the wishes make no sense."""
+    for name, value, kind in (("sizing", sizing, Sizing), ("choice", choice, ImageChoice)):
+        if not isinstance(value, kind):
+            known = ", ".join(str(member) for member in kind)
+            raise InvalidSeeding(f"{name}: expected one of {known}, got {value!r}")
+    if not isinstance(jitter, Jitter | None):
+        raise InvalidSeeding(f"jitter: expected a Jitter, got {jitter!r}")
     if not (np.isfinite(factor) and factor > 0):
         raise InvalidSeeding(f"factor: expected a number above 0, got {factor!r}")
     return odds(images, weights)

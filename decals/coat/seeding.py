@@ -13,7 +13,7 @@ from decals.coat.sizing import Sizing
 from decals.errors import InvalidSeeding
 from decals.model import Decals
 from decals.seeds.polishing import CLOSE
-from decals.seeds.population import Density, Mask
+from decals.seeds.population import Density, Mask, surfaces_of
 from decals.seeds.relaxation import Relaxation
 from decals.surfaces.surface import Surface
 
@@ -89,10 +89,10 @@ def seed(
         For a count, spacing, seed, density, mask, regularity, factor, direction, number of images or weights
         that make no sense, or nothing to lie on.
     """
-    given = [surfaces] if isinstance(surfaces, Surface) else list(surfaces)
+    given = surfaces_of(surfaces)
     if not 0.0 <= regularity <= 1.0:
         raise InvalidSeeding(f"regularity: expected a number from 0 to 1, got {regularity!r}")
-    wishes(factor, images, weights)  # before the long work, not after it
+    wishes(factor, images, weights, sizing, choice, jitter)  # before the long work, not after it
     tell = progress or (lambda stage, fraction: None)
     relaxation = Relaxation(
         given,

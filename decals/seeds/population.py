@@ -1,6 +1,7 @@
 """Who lives where: visible areas, the share of each surface, and the first positions."""
 
-from collections.abc import Callable, Sequence
+import reprlib
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -220,6 +221,20 @@ def _evenly(weights: NDArray[np.float64], count: int) -> NDArray[np.int64]:
     levels = (np.arange(count) + 0.5) * (total[-1] / count)
     rows: NDArray[np.int64] = np.minimum(np.searchsorted(total, levels, side="right"), len(weights) - 1)
     return rows
+
+
+def surfaces_of(given: object) -> tuple[Surface, ...]:
+    """One surface or several as a tuple; `InvalidSeeding` for what is none."""
+    if isinstance(given, Surface):
+        return (given,)
+    several = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+    for one in several:
+        if not isinstance(one, Surface):
+            raise InvalidSeeding(
+                f"surfaces: expected a surface or several, got {reprlib.repr(one)}; "
+                "make one by ImplicitSurface(tree) or MeshSurface(vertices, faces)"
+            )
+    return several
 
 
 def _answers(name: str, function: Callable[[Floats], ArrayLike], positions: Floats) -> NDArray[np.float64]:

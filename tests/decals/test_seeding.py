@@ -194,6 +194,13 @@ def test_progress_runs_from_start_to_end():
         ({"count": -1}, "count: expected at least 0, got -1"),
         ({"count": 2.5}, "count: expected a whole number"),
         ({"count": True}, "count: expected a whole number"),
+        ({"count": 10**12}, "count: expected at most 100,000,000, got 1,000,000,000,000"),
+        ({"spacing": 1e-9}, "spacing: 1e-09 makes more than 100,000,000 seeds"),
+        ({"spacing": 1e-200}, "spacing: 1e-200 makes more than 100,000,000 seeds"),
+        ({"spacing": "wide"}, "spacing: expected a length above 0, got 'wide'"),
+        ({"count": 5, "sizing": "touching"}, "sizing: expected one of Sizing.COVERING, .*, got 'touching'"),
+        ({"count": 5, "choice": "size"}, "choice: expected one of ImageChoice.RANDOM, .*, got 'size'"),
+        ({"count": 5, "jitter": 0.1}, "jitter: expected a Jitter, got 0.1"),
         ({"count": 5, "seed": -3}, "seed: expected at least 0"),
         ({"count": 5, "factor": 0.0}, "factor: expected"),
         ({"count": 5, "images": 0}, "images: expected"),
@@ -209,6 +216,12 @@ def test_progress_runs_from_start_to_end():
 def test_what_makes_no_sense_is_refused(wish, says):
     with pytest.raises(InvalidSeeding, match=says):
         seed(plane(), **wish)
+
+
+@pytest.mark.parametrize("other", [None, 5, "knot", Point((0, 0, 0), radius=1.0), [plane(), None], np.eye(3)])
+def test_what_is_no_surface_is_refused(other):
+    with pytest.raises(InvalidSeeding, match="surfaces: expected a surface or several, got"):
+        seed(other, count=5)
 
 
 def test_seeds_need_a_surface():
