@@ -70,11 +70,8 @@ class Injection:
         self.actor, self._follow, self._paint = actor, follow, paint
         self._mapper = polygon_mapper(actor)
         self._normals = SmoothNormals()
-        self._normals.insert_before(actor.GetMapper())
+        self._give_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
-        self._mapper.MapDataArrayToVertexAttribute(
-            "decalNormalMC", NORMALS, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1
-        )
         self._stage = weakref.ref(stage)
         self._written: tuple[Contact, bool] | None = None
         self._camera: CameraBuffer | None = None
@@ -96,12 +93,24 @@ class Injection:
         if found is None:
             self._erase()
             return
-        self._normals.insert_before(self.actor.GetMapper())  # somebody may have given it other data
+        self._give_normals()  # somebody may have given it other data
         stage, data, _ = found
         wanted = stage.contact, data.layered
         if wanted != self._written:
             self._write(library(stage.contact, layered=data.layered))
             self._written = wanted
+
+    def _give_normals(self) -> None:
+        """Let the mesh have smooth normals, unless the injection of another stage gives them."""
+        if self._normals.insert_before(self.actor.GetMapper()):
+            self._mapper.MapDataArrayToVertexAttribute(
+                "decalNormalMC", NORMALS, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1
+            )
+
+    def finish(self) -> None:
+        """Leave the shader to others, where other renderers draw the actor too."""
+        if self.actor.GetNumberOfConsumers() > 1:
+            self._erase()
 
     def _write(self, functions: str) -> None:
         """Put our code behind VTK's own; tags stay, for what VTK puts there."""
@@ -132,8 +141,8 @@ class Injection:
 
     def bind(self, program: Any) -> None:
         """Give VTK's program what ours would have: decals, images, camera."""
-        found = self._found()
-        if found is None or self._written is None:
+        found = self._found() if self._written is not None else None
+        if found is None or not found[0].drawing:  # another renderer may draw the actor too
             return
         stage, data, images = found
         place = self._frame(stage)
@@ -173,8 +182,8 @@ class Injection:
         """Leave the actor as it was."""
         self._erase()
         self._mapper.RemoveObserver(self._tag)
-        self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
-        self._normals.leave(self.actor.GetMapper())
+        if self._normals.leave(self.actor.GetMapper()):
+            self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
         if self._camera is not None:
             self._camera.release()
             self._camera = None

@@ -58,18 +58,22 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__(nInputPorts=1, inputType="vtkDataSet", nOutputPorts=1, outputType="vtkDataSet")
 
-    def insert_before(self, mapper: Any) -> None:
-        """Stand between a mapper and what it draws; nothing happens if that is so already."""
+    def insert_before(self, mapper: Any) -> bool:
+        """Stand between a mapper and what it draws; False where one of us stands there already."""
         connection = mapper.GetInputConnection(0, 0)
-        if connection is not None and connection.GetProducer() is not self:
-            self.SetInputConnection(connection)
-            mapper.SetInputConnection(self.GetOutputPort())
+        if connection is None or isinstance(connection.GetProducer(), SmoothNormals):
+            return False
+        self.SetInputConnection(connection)
+        mapper.SetInputConnection(self.GetOutputPort())
+        return True
 
-    def leave(self, mapper: Any) -> None:
-        """Let the mapper draw what it drew before."""
+    def leave(self, mapper: Any) -> bool:
+        """Let the mapper draw what it drew before; whether it was we who stood there."""
         connection = mapper.GetInputConnection(0, 0)
-        if connection is not None and connection.GetProducer() is self:
-            mapper.SetInputConnection(self.GetInputConnection(0, 0))
+        if connection is None or connection.GetProducer() is not self:
+            return False
+        mapper.SetInputConnection(self.GetInputConnection(0, 0))
+        return True
 
     def RequestDataObject(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
         """Put out the type of data that comes in."""

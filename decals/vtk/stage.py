@@ -86,6 +86,8 @@ class Stage:
         How long our part of the last frame took; with ``measure``, until the card had finished.
     measure
         Whether to wait for the card, so as to know.
+    drawing
+        Whether VTK is drawing a frame of the renderer now.
     """
 
     def __init__(
@@ -96,6 +98,7 @@ class Stage:
         self._draw_scale = 1.0
         self.mapping, self.contact = Mapping.CORRECTED, Contact.PAPER
         self.frame_seconds, self.measure = 0.0, False
+        self.drawing = False
         self._scene: SceneLike | None = None
         self._context = context
         self._frame: Frame | None = None
@@ -172,8 +175,12 @@ class Stage:
         for unit in self._units:
             manager.Free(unit)
         self._units = []
+        self.drawing = False
+        for injection in self._injections:
+            injection.finish()
 
     def _prepare(self) -> None:
+        self.drawing = True
         self._follow_objects(box_around)  # what changes in place may do so with every frame
         if self._scene is not None:
             for complaint in complaints(self.vtk_renderer):

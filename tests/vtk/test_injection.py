@@ -232,6 +232,37 @@ def test_solids_take_decals_on_their_surface(plotter: Factory) -> None:
     assert ((seen[..., 0] + 256 * seen[..., 1] - 1) == ours.owner)[sure].mean() > 0.99
 
 
+def test_subplots_share_an_actor_and_lay_their_own_decals_on_it(plotter: Factory) -> None:
+    mesh = torus()
+
+    def picture(left: str | None, right: str | None, *, taken_off: bool = False) -> np.ndarray:
+        pl = plotter(shape=(1, 2), window_size=(320, 120), border=False)
+        pl.disable_anti_aliasing()
+        actor = pl.add_mesh(mesh, color="white")
+        for column, image in enumerate((left, right)):
+            pl.subplot(0, column)
+            pl.add_actor(actor, render=False)
+            pl.camera_position = [(2.0, -2.6, 2.4), (0, 0, 0), (0, 0, 1)]
+            pl.reset_camera_clipping_range()
+            if image is not None:
+                pl.decals.add(coat(mesh), images=[image])
+                pl.decals.apply(actor)
+        first = shot(pl)
+        np.testing.assert_array_equal(shot(pl), first)
+        if taken_off:
+            pl.subplot(0, 0)
+            pl.decals.remove(actor)
+            return shot(pl)
+        return first
+
+    scales, tiles, bare = (picture(image, image) for image in ("scale", "tile", None))
+    np.testing.assert_array_equal(picture("scale", "tile"), np.hstack([scales[:, :160], tiles[:, 160:]]))
+    off = picture("scale", "tile", taken_off=True)
+    np.testing.assert_array_equal(off, np.hstack([bare[:, :160], tiles[:, 160:]]))
+    one = picture(None, "tile")
+    np.testing.assert_array_equal(one, off)
+
+
 @pytest.mark.parametrize("kind", ["volume", "glyphs", "composite"])
 def test_other_mappers_are_refused(plotter: Factory, kind: str) -> None:
     pl = plotter()
