@@ -9,6 +9,7 @@
     ├── InvalidSeeding(ValueError)            an impossible wish for seeds: negative count, no surface, ...
     ├── InvalidImage(ValueError)              a file or array that is no image
     ├── InvalidScene(ValueError)              a scene or scene file that does not hold together
+    ├── InvalidEdit(ValueError)               a command that makes no sense for the document as it is
     ├── TooMuchData(ValueError)               more than fits into a texture of this graphics card
     └── NoGraphics(RuntimeError)              no usable OpenGL here; the message says what to install
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +20,7 @@ from decals.vtk.context import WindowContext
 from decals.vtk.modes import restore_exports, warn_of_exports
 from decals.vtk.stage import Stage
 
-Image = str | DecalImage | NDArray[np.uint8]
+Image = str | os.PathLike[str] | DecalImage | NDArray[np.uint8]
 """The name of a generated image, a path, an image, or ``uint8[h, w, 4]``."""
 
 NOWHERE = Camera((0.0, 0.0, 1.0))
@@ -90,7 +91,7 @@ class Component:
         return thing
 
     def add_mesh(
-        self, mesh: pv.DataSet | MeshObject, *, color: Color = CLAY, name: str | None = None
+        self, mesh: pv.DataSet | MeshObject, *, color: Color | str = CLAY, name: str | None = None
     ) -> MeshObject:
         """Show a mesh under the decals, lit as our other objects are.
 
@@ -101,12 +102,12 @@ class Component:
         mesh
             Any dataset with a surface, or an object of a scene.
         color
-            sRGB, each channel in [0, 1].
+            sRGB, each channel in [0, 1], or a name that pyvista knows.
         name
             What to call it; unique in the subplot.
         """
         if not isinstance(mesh, MeshObject):
-            mesh = MeshObject(self._name(name), *triangles(mesh), color)
+            mesh = MeshObject(self._name(name), *triangles(mesh), _color(color))
         self._add_object(mesh)
         return mesh
 
@@ -125,7 +126,11 @@ class Component:
         Decals
             Those of the whole subplot, as they are now.
         """
+        if not isinstance(decals, Decals):
+            raise InvalidScene(f"expected Decals to add, got {type(decals).__name__}; decals.seed makes some")
         scene = self.scene
+        if isinstance(images, str):
+            raise InvalidScene(f"expected a list of images, got the text {images!r}; write [{images!r}]")
         added = tuple(_image(image, number) for number, image in enumerate(images))
         if added:
             shifted = np.where(decals.images == PLAIN, PLAIN, decals.images + len(scene.images))
@@ -222,6 +227,10 @@ class Component:
 
 def triangles(mesh: pv.DataSet) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]`` of a dataset's surface."""
+    if not isinstance(mesh, pv.DataSet | pv.MultiBlock):
+        raise InvalidScene(
+            f"expected a dataset of pyvista's, got {type(mesh).__name__}; pyvista.wrap makes one"
+        )
     surface = mesh if isinstance(mesh, pv.PolyData) else mesh.extract_surface(algorithm="dataset_surface")
     surface = surface.triangulate()
     return np.asarray(surface.points, np.float32), np.asarray(surface.regular_faces, np.int32)
@@ -230,4 +239,19 @@ def triangles(mesh: pv.DataSet) -> tuple[NDArray[np.float32], NDArray[np.int32]]
 def _image(image: Any, number: int) -> DecalImage:
     if isinstance(image, DecalImage):
         return image
-    return DecalImage.load(image) if isinstance(image, str) else DecalImage(f"image {number}", image)
+    if isinstance(image, str | os.PathLike):
+        return DecalImage.load(os.fspath(image))
+    return DecalImage(f"image {number}", np.asarray(image))
+
+
+def _color(color: Color | str) -> Color:
+    """Look up a name; what is none goes on as it is, to be checked with the object."""
+    if not isinstance(color, str):
+        return color
+    try:
+        red, green, blue = pv.Color(color).float_rgb
+    except ValueError as error:
+        raise InvalidScene(
+            f"expected a colour that pyvista knows, got {color!r}; give a name such as 'tomato', or #rrggbb"
+        ) from error
+    return red, green, blue

@@ -7,7 +7,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonDataModel import vtkDataObject
-from vtkmodules.vtkRenderingCore import vtkDataSetMapper, vtkRenderer
+from vtkmodules.vtkRenderingCore import vtkDataSetMapper, vtkProp, vtkRenderer
 from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
 
 from decals.errors import InvalidScene
@@ -27,6 +27,11 @@ def polygon_mapper(actor: Any) -> Any:
     InvalidScene
         It is drawn by another kind of mapper.
     """
+    if not isinstance(actor, vtkProp) or not hasattr(actor, "GetMapper"):
+        raise InvalidScene(
+            f"expected an actor to lay decals on, got {type(actor).__name__}; "
+            "give what plotter.add_mesh returned"
+        )
     mapper = actor.GetMapper()
     if isinstance(mapper, vtkDataSetMapper):
         if mapper.GetPolyDataMapper() is None:

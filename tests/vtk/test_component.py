@@ -1,6 +1,10 @@
 """What users type: objects, decals and images of a plotter, and what they get back."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
+import PIL.Image
 import pytest
 import pyvista as pv
 
@@ -8,6 +12,7 @@ from blobtree import Point
 from decals.errors import InvalidDecals, InvalidImage, InvalidScene
 from decals.model import PLAIN, Decals
 from decals.scenes.scene import DecalImage, MeshObject, TreeObject
+from decals.vtk.component import Component
 from tests.decals.shapes import View
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import both, shot
@@ -133,3 +138,34 @@ def test_a_cleared_plotter_takes_scenes_again(plotter: Factory) -> None:
     pl.decals.clear()
     pl.decals.add_scene(both())
     np.testing.assert_array_equal(shot(pl), first)
+
+
+def test_colours_have_names_and_images_paths(plotter: Factory, tmp_path: Path) -> None:
+    pl = plotter()
+    assert pl.decals.add_mesh(pv.Cube(), color="red").color == (1.0, 0.0, 0.0)
+    PIL.Image.new("RGB", (4, 4), "blue").save(tmp_path / "blue.png")
+    pl.decals.add(decals_at(0), images=[tmp_path / "blue.png"])
+    assert pl.decals.scene.images[0].pixels[0, 0].tolist() == [0, 0, 255, 255]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda it: it.add_mesh(pv.Cube(), color="reddish"), "colour that pyvista knows, got 'reddish'"),
+        (lambda it: it.add_mesh("cube.ply"), "dataset of pyvista's, got str"),
+        (lambda it: it.add([decals_at(0)], images=["scale"]), "expected Decals to add, got list"),
+        (lambda it: it.add(decals_at(0), images="scale"), "write \\['scale'\\]"),
+        (lambda it: it.add(decals_at(0), images=[None]), "expected uint8 pixels"),
+        (lambda it: it.apply(None), "expected an actor to lay decals on, got NoneType"),
+        (lambda it: it.apply(pv.Cube()), "expected an actor to lay decals on, got PolyData"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_plain_words(
+    plotter: Factory, wrong: Callable[[Component], object], message: str
+) -> None:
+    pl = plotter()
+    pl.decals.add_implicit(TREE)
+    before = pl.decals.scene
+    with pytest.raises(InvalidScene, match=message):
+        wrong(pl.decals)
+    assert pl.decals.scene is before
