@@ -47,12 +47,17 @@ class Anchor:
         low, high = np.asarray(bounds[0], np.float64), np.asarray(bounds[1], np.float64)
         choice = np.indices((2, 2, 2)).reshape(3, 8).T
         self._corners.points = np.where(choice, high, low)
-        if not self._renderer.HasViewProp(self.actor):
+        if not self.there:
             self._renderer.add_actor(self.actor, name=NAME, pickable=False, render=False)
+
+    @property
+    def there(self) -> bool:
+        """Whether the actor is among the renderer's; pyvista's ``clear`` takes it out too."""
+        return bool(self._renderer.HasViewProp(self.actor))
 
     def leave(self) -> None:
         """Leave the renderer's actors."""
-        if self._renderer.HasViewProp(self.actor):
+        if self.there:
             self._renderer.remove_actor(self.actor, render=False)
 
     def matrix(self) -> Floats:

@@ -123,6 +123,8 @@ class Stage:
     def scene(self, scene: SceneLike | None) -> None:
         self._scene = scene
         self._failed = None
+        if not self._anchor.there:
+            self._placed = ()
         self._follow_objects(bounds_of)
 
     def _follow_objects(self, box: Callable[[Sequence[SceneObject]], Box]) -> None:

@@ -140,6 +140,17 @@ def test_a_cleared_plotter_takes_scenes_again(plotter: Factory) -> None:
     np.testing.assert_array_equal(shot(pl), first)
 
 
+@pytest.mark.parametrize("wipe", ["clear", "clear_actors"])
+def test_a_scene_comes_back_after_pyvista_cleared_the_plotter(plotter: Factory, wipe: str) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    getattr(pl, wipe)()
+    assert (shot(pl) != first).any()
+    pl.decals.add_scene(both())
+    np.testing.assert_array_equal(shot(pl), first)
+
+
 def test_colours_have_names_and_images_paths(plotter: Factory, tmp_path: Path) -> None:
     pl = plotter()
     assert pl.decals.add_mesh(pv.Cube(), color="red").color == (1.0, 0.0, 0.0)
