@@ -14,7 +14,7 @@ from decals.edit.actions import Actions
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
 from decals.edit.tools import Ray, Tools
-from decals.errors import DecalsError, NoGraphics
+from decals.errors import DecalsError, InvalidEdit, InvalidScene, NoGraphics
 from decals.render.libraries import require_gl
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
@@ -57,6 +57,8 @@ class EditWindow:
     ------
     NoGraphics
         There is no OpenGL, or no screen for a window.
+    InvalidScene
+        There is no scene to edit, or no pixel in the window.
     """
 
     def __init__(
@@ -68,12 +70,16 @@ class EditWindow:
         off_screen: bool = False,
         samples: int = 2,
     ) -> None:
+        if not isinstance(scene, Scene | EditSession):
+            raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
+        if len(size) != 2 or min(size) < 1:
+            raise InvalidScene(f"size: expected width and height of at least 1 pixel, got {tuple(size)}")
         require_gl()
         if not off_screen:
             self.require_screen()
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
         self.document = self.session.document
-        self.samples = samples
+        self.samples, self._closed = samples, False
         self.worker, self.quality = Worker(), Quality()
         self.actions = Actions(self.session, path=path, run=self._start)
         self.actions.camera, self.actions.interrupt = self._camera, self.worker.cancel
@@ -86,7 +92,6 @@ class EditWindow:
         self._bindings = Bindings(self, self.plotter.iren.interactor)
         self._moved = 0.0
         self._whole: tuple[int, ...] = self._shown
-        self._closed = False
 
     def _open_stage(self) -> None:
         self.plotter.decals.add_scene(self.document.scene)
@@ -101,7 +106,9 @@ class EditWindow:
     # -- what is seen -----------------------------------------------------------------------------------
 
     def redraw(self, *, whole: bool) -> None:
-        """Show what there is: as a whole once nothing moves any more, or quickly."""
+        """Show what there is: as a whole once nothing moves any more, or quickly; nothing once closed."""
+        if self._closed:
+            return
         self.actions_shown()
         if not whole:
             self.moving()
@@ -221,7 +228,15 @@ class EditWindow:
             )
 
     def show(self) -> None:
-        """Open the window, and stay until it is closed; off screen, draw the first frame."""
+        """Open the window, and stay until it is closed; off screen, draw the first frame.
+
+        Raises
+        ------
+        InvalidEdit
+            The window was closed.
+        """
+        if self._closed:
+            raise InvalidEdit("the window was closed; open another EditWindow on its session")
         self.actions_shown()
         self.plotter.iren.initialize()
         self.plotter.iren.interactor.CreateRepeatingTimer(TICK)

@@ -8,8 +8,9 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
+from decals.edit.commands import Scale
 from decals.edit.population import lying_on
-from decals.errors import NoGraphics
+from decals.errors import InvalidEdit, InvalidScene, NoGraphics
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.scenes.scene_file import load_scene
@@ -251,6 +252,27 @@ def test_a_session_goes_on_in_another_window(opened):
     assert len(second.document.decals) == 59
     second.key("z", ctrl=True)
     assert len(second.document.decals) == 60
+
+
+def test_a_closed_window_says_so_and_its_session_goes_on(opened):
+    driver = opened()
+    driver.window.close()
+    with pytest.raises(InvalidEdit, match="was closed"):
+        driver.window.show()
+    driver.window.redraw(whole=True)
+    driver.session.do(Scale(driver.document.decals.numbers[:1], 1.5))
+    assert driver.session.undo() is not None
+
+
+@pytest.mark.parametrize("size", [(0, 90), (-5, 10), (120,)])
+def test_a_window_without_pixels_is_refused(size):
+    with pytest.raises(InvalidScene, match="size: expected width and height"):
+        EditWindow(scene(), off_screen=True, size=size)
+
+
+def test_what_is_no_scene_is_refused():
+    with pytest.raises(InvalidScene, match="EditSession to edit, got NoneType"):
+        EditWindow(None, off_screen=True)
 
 
 def test_without_a_screen_a_window_says_so(monkeypatch):
