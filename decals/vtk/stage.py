@@ -78,10 +78,6 @@ class Stage:
 
     Attributes
     ----------
-    samples
-        Samples a pixel along each axis; where VTK itself draws larger than the window, one.
-    mapping, contact
-        As for `decals.render.Renderer.render`.
     frame_seconds
         How long our part of the last frame took; with ``measure``, until the card had finished.
     measure
@@ -94,9 +90,8 @@ class Stage:
         self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]
     ) -> None:
         self.plotter, self.vtk_renderer = plotter, renderer
-        self.samples = 2
-        self._draw_scale = 1.0
-        self.mapping, self.contact = Mapping.CORRECTED, Contact.PAPER
+        self._samples, self._draw_scale = 2, 1.0
+        self._mapping, self._contact = Mapping.CORRECTED, Contact.PAPER
         self.frame_seconds, self.measure = 0.0, False
         self.drawing = False
         self._scene: SceneLike | None = None
@@ -153,6 +148,43 @@ class Stage:
         if not 0.0 < scale <= 1.0:
             raise InvalidScene(f"draw_scale must be above 0 and at most 1, got {scale}")
         self._draw_scale = float(scale)
+
+    @property
+    def samples(self) -> int:
+        """Samples a pixel along each axis; where VTK itself draws larger than the window, one."""
+        return self._samples
+
+    @samples.setter
+    def samples(self, samples: int) -> None:
+        if not isinstance(samples, int | np.integer) or samples < 1:
+            raise InvalidScene(f"samples must be a whole number from 1; got {samples!r}")
+        self._samples = int(samples)
+
+    @property
+    def mapping(self) -> Mapping:
+        """How images lie on curved surface; as for `decals.render.Renderer.render`."""
+        return self._mapping
+
+    @mapping.setter
+    def mapping(self, mapping: Mapping) -> None:
+        try:
+            self._mapping = Mapping(mapping)
+        except ValueError as error:
+            names = ", ".join(f"Mapping.{one.name}" for one in Mapping)
+            raise InvalidScene(f"mapping must be one of {names}; got {mapping!r}") from error
+
+    @property
+    def contact(self) -> Contact:
+        """How decals push each other; as for `decals.render.Renderer.render`."""
+        return self._contact
+
+    @contact.setter
+    def contact(self, contact: Contact) -> None:
+        try:
+            self._contact = Contact(contact)
+        except ValueError as error:
+            names = ", ".join(f"Contact.{one.name}" for one in Contact)
+            raise InvalidScene(f"contact must be one of {names}; got {contact!r}") from error
 
     def apply(self, actor: Any, *, follow: bool = False) -> None:
         """Put the scene's decals into VTK's own shader of an actor; see `Component.apply`."""

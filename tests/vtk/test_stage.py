@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from decals.errors import NoGraphics
+from decals.errors import InvalidScene, NoGraphics
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
@@ -152,3 +152,15 @@ def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pyte
     pl.decals.stage.scene = both()
     with pytest.raises(NoGraphics, match=r"EGL, GLX, WGL or macOS, got a vtk\w+Window"):
         pl.decals.stage.at(80, 60)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("samples", 0), ("samples", 1.5), ("samples", "2"), ("contact", 7), ("mapping", "chord")],
+)
+def test_what_a_stage_cannot_be_set_to_is_said_at_once(plotter: Factory, name: str, value: object) -> None:
+    stage = plotter().decals.stage
+    before = getattr(stage, name)
+    with pytest.raises(InvalidScene, match=f"{name} must be .* got {value!r}"):
+        setattr(stage, name, value)
+    assert getattr(stage, name) == before
