@@ -4,6 +4,7 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from rich import box
 from rich.console import Console
@@ -94,7 +95,7 @@ def measure(renderer: Renderer, model: str, counts: Sequence[int], size: Size) -
     for count in counts:
         decals = even_coat(item.surface, count=count)
         index = DecalIndex.of(decals)
-        build = _median(lambda decals=decals: _seconds(lambda: DecalIndex.of(decals)))  # type: ignore[misc]
+        build = _median(partial(_seconds, partial(DecalIndex.of, decals)))
         scene = Scene(objects=(item,), camera=camera, decals=decals, images=(image,))
         renderer.time_frame(scene, size=size)
         rows.append(
@@ -103,7 +104,7 @@ def measure(renderer: Renderer, model: str, counts: Sequence[int], size: Size) -
                 decals=count,
                 nodes=int((index.table.reshape(-1, 4)[:, 0] >= 0).sum()),
                 build=build,
-                frame=1e3 * _median(lambda scene=scene: renderer.time_frame(scene, size=size)),  # type: ignore[misc]
+                frame=1e3 * _median(partial(renderer.time_frame, scene, size=size)),
                 memory=index.nbytes + decals.packed().nbytes,
             )
         )
@@ -116,11 +117,11 @@ def as_table(rows: Sequence[Row], title: str) -> Table:
     for heading in ("model", "decals", "index nodes", "build, s", "ms/frame", "memory"):
         result.add_column(heading, justify="left" if heading == "model" else "right", no_wrap=True)
     for row in rows:
-        own = f"{row.nodes:,}", f"{row.build:.3f}", f"{row.frame:.1f}", _bytes(row.memory)
+        own: tuple[str, ...] = f"{row.nodes:,}", f"{row.build:.3f}", f"{row.frame:.1f}", _bytes(row.memory)
         paper = row.paper
         if paper is not None:
             theirs = f"{paper.voxels:,}", f"{paper.build:.2f}", str(paper.frame), _bytes(paper.memory)
-            own = tuple(f"{a} ({b})" for a, b in zip(own, theirs, strict=True))  # type: ignore[assignment]
+            own = tuple(f"{a} ({b})" for a, b in zip(own, theirs, strict=True))
         result.add_row(row.model, f"{row.decals:,}", *own)
     return result
 

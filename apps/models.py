@@ -6,8 +6,8 @@ from pathlib import Path
 
 from blobtree import BlobTreeError, from_json
 from decals.errors import DecalsError
+from decals.paths import is_file
 from decals.scenes.mesh_file import read_mesh
-from decals.scenes.paths import is_file
 from decals.scenes.scene import MeshObject, Scene, SceneObject, TreeObject
 from decals.scenes.scene_file import is_scene, load_scene
 

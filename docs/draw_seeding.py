@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from decals.coat.neighbours import FacingTree
 from decals.seeds.evenness import ideal_spacing
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.relaxation import Relaxation
 from decals.surfaces.mesh import MeshSurface
 

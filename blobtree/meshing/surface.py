@@ -26,11 +26,11 @@ from blobtree.meshing.reuse import (
     mark_above,
     mark_beside,
 )
-from blobtree.meshing.scan import chosen, everything, starts_of, where_negative
 from blobtree.meshing.vertices import list_patches, place_vertices
 from blobtree.progress import Progress
 from blobtree.sparse.cells import SparseCells
 from blobtree.sparse.grid import CHILDREN
+from blobtree.sparse.scan import chosen, everything, starts_of, where_negative
 
 Array = Any
 

@@ -101,7 +101,7 @@ def from_records(records: list[Record]) -> "Node":
 
 
 def _fields(node: "Node") -> dict[str, Any]:
-    return {field.name: getattr(node, field.name) for field in fields(node)}  # type: ignore[arg-type]
+    return {field.name: getattr(node, field.name) for field in fields(node)}  # type: ignore[arg-type]  # every kind of node is a dataclass
 
 
 def _holds_nodes(value: Any, held: set[int]) -> bool:

@@ -23,11 +23,11 @@ from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.formulas.vocabulary import Vocabulary
 from blobtree.launch import launch
 from blobtree.memory import demand_memory
-from blobtree.meshing.scan import everything, starts_of, where_negative
 from blobtree.progress import Progress
 from blobtree.sparse.cull import count_reaching, name_children, pieces_of, write_reaching
 from blobtree.sparse.grid import BRANCHING, CHILDREN, Grid
 from blobtree.sparse.refine import inherit, match, measure, take_over, write
+from blobtree.sparse.scan import everything, starts_of, where_negative
 from blobtree.tapes.tape import Tape
 
 MOST_BLOCKS = 1 << 21

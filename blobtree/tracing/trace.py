@@ -129,7 +129,7 @@ def trace_arrays(tree: "Node", origins: Any, directions: Any) -> tuple[Any, Any]
     """`trace` for Warp arrays of vec3, without a copy and unchecked: distances, and the tapes at the hits.
 
     The work is done where `origins` are. A tape is given by its first texel and one past its last, in the
-    cells' tape (`tracing_cells.device_cells`).
+    cells' tape (`cells.device_cells`).
     """
     place = str(origins.device)
     distances: wp.array[Any] = wp.empty(len(origins), dtype=wp.float32, device=place)

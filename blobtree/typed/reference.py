@@ -74,7 +74,7 @@ _MATHS: dict[str, Callable[..., Any]] = {
     "bool": bool,
     **{f"vec{size}i": _whole_vector(size) for size in (2, 3, 4)},
 }
-"""Warp's names, as far as GLSL shares them (`glsl_builtins`)."""
+"""Warp's names, as far as GLSL shares them (`builtins`)."""
 
 
 def divided(a: Any, b: Any) -> Any:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from decals.coat.neighbours import FacingTree
+from decals.seeds.neighbours import FacingTree
 from decals.surfaces.surface import Floats, unit_rows
 
 RING = 8

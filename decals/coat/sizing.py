@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree.formulas.kernels import RIM as FIELD_RIM
-from decals.coat.neighbours import FacingTree
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.population import Sites
 
 MARGIN = 0.03

@@ -237,7 +237,7 @@ class DecalEditor:
         self._journal.add(LEVELS, (level, level + 1))
 
     def _exponent(self, number: int) -> int:
-        """As `index_cells.cell_exponent`, from the record."""
+        """As `cells.cell_exponent`, from the record."""
         x, y, z, influence = self.arrays[RECORDS][RECORD * number].tolist()
         reach = influence * REACH_WITH_SLACK
         farthest = max(abs(x), abs(y), abs(z)) + reach

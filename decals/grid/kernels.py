@@ -1,4 +1,4 @@
-"""Kernels that build the decal index in parallel, in the order in which index_build.py launches them."""
+"""Kernels that build the decal index in parallel, in the order in which `build` launches them."""
 
 # ruff: noqa: SIM114  (Warp evaluates both sides of `or`)
 # mypy: ignore-errors

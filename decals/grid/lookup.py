@@ -1,4 +1,4 @@
-"""Reading the decal index, laid out in index.py: which list of decals belongs to a point on one level."""
+"""Reading the decal index, laid out in `index`: which list of decals belongs to a point on one level."""
 
 # mypy: ignore-errors
 # (kernel code is Python to look at only: its names have Warp types)

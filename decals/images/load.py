@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from decals.errors import InvalidImage
-from decals.scenes.paths import is_file
+from decals.paths import is_file
 
 from .builtin import BUILTIN_IMAGES, generate_image, is_builtin
 

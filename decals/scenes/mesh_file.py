@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from decals.errors import InvalidMesh
-from decals.scenes.paths import is_file
+from decals.paths import is_file
 from decals.scenes.ply import Polygons, read_ply
 
 MeshArrays = tuple[NDArray[np.float32], NDArray[np.int32]]

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
-from decals.coat.neighbours import FacingTree
 from decals.errors import InvalidSeeding
 from decals.seeds.carrying import carried, freed
 from decals.seeds.crowd import Crowd
@@ -14,6 +13,7 @@ from decals.seeds.evenness import Spacing, evenness, ideal_spacing
 from decals.seeds.homes import Homes
 from decals.seeds.local_relaxation import relax_near
 from decals.seeds.looking import Lookout
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.placing import check, count_of, nobody, placed, remaining
 from decals.seeds.polishing import CLOSE, polish
 from decals.seeds.population import Density, Mask, Sites, World, shares

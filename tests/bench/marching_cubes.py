@@ -17,10 +17,10 @@ from blobtree.kernel_options import KERNEL_OPTIONS
 from blobtree.launch import launch
 from blobtree.meshing.dual import SAMPLES, classify_cells, corner_place, corner_sample, sample_blocks
 from blobtree.meshing.patches import EDGES, FACES
-from blobtree.meshing.scan import everything, starts_of
 from blobtree.sparse.blocks import child_number, child_place, find_block, grid_point
 from blobtree.sparse.cells import SparseCells
 from blobtree.sparse.grid import BRANCHING, CHILDREN
+from blobtree.sparse.scan import everything, starts_of
 
 wp.set_module_options(KERNEL_OPTIONS)
 

@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from decals.coat.neighbours import FacingTree
 from decals.model import FACING_LIMIT
 from decals.seeds.evenness import BEYOND
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.relaxation import Relaxation
 from tests.bench.seeds import MODELS, model
 

@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from blobtree import Node, Point, polygonize
-from decals.coat.neighbours import FacingTree
 from decals.errors import InvalidSeeding
 from decals.seeds.evenness import Spacing, evenness, ideal_spacing
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.relaxation import Relaxation
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface

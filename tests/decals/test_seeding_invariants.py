@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blobtree import Point, Segment
-from decals.coat.neighbours import FacingTree
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.relaxation import Relaxation
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface

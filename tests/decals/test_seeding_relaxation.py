@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from decals.coat.neighbours import FacingTree
 from decals.errors import InvalidSeeding
 from decals.model import FACING_LIMIT
 from decals.seeds.crowd import Crowd
+from decals.seeds.neighbours import FacingTree
 from decals.seeds.particles import CLOSEST
 from decals.seeds.polishing import polish
 from decals.seeds.population import Sites, World, shares

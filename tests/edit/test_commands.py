@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from decals.coat.neighbours import FacingTree
 from decals.edit import (
     Add,
     AddImage,
@@ -25,6 +24,7 @@ from decals.edit import (
 from decals.edit.population import lying_on
 from decals.errors import InvalidDecals, InvalidEdit
 from decals.scenes.scene import DecalImage
+from decals.seeds.neighbours import FacingTree
 from tests.edit.scenes import digest, one, scene
 
 
