@@ -1,17 +1,33 @@
-"""Small meshes for the tests of surfaces and seeds."""
+"""Small meshes for the tests of surfaces and seeds, made with NumPy alone: some run where little else is."""
 
 import numpy as np
-import pyvista as pv
+from scipy.spatial import ConvexHull
 
 from decals.surfaces.mesh import MeshSurface
 
 
-def mesh(data: pv.PolyData) -> MeshSurface:
-    return MeshSurface(data.points, data.regular_faces)
+def icosphere(level: int):
+    """Vertices and outward faces of an icosahedron on the unit ball, each face divided in four so often."""
+    golden = (1 + 5**0.5) / 2
+    vertices = np.array([np.roll([0, a, b * golden], k) for a in (-1, 1) for b in (-1, 1) for k in range(3)])
+    vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
+    faces = ConvexHull(vertices).simplices.astype(np.int64)
+    inward = np.linalg.det(vertices[faces]) < 0
+    faces[inward] = faces[inward, ::-1]
+    for _ in range(level):
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, middles = np.unique(sides, axis=0, return_inverse=True)
+        middles = len(vertices) + middles.reshape(-1, 3)
+        halves = vertices[edges].sum(axis=1)
+        vertices = np.concatenate([vertices, halves / np.linalg.norm(halves, axis=1, keepdims=True)])
+        corners = [np.stack([faces[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+        faces = np.concatenate([*corners, middles])
+    return vertices, faces
 
 
 def sphere(radius: float = 1.0, center=(0.0, 0.0, 0.0), level: int = 4) -> MeshSurface:
-    return mesh(pv.Icosphere(radius=radius, center=center, nsub=level))
+    vertices, faces = icosphere(level)
+    return MeshSurface(radius * vertices + np.asarray(center), faces)
 
 
 def plane(size: float = 1.0) -> MeshSurface:
@@ -32,9 +48,8 @@ def box(size=(1.0, 1.0, 1.0), center=(0.0, 0.0, 0.0)) -> MeshSurface:
 
 def star() -> MeshSurface:
     """A ball with six sharp thorns and a thin fin around it: what folds away within a spacing."""
-    ball = pv.Icosphere(radius=1.0, nsub=5)
-    unit = ball.points.astype(float)
+    unit, faces = icosphere(5)
     thorns = np.abs(unit).max(axis=1)
     fin = np.exp(-((unit @ (0.48, 0.6, 0.64) / 0.03) ** 2))
-    ball.points = (unit * (1.0 + 1.0 * np.exp((thorns - 1.0) / 0.01) + 0.5 * fin)[:, None]).astype(np.float32)
-    return mesh(ball)
+    heights = 1.0 + 1.0 * np.exp((thorns - 1.0) / 0.01) + 0.5 * fin
+    return MeshSurface(unit * heights[:, None], faces)
