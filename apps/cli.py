@@ -11,8 +11,8 @@ from cyclopts import App, CycloptsError
 from rich.console import Console
 from rich.markup import escape
 
+from .commands.help_texts import BENCH_TABLE, HELP
 from .errors import UsageError
-from .help_texts import BENCH_TABLE, HELP
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -25,10 +25,10 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 for _name, _help in HELP.items():
-    app.command(f"implicit_decals.apps.{_name}:{_name}", name=_name, help=_help)
+    app.command(f"implicit_decals.apps.commands.{_name}:{_name}", name=_name, help=_help)
 
 _bench = App(name="bench", help="Measure this machine.", help_format="plaintext")
-_bench.command("implicit_decals.apps.bench:table", name="table", help=BENCH_TABLE)
+_bench.command("implicit_decals.apps.commands.bench:table", name="table", help=BENCH_TABLE)
 app.command(_bench)
 
 

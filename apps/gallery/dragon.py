@@ -10,7 +10,7 @@ from decals.model import PLAIN, Decals, Interaction
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene, SceneObject
 
-from ..samples import axes_of, sample
+from ..models.samples import axes_of, sample
 from ..views import frame, parse_view
 from .panels import Panel, main
 

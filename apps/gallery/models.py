@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from decals.coat.seeding import seed
 from decals.scenes.scene import DecalImage, Scene
 
-from ..samples import axes_of, sample
+from ..models.samples import axes_of, sample
 from ..views import frame, parse_view
 from .panels import Panel, main
 

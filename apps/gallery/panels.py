@@ -14,8 +14,8 @@ from decals.model import Decals
 from decals.render import Renderer
 from decals.scenes.scene import Scene
 
+from ..machine.warp_start import start_warp
 from ..output import write_picture
-from ..warp_start import start_warp
 
 SIDE = 300
 """Width and height of a panel, in pixels."""

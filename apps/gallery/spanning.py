@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..spanning import spanning
+from ..models.spanning import spanning
 from .panels import Panel, main
 
 

@@ -4,10 +4,10 @@ import pytest
 
 from decals.errors import NoGraphics
 from decals.render import Renderer
-from implicit_decals.apps.bench import Row, as_table, measure, parse_counts, parse_models
 from implicit_decals.apps.cli import BAD_INPUT, run
+from implicit_decals.apps.commands.bench import Row, as_table, measure, parse_counts, parse_models
 from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.paper import FIGURE_14
+from implicit_decals.apps.measuring.paper import FIGURE_14
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,10 @@ from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene, TreeObject
 from decals.scenes.scene_file import save_scene
 from decals.window import EditWindow
-from implicit_decals.apps import demo as demo_module
-from implicit_decals.apps import render as render_module
-from implicit_decals.apps import view as view_module
 from implicit_decals.apps.cli import run
+from implicit_decals.apps.commands import demo as demo_module
+from implicit_decals.apps.commands import render as render_module
+from implicit_decals.apps.commands import view as view_module
 
 Capture = pytest.CaptureFixture[str]
 
@@ -240,7 +240,7 @@ def test_an_interrupted_polygonize_leaves_no_file(
 
 
 def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    monkeypatch.setattr("implicit_decals.apps.hatching.COUNT", 120)
+    monkeypatch.setattr("implicit_decals.apps.models.hatching.COUNT", 120)
     assert run(["demo", "--size", "80x60", "--samples", "1"]) == 0
     names = capsys.readouterr().out.split()
     assert names == ["out/hero.png", "out/contact.png", "out/span.png"]
@@ -404,7 +404,7 @@ def test_a_path_that_no_file_can_have(bad: Callable[..., str]) -> None:
 
 
 def test_a_wrong_data_folder_is_not_spoken_of_where_no_sample_is_fetched(tmp_path: Path) -> None:
-    program = "from implicit_decals.apps.samples import sample; sample('knot')"
+    program = "from implicit_decals.apps.models.samples import sample; sample('knot')"
     environment = {**os.environ, "PYVISTA_DATA": str(tmp_path / "missing")}
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", program],

@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 
 from decals.render.libraries import missing_gl_libraries
-from implicit_decals.apps import doctor
-from implicit_decals.apps.doctor import Finding, Status
+from implicit_decals.apps.commands import doctor
+from implicit_decals.apps.commands.doctor import Finding, Status
 
 CONTEXT: dict[str, str | int] = {
     "code": 330,

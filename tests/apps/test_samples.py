@@ -10,11 +10,11 @@ from blobtree import polygonize
 from decals.scenes.mesh_file import MeshArrays
 from decals.scenes.scene import MeshObject, TreeObject
 from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.hatching import hatching, mosaic
-from implicit_decals.apps.knot import torus_knot
-from implicit_decals.apps.samples import SAMPLES, axes_of, sample, sample_mesh
-from implicit_decals.apps.shapes import egg, rounded_box
-from implicit_decals.apps.spanning import spanning
+from implicit_decals.apps.models.hatching import hatching, mosaic
+from implicit_decals.apps.models.knot import torus_knot
+from implicit_decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
+from implicit_decals.apps.models.shapes import egg, rounded_box
+from implicit_decals.apps.models.spanning import spanning
 
 
 def _volume(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> float:
@@ -79,7 +79,7 @@ def test_models_stand_along_y_but_the_horse() -> None:
 
 
 def test_one_coat_runs_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("implicit_decals.apps.hatching.COUNT", 300)
+    monkeypatch.setattr("implicit_decals.apps.models.hatching.COUNT", 300)
     scene = hatching(progress=lambda _stage, _fraction: None)
     creature, shell = (item.surface for item in scene.objects)
     distance = [

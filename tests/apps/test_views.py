@@ -6,7 +6,7 @@ import pytest
 from blobtree import Point
 from decals.scenes.scene import MeshObject, SceneObject, TreeObject
 from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.knot import torus_knot
+from implicit_decals.apps.models.knot import torus_knot
 from implicit_decals.apps.views import PRESETS, UPRIGHT, View, frame, parse_view
 
 

@@ -22,10 +22,10 @@ from decals.grid.index import DecalIndex
 from decals.model import Decals
 from decals.render import Renderer
 from decals.scenes.scene import DecalImage, MeshObject, Scene
-from implicit_decals.apps.coats import even_coat
 from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.knot import torus_knot
-from implicit_decals.apps.samples import axes_of, sample
+from implicit_decals.apps.measuring.coats import even_coat
+from implicit_decals.apps.models.knot import torus_knot
+from implicit_decals.apps.models.samples import axes_of, sample
 from implicit_decals.apps.views import frame, parse_view
 from tests.bench import decal_rivals as rivals
 from tests.bench.mesh_decals import ClippedMesh, MeshDecals

@@ -6,8 +6,8 @@ from decals.coat.seeding import seed
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene
-from implicit_decals.apps.coats import even_coat
-from implicit_decals.apps.samples import axes_of, sample
+from implicit_decals.apps.measuring.coats import even_coat
+from implicit_decals.apps.models.samples import axes_of, sample
 from implicit_decals.apps.views import frame, parse_view
 
 

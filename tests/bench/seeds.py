@@ -28,8 +28,8 @@ from decals.seeds.relaxation import Relaxation
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.knot import torus_knot
-from implicit_decals.apps.samples import sample_mesh
+from implicit_decals.apps.models.knot import torus_knot
+from implicit_decals.apps.models.samples import sample_mesh
 from tests.bench.seed_packages import PACKAGES
 
 COUNTS = (1_000, 10_000, 100_000)

@@ -11,7 +11,7 @@ from decals.errors import NoGraphics
 from decals.field.contact import Contact
 from decals.render.context import Context
 from decals.scenes.scene import DecalImage, MeshObject, Scene
-from implicit_decals.apps.coats import even_coat
+from implicit_decals.apps.measuring.coats import even_coat
 from tests.bench import record, replay, replay_counts
 from tests.bench.scenes import in_layers
 from tests.decals.shapes import torus

@@ -13,8 +13,12 @@ from decals.render import Renderer
 from decals.scenes.scene import DecalImage, Scene, SceneObject
 from decals.scenes.scene_file import save_scene
 
-from .errors import UsageError
-from .models import load_models
+from ..errors import UsageError
+from ..machine.warp_start import start_warp
+from ..models.loading import load_models
+from ..models.samples import axes_of
+from ..output import PICTURE_SUFFIXES, check_output, write_picture
+from ..views import UPRIGHT, Size, View, frame, parse_view
 from .options import (
     MAX_DECALS,
     MAX_SAMPLES,
@@ -25,11 +29,7 @@ from .options import (
     check_count,
     parse_size,
 )
-from .output import PICTURE_SUFFIXES, check_output, write_picture
 from .progress_bars import progress_bars
-from .samples import axes_of
-from .views import UPRIGHT, Size, View, frame, parse_view
-from .warp_start import start_warp
 
 DEFAULT_COUNT = 500
 DEFAULT_IMAGES = ("scale",)

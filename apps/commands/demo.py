@@ -8,13 +8,13 @@ from rich.console import Console
 
 from decals.render import Renderer
 
-from .errors import UsageError
-from .hatching import hatching, mosaic
+from ..errors import UsageError
+from ..machine.warp_start import start_warp
+from ..models.hatching import hatching, mosaic
+from ..models.spanning import spanning
+from ..output import check_output, write_picture
 from .options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
-from .output import check_output, write_picture
 from .progress_bars import progress_bars
-from .spanning import spanning
-from .warp_start import start_warp
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 

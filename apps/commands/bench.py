@@ -14,14 +14,14 @@ from decals.grid.index import DecalIndex
 from decals.render import Renderer
 from decals.scenes.scene import DecalImage, Scene
 
-from .coats import even_coat
-from .errors import UsageError
+from ..errors import UsageError
+from ..machine.warp_start import start_warp
+from ..measuring.coats import even_coat
+from ..measuring.paper import FIGURE_14, PaperRow
+from ..models.samples import SAMPLES, axes_of, sample
+from ..views import Size, frame, parse_view
 from .options import MAX_DECALS, check_count, parse_size
-from .paper import FIGURE_14, PaperRow
 from .progress_bars import progress_bars
-from .samples import SAMPLES, axes_of, sample
-from .views import Size, frame, parse_view
-from .warp_start import start_warp
 
 RUNS = 3
 """Runs of which the median counts."""

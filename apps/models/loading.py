@@ -11,7 +11,7 @@ from decals.scenes.mesh_file import read_mesh
 from decals.scenes.scene import MeshObject, Scene, SceneObject, TreeObject
 from decals.scenes.scene_file import is_scene, load_scene
 
-from .errors import UsageError
+from ..errors import UsageError
 from .samples import SAMPLES, sample, sample_mesh
 
 

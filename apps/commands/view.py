@@ -9,15 +9,15 @@ from rich.console import Console
 from decals.scenes.scene import Scene
 from decals.window import EditWindow
 
-from .errors import UsageError
-from .models import load_models
+from ..errors import UsageError
+from ..machine.warp_start import start_warp
+from ..models.loading import load_models
+from ..models.samples import axes_of
+from ..output import check_output
+from ..views import UPRIGHT, parse_view
 from .options import MAX_DECALS, MAX_SEED, OptionalWhole, check_count, parse_size
-from .output import check_output
 from .progress_bars import progress_bars
 from .render import Coat
-from .samples import axes_of
-from .views import UPRIGHT, parse_view
-from .warp_start import start_warp
 
 
 def view(

@@ -8,12 +8,12 @@ from cyclopts import Parameter
 
 from decals.scenes.scene import TreeObject
 
-from .errors import UsageError
-from .models import load_model
+from ..errors import UsageError
+from ..machine.warp_start import start_warp
+from ..models.loading import load_model
+from ..output import MESH_SUFFIXES, check_output, replacing
 from .options import OptionalWhole
-from .output import MESH_SUFFIXES, check_output, replacing
 from .progress_bars import progress_bars
-from .warp_start import start_warp
 
 OptionalLength = Annotated[float | None, Parameter(show_default=False)]
 

@@ -17,12 +17,12 @@ from decals.scenes.scene import Scene
 from decals.seeds.painted_image import PaintedImage
 from decals.seeds.projections import Planar
 
-from .errors import UsageError
-from .models import load_models
+from ..errors import UsageError
+from ..machine.warp_start import start_warp
+from ..models.loading import load_models
+from ..output import check_output
 from .options import MAX_DECALS, MAX_SEED, OptionalWhole, Whole, check_count
-from .output import check_output
 from .progress_bars import progress_bars
-from .warp_start import start_warp
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
 SUFFIXES = (".json", ".csv")

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from .errors import UsageError
-from .views import Size
+from ..errors import UsageError
+from ..views import Size
 
 MAX_EDGE = 16384
 """Longest edge of a picture, in pixels."""

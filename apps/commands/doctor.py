@@ -20,7 +20,7 @@ from decals.render.libraries import GL_LIBRARIES, install_advice, missing_gl_lib
 PACKAGES = ("numpy", "scipy", "warp-lang", "moderngl", "pyvista", "vtk")
 OLDEST_PYTHON = (3, 11)
 OLDEST_GL = 330
-PROBE = (sys.executable, "-m", "implicit_decals.apps.gl_probe")
+PROBE = (sys.executable, "-m", "implicit_decals.apps.machine.gl_probe")
 PROBE_SECONDS = 60.0
 SAMPLES = ("dragon.ply", "horse.vtp")
 DRIVER_ADVICE = (
@@ -137,7 +137,7 @@ def context_findings(probe: Iterable[str] = PROBE) -> list[Finding]:
     Parameters
     ----------
     probe
-        The command that prints what `implicit_decals.apps.gl_probe.describe` returns.
+        The command that prints what `implicit_decals.apps.machine.gl_probe.describe` returns.
     """
     try:
         ran = subprocess.run(
@@ -166,7 +166,7 @@ def describe_context(context: Mapping[str, str | int]) -> list[Finding]:
     Parameters
     ----------
     context
-        As `implicit_decals.apps.gl_probe.describe` returns it.
+        As `implicit_decals.apps.machine.gl_probe.describe` returns it.
     """
     code, glsl = int(context["code"]), int(context["glsl"])
     shown = f"OpenGL {code // 100}.{code % 100 // 10}"

@@ -10,11 +10,11 @@ from decals.scenes.mesh_file import MeshArrays, surface_triangles
 from decals.scenes.scene import MeshObject, SceneObject, TreeObject
 from decals.scenes.scene_file import SAMPLE
 
+from ..errors import UsageError
+from ..views import UPRIGHT, Axes
 from .creature import creature
-from .errors import UsageError
 from .knot import torus_knot
 from .spheres import spheres
-from .views import UPRIGHT, Axes
 
 _DATA = "https://github.com/pyvista/vtk-data"
 
