@@ -1,16 +1,12 @@
 """``implicit-decals render``: cover models with decals and draw the picture."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from blobtree import Progress
-from decals.coat.seeding import seed as seed_decals
 from decals.render import Renderer
-from decals.scenes.scene import DecalImage, Scene, SceneObject
+from decals.scenes.scene import Scene
 from decals.scenes.scene_file import save_scene
 
 from ..errors import UsageError
@@ -18,11 +14,10 @@ from ..machine.warp_start import start_warp
 from ..models.loading import load_models
 from ..models.samples import axes_of
 from ..output import PICTURE_SUFFIXES, check_output, write_picture
-from ..views import UPRIGHT, Size, View, frame, parse_view
+from ..views import UPRIGHT, frame, parse_view
+from .coat import Coat
 from .options import (
-    MAX_DECALS,
     MAX_SAMPLES,
-    MAX_SEED,
     TILE,
     OptionalWhole,
     Whole,
@@ -30,9 +25,6 @@ from .options import (
     parse_size,
 )
 from .progress_bars import progress_bars
-
-DEFAULT_COUNT = 500
-DEFAULT_IMAGES = ("scale",)
 
 
 def render(
@@ -100,35 +92,3 @@ def render(
             save_scene(scene, save)
         progress("Drawing", 0.0)
         write_picture(output, renderer.render(scene, size=pixels, samples=samples))
-
-
-@dataclass(frozen=True)
-class Coat:
-    """The decals that somebody asked for."""
-
-    count: int
-    images: tuple[DecalImage, ...]
-    seed: int
-
-    @classmethod
-    def asked(cls, count: int | None, images: Sequence[str] | None, seed: int | None) -> "Coat":
-        """Check what was asked, fill in the defaults and read the images."""
-        count, seed = DEFAULT_COUNT if count is None else count, seed or 0
-        check_count("--decals", count, 0, MAX_DECALS)
-        check_count("--seed", seed, 0, MAX_SEED)
-        return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
-
-    def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
-        """Cover objects with the decals and look at them."""
-        return Scene(
-            objects=tuple(objects),
-            camera=frame(objects, view, size),
-            images=self.images,
-            decals=seed_decals(
-                [item.surface for item in objects],
-                count=self.count,
-                seed=self.seed,
-                images=len(self.images),
-                progress=progress,
-            ),
-        )

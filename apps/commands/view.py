@@ -15,9 +15,9 @@ from ..models.loading import load_models
 from ..models.samples import axes_of
 from ..output import check_output
 from ..views import UPRIGHT, parse_view
+from .coat import Coat
 from .options import MAX_DECALS, MAX_SEED, OptionalWhole, check_count, parse_size
 from .progress_bars import progress_bars
-from .render import Coat
 
 
 def view(

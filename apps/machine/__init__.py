@@ -1,1 +1,1 @@
-"""What this machine has, and how to start on it."""
+"""What this machine has of what the project needs, finding by finding, and how to start Warp on it."""

@@ -1,1 +1,1 @@
-"""What measurements need: even coats in seconds, and the paper's own numbers."""
+"""What measurements need: even coats in seconds, and the paper's figure 14 with its own numbers."""

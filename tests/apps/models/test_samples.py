@@ -1,4 +1,8 @@
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -102,3 +106,16 @@ def test_the_one_decal_spans_both_surfaces() -> None:
     box, blob = (item.surface for item in scene.objects)
     assert np.linalg.norm(box.project(rim[:1])[0] - rim[:1]) < 0.1 * radius
     assert np.linalg.norm(blob.project(rim[1:])[0] - rim[1:]) < 0.5 * radius
+
+
+def test_a_wrong_data_folder_is_not_spoken_of_where_no_sample_is_fetched(tmp_path: Path) -> None:
+    program = "from implicit_decals.apps.models.samples import sample; sample('knot')"
+    environment = {**os.environ, "PYVISTA_DATA": str(tmp_path / "missing")}
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "PYVISTA_DATA" not in result.stderr

@@ -1,0 +1,69 @@
+"""Python, the packages that computing and drawing stand on, and the devices that Warp finds."""
+
+import os
+import platform
+import sys
+from collections.abc import Callable
+from importlib import metadata
+
+from .finding import Finding, Status, last_line
+
+PACKAGES = ("numpy", "scipy", "warp-lang", "moderngl", "pyvista", "vtk")
+OLDEST_PYTHON = (3, 11)
+
+
+def python_finding(version: tuple[int, ...] = tuple(sys.version_info[:3])) -> Finding:
+    """Look at the version of Python."""
+    shown = ".".join(map(str, version))
+    if version >= OLDEST_PYTHON:
+        return Finding("Python", shown)
+    oldest = ".".join(map(str, OLDEST_PYTHON))
+    return Finding("Python", shown, Status.MISSING, f"Make the environment with Python {oldest} or newer.")
+
+
+def platform_finding() -> Finding:
+    """Name the system and the processor."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return Finding("Platform", f"{platform.platform()}, {cores} cores")
+
+
+def package_findings(version: Callable[[str], str] = metadata.version) -> list[Finding]:
+    """Look for the packages that computing and drawing stand on.
+
+    Parameters
+    ----------
+    version
+        Gives the version of an installed package, or raises `importlib.metadata.PackageNotFoundError`.
+    """
+    return [_package_finding(name, version) for name in PACKAGES]
+
+
+def _package_finding(name: str, version: Callable[[str], str]) -> Finding:
+    try:
+        return Finding(name, version(name))
+    except metadata.PackageNotFoundError:
+        return Finding(name, "not installed", Status.MISSING, f"Run: {sys.executable} -m pip install {name}")
+
+
+def warp_devices() -> list[str]:
+    """Name the devices that Warp computes on."""
+    import warp as wp
+
+    import blobtree  # noqa: F401 -- it keeps Warp from printing while it starts
+
+    return [f"{device.alias} ({device.name})" for device in wp.get_devices()]
+
+
+def warp_finding(devices: Callable[[], list[str]] = warp_devices) -> Finding:
+    """Ask Warp for its devices.
+
+    Parameters
+    ----------
+    devices
+        Names them; raises anything where Warp does not work.
+    """
+    try:
+        return Finding("Warp devices", ", ".join(devices()))
+    except Exception as error:  # a broken installation fails in any way it likes
+        advice = f"Run: {sys.executable} -m pip install --force-reinstall warp-lang"
+        return Finding("Warp devices", f"none: {last_line(str(error))}", Status.MISSING, advice)

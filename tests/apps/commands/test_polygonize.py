@@ -1,0 +1,77 @@
+"""``implicit-decals polygonize``."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+import blobtree
+from blobtree import Point
+from implicit_decals.apps.cli import run
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp"])
+def test_polygonize(folder: Path, suffix: str) -> None:
+    blobtree.save(Point((1, 2, 3), radius=0.5, color=(1.0, 0.5, 0.0)), folder / "ball.json")
+    assert run(["polygonize", "ball.json", "--resolution", "40", "-o", f"ball.{suffix}"]) == 0
+    mesh = pv.read(folder / f"ball.{suffix}")
+    assert np.allclose(np.linalg.norm(mesh.points - [1, 2, 3], axis=1), 0.5, atol=1e-3)
+    assert mesh.triangulate().volume == pytest.approx(4 / 3 * np.pi * 0.125, rel=0.02)
+    if suffix in ("ply", "vtp"):
+        assert np.asarray(mesh["RGB"])[0].tolist() == [255, 128, 0]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(["ball.json", f"ball.{suffix}"])
+
+
+def test_polygonize_by_cell_size(folder: Path) -> None:
+    for cell, name in (("0.4", "coarse"), ("0.1", "fine")):
+        assert run(["polygonize", "spheres", "--cell-size", cell, "-o", f"{name}.ply"]) == 0
+    assert pv.read(folder / "fine.ply").n_cells > 8 * pv.read(folder / "coarse.ply").n_cells
+
+
+def test_polygonize_by_chord_error_with_creases(folder: Path) -> None:
+    cut = Point((0, 0, 0), radius=1.0) - Point((0.8, 0, 0), radius=0.9)
+    blobtree.save(cut, folder / "cut.json")
+    wish = ["polygonize", "cut.json", "--chord-error", "0.01"]
+    assert run([*wish, "--creases", "-o", "closed.vtp"]) == 0
+    assert run([*wish, "--split-normals", "-o", "split.vtp"]) == 0
+    assert run(["polygonize", "cut.json", "--cells", "30", "--creases", "-o", "cells.stl"]) == 0
+    closed, split = pv.read(folder / "closed.vtp"), pv.read(folder / "split.vtp")
+    assert closed.is_manifold
+    assert (closed["meetings"] == 2).sum() > 20
+    assert split.n_points > closed.n_points
+    assert split.n_cells == closed.n_cells
+    assert pv.read(folder / "cells.stl").n_cells > 100
+
+
+@pytest.mark.parametrize("stage", ["placing vertices", "writing"])
+def test_an_interrupted_polygonize_leaves_no_file(
+    folder: Path, stage: str, monkeypatch: pytest.MonkeyPatch, capfd: Capture
+) -> None:
+    """Control-C while it computes, or while the file is half written."""
+
+    def report(_self: object, _task: object, **_state: object) -> None:
+        raise KeyboardInterrupt
+
+    def save(_self: object, path: Path, **_options: object) -> None:
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    if stage == "writing":
+        monkeypatch.setattr(pv.PolyData, "save", save)
+    else:
+        monkeypatch.setattr("rich.progress.Progress.update", report)
+    before = sorted(folder.iterdir())
+    assert run(["polygonize", "spheres", "-o", "half.ply"]) == 130
+    assert sorted(folder.iterdir()) == before
+    assert capfd.readouterr().err.split() == ["interrupted"]
+
+
+def test_a_tree_without_a_surface_is_no_mesh(folder: Path, capfd: Capture) -> None:
+    apart = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
+    blobtree.save(apart, folder / "nothing.json")
+    assert run(["polygonize", "nothing.json", "-o", "a.ply"]) == 2
+    assert capfd.readouterr().err.startswith("error: 'nothing.json' shows no surface")
+    assert not (folder / "a.ply").exists()

@@ -1,0 +1,121 @@
+"""``implicit-decals render``."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from PIL import Image
+
+import blobtree
+from blobtree import Point
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene, TreeObject
+from decals.scenes.scene_file import save_scene
+from implicit_decals.apps.cli import run
+from tests.apps.commands.pictures import picture, small
+
+Capture = pytest.CaptureFixture[str]
+
+
+def test_render_a_mesh_and_a_blob_together(folder: Path, capsys: Capture) -> None:
+    pv.Sphere(radius=0.5, center=(1, 0, 0)).save(folder / "ball.ply")
+    blobtree.save(Point((0, 0, 0), radius=0.6), folder / "blob.json")
+    assert run([*small("ball.ply", "blob.json"), "--image", "rock", "--image", "tile", "-o", "both.png"]) == 0
+    drawn = picture(folder / "both.png")
+    assert drawn.shape == (48, 64, 4)
+    middle, corner = drawn[20:28, 24:40, :3].reshape(-1, 3), drawn[0, 0, :3]
+    assert np.abs(middle.astype(int) - corner).max(axis=1).mean() > 40
+    progress = capsys.readouterr()
+    assert "Drawing" in progress.err
+    assert progress.out == ""
+
+
+def test_the_same_seed_gives_the_same_picture_and_another_another(folder: Path) -> None:
+    for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
+        assert run([*small("spheres"), "--seed", seed, "-o", f"{name}.png"]) == 0
+    pictures = [picture(folder / f"{name}.png") for name in "abc"]
+    assert np.array_equal(pictures[0], pictures[1])
+    assert not np.array_equal(pictures[0], pictures[2])
+
+
+def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
+    pv.Sphere().save(folder / "ball.stl")
+    Image.new("RGB", (8, 8), (200, 30, 30)).save(folder / "red.png")
+    models = ("ball.stl", "knot", "spheres")
+    assert (
+        run([*small(*models), "--image", "red.png", "--image", "eye", "--save", "s.json", "-o", "a.png"]) == 0
+    )
+    assert run(["render", "s.json", "--size", "64x48", "--samples", "1", "-o", "b.png"]) == 0
+    assert np.array_equal(picture(folder / "a.png"), picture(folder / "b.png"))
+    written = json.loads((folder / "s.json").read_text())
+    assert [item.get("source") for item in written["objects"]] == ["ball.stl", "sample:knot", None]
+    assert len(written["decals"]) == 30
+
+
+def test_a_camera_for_a_saved_scene(folder: Path) -> None:
+    assert run([*small("spheres"), "--save", "s.json", "-o", "a.png"]) == 0
+    assert run(["render", "s.json", "--size", "64x48", "--camera", "back", "-o", "b.png"]) == 0
+    assert not np.array_equal(picture(folder / "a.png"), picture(folder / "b.png"))
+
+
+@pytest.mark.parametrize("camera", ["top", "bottom", "left", "-1,0.5,2", "0,3,0"])
+def test_cameras_see_the_model(folder: Path, camera: str) -> None:
+    assert run([*small("knot"), f"--camera={camera}", "-o", "a.png"]) == 0
+    drawn = picture(folder / "a.png")[..., :3].astype(int)
+    assert (np.abs(drawn - drawn[:, :1]).max(axis=-1) > 30).mean() > 0.1
+
+
+def test_no_decals_at_all(folder: Path) -> None:
+    assert run(["render", "spheres", "--decals", "0", "--size", "40x30", "-o", "a.jpg"]) == 0
+    assert picture(folder / "a.jpg").shape == (30, 40, 3)
+
+
+def test_two_of_a_name_are_told_apart(folder: Path) -> None:
+    assert run([*small("knot", "knot"), "--save", "s.json", "-o", "a.png"]) == 0
+    assert [item["name"] for item in json.loads((folder / "s.json").read_text())["objects"]] == [
+        "knot",
+        "knot-2",
+    ]
+
+
+def test_a_scene_brings_its_own_decals(bad: Callable[..., str], folder: Path) -> None:
+    blob = TreeObject("blob", Point((0, 0, 0), radius=1))
+    save_scene(Scene(objects=(blob,), camera=Camera((0, 0, 5))), folder / "s.json")
+    assert "own decals" in bad("render", "s.json", "-o", "a.png", "--decals", "5")
+    assert "render it alone" in bad("render", "s.json", "ball.ply", "-o", "a.png")
+    assert "BlobTree" in bad("polygonize", "s.json", "-o", "a.ply")
+
+
+def test_a_sample_that_cannot_be_downloaded(bad: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def offline() -> None:
+        raise ConnectionError("no network")
+
+    monkeypatch.setattr("pyvista.examples.download_dragon", offline)
+    line = bad("render", "dragon", "-o", "a.png")
+    assert "PYVISTA_DATA" in line
+    assert "internet" in line
+
+
+@pytest.mark.parametrize("number", ["1.9", "1e3", "many", ""])
+def test_a_fraction_is_no_count(bad: Callable[..., str], number: str) -> None:
+    assert "whole number" in bad("render", "knot", "-o", "a.png", f"--decals={number}")
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="wants a folder that not even root can write to")
+def test_a_folder_that_cannot_be_written(bad: Callable[..., str]) -> None:
+    assert "cannot be written" in bad("render", "ball.ply", "-o", "/proc/a.png")
+
+
+def test_files_are_replaced_not_left_half(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "a.png").write_bytes(b"old")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    assert run([*small("knot"), "-o", "a.png"]) == 2
+    assert (folder / "a.png").read_bytes() == b"old"
+    assert [path.name for path in folder.iterdir()] == ["a.png"]

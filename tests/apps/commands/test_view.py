@@ -1,0 +1,83 @@
+"""``implicit-decals view``, without a screen."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import blobtree
+from blobtree import Point
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
+from decals.scenes.scene_file import save_scene
+from decals.window import EditWindow
+from implicit_decals.apps.cli import run
+from implicit_decals.apps.commands import view as view_module
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[EditWindow]:
+    """Windows that `view` opens, without a screen and closed at once."""
+    opened: list[EditWindow] = []
+
+    class Window(EditWindow):
+        def __init__(self, *arguments: object, **options: object) -> None:
+            super().__init__(*arguments, **options, off_screen=True)
+            opened.append(self)
+
+        @staticmethod
+        def require_screen() -> None:
+            pass
+
+    monkeypatch.setattr(view_module, "EditWindow", Window)
+    return opened
+
+
+def test_view_opens_models_and_scenes(folder: Path, windows: list[EditWindow]) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    arguments = ["view", "ball.json", "--decals", "20", "--size", "80x60", "--save", "scene.json"]
+    assert run(arguments) == 0
+    assert len(windows[0].document.decals) == 20
+    assert windows[0].actions.path == Path("scene.json")
+    save_scene(windows[0].document.scene, folder / "scene.json")
+    assert run(["view", "scene.json", "--size", "80x60"]) == 0
+    assert len(windows[1].document.decals) == 20
+    assert windows[1].actions.path == Path("scene.json")
+
+
+def test_view_says_what_was_not_saved(
+    folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+
+    def show(window: EditWindow) -> None:
+        window.tools.key("a", 0, 0, ctrl=True)
+        window.tools.key("d", 0, 0)
+
+    monkeypatch.setattr(EditWindow, "show", show)
+    assert run(["view", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
+    assert len(windows[0].document.decals) == 10
+    assert "without saving" in capsys.readouterr().err
+
+
+def test_view_says_what_is_wrong(folder: Path, windows: list[EditWindow], capsys: Capture) -> None:
+    save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "scene.json")
+    for wrong, message in (
+        (["view", "scene.json", "--decals", "3"], "brings its own decals"),
+        (["view", "nothing.ply"], "nothing.ply"),
+        (["view", "scene.json", "--size", "0x3"], "--size"),
+        (["view", "scene.json", "--save", "scene.png"], "scene.png"),
+    ):
+        assert run(wrong) == 2
+        assert message in capsys.readouterr().err
+    assert windows == []
+
+
+def test_view_wants_a_screen(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert run(["view", "knot"]) == 2
+    assert "DISPLAY" in capsys.readouterr().err
