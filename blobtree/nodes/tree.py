@@ -26,13 +26,7 @@ from blobtree.tapes.evaluate import colors_at, gradients_at, values_at
 from blobtree.tapes.program import Instruction, compile_program
 from blobtree.tapes.tape import Tape, compile_tape
 from blobtree.tracing.trace import Hits, raycast
-from blobtree.validation import (
-    Matrix,
-    affine_matrix,
-    finite_number,
-    finite_vector,
-    settle,
-)
+from blobtree.validation import Matrix, affine_matrix, finite_number, finite_vector, settle
 from blobtree.views.viewing import Viewing
 
 LARGEST_EXPONENT = 100.0
@@ -77,23 +71,13 @@ class Node(Viewing):
     # -- combining ----------------------------------------------------------------------------------
 
     def __add__(self, other: "Node") -> "Node":
-        return (
-            Sum((*_operands(Sum, self), *_operands(Sum, other)))
-            if isinstance(other, Node)
-            else NotImplemented
-        )
+        return _folded(Sum, self, other)
 
     def __or__(self, other: "Node") -> "Node":
-        return (
-            Union((*_operands(Union, self), *_operands(Union, other)))
-            if isinstance(other, Node)
-            else NotImplemented
-        )
+        return _folded(Union, self, other)
 
     def __and__(self, other: "Node") -> "Node":
-        if not isinstance(other, Node):
-            return NotImplemented
-        return Intersection((*_operands(Intersection, self), *_operands(Intersection, other)))
+        return _folded(Intersection, self, other)
 
     def __sub__(self, other: "Node") -> "Node":
         return Difference(self, other) if isinstance(other, Node) else NotImplemented
@@ -348,6 +332,9 @@ def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
     return nodes
 
 
-def _operands(kind: type[Sum] | type[Union] | type[Intersection], node: Node) -> tuple[Node, ...]:
-    """What `node` brings to an operator of `kind`: a + b + c is one sum of three."""
-    return node.operands if isinstance(node, kind) else (node,)
+def _folded(kind: type[Sum] | type[Union] | type[Intersection], first: Node, second: Node) -> Node:
+    """Both under an operator of `kind`: a + b + c is one sum of three."""
+    if not isinstance(second, Node):
+        return NotImplemented
+    operands = [item.operands if isinstance(item, kind) else (item,) for item in (first, second)]
+    return kind((*operands[0], *operands[1]))
