@@ -8,11 +8,26 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from blobtree.formulas.operators import OPERATORS
+from blobtree.formulas.skeletons import SKELETONS
+from blobtree.formulas.warps import WARPS
 from blobtree.typed.builtins import type_name
 from decals.render.buffers import WIDTH, DataTexture
 from decals.render.context import Context
+from decals.render.tape_shader import Kinds
 from tests.blobtree.warp_functions import TypedFunction
 
+AGREEMENT = 1e-5
+"""Largest relative difference between the two languages, or absolute one below 1."""
+ALL_KINDS = Kinds(
+    tuple(range(len(SKELETONS))),
+    tuple(range(len(OPERATORS))),
+    6,
+    stretched=True,
+    warps=tuple(range(len(WARPS))),
+    warp_registers=4,
+)
+"""All that a tape can hold, in one program."""
 VERTEX = """#version 330 core
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 """

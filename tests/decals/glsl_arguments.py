@@ -1,0 +1,213 @@
+"""Arguments for typed functions: by the parameters' names, seeded, edge cases among them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree.formulas.operators import OPERATORS
+from blobtree.formulas.warps import WARPS
+from decals.field.ownership import owner_at
+from decals.grid.index import DecalIndex
+from decals.model import RECORD
+from tests.blobtree.warp_functions import TypedFunction, call, element, numpy_type
+
+Array = NDArray[Any]
+
+COUNT = 10_240
+TEXELS = 4096
+DECALS = 300
+
+Draw = Callable[[np.random.Generator, int], Array]
+
+
+def uniform(low: float, high: float, *shape: int) -> Draw:
+    """Evenly spread numbers; the first rows are all 0, all ½ and all 1 where these lie in the range."""
+
+    def draw(rng: np.random.Generator, count: int) -> Array:
+        numbers = rng.uniform(low, high, (count, *shape))
+        for row, special in enumerate((0.0, 0.5, 1.0)):
+            if low <= special <= high:
+                numbers[row::1000] = special
+        return numbers
+
+    return draw
+
+
+def powers(low: float, high: float) -> Draw:
+    return lambda rng, count: 10.0 ** rng.uniform(low, high, count)
+
+
+def whole(low: int, high: int, step: int = 1) -> Draw:
+    return lambda rng, count: rng.integers(low, high, count) * step
+
+
+def among(*values: float) -> Draw:
+    return lambda rng, count: rng.choice(values, count)
+
+
+def units(rng: np.random.Generator, count: int) -> Array:
+    vectors = rng.normal(size=(count, 3))
+    vectors[:3] = np.eye(3)
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def units_or_none(rng: np.random.Generator, count: int) -> Array:
+    vectors = units(rng, count)
+    vectors[::5] = 0.0
+    return vectors
+
+
+def beside(*draws: Draw) -> Draw:
+    """A vector whose components are drawn by these."""
+    return lambda rng, count: np.column_stack([draw(rng, count) for draw in draws])
+
+
+def interval(high: float) -> Draw:
+    return lambda rng, count: np.sort(uniform(0.0, high, 2)(rng, count), axis=1)
+
+
+place, ball = uniform(-2.0, 2.0, 3), beside(uniform(-2.0, 2.0, 3), uniform(0.3, 2.5))
+share, field, four = uniform(0.0, 1.0), uniform(0.0, 3.0), uniform(-3.0, 3.0, 4)
+
+BY_NAME: dict[str, Draw] = {
+    "a": field, "aim": units_or_none, "b": field, "max_a": field, "max_b": field, "slope_a": uniform(0, 5),
+    "slope_b": uniform(0, 5),
+    "at": whole(0, (TEXELS - 8) // 2, step=2), "apart": place,
+    "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
+    "center": place, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5), "contact": whole(0, 3),
+    "decal": whole(0, DECALS),
+    "above": whole(-1, DECALS),
+    "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
+    "p": uniform(-1.5, 1.5, 4), "slim": uniform(0.3, 2.5), "slimmest": uniform(0.3, 2.5),
+    "e_k": uniform(0.0, 0.5), "e_i": share,
+    "exponent": among(1.5, 2, 3, 7, 20, 100), "parameter": among(1.5, 2, 3, 7, 20, 100), "f": field,
+    "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3),
+    "inverse": uniform(-3.0, 3.0, 3), "m": place,
+    "mapping": whole(0, 2), "n": units, "n_p": units, "n_q": units, "nearest": uniform(0.0, 1.5),
+    "offset": beside(powers(-9, 9), powers(-9, 9)),
+    "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
+    "operator": whole(0, len(OPERATORS)), "origin": place,
+    "phi": share, "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
+    "rim": share,
+    "speed": uniform(0.1, 3.0),
+    "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3), "v": four, "w": place,
+    "z": uniform(0.0, 1.5),
+}  # fmt: skip
+BY_FUNCTION: dict[str, dict[str, Draw]] = {
+    "bound_combine": {key: beside(field, uniform(-2, 5), uniform(0, 5)) for key in "ab"},
+    "gradient_combine": {"a": beside(field, uniform(-3, 3, 3)), "b": beside(field, uniform(-3, 3, 3))},
+    "color_combine": {"a": beside(field, uniform(0, 1, 3)), "b": beside(field, uniform(0, 1, 3))},
+    "turned_to_local": {"v": place},
+    "bound_unstretch": {"f": uniform(0, 3, 3)},
+    "gradient_unstretch": {"f": four},
+    "bound_unwarp": {"f": uniform(0, 3, 3)},
+    "gradient_unwarp": {"f": uniform(-1.0, 1.0, 4), "q": uniform(-1.0, 1.0, 3)},
+    "color_unwarp": {"f": four},
+    "color_unstretch": {"f": four},
+    "power": {"radius": uniform(0.1, 2.0)},
+    "are_stacked": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
+    "plane_distance": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
+    "apart": {"other": whole(0, DECALS)},
+    "lies_over": {"other": whole(0, DECALS)},
+    "stacked": {"other": whole(0, DECALS)},
+    "cell_owner": {"rank": among(1)},
+    "log_of_rest": {"w": uniform(0.0, 0.999)},
+    "cell_coordinate": {"x": uniform(-1000.0, 1000.0)},
+    "cell_hash": dict.fromkeys("xyz", whole(-(2**31), 2**31)),
+} | {
+    f"{name}_{kind}": {"a": interval(2.0), "b": interval(2.0)}
+    for name in ("sum", "ricci", "union", "intersection", "difference", "blend")
+    for kind in ("range", "choice")
+}  # fmt: skip
+
+
+def texels(rng: np.random.Generator) -> Array:
+    """What every skeleton reads at every even place of a tape: (point, influence), (axis, number above 0)."""
+    tape = rng.uniform(-1.5, 1.5, (TEXELS, 4)).astype(np.float32)
+    tape[::2, 3] = rng.uniform(0.3, 2.0, TEXELS // 2)
+    tape[1::2, 3] = 1.0 / (tape[1::2, :3] ** 2).sum(axis=1)
+    return tape
+
+
+@dataclass(frozen=True)
+class World:
+    """Decals of two sizes on the unit ball, and their index."""
+
+    decals: Array
+    index: DecalIndex
+    points: Array
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        index = self.index
+        return {"decals": self.decals, "level_count": index.level_count, "layered": True,
+                "levels": index.levels, "table": index.table, "mask": index.mask,
+                "ids": index.ids}  # fmt: skip
+
+
+@lru_cache
+def world() -> World:
+    rng = np.random.default_rng(11)
+    centres, tangents = units(rng, DECALS), units(rng, DECALS)
+    reach = rng.choice([0.1, 0.35], DECALS)
+    record = np.zeros((DECALS, RECORD, 4), np.float32)
+    kind = rng.choice(3, DECALS, p=[0.1, 0.8, 0.1])
+    record[:, 0] = np.column_stack([centres, reach])
+    record[:, 1] = np.column_stack([centres, kind + 0.5 * (rng.random(DECALS) < 0.2)])
+    record[:, 2, :3] = np.cross(centres, np.cross(tangents, centres))
+    near = centres[rng.integers(0, DECALS, COUNT)] + rng.normal(size=(COUNT, 3)) * 0.1
+    points = near / np.linalg.norm(near, axis=1, keepdims=True)
+    return World(record.reshape(-1, 4), DecalIndex.build(centres, reach, kind), points.astype(np.float32))
+
+
+def arguments_of(typed: TypedFunction) -> dict[str, Array]:
+    """The same seeded arguments for a function every time, in the types that it takes."""
+    rng = np.random.default_rng(7)
+    draws = BY_NAME | BY_FUNCTION.get(typed.name, {})
+    known: dict[str, Any] = {"tape": texels(rng)}
+    if {"decals", "levels"} & set(typed.parameters):
+        known |= world().arguments | {"q": world().points, "n_q": world().points}
+        known["level"] = rng.integers(0, world().index.level_count, COUNT)
+    if "owner" in typed.parameters:
+        sheet = world().decals[1::RECORD, 3][owners()].astype(int) == 1
+        fits = (owners() >= 0) & (sheet | (typed.name != "pushed_complement"))
+        owned = np.resize(np.flatnonzero(fits), COUNT)
+        known |= {"q": world().points[owned], "n_q": world().points[owned], "owner": owners()[owned]}
+    if typed.name == "contact_push":
+        least = draws["e_k"](rng, COUNT)
+        known |= {"e_k": least, "e_i": least + share(rng, COUNT)}
+    if typed.name == "arc_over_chord":
+        angle = uniform(0.0, 0.5 * np.pi)(rng, COUNT)
+        known |= {"sine": np.sin(angle), "cosine": np.cos(angle)}
+    if typed.name == "plane_distance":
+        known["apart"] = ahead_of(known.setdefault("ray", units(rng, COUNT)), place(rng, COUNT))
+    if {"n_p", "n_q"} <= set(typed.parameters):
+        normal, other = units(rng, COUNT), units(rng, COUNT)
+        opposite = (normal * other).sum(axis=1) < -0.9  # towards −1, no float32 tells the arc
+        known |= {"n_p": normal, "n_q": np.where(opposite[:, None], -other, other)}
+    drawn = {name: known[name] if name in known else draws[name](rng, COUNT) for name in typed.parameters}
+    whole_names = {
+        name
+        for name, hint in typed.parameters.items()
+        if numpy_type(element(hint))[0] in (np.int32, np.bool_)
+    }
+    arrays = {
+        name: np.asarray(v, np.int32 if name in whole_names else np.float32) for name, v in drawn.items()
+    }
+    return {name: np.full(COUNT, v) if v.ndim == 0 else v for name, v in arrays.items()}
+
+
+def ahead_of(ray: Array, apart: Array) -> Array:
+    """Neighbours that a ray comes to."""
+    ahead = (ray * apart).sum(axis=1, keepdims=True)
+    return np.asarray(apart + (0.2 - np.minimum(ahead, 0.2)) * ray)
+
+
+@lru_cache
+def owners() -> Array:
+    everything: Any = {**world().arguments, "contact": 0, "q": world().points, "n_q": world().points}
+    return call(owner_at, **everything)

@@ -1,0 +1,131 @@
+"""Whole tapes in Warp and GLSL, and pictures of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from blobtree import Node, Point, Segment
+from blobtree.tapes.evaluate import bounds_along, bounds_at, colors_at, gradients_at
+from blobtree.tracing.trace import trace
+from decals.render.context import Context
+from decals.render.drawables import register
+from decals.render.renderer import Renderer
+from decals.render.tape_shader import tracing_shader
+from decals.render.tree import TreeDrawable
+from decals.scenes.camera import Camera
+from tests.blobtree.trees import points_around, random_trees
+from tests.decals.glsl_arguments import Array, units
+from tests.decals.glsl_functions import AGREEMENT, ALL_KINDS, run_program
+from tests.decals.shapes import View
+from tests.oracles import blobtree as oracle
+
+TREES = random_trees(seed=31, count=24)
+MAIN = """
+uniform sampler2D points; uniform ivec2 part; uniform int reading; uniform vec3 heading;
+void main() {
+    ivec2 here = ivec2(gl_FragCoord.xy);
+    vec4 q = texelFetch(points, here, 0);
+    vec4 result = vec4(0.0);
+    if (reading == 0) result.xyz = field_bound(q.xyz, heading, q.w, tape, part);
+    if (reading == 1) result = field_gradient(q.xyz, tape, part);
+    if (reading == 2) result = interpret_color(q.xyz, vec3(0.0), 0.0, tape, part);
+    g_position = result;
+}
+"""
+BOUND_AND_VALUE, GRADIENT, COLOR = range(3)
+
+
+def read_tape(
+    context: Context, tree: Node, reading: int, points: Array, heading: tuple[float, ...] = (0.0, 0.0, 0.0)
+) -> Array:
+    """What the tracing shader's own functions give for `tree`, in place of a picture."""
+    shader, _, _ = tracing_shader(ALL_KINDS).text.partition("void main()")
+    textures = {"tape": tree.tape.data, "points": padded(points)}
+    uniforms = {"reading": reading, "part": (0, len(tree.tape.data)), "heading": heading}
+    return run_program(context, shader + MAIN, len(points), textures, uniforms)
+
+
+def padded(points: Array) -> Array:
+    return np.pad(points, ((0, 0), (0, 4 - points.shape[1]))).astype(np.float32)
+
+
+def assert_close(seen: Array, expected: Array) -> None:
+    error = np.abs(seen - expected) / np.maximum(1.0, np.abs(expected))
+    assert error.max(initial=0.0) <= AGREEMENT
+
+
+def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
+    assert {code for tree in TREES for code in tree.tape.skeletons} == set(ALL_KINDS.skeletons)
+    assert {code for tree in TREES for code in tree.tape.operators} == set(ALL_KINDS.operators)
+    assert 2 <= max(tree.tape.registers for tree in TREES) <= ALL_KINDS.registers
+    assert sum(tree.tape.stretched for tree in TREES) > 5
+
+
+@pytest.mark.parametrize("start", range(0, 24, 6))
+def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int) -> None:
+    rng = np.random.default_rng(start)
+    compared = 0
+    for tree in TREES[start : start + 6]:
+        points = points_around(rng, tree, 500)
+        reach = (10.0 ** rng.uniform(-3.0, 0.5, 500)).astype(np.float32)
+        seen = read_tape(context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]))
+        assert_close(seen[:, :2], bounds_at(tree.tape, points, reach))
+        heading = units(rng, 4)[3]
+        seen = read_tape(
+            context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist())
+        )
+        assert_close(seen[:, :3], bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach))
+        field = oracle.evaluate(tree, points)
+        smooth = field.margin > 1e-5
+        assert_close(
+            read_tape(context, tree, GRADIENT, points)[smooth], gradients_at(tree.tape, points)[smooth]
+        )
+        strong = smooth & (field.value > 1e-3)
+        seen = read_tape(context, tree, COLOR, points)[:, 1:]
+        assert_close(seen[strong], colors_at(tree.tape, points)[strong])
+        compared += int(strong.sum())
+    assert compared > 0.3 * 6 * 500
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A tree in a scene: all that the renderer asks of one."""
+
+    tree: Node
+
+
+register(Model, TreeDrawable)
+
+MODELS = {
+    "one point": Point((0, 0, 0), radius=1.0),
+    "one segment": Segment((0, 0, 0), (1, 1, 0), radius=0.4),
+    "a tiny model": (Point((0, 0, 0), radius=1.0) - Point((0.5, 0, 1), radius=0.7)).scale(1e-4),
+    "random trees side by side": random_trees(seed=5, count=1)[0]
+    | random_trees(seed=6, count=1)[0].translate((2, 0, 0)),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
+    tree, (width, height) = MODELS[name], (160, 120)
+    camera = Camera.framing(tree.bounds, direction=(0.3, 0.5, 1.0), aspect=width / height)
+    buffers = renderer.buffers(View((Model(tree),), camera), size=(width, height))
+    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
+    rays = camera.rays(width, height)
+    directions = rays.directions(x, y).reshape(-1, 3)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    distance = trace(tree, np.tile(rays.origin, (len(directions), 1)), directions)
+    expected = np.isfinite(distance)
+    seen = buffers.object_id.ravel() == 0
+    assert expected.sum() > 500
+    assert (seen != expected).sum() <= 1e-3 * expected.size
+    both = seen & expected
+    depth = np.linalg.norm(buffers.position.reshape(-1, 3)[both] - rays.origin, axis=1)
+    size = float(np.linalg.norm(tree.bounds[1] - tree.bounds[0]))
+    assert (np.abs(depth - distance[both]) > 1e-4 * size).mean() <= 2e-3
+    points = buffers.position.reshape(-1, 3)[both]
+    smooth = oracle.evaluate(tree, points).margin > 2e-3  # a hit may lie a tolerance beside its block
+    gradient = tree.gradient(points[smooth])
+    normal = -gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+    np.testing.assert_allclose(buffers.normal.reshape(-1, 3)[both][smooth], normal, atol=1e-4)
