@@ -16,7 +16,7 @@ from decals.model import FACING_LIMIT
 from decals.seeds.evenness import BEYOND
 from decals.seeds.neighbours import FacingTree
 from decals.seeds.relaxation import Relaxation
-from tests.bench.seeds import MODELS, model
+from tests.bench.seed_models import MODELS, surfaces_of
 
 AROUND = 1.5
 """Radius within which bends are measured, in spacings."""
@@ -56,7 +56,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--steps", type=int, default=150)
     wish = parser.parse_args()
-    surfaces, _ = model(wish.model)
+    surfaces = surfaces_of(wish.model)
     relaxation = Relaxation(surfaces, count=wish.count, iterations=wish.steps)
     relaxation.run()
     print(f"{wish.model}, {wish.count}: {relaxation.statistics()}")

@@ -20,16 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from blobtree import Node, Point, polygonize
 from decals.errors import InvalidSeeding
 from decals.seeds.evenness import Spacing, evenness, ideal_spacing
 from decals.seeds.neighbours import FacingTree
 from decals.seeds.relaxation import Relaxation
-from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.models.knot import torus_knot
-from implicit_decals.apps.models.samples import sample_mesh
+from tests.bench.seed_models import MODELS, TREES, meshed, surfaces_of
 from tests.bench.seed_packages import PACKAGES
 
 COUNTS = (1_000, 10_000, 100_000)
@@ -56,44 +53,11 @@ class Figures:
     seconds: float
 
 
-def bumpy() -> Node:
-    """Make a ball with twenty-four bumps."""
-    ways = np.random.default_rng(0).normal(size=(24, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    tree: Node = Point((0, 0, 0), radius=1.0)
-    for way in 0.95 * ways:
-        tree = tree + Point(tuple(way), radius=0.3)
-    return tree
-
-
-def meshed(tree: Node) -> MeshSurface:
-    mesh = polygonize(tree, resolution=160)
-    return MeshSurface(mesh.vertices, mesh.faces)
-
-
-def _tree_model(*trees: Node):
-    return [ImplicitSurface(tree) for tree in trees], [meshed(tree) for tree in trees]
-
-
-def _mesh_model(vertices, faces):
-    surface = MeshSurface(vertices, faces)
-    return [surface], [surface]
-
-
-MODELS: dict[str, Callable] = {
-    "bumpy": lambda: _tree_model(bumpy()),
-    "sphere": lambda: _tree_model(Point((0, 0, 0), radius=1.0)),
-    "touching": lambda: _tree_model(Point((-1, 0, 0), radius=1.0), Point((1, 0, 0), radius=1.0)),
-    "knot": lambda: _mesh_model(*torus_knot(along=1042)),
-    "dragon": lambda: _mesh_model(*sample_mesh("dragon")),
-    "horse": lambda: _mesh_model(*sample_mesh("horse")),
-}
-
-
 @cache
 def model(name: str):
     """Make our surfaces and the meshes for others."""
-    return MODELS[name]()
+    surfaces = surfaces_of(name)
+    return surfaces, [meshed(tree) for tree in TREES[name]()] if name in TREES else surfaces
 
 
 def joined(meshes: list[MeshSurface]):

@@ -1,9 +1,10 @@
 """The relaxation of seeds on one Warp device, alone: how long it takes, and how even it gets.
 
-``python -m tests.bench.seeds_device --device cuda:0 [--count 100000] [--only bumpy] [--json PATH]``
+    python -m tests.bench.seeds_device --record meshes.npz                     # anywhere
+    python -m tests.bench.seeds_device --device cuda:0 --meshes meshes.npz     # on the machine with the card
 
-Needs NumPy, SciPy, msgspec and Warp alone, and no Warp device but the one that is asked for. Kernels are
-compiled before the clock starts; models are built and taken to the device before it, too.
+With ``--meshes`` it needs NumPy, SciPy, msgspec and Warp alone, and no Warp device but the one asked for.
+Kernels are compiled before the clock starts; models are built and taken to the device before it, too.
 """
 
 import argparse
@@ -16,10 +17,8 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 
-from blobtree import Node, Point, polygonize
 from decals.seeds.relaxation import Relaxation
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
+from tests.bench.seed_models import MODELS, surfaces_of, write_meshes
 
 SCHEDULES = (60, 100, 150)
 """Lengths of the schedule; the last is the default."""
@@ -28,30 +27,6 @@ RUNS = 3
 
 OFF = 1e-4
 """Largest distance of a seed from its surface, in spacings."""
-
-
-def bumpy() -> Node:
-    """Make a ball with twenty-four bumps, the same as in ``tests.bench.seeds``."""
-    ways = np.random.default_rng(0).normal(size=(24, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    tree: Node = Point((0, 0, 0), radius=1.0)
-    for way in 0.95 * ways:
-        tree = tree + Point(tuple(way), radius=0.3)
-    return tree
-
-
-def meshed(tree: Node, device: str) -> MeshSurface:
-    mesh = polygonize(tree, resolution=160, device=device)
-    return MeshSurface(mesh.vertices, mesh.faces, device=device)
-
-
-MODELS = {
-    "bumpy": lambda device: [ImplicitSurface(bumpy(), device=device)],
-    "mesh": lambda device: [meshed(bumpy(), device)],
-    "touching": lambda device: [
-        ImplicitSurface(Point((x, 0, 0), radius=1.0), device=device) for x in (-1.0, 1.0)
-    ],
-}
 
 
 def timed(device: str, work):
@@ -92,11 +67,11 @@ def check(surfaces, relaxation: Relaxation, count: int) -> None:
             assert not other.contains(own).any()
 
 
-def bench(names: list[str], count: int, device: str) -> dict[str, float]:
+def bench(names: list[str], count: int, device: str, meshes: Path | None) -> dict[str, float]:
     """Print the table and return its figures."""
     figures: dict[str, float] = {}
     for name in names:
-        surfaces = MODELS[name](device)
+        surfaces = surfaces_of(name, device, meshes)
         relaxed(surfaces, count, 12, device)  # compile kernels
         print(f"{name}, {count}\n  steps     rho   cv %  cv6 %   seconds = placing + stepping + polishing")
         for length in SCHEDULES:
@@ -126,10 +101,16 @@ def main() -> None:
     parser.add_argument("--device", default="cuda:0", help="Warp device")
     parser.add_argument("--count", type=int, default=100_000, help="number of seeds")
     parser.add_argument("--only", help=f"some of {', '.join(MODELS)}, with commas between")
+    parser.add_argument("--meshes", type=Path, metavar="PATH", help="take meshes from a file of --record")
+    parser.add_argument("--record", type=Path, metavar="PATH", help="write that file in place of measuring")
     parser.add_argument("--json", type=Path, help="also write the figures there")
     wish = parser.parse_args()
+    if wish.record:
+        write_meshes(wish.record)
+        return
     print(f"{wp.get_device(wish.device).name}, Warp {wp.__version__}, Python {platform.python_version()}")
-    figures = bench(wish.only.split(",") if wish.only else list(MODELS), wish.count, wish.device)
+    names = wish.only.split(",") if wish.only else list(MODELS)
+    figures = bench(names, wish.count, wish.device, wish.meshes)
     if wish.json:
         wish.json.write_text(json.dumps(figures, indent=1) + "\n")
 
