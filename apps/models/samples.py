@@ -7,8 +7,8 @@ from functools import partial
 
 from blobtree import Node
 from decals.scenes.mesh_file import MeshArrays, surface_triangles
+from decals.scenes.object_records import SAMPLE
 from decals.scenes.scene import MeshObject, SceneObject, TreeObject
-from decals.scenes.scene_file import SAMPLE
 
 from ..errors import UsageError
 from ..views import UPRIGHT, Axes
@@ -56,7 +56,7 @@ def axes_of(model: str) -> Axes:
 
 
 def sample_mesh(name: str) -> MeshArrays:
-    """Vertices and faces of a sample mesh; a `decals.scenes.scene_file.SampleLoader`."""
+    """Vertices and faces of a sample mesh; a `decals.scenes.object_records.SampleLoader`."""
     if name not in _MESHES:
         raise UsageError(f"expected a sample mesh ({', '.join(sorted(_MESHES))}), got {name!r}")
     return _MESHES[name]()
