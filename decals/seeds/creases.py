@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from decals.errors import InvalidSeeding
 from decals.seeds.placing import MOST_SEEDS
 from decals.seeds.population import Mask
+from decals.surfaces.edges import edges_of
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Floats
 
@@ -117,24 +118,13 @@ class _Samples:
 
 def _sharp_edges(surface: MeshSurface, angle: float, rims: bool) -> tuple[Wide, NDArray[np.int64]]:
     """Welded vertices, and the edges whose faces' normals part, or that have one face or more than two."""
-    vertices, welded = np.unique(surface.vertices + np.float32(0), axis=0, return_inverse=True)
-    corners = welded.reshape(-1)[surface.faces[surface.sound]]
-    wide = vertices.astype(np.float64)
-    a, b, c = np.moveaxis(wide[corners], 1, 0)
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    faces = np.repeat(np.arange(len(corners)), 3)
-    edges, which, counts = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(which.reshape(-1), kind="stable")
-    first = faces[order[np.cumsum(counts) - counts]]
-    last = faces[order[np.cumsum(counts) - 1]]
-    cosines = np.einsum("ni,ni->n", normals[first], normals[last])
-    sharp = (counts == 2) & (cosines < np.cos(np.radians(angle)))
-    sharp |= counts > 2
+    edges = edges_of(surface)
+    cosines = np.einsum("ni,ni->n", edges.normals[:, 0], edges.normals[:, 1])
+    sharp = (edges.counts == 2) & (cosines < np.cos(np.radians(angle)))
+    sharp |= edges.counts > 2
     if rims:
-        sharp |= counts == 1
-    return wide, edges[sharp & (edges[:, 0] != edges[:, 1])].astype(np.int64)
+        sharp |= edges.counts == 1
+    return edges.vertices, edges.ends[sharp]
 
 
 def _to_segments(points: Wide, starts: Wide, ends: Wide) -> Wide:

@@ -10,7 +10,8 @@ from blobtree.launch import launch
 from decals.model import FACING_LIMIT
 from decals.seeds.crowd_kernels import aim, arrive, judge, resolve, scatter
 from decals.seeds.population import Sites, World
-from decals.seeds.repulsion import SKIN, Law, Repulsion
+from decals.seeds.repulsion import CUTOFF, SKIN, Law, Repulsion
+from decals.seeds.rims import Walls
 from decals.seeds.settling import spans_of
 from decals.surfaces.ground import Scalars, Vectors, vectors
 from decals.surfaces.surface import Flags, Floats
@@ -66,7 +67,8 @@ class Crowd:
         self.spans = spans_of(sites.surface_ids)
         self.epoch = 0
         self._here, self._tried = self._state(sites), self._state(sites)
-        self._movable: Any = wp.array(movable.astype(np.int32), dtype=wp.int32, device=self.device)
+        self.may_move: Any = wp.array(movable.astype(np.int32), dtype=wp.int32, device=self.device)
+        self.owners: Any = wp.array(sites.surface_ids, dtype=wp.int32, device=self.device)
         self._found, self._found_normals, self._targets = (self._empty(wp.vec3) for _ in range(3))
         self._lengths, self._reaches = self._empty(wp.float32), self._empty(wp.float32)
         self._forbidden = self._empty(wp.int32)
@@ -137,6 +139,16 @@ class Crowd:
         launch(scatter, len(rows), inputs, [self._here.positions, self._here.normals], device=self.device)
         self.forget()
 
+    def walls(
+        self, places: Vectors, normals: Vectors, sizes: Scalars, owners: Scalars, wanted: Scalars
+    ) -> Walls:
+        """Open rims near places on the surfaces `owners`, where they are wanted (1).
+
+        Particles that may not move want none: they may lie on the very rim.
+        """
+        rims = self.world.rims(self.spacing)
+        return rims.walls(places, normals, sizes, owners, wanted, reach=CUTOFF)
+
     @property
     def stale(self) -> bool:
         """Whether a new epoch must begin before the next step."""
@@ -154,7 +166,12 @@ class Crowd:
         self.epoch += 1
         here = self._here
         self._repulsion.relist(
-            here.positions, here.normals, self.sizes, spacing=self.spacing, varied=self.varied
+            here.positions,
+            here.normals,
+            self.sizes,
+            spacing=self.spacing,
+            varied=self.varied,
+            walls=self.walls(here.positions, here.normals, self.sizes, self.owners, self.may_move),
         )
         self._evaluate(here, self._totals[1])
 
@@ -162,7 +179,7 @@ class Crowd:
         """Move everybody who wants to and may."""
         self.settle()
         here, tried = self._here, self._tried
-        inputs = [here.positions, here.moves, self._shares, self.sizes, self._movable]
+        inputs = [here.positions, here.moves, self._shares, self.sizes, self.may_move]
         launch(aim, self.count, inputs, [self._targets, self._lengths, self._reaches], device=self.device)
         self.world.settling.settle(
             self._targets, self._reaches, self.spans, self._found, self._found_normals, self._forbidden

@@ -10,6 +10,7 @@ from blobtree.launch import launch
 from decals.model import FACING_LIMIT
 from decals.seeds.crowd import Crowd
 from decals.seeds.repulsion import WIDENING, make_grid
+from decals.seeds.rims import Walls
 from decals.seeds.search_kernels import nearest_facing, peaks
 from decals.surfaces.ground import Scalars, Vectors, vectors
 from decals.surfaces.surface import Flags, Floats
@@ -36,18 +37,25 @@ class Lookout:
         self._grid.build(self._crowd.positions, self._reach * self._crowd.spacing)
 
     def nearness(
-        self, points: Vectors, normals: Vectors, sizes: Scalars, own: Scalars, *, enough: float = 0.0
+        self,
+        points: Vectors,
+        normals: Vectors,
+        sizes: Scalars,
+        own: Scalars,
+        walls: Walls,
+        *,
+        enough: float = 0.0,
     ) -> Scalars:
         """Distance of each point to the nearest particle that faces it, in their spacing, on the device.
 
         At most the reach. `own` are particles that do not count, -1 for none; below `enough` any number
-        serves that is not larger than that.
+        serves that is not larger than that. A point's own image beyond one of its walls counts as well.
         """
         crowd = self._crowd
         found: Any = wp.empty(len(points), dtype=wp.float32, device=crowd.device)
         widening = WIDENING if crowd.varied else 1.0
         inputs = [self._grid.id, crowd.positions, crowd.normals, crowd.sizes, FACING_LIMIT, self._reach]
-        inputs += [widening, enough, own, points, normals, sizes]
+        inputs += [widening, enough, own, points, normals, sizes, *walls]
         launch(nearest_facing, len(points), inputs, [found], device=crowd.device)
         return found
 
@@ -55,10 +63,11 @@ class Lookout:
         """The same for some particles of the crowd, ``float32[k]``."""
         crowd = self._crowd
         own = whole_numbers(rows, crowd.device)
-        places, ways, sizes = crowd.positions, crowd.normals, crowd.sizes
+        given = [crowd.positions, crowd.normals, crowd.sizes, crowd.owners, crowd.may_move]
         if len(rows) < crowd.count:
-            places, ways, sizes = (array[own].contiguous() for array in (places, ways, sizes))
-        found: Floats = self.nearness(places, ways, sizes, own).numpy()
+            given = [array[own].contiguous() for array in given]
+        places, ways, sizes, _, _ = given
+        found: Floats = self.nearness(places, ways, sizes, own, crowd.walls(*given)).numpy()
         return found
 
 
@@ -79,6 +88,6 @@ def outstanding(points: Floats, values: Floats, radii: Floats, *, device: str) -
     return found
 
 
-def whole_numbers(rows: NDArray[np.int64], device: str) -> Scalars:
+def whole_numbers(rows: NDArray[np.integer], device: str) -> Scalars:
     """Rows as an array of a device."""
     return wp.array(rows.astype(np.int32), dtype=wp.int32, device=device)

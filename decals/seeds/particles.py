@@ -12,10 +12,15 @@ result does not depend on scheduling.
 
 import warp as wp
 
+from decals.seeds.rim_kernels import mirrored
+
 wp.set_module_options({"enable_backward": False})
 
 CLOSEST = 0.6
 """Distances below this many spacings act like it: coincident particles part at once, not by inches."""
+
+ON_WALL = 0.25
+"""Images of neighbours nearer to the wall than so many spacings count less: one on it is its own image."""
 
 ISOTROPY = 0.1
 """Share of the trace added to the curvature of the energy, so that no direction is without any."""
@@ -45,6 +50,12 @@ def apart(offset: wp.vec3, i: wp.int32, j: wp.int32, tangent: wp.vec3, closest: 
     if i < j:
         return tangent * closest
     return -tangent * closest
+
+
+@wp.func
+def shown_beyond(q: wp.vec3, point: wp.vec3, normal: wp.vec3, depth: wp.float32) -> wp.float32:
+    """How far a neighbour's image counts: 0 on the wall and beyond it, 1 from a depth on this side of it."""
+    return wp.clamp(wp.dot(q - point, normal) / depth, 0.0, 1.0)
 
 
 @wp.kernel
@@ -98,6 +109,9 @@ def repel(
     stiffness: wp.float32,
     damping: wp.float32,
     longest: wp.float32,
+    walls: wp.int32,
+    wall_points: wp.array(dtype=wp.vec3),
+    wall_normals: wp.array(dtype=wp.vec3),
     moves: wp.array(dtype=wp.vec3),
     energies: wp.array(dtype=wp.float32),
     works: wp.array(dtype=wp.float64),
@@ -109,6 +123,9 @@ def repel(
     tangent. A pair's part of the total energy is that times its spacing squared, so that pressure is the
     same where spacings differ: `works` are halves of it, `energies` leave the square out. Curvature across
     the line of a pair is left out: it is negative.
+
+    Beyond each wall lie the images of the neighbours, and of the particle itself: of that pair half the
+    energy counts, and it parts by twice the move.
     """
     i = first + wp.tid()
     p = positions[i]
@@ -124,34 +141,54 @@ def repel(
     work = wp.float64(0.0)
     rim_value = wp.pow(cutoff, -exponent)
     rim_slope = exponent * rim_value / cutoff
-    for k in range(counts[i]):
-        j = neighbours[i * room + k]
+    for k in range(counts[i] + 1):
+        j = int(i)
+        listed = float(1.0)
+        if k < counts[i]:
+            j = neighbours[i * room + k]
+            listed = weights[i * room + k]
         pair = 0.5 * (size + sizes[j])
-        offset = p - positions[j]
-        if wp.length_sq(offset) < cutoff * cutoff * pair * pair:
-            weight = weights[i * room + k]
-            away = apart(offset, i, j, u, CLOSEST * pair) / pair
-            x = wp.length(away)
-            value = wp.pow(x, -exponent)
-            slope = exponent * value / x
-            curve = (exponent + 1.0) * slope / x
-            overlap = wp.max(core - x, 0.0)
-            if overlap > 0.0:
-                curve += stiffness
-            ax = wp.dot(away, u) / x
-            ay = wp.dot(away, v) / x
-            push = weight * (pair / size) * (slope - rim_slope + stiffness * overlap)
-            bend = weight * curve
-            fx += push * ax
-            fy += push * ay
-            hxx += bend * ax * ax
-            hxy += bend * ax * ay
-            hyy += bend * ay * ay
-            part = value - rim_value + rim_slope * (x - cutoff) + 0.5 * stiffness * overlap * overlap
-            nearer = wp.max(x - wp.length(offset) / pair, 0.0)
-            part = weight * (part + nearer * (slope - rim_slope + stiffness * overlap))
-            energy += part
-            work += wp.float64(0.5 * pair * pair * part)
+        for image in range(walls + 1):
+            q = positions[j]
+            weight = float(listed)
+            lone = wp.vec3(u)
+            bends = float(1.0)
+            if image > 0:
+                w = walls * i + image - 1
+                lone = wall_normals[w]
+                weight *= shown_beyond(q, wall_points[w], lone, ON_WALL * size)
+                q = mirrored(q, wall_points[w], lone)
+                if j == i:
+                    weight = wp.length_sq(lone)
+                    bends = 2.0
+            elif j == i:
+                weight = 0.0
+            offset = p - q
+            if weight > 0.0 and wp.length_sq(offset) < cutoff * cutoff * pair * pair:
+                away = apart(offset, i, j, lone, CLOSEST * pair) / pair
+                if j == i:
+                    away = apart(offset, 0, 1, lone, CLOSEST * pair) / pair
+                x = wp.length(away)
+                value = wp.pow(x, -exponent)
+                slope = exponent * value / x
+                curve = (exponent + 1.0) * slope / x
+                overlap = wp.max(core - x, 0.0)
+                if overlap > 0.0:
+                    curve += stiffness
+                ax = wp.dot(away, u) / x
+                ay = wp.dot(away, v) / x
+                push = weight * (pair / size) * (slope - rim_slope + stiffness * overlap)
+                bend = bends * weight * curve
+                fx += push * ax
+                fy += push * ay
+                hxx += bend * ax * ax
+                hxy += bend * ax * ay
+                hyy += bend * ay * ay
+                part = value - rim_value + rim_slope * (x - cutoff) + 0.5 * stiffness * overlap * overlap
+                nearer = wp.max(x - wp.length(offset) / pair, 0.0)
+                part = weight * (part + nearer * (slope - rim_slope + stiffness * overlap))
+                energy += part
+                work += wp.float64(0.5 * pair * pair * part)
     energies[i] = energy
     works[i] = work
     extra = ISOTROPY * (hxx + hyy)

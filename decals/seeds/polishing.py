@@ -111,7 +111,10 @@ def _try_places(
         barred = crosses_edge(sizes.numpy(), there) | (forbidden.numpy() == 1)
         forbidden.assign(barred.astype(np.int32))
         sizes.assign(there)
-    nearness = lookout.nearness(places, normals, sizes, own)
+    walls = crowd.walls(
+        places, normals, sizes, crowd.owners[own].contiguous(), crowd.may_move[own].contiguous()
+    )
+    nearness = lookout.nearness(places, normals, sizes, own, walls)
     present: Any = wp.array(nearest, dtype=wp.float32, device=device)
     went = _new(wp.int32, count, device)
     inputs = [tries, GAIN, rows, present, places, normals, forbidden, nearness]

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidSeeding
+from decals.seeds.rims import Rims
 from decals.seeds.settling import Settling, spans_of
 from decals.surfaces.ground import vectors
 from decals.surfaces.surface import Flags, Floats, Surface
@@ -84,6 +85,7 @@ class World:
         measures = [self._measure(number) for number in range(len(self.surfaces))]
         self.areas = np.array([area for area, _ in measures])
         self.masses = np.array([mass for _, mass in measures])
+        self._rims: dict[int, Rims] = {}
 
     def deformed(self, surfaces: Sequence[Surface]) -> "World":
         """Other surfaces in place of these, one for one, under the same rules."""
@@ -111,6 +113,13 @@ class World:
         if self._density is None or len(positions) == 0:
             return np.ones(len(positions))
         return _answers("density", self._density, positions)
+
+    def rims(self, spacing: float) -> Rims:
+        """Where the surfaces end, for particles about that far apart."""
+        octave = int(np.round(np.log2(max(spacing, 1e-30))))
+        if octave not in self._rims:
+            self._rims[octave] = Rims(self.surfaces, 2.0**octave, self.device)
+        return self._rims[octave]
 
     def barred(self, number: int, positions: Floats, normals: Floats) -> Flags:
         """Whether points of the surface of that number are hidden or outside the mask."""

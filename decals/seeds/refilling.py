@@ -71,11 +71,16 @@ def _bareness(crowd: Crowd, scouts: Sites, sizes: Floats) -> Floats:
     """Distance of each scout to the nearest particle that faces it, in spacings, up to a limit."""
     device = crowd.device
     spacings: Any = wp.array(sizes, dtype=wp.float32, device=device)
+    places, ways = vectors(scouts.positions, device), vectors(scouts.normals, device)
+    owners, everybody = (
+        whole_numbers(rows, device) for rows in (scouts.surface_ids, np.ones(len(scouts), np.int32))
+    )
     found = Lookout(crowd, SIGHT).nearness(
-        vectors(scouts.positions, device),
-        vectors(scouts.normals, device),
+        places,
+        ways,
         spacings,
         whole_numbers(np.full(len(scouts), -1), device),
+        crowd.walls(places, ways, spacings, owners, everybody),
         enough=BARE,
     )
     bareness: Floats = found.numpy()

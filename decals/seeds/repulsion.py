@@ -9,6 +9,7 @@ import warp as wp
 from blobtree.launch import launch
 from decals.model import FACING_LIMIT
 from decals.seeds.particles import list_neighbours, repel
+from decals.seeds.rims import Walls
 from decals.surfaces.ground import Scalars, Vectors
 
 CUTOFF = 2.0
@@ -64,14 +65,24 @@ class Repulsion:
         )
         self._grid = make_grid(count, device)
         self._sizes: Any = None
+        self._walls = Walls.none(device)
 
     def relist(
-        self, positions: Vectors, normals: Vectors, sizes: Scalars, *, spacing: float, varied: bool
+        self,
+        positions: Vectors,
+        normals: Vectors,
+        sizes: Scalars,
+        *,
+        spacing: float,
+        varied: bool,
+        walls: Walls | None = None,
     ) -> None:
         """List the neighbours of all particles.
 
         `sizes` are the spacings around each, `spacing` a typical one; `varied` unless all are the same.
+        Beyond walls lie images of particles.
         """
+        self._walls = walls or Walls.none(self._device)
         reach = CUTOFF + SKIN
         widening = WIDENING if varied else 1.0
         self._sizes = sizes
@@ -91,7 +102,7 @@ class Repulsion:
     ) -> None:
         """Write where each particle wants to go within its tangent plane, and its energy where it is."""
         inputs = [positions, normals, self._sizes, ROOM, *self.lists]
-        inputs += [CUTOFF, law.exponent, CORE, law.stiffness, DAMPING, LONGEST]
+        inputs += [CUTOFF, law.exponent, CORE, law.stiffness, DAMPING, LONGEST, *self._walls]
         launch(repel, self._count, inputs, [moves, energies, works], device=self._device)
 
 

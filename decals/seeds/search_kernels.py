@@ -5,6 +5,8 @@
 
 import warp as wp
 
+from decals.seeds.rim_kernels import mirrored
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -23,17 +25,24 @@ def nearest_facing(
     points: wp.array(dtype=wp.vec3),
     point_normals: wp.array(dtype=wp.vec3),
     point_sizes: wp.array(dtype=wp.float32),
+    walls: wp.int32,
+    wall_points: wp.array(dtype=wp.vec3),
+    wall_normals: wp.array(dtype=wp.vec3),
     nearness: wp.array(dtype=wp.float32),
 ) -> None:
     """Distance of each point to the nearest particle that faces it, other than its own, in their spacing.
 
-    At most `reach`. Who is nearer to some particle than `enough` is not looked at any further.
+    At most `reach`. Who is nearer to some particle than `enough` is not looked at any further. A point's own
+    image beyond a rim is a particle, too.
     """
     k = first + wp.tid()
     p = points[k]
     n = point_normals[k]
     size = point_sizes[k]
     least = float(reach)
+    for w in range(walls * k, walls * (k + 1)):
+        if wp.length_sq(wall_normals[w]) > 0.0:
+            least = wp.min(least, wp.length(p - mirrored(p, wall_points[w], wall_normals[w])) / size)
     j = int(0)
     query = wp.hash_grid_query(grid, p, reach * widening * size)
     while least > enough and wp.hash_grid_query_next(query, j):

@@ -54,8 +54,12 @@ def moves(
     longest,
     isotropy,
     closest,
+    wall=None,
 ):
     """Damped Newton move and energy of every particle, its neighbours at rest.
+
+    Beyond a wall, a plane given as (point, unit normal), lie the images of all particles; a particle's own
+    retreats as far as it does.
 
     The slope is a central difference of `pair_energy`: only the energy is shared with the kernel.
     """
@@ -63,9 +67,15 @@ def moves(
     result, energies = np.zeros_like(positions), np.zeros(len(positions))
     for i, (p, n) in enumerate(zip(positions, normals, strict=True)):
         force, curvature = np.zeros(3), np.zeros((3, 3))
-        for j, q in enumerate(positions):
+        others = [(j, q, 1.0) for j, q in enumerate(positions) if j != i]
+        if wall is not None:
+            others += [
+                (j, q - 2.0 * ((q - wall[0]) @ wall[1]) * wall[1], 1.0 + (j == i))
+                for j, q in enumerate(positions)
+            ]
+        for j, q, bends in others:
             pair = 0.5 * (sizes[i] + sizes[j])
-            if j == i or np.linalg.norm(p - q) >= cutoff * pair:
+            if np.linalg.norm(p - q) >= cutoff * pair:
                 continue
             weight = facing_weight(n @ normals[j], facing_limit)
             x = max(np.linalg.norm(p - q) / pair, closest)
@@ -77,7 +87,7 @@ def moves(
             away -= (away @ n) * n
             scale = pair / sizes[i]
             force -= weight * scale * slope * away
-            curvature += weight * bend * np.outer(away, away)
+            curvature += bends * weight * bend * np.outer(away, away)
             nearer = max(x - np.linalg.norm(p - q) / pair, 0.0)
             energies[i] += weight * (values[1] - nearer * slope)
         tangent = np.eye(3) - np.outer(n, n)
