@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import pyvista as pv
 import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,7 +16,7 @@ from decals.seeds.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsio
 from decals.seeds.rim_kernels import WALLS
 from decals.seeds.rims import Rims, Walls
 from decals.surfaces.mesh import MeshSurface
-from tests.decals.meshes import box, mesh, plane, sphere
+from tests.decals.meshes import box, plane, sphere
 from tests.oracles.repulsion import moves as expected_moves
 from tests.oracles.repulsion import total_energy
 
@@ -32,11 +31,18 @@ def disc(corners=200):
     return MeshSurface(np.vstack([[0, 0, 0], around]), faces)
 
 
-def half_ball():
-    ball = pv.Icosphere(radius=1.0, nsub=5)
-    return mesh(
-        ball.clip_surface(pv.Plane(i_size=9, j_size=9, direction=(0, 0, -1)), invert=False).triangulate()
+def half_ball(rings=48, corners=160):
+    """The upper half of a unit ball, its rim on z = 0."""
+    away, turn = np.linspace(0, np.pi / 2, rings), np.linspace(0, 2 * np.pi, corners, endpoint=False)
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    rows = [np.column_stack([np.sin(a) * around, np.full(corners, np.cos(a))]) for a in away]
+    here = np.arange(rings * corners).reshape(rings, corners)
+    one, other = here[:-1], here[1:]
+    after, beyond = np.roll(one, -1, axis=1), np.roll(other, -1, axis=1)
+    faces = np.concatenate(
+        [np.stack(f, axis=-1).reshape(-1, 3) for f in ((one, other, beyond), (one, beyond, after))]
     )
+    return MeshSurface(np.concatenate(rows), faces)
 
 
 def cells(relaxation):
