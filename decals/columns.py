@@ -19,7 +19,7 @@ def floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
     """Copy to float64, checking shape (-1: any length) and refusing NaN and infinity."""
     try:
         array = np.array(values, np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidDecals(f"{name}: expected numbers, got {values!r:.80}") from error
     _check_shape(name, array.shape, shape)
     bad = ~np.isfinite(array)

@@ -20,6 +20,7 @@ from decals.edit.commands import (
 )
 from decals.edit.document import Document
 from decals.edit.jobs import Job, Worker
+from decals.edit.objects import AddObject, RemoveObject
 from decals.edit.pick import Pick, outline, pick
 from decals.edit.places import Places, first_hit, nearest
 from decals.edit.population import Coat, Relax, Scatter
@@ -31,6 +32,7 @@ __all__ = [
     "Actions",
     "Add",
     "AddImage",
+    "AddObject",
     "Alter",
     "Carry",
     "Change",
@@ -50,6 +52,7 @@ __all__ = [
     "Places",
     "Relax",
     "RemoveImage",
+    "RemoveObject",
     "ResizePrimitive",
     "Rows",
     "Scale",

@@ -14,7 +14,15 @@ from decals.edit.keys import BINDINGS, CAMERA
 from decals.edit.pick import Pick
 from decals.edit.population import Relax, Scatter, lying_on
 from decals.edit.session import Command, EditSession
-from decals.edit.trees import MovePrimitive, PaintPrimitive, Path, ResizePrimitive, alone, primitive_near
+from decals.edit.trees import (
+    MovePrimitive,
+    PaintPrimitive,
+    Path,
+    ResizePrimitive,
+    alone,
+    primitive_near,
+    primitive_paths,
+)
 from decals.errors import DecalsError, InvalidEdit
 from decals.model import LAYERS, PLAIN, Decals
 from decals.scenes.camera import Camera
@@ -81,7 +89,7 @@ class Actions:
         self._run = run or self._do_at_once
         self._coats = 0
         self._series: tuple[str, object] | None = None
-        self.release = session.listen(lambda _change: self._forget_deleted())
+        self.release = session.listen(lambda _change: self._forget_gone())
 
     # -- doing ------------------------------------------------------------------------------------------
 
@@ -120,9 +128,17 @@ class Actions:
     def _do_at_once(self, job: Job) -> None:
         self._do(job.work(lambda _stage, _fraction: None, lambda: False))
 
-    def _forget_deleted(self) -> None:
+    def _forget_gone(self) -> None:
+        if self.grip is not None and not self._holds(*self.grip):
+            self.grip = None
         there = self.session.document.decals.has(np.array(self.selection, np.int64))
         self.selection = tuple(n for n, stays in zip(self.selection, there, strict=True) if stays)
+
+    def _holds(self, number: int, path: Path) -> bool:
+        """Whether there is a primitive to hold."""
+        objects = self.session.document.objects
+        item = objects[number] if number < len(objects) else None
+        return isinstance(item, TreeObject) and path in primitive_paths(item.tree)
 
     def _chosen(self) -> tuple[Decals, np.ndarray]:
         if not self.selection:

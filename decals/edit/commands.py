@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from decals.checks import finite, instance, shown, triple, whole
 from decals.edit.change import Change, Numbers
 from decals.edit.document import Document
 from decals.edit.places import Places, carried, nearest, turns
@@ -15,7 +16,7 @@ from decals.grid.rows import as_numbers
 from decals.model import PLAIN, Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage
-from decals.surfaces.surface import Floats, unit_rows
+from decals.surfaces.surface import Floats, as_points, unit_rows
 
 NEXT_TO = 1.0
 """How far a duplicate lies from what it was made of, in radii."""
@@ -71,6 +72,8 @@ class Alter(OfNumbers):
 
     def change(self, document: Document) -> Change:
         """Exchange them."""
+        if not isinstance(self.values, Mapping):
+            raise InvalidEdit(f"values: expected {{'layers': 1}} or such, got {shown(self.values)}")
         before = document.decals.take(self.numbers)
         arrays = {name: _spread(before, name, value) for name, value in self.values.items()}
         return document.with_decals(self.numbers, before.replace(**arrays))
@@ -85,9 +88,9 @@ class Scale(OfNumbers):
 
     def change(self, document: Document) -> Change:
         """Multiply the radii."""
-        _check_number("factor", self.factor)
+        factor = finite("factor", self.factor, InvalidEdit)
         before = document.decals.take(self.numbers)
-        radii = before.radii.astype(np.float64) * self.factor
+        radii = before.radii.astype(np.float64) * factor
         return document.with_decals(self.numbers, before.replace(radii=radii))
 
 
@@ -100,9 +103,8 @@ class Turn(OfNumbers):
 
     def change(self, document: Document) -> Change:
         """Turn the tangents."""
-        _check_number("degrees", self.degrees)
+        angle = np.radians(finite("degrees", self.degrees, InvalidEdit))
         before = document.decals.take(self.numbers)
-        angle = np.radians(self.degrees)
         tangents = np.cos(angle) * before.tangents + np.sin(angle) * before.bitangents
         return document.with_decals(self.numbers, before.replace(tangents=tangents))
 
@@ -152,6 +154,7 @@ class AddImage:
 
     def change(self, document: Document) -> Change:
         """Put it last."""
+        _check_image(self.image)
         return document.with_parts(images=(*document.images, self.image))
 
 
@@ -165,9 +168,9 @@ class ChangeImage:
 
     def change(self, document: Document) -> Change:
         """Exchange it."""
-        _check_image(document, self.number)
+        _check_image(self.image)
         images = list(document.images)
-        images[self.number] = self.image
+        images[_image_number(document, self.number)] = self.image
         return document.with_parts(images=tuple(images))
 
 
@@ -180,12 +183,12 @@ class RemoveImage:
 
     def change(self, document: Document) -> Change:
         """Renumber the others."""
-        _check_image(document, self.number)
-        images = (*document.images[: self.number], *document.images[self.number + 1 :])
+        number = _image_number(document, self.number)
+        images = (*document.images[:number], *document.images[number + 1 :])
         decals, numbers = document.decals.decals, document.decals.numbers
-        touched = decals.images >= self.number
-        shown = decals.images[touched]
-        renumbered = np.where(shown == self.number, PLAIN, shown - 1)
+        touched = decals.images >= number
+        images_there = decals.images[touched]
+        renumbered = np.where(images_there == number, PLAIN, images_there - 1)
         return document.with_decals(
             numbers[touched], decals[touched].replace(images=renumbered), images=images
         )
@@ -200,15 +203,17 @@ class Look:
 
     def change(self, document: Document) -> Change:
         """Exchange it."""
+        instance("camera", self.camera, Camera, InvalidEdit, "Camera.framing makes one")
         return document.with_parts(camera=self.camera)
 
 
 def _rows(position: ArrayLike, normal: ArrayLike) -> tuple[Floats, Floats]:
     """Check a place, and give it as arrays of one row."""
-    rows = np.array([position, normal], np.float32)
-    if rows.shape != (2, 3) or not np.isfinite(rows).all() or not rows[1].any():
-        raise InvalidEdit(f"expected a position and a normal, got {position!r:.60} and {normal!r:.60}")
-    return rows[:1], unit_rows(rows[1:])
+    place = triple("position", position, InvalidEdit)
+    direction = triple("normal", normal, InvalidEdit)
+    if not direction.any():
+        raise InvalidEdit("normal: expected a direction, got a zero vector")
+    return as_points(place[None]), unit_rows(direction[None])
 
 
 def _spread(decals: Decals, name: str, value: ArrayLike) -> Any:
@@ -216,15 +221,18 @@ def _spread(decals: Decals, name: str, value: ArrayLike) -> Any:
     known = getattr(decals, name, None)
     if not isinstance(known, np.ndarray):
         raise InvalidEdit(f"expected the name of an array of decals, such as 'layers', got {name!r}")
-    array = np.asarray(value)
-    return array if array.ndim == known.ndim else np.broadcast_to(array, known.shape)
+    try:
+        array = np.asarray(value)
+        return array if array.ndim == known.ndim else np.broadcast_to(array, known.shape)
+    except ValueError as error:
+        raise InvalidEdit(
+            f"{name}: expected a value for all, or one for each of {len(decals)}, got {value!r:.60}"
+        ) from error
 
 
-def _check_number(name: str, value: float) -> None:
-    if not np.isfinite(value):
-        raise InvalidEdit(f"{name}: expected a finite number, got {value!r}")
+def _image_number(document: Document, number: int) -> int:
+    return whole("image", number, 0, len(document.images) - 1, InvalidEdit)
 
 
-def _check_image(document: Document, number: int) -> None:
-    if not 0 <= number < len(document.images):
-        raise InvalidEdit(f"expected the number of an image, 0 to {len(document.images) - 1}, got {number}")
+def _check_image(image: object) -> None:
+    instance("image", image, DecalImage, InvalidEdit, "DecalImage.load makes one")

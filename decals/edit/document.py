@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from decals.checks import instance, whole
 from decals.edit.change import NOTHING, Change, Numbers, Parts, Rows
-from decals.errors import InvalidEdit
+from decals.errors import InvalidEdit, InvalidScene
 from decals.grid.editor import DecalEditor
 from decals.model import Decals
 from decals.scenes.camera import Camera
@@ -19,6 +20,7 @@ class Document:
     """
 
     def __init__(self, scene: Scene) -> None:
+        instance("what to edit", scene, Scene, InvalidScene, "decals.cover makes one")
         self._objects, self._images, self._camera = scene.objects, scene.images, scene.camera
         self._decals = DecalEditor(scene.decals)
 
@@ -49,9 +51,7 @@ class Document:
 
     def object(self, number: int) -> SceneObject:
         """Give an object by its number, or `InvalidEdit`."""
-        if not 0 <= number < len(self.objects):
-            raise InvalidEdit(f"expected the number of an object, 0 to {len(self.objects) - 1}, got {number}")
-        return self.objects[number]
+        return self.objects[whole("object", number, 0, len(self.objects) - 1, InvalidEdit)]
 
     # -- changes of it ----------------------------------------------------------------------------------
 
@@ -73,13 +73,14 @@ class Document:
 
     def with_added(self, decals: Decals) -> Change:
         """The change that adds decals under new numbers."""
+        instance("decals", decals, Decals, InvalidEdit, "decals.seed makes some")
         first = self.decals.next_number
         return self.with_decals(np.arange(first, first + len(decals)), decals)
 
-    def without(self, numbers: Numbers) -> Change:
-        """The change that deletes decals."""
+    def without(self, numbers: Numbers, **parts: Any) -> Change:
+        """The change that deletes decals, and exchanges parts."""
         self.decals.take(numbers)
-        return self._change(Rows.bare(numbers), {})
+        return self._change(Rows.bare(numbers), parts)
 
     def with_parts(self, **parts: Any) -> Change:
         """The change that exchanges objects, images or camera."""

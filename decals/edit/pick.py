@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from decals.checks import whole
 from decals.edit.document import Document
 from decals.edit.places import Doubles, first_hit, nearest
+from decals.errors import InvalidEdit
 from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
 from decals.surfaces.surface import Floats
@@ -47,7 +49,7 @@ def outline(document: Document, number: int, *, contact: Contact = Contact.PAPER
     Neighbours that push it, and the surface, count: along rays from its centre the outline lies where
     somebody else begins to show. A decal that does not show at its own centre gets its undisturbed rim.
     """
-    decal = document.decals[number]
+    decal = document.decals[whole("decal", number, 0, document.decals.next_number - 1, InvalidEdit)]
     center, radius = decal.positions[0].astype(np.float64), float(decal.radii[0])
     turn = np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False)
     ways = np.cos(turn)[:, None] * decal.tangents[0] + np.sin(turn)[:, None] * decal.bitangents[0]

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import triple
+from decals.errors import InvalidPoints
 from decals.model import Decals
 from decals.scenes.scene import SceneObject
 from decals.surfaces.surface import Floats, as_points, unit_rows
@@ -45,8 +47,8 @@ def nearest(objects: Sequence[SceneObject], points: ArrayLike) -> Places:
 
 def first_hit(objects: Sequence[SceneObject], origin: ArrayLike, direction: ArrayLike) -> Places:
     """Where a ray first meets an object: one place, or none for a miss."""
-    start = as_points(np.reshape(np.asarray(origin, np.float64), (1, 3)))
-    way = unit_rows(np.reshape(np.asarray(direction, np.float64), (1, 3)))
+    start = as_points(triple("origin", origin, InvalidPoints)[None])
+    way = unit_rows(triple("direction", direction, InvalidPoints)[None])
     distances = [float(item.surface.raycast(start, way)[0]) for item in objects]
     if not distances or not np.isfinite(min(distances)):
         return Places(start[:0], start[:0], np.zeros(0, np.int32))

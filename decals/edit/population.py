@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.progress import Progress
+from decals.checks import shown, triple, whole
 from decals.coat.seeding import seed
 from decals.edit.change import Change
 from decals.edit.document import Document
@@ -19,6 +20,7 @@ from decals.seeds.local_relaxation import relax_near
 from decals.seeds.population import Sites, World
 from decals.seeds.relaxation import EXPONENTS, STIFFNESS
 from decals.seeds.repulsion import Law
+from decals.surfaces.surface import as_points
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours in an even coat without gaps, in radii: `sizing.MARGIN` is in the radii."""
@@ -32,18 +34,30 @@ def lying_on(document: Document, objects: Sequence[int]) -> NDArray[np.int64]:
     return document.decals.numbers[np.isin(places.objects, objects)]
 
 
+def object_numbers(objects: object) -> tuple[int, ...]:
+    """Numbers of objects that a command was given, or `InvalidEdit`; what they stand for is not looked at."""
+    if not isinstance(objects, Sequence) or isinstance(objects, str | bytes):
+        raise InvalidEdit(f"objects: expected their numbers, such as (0,), got {shown(objects)}")
+    return tuple(objects)
+
+
 @dataclass(frozen=True, eq=False)
 class Coat:
-    """New decals in place of those that lie on some objects."""
+    """New decals in place of those that lie on some objects.
+
+    ``made_for`` are those objects themselves, if the coat fits no others.
+    """
 
     objects: tuple[int, ...]
     decals: Decals
+    made_for: tuple[SceneObject, ...] = ()
     label: ClassVar[str] = "scatter"
 
     def change(self, document: Document) -> Change:
         """Delete and add at once."""
-        for number in self.objects:
-            document.object(number)
+        there = [document.object(number) for number in object_numbers(self.objects)]
+        if any(item is not known for item, known in zip(there, self.made_for, strict=False)):
+            raise InvalidEdit("an object changed while its new coat was made; scatter again")
         gone = document.without(lying_on(document, self.objects))
         return gone.then(document.with_added(self.decals))
 
@@ -69,18 +83,21 @@ class Scatter:
         cancel: Callable[[], bool] | None = None,
     ) -> Coat:
         """Spread the decals over a document's objects; arguments are as for `decals.seed`."""
-        for number in self.objects:
-            if not 0 <= number < len(objects):
-                raise InvalidEdit(f"expected objects from 0 to {len(objects) - 1}, got {number}")
-        if not 0 <= self.count <= MOST:
-            raise InvalidEdit(f"count: expected 0 to {MOST} decals, got {self.count}")
+        for number in object_numbers(self.objects):
+            whole("object", number, 0, len(objects) - 1, InvalidEdit)
+        whole("count", self.count, 0, MOST, InvalidEdit)
         if images < 1:
             raise InvalidEdit("expected an image for the decals to show, got none; add one first")
-        surfaces = [objects[number].surface for number in self.objects]
+        covered = tuple(objects[number] for number in self.objects)
         decals = seed(
-            surfaces, count=self.count, seed=self.seed, images=images, progress=progress, cancel=cancel
+            [item.surface for item in covered],
+            count=self.count,
+            seed=self.seed,
+            images=images,
+            progress=progress,
+            cancel=cancel,
         )
-        return Coat(self.objects, decals)
+        return Coat(self.objects, decals, covered)
 
     def change(self, document: Document) -> Change:
         """Spread and put on, however long it takes."""
@@ -99,9 +116,7 @@ class Relax:
 
     def change(self, document: Document) -> Change:
         """Move the neighbourhood, sizes unchanged."""
-        center = np.asarray(self.place, np.float32)
-        if center.shape != (3,) or not np.isfinite(center).all():
-            raise InvalidEdit(f"place: expected three finite numbers, got {self.place!r:.60}")
+        center = as_points(triple("place", self.place, InvalidEdit)[None])[0]
         numbers, decals = document.decals.numbers, document.decals.decals
         if not len(decals) or not document.objects:
             return Change()

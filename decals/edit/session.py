@@ -6,8 +6,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from decals.checks import shown
 from decals.edit.change import Change
 from decals.edit.document import Document
+from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.scenes.scene_file import save_scene
@@ -57,6 +59,9 @@ class EditSession:
 
     def do(self, command: Command) -> Change:
         """Carry out a command; what it raises leaves everything as it was."""
+        known = callable(getattr(command, "change", None)) and hasattr(command, "label")
+        if not known or isinstance(command, type):
+            raise InvalidEdit(f"expected a command such as Scale([7], 1.5), got {shown(command)}")
         return self._carry_out(command.label, command.change(self.document))
 
     def _carry_out(self, label: str, change: Change) -> Change:
@@ -166,6 +171,8 @@ class EditSession:
 
     def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
         """Write the scene to a file, whole or not at all (`decals.save_scene`), with a camera if given."""
+        if not isinstance(path, str | os.PathLike) or not os.fspath(path):
+            raise InvalidEdit(f"expected a path to save to, got {shown(path)}")
         self.end()
         save_scene(self.document.scene.replace(camera=camera), path)
         self._saved = self._last

@@ -15,6 +15,9 @@ from decals.surfaces.surface import Floats
 Ray = tuple[ArrayLike, ArrayLike]
 """Origin and direction in the scene's coordinates."""
 
+Hidden = Callable[[float, float, Floats], bool]
+"""Whether something else in the window hides a point of a surface, at a place in pixels."""
+
 CLICK = 3.0
 """A press that moves farther than so many pixels is a drag."""
 
@@ -30,11 +33,18 @@ class Tools:
         Selection and actions.
     ray
         Gives the ray through a place in the window, None outside of it.
+    hidden
+        What is hidden cannot be picked, nor be gone to.
     """
 
-    def __init__(self, actions: Actions, ray: Callable[[float, float], Ray | None]) -> None:
+    def __init__(
+        self,
+        actions: Actions,
+        ray: Callable[[float, float], Ray | None],
+        hidden: Hidden = lambda _x, _y, _point: False,
+    ) -> None:
         self.actions = actions
-        self._ray = ray
+        self._ray, self._hidden = ray, hidden
         self._pressed: tuple[float, float] | None = None
         self._held: _Held | None = None
         self._strayed = False
@@ -47,7 +57,8 @@ class Tools:
     def at(self, x: float, y: float) -> Pick | None:
         """Say what is under a place."""
         ray = self._ray(x, y)
-        return None if ray is None else pick(self.actions.session.document, *ray)
+        found = None if ray is None else pick(self.actions.session.document, *ray)
+        return None if found is None or self._hidden(x, y, found.position) else found
 
     def key(self, name: str, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
         """Take a key that was pressed while the cursor was at a place."""
@@ -81,7 +92,7 @@ class Tools:
         if self._strayed:
             ray = self._ray(x, y)
             if ray is not None:
-                self._held.move(ray)
+                self._held.move(ray, lambda point: self._hidden(x, y, point))
         return True
 
     def release(self, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
@@ -122,11 +133,11 @@ class _Held:
         self._actions.settle()
         self._actions.session.begin("move")
 
-    def move(self, ray: Ray) -> None:
-        """Go to where the ray meets a surface; stay where it meets none."""
+    def move(self, ray: Ray, hidden: Callable[[Floats], bool]) -> None:
+        """Go to where the ray meets a surface; stay where it meets none that is seen."""
         document = self._actions.session.document
         found = first_hit(document.objects, *ray)
-        if not len(found.objects):
+        if not len(found.objects) or hidden(found.positions[0]):
             return
         offset = turns(self._normal[None], found.normals)[0] @ self._offset
         goal = nearest(document.objects, found.positions + offset)

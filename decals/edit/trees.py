@@ -1,7 +1,6 @@
 """Primitives of a tree: finding them by path, moving and changing them, and decals that follow."""
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -11,11 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree import ISO, Cone, Node, Point, Segment
 from blobtree.nodes.primitives import Primitive
 from blobtree.nodes.tree import Combination, Transform
+from decals.checks import finite, instance, shown, triple
 from decals.edit.change import Change
 from decals.edit.document import Document
 from decals.edit.places import Places, carried, nearest
 from decals.errors import InvalidEdit
 from decals.scenes.scene import TreeObject
+from decals.surfaces.surface import as_points
 
 Path = tuple[int, ...]
 """Which child to take, from the root down."""
@@ -34,6 +35,7 @@ FIELD_ERROR = 1e-5
 
 def primitive_paths(tree: Node) -> list[Path]:
     """Paths of all primitives, from the first to the last."""
+    instance("tree", tree, Node, InvalidEdit, "give the tree of a TreeObject")
     found: list[Path] = []
     pending: list[tuple[Path, Node]] = [((), tree)]
     while pending:
@@ -48,8 +50,10 @@ def _down(tree: Node, path: Path) -> Iterator[Node]:
     """Nodes from the root to the one that a path leads to."""
     node = tree
     yield node
+    if not isinstance(path, Sequence):
+        raise InvalidEdit(f"expected a path through the tree, such as (0, 1), got {shown(path)}")
     for step in path:
-        if not 0 <= step < len(node.children):
+        if not isinstance(step, int | np.integer) or not 0 <= step < len(node.children):
             raise InvalidEdit(f"expected a path through the tree, got {path}; {step} is no child there")
         node = node.children[step]
         yield node
@@ -80,7 +84,7 @@ def to_primitive(tree: Node, path: Path) -> Path:
 
 def primitive_near(tree: Node, point: ArrayLike) -> Path:
     """Path of the primitive whose field is the highest at a point; the first of equals."""
-    place = np.asarray(point, np.float32).reshape(1, 3)
+    place = as_points(triple("point", point, InvalidEdit)[None])
     paths = primitive_paths(tree)
     near = [path for path in paths if _within(place, alone(tree, path))[0]] or paths
     return max(near, key=lambda path: float(alone(tree, path)(place)[0]))
@@ -250,9 +254,7 @@ class MovePrimitive(OfPrimitive):
     def change(self, document: Document) -> Change:
         """Exchange the tree, and carry the decals that it moves."""
         tree = self.tree(document)
-        offset = np.asarray(self.offset, np.float64)
-        if offset.shape != (3,) or not np.isfinite(offset).all():
-            raise InvalidEdit(f"offset: expected three finite numbers, got {self.offset!r:.60}")
+        offset = triple("offset", self.offset, InvalidEdit)
         own = np.linalg.solve(world_matrix(tree, self.path), offset)
         return self.exchanged(document, moved(node_at(tree, self.path), own), offset)
 
@@ -266,11 +268,12 @@ class ResizePrimitive(OfPrimitive):
 
     def change(self, document: Document) -> Change:
         """Exchange the tree, and put the decals back onto it."""
-        if not (math.isfinite(self.factor) and self.factor > 0):
-            raise InvalidEdit(f"factor: expected a number above 0, got {self.factor!r}")
+        factor = finite("factor", self.factor, InvalidEdit)
+        if factor <= 0:
+            raise InvalidEdit(f"factor: expected a number above 0, got {factor}")
         tree = self.tree(document)
         whole = replace(self, path=to_primitive(tree, self.path))
-        return whole.exchanged(document, resized(primitive_at(tree, self.path), self.factor))
+        return whole.exchanged(document, resized(primitive_at(tree, self.path), factor))
 
 
 @dataclass(frozen=True, eq=False)

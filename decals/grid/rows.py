@@ -91,7 +91,10 @@ class DecalRows:
 
 def as_numbers(numbers: ArrayLike) -> Numbers:
     """Give whole numbers as ``int64[n]``, or `InvalidDecals`."""
-    array = np.atleast_1d(np.asarray(numbers))
+    try:
+        array = np.atleast_1d(np.asarray(numbers))
+    except ValueError as error:
+        raise InvalidDecals(f"expected numbers of decals, got {numbers!r:.80}") from error
     if array.size == 0:
         return np.zeros(0, np.int64)
     if array.ndim != 1 or array.dtype.kind not in "iu":

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from decals.render.context import Context
 from decals.render.entry import GROUP, Entry
-from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
+from decals.render.tile import Rectangle, Tile, attach_camera, read_floats, set_uniform
 from implicit_decals.shaders import compose
 
 
@@ -76,6 +76,12 @@ class GBuffer:
     def read_normal(self, tile: Tile) -> NDArray[np.float32]:
         """Read the normals, ``float32[h, w, 4]``, the lowest row first."""
         return self._read(1, tile)
+
+    def read_depth(self, part: Rectangle) -> float:
+        """Read the least depth in a rectangle of samples."""
+        place = part.x, part.y, part.width, part.height
+        data = self._depth_alone.read(place, components=1, attachment=-1, alignment=1, dtype="f4")
+        return float(np.frombuffer(data, np.float32).min())
 
     def _read(self, attachment: int, tile: Tile) -> NDArray[np.float32]:
         return read_floats(self._framebuffer, attachment, tile)

@@ -178,8 +178,13 @@ class Renderer:
         current. Arguments and errors as for `render`.
         """
         _check_size(size, samples)
-        uploaded = self._upload(scene)
         full = size[0] * samples, size[1] * samples
+        if max(full) > self.context.max_texture_size:
+            raise InvalidScene(
+                f"expected at most {self.context.max_texture_size} samples along each axis, got {full[0]} x "
+                f"{full[1]}; take fewer a pixel, or `render` draws in parts"
+            )
+        uploaded = self._upload(scene)
         targets = self._targets_for(full, buffers=False)
         tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
         self._draw_tile(uploaded, tile, targets, mapping, contact)

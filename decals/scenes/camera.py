@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from decals.checks import finite
 from decals.errors import InvalidScene
 from decals.scenes.viewpoint import Bounds, Floats, Rays
 
@@ -51,7 +52,7 @@ class Camera:
     def __post_init__(self) -> None:
         for name in ("position", "target", "up"):
             object.__setattr__(self, name, _vector(name, getattr(self, name)))
-        object.__setattr__(self, "fov", float(self.fov))
+        object.__setattr__(self, "fov", finite("a camera's fov", self.fov, InvalidScene))
         if not 0.0 < self.fov < 180.0:
             raise InvalidScene(f"a camera's fov must lie between 0 and 180 degrees, got {self.fov}")
         scale = max(abs(x) for x in (*self.position, *self.target))
@@ -220,7 +221,7 @@ def _corners(bounds: Bounds) -> Floats:
 def _vector(name: str, value: ArrayLike) -> Vector:
     try:
         array = np.asarray(value, np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidScene(f"a camera's {name} must be three numbers, got {value!r}") from error
     if array.shape != (3,) or not np.isfinite(array).all():
         raise InvalidScene(f"a camera's {name} must be three finite numbers, got {value!r}")

@@ -5,13 +5,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from blobtree import Node
+from decals.checks import instance, shown, triple
 from decals.errors import InvalidScene, NoGraphics
 from decals.images import load_image
 from decals.model import Decals
@@ -24,6 +25,8 @@ Box = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 PICTURE = (640, 480)
 """Size of the picture that a notebook shows of a scene."""
+
+PIXELS = "give uint8 pixels [h, w, 4]"
 
 CLAY: Color = (0.72, 0.68, 0.62)
 """Colour of a mesh that brings none of its own."""
@@ -121,7 +124,8 @@ class DecalImage:
     pixels: NDArray[np.uint8] = field(repr=False)
 
     def __post_init__(self) -> None:
-        pixels = self.pixels
+        instance("an image's source", self.source, str, InvalidScene, "give a name or a path")
+        pixels = instance(f"image {self.source!r}", self.pixels, np.ndarray, InvalidScene, PIXELS)
         if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
             got = f"{pixels.dtype}{list(pixels.shape)}"
             raise InvalidScene(f"image {self.source!r}: expected uint8 pixels [h, w, 4], got {got}")
@@ -129,6 +133,7 @@ class DecalImage:
     @classmethod
     def load(cls, source: str, *, folder: Path | None = None) -> Self:
         """Draw or read the picture behind ``source``; relative paths start at ``folder``."""
+        instance("an image's source", source, str, InvalidScene, "give a name or a path")
         return cls(source, load_image(source, folder=folder))
 
 
@@ -159,9 +164,13 @@ class Scene:
     images: tuple[DecalImage, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "objects", tuple(self.objects))
-        object.__setattr__(self, "images", tuple(self.images))
-        _check_names(self.objects)
+        objects = _each("objects", self.objects, MeshObject | TreeObject, "make a MeshObject or a TreeObject")
+        images = _each("images", self.images, DecalImage, "DecalImage.load makes one")
+        object.__setattr__(self, "objects", objects)
+        object.__setattr__(self, "images", images)
+        instance("camera", self.camera, Camera, InvalidScene, "Camera.framing makes one")
+        instance("decals", self.decals, Decals, InvalidScene, "decals.seed makes some")
+        check_names(self.objects)
         last = int(self.decals.images.max(initial=-1))
         if last >= len(self.images):
             raise InvalidScene(
@@ -207,22 +216,36 @@ def bounds_of(objects: Iterable[SceneObject]) -> Box:
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
 
 
-def _check_names(objects: Sequence[SceneObject]) -> None:
+def check_names(objects: Sequence[SceneObject]) -> None:
+    """Refuse objects of which two have the same name."""
     names = [item.name for item in objects]
     for name in names:
         if names.count(name) > 1:
             raise InvalidScene(f"expected a different name for each object, got {name!r} twice; rename one")
 
 
+def _each(name: str, values: Any, kind: Any, advice: str) -> tuple[Any, ...]:
+    """Give a tuple of things of a kind, or raise InvalidScene."""
+    try:
+        found = tuple(values)
+    except TypeError:
+        raise InvalidScene(f"{name}: expected a list of them, got {shown(values)}; {advice}") from None
+    for value in found:
+        if not isinstance(value, kind):
+            raise InvalidScene(f"{name}: got {shown(value)} among them; {advice}")
+    return found
+
+
 def _name(name: str) -> str:
+    instance("an object's name", name, str, InvalidScene, "give it a name of letters")
     if not name.strip():
         raise InvalidScene("expected a name for the object, got an empty one; give it a name")
     return name
 
 
 def _color(name: str, color: ArrayLike) -> Color:
-    values = np.asarray(color, np.float64)
-    if values.shape != (3,) or not ((values >= 0.0) & (values <= 1.0)).all():
+    values = triple(f"object {name!r}, colour", color, InvalidScene)
+    if not ((values >= 0.0) & (values <= 1.0)).all():
         raise InvalidScene(f"object {name!r}: expected a colour of three numbers in [0, 1], got {color!r}")
     red, green, blue = values.tolist()
     return red, green, blue

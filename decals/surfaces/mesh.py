@@ -153,7 +153,7 @@ def _as_vertices(vertices: ArrayLike) -> Floats:
     try:
         with np.errstate(over="ignore"):  # what overflows is refused below
             array = np.array(vertices, dtype=np.float32, order="C")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidMesh(
             f"vertices: expected numbers of shape [n, 3], got {type(vertices).__name__}"
         ) from error

@@ -67,8 +67,9 @@ class Surface(Protocol):
 def as_points(points: ArrayLike, name: str = "points") -> Floats:
     """Points as contiguous finite ``float32[n, 3]``, or `InvalidPoints`."""
     try:
-        array = np.ascontiguousarray(points, dtype=np.float32)
-    except (TypeError, ValueError) as error:
+        with np.errstate(over="ignore"):  # what overflows is refused below
+            array = np.ascontiguousarray(points, dtype=np.float32)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidPoints(
             f"{name}: expected numbers of shape [n, 3], got {type(points).__name__}"
         ) from error

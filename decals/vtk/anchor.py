@@ -10,8 +10,8 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from decals.scenes.viewpoint import Bounds, Floats
 from decals.vtk.camera import matrix_of
 
-NAME = "decals"
-"""What pyvista calls the actor."""
+NAME = "plotter.decals"
+"""What pyvista calls the actor: an actor of the user's that had the same name would take its place."""
 
 
 class Anchor:
@@ -42,11 +42,12 @@ class Anchor:
             (renderer, renderer.AddObserver(vtkCommand.StartEvent, lambda *_: self._come_last())),
         ]
 
-    def place(self, bounds: Bounds) -> None:
-        """Stand around a box; the first time, join the renderer's actors."""
-        low, high = np.asarray(bounds[0], np.float64), np.asarray(bounds[1], np.float64)
-        choice = np.indices((2, 2, 2)).reshape(3, 8).T
-        self._corners.points = np.where(choice, high, low)
+    def place(self, bounds: Bounds | None) -> None:
+        """Stand around a box, or nowhere; the first time, join the renderer's actors."""
+        if bounds is not None:
+            choice = np.indices((2, 2, 2)).reshape(3, 8).T
+            self._corners.points = np.where(choice, *np.asarray(bounds, np.float64)[::-1])
+        self._mapper.SetInputData(pv.PolyData() if bounds is None else self._corners)
         if not self.there:
             self._renderer.add_actor(self.actor, name=NAME, pickable=False, render=False)
 

@@ -11,7 +11,8 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import Node
-from decals.errors import InvalidScene
+from decals.checks import instance, shown
+from decals.errors import InvalidScene, NoGraphics
 from decals.model import PLAIN, Decals
 from decals.render import SceneLike
 from decals.scenes.camera import Camera
@@ -131,6 +132,8 @@ class Component:
         scene = self.scene
         if isinstance(images, str):
             raise InvalidScene(f"expected a list of images, got the text {images!r}; write [{images!r}]")
+        if not isinstance(images, Sequence):
+            raise InvalidScene(f"expected a list of images, got {shown(images)}; put it into one")
         added = tuple(_image(image, number) for number, image in enumerate(images))
         if added:
             shifted = np.where(decals.images == PLAIN, PLAIN, decals.images + len(scene.images))
@@ -166,6 +169,7 @@ class Component:
 
     def add_scene(self, scene: Scene, *, camera: bool = True) -> Scene:
         """Show a scene in place of what there was; with ``camera``, from where its own camera stands."""
+        instance("scene", scene, Scene, InvalidScene, "decals.cover makes one; for others set `scene`")
         self.scene = scene
         if camera:
             view = self._plotter.camera
@@ -190,6 +194,8 @@ class Component:
     def stage(self) -> Stage:
         """What draws in the active subplot."""
         renderer = self._plotter.renderer
+        if self._plotter.render_window is None:
+            raise NoGraphics("the plotter was closed; make another, as pyvista asks for too")
         if id(renderer) not in self._stages:
             self._stages[id(renderer)] = Stage(self._plotter, renderer, self._window_context)
             warn_of_exports(self._plotter)
@@ -210,7 +216,7 @@ class Component:
 
     def _name(self, name: str | None) -> str:
         if name is not None:
-            return name
+            return name  # checked with the object
         taken = {thing.name for thing in self.scene.objects}
         return next(name for n in range(1, len(taken) + 2) if (name := f"object {n}") not in taken)
 

@@ -13,6 +13,7 @@ from decals.render.targets import Targets
 from decals.scenes.viewpoint import Projection
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
+from decals.vtk.picking import texels_of
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class Frame:
         self._shown: tuple[object, ...] = ()
         self._values: tuple[object, ...] = ()
         self._targets: Targets | None = None
+        self._magnified = False
         with context.current():
             self.renderer = Renderer(context)
             self._composite = Composite(context)
@@ -73,10 +75,19 @@ class Frame:
         self._shown, self._values, self.drawn = shown, values, True
         return self._targets
 
+    def nearest(self, x: int, y: int, size: Size) -> float:
+        """Least depth that was drawn at a pixel of a frame of this size: 1 for nothing, 0 for not known."""
+        if self._targets is None or self._targets.picture is not self:
+            return 0.0
+        with self.context.current():
+            gbuffer = self._targets.gbuffer
+            return gbuffer.read_depth(texels_of(x, y, size, gbuffer.size, magnified=self._magnified))
+
     def composite(
         self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int
     ) -> None:
         """Put what was drawn into VTK's frame; see `Composite.draw`."""
+        self._magnified = samples == 0
         self._composite.draw(window, viewport, targets, samples)
 
     def release(self) -> None:

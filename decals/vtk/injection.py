@@ -149,7 +149,7 @@ class Injection:
         self._use_camera(stage, place)
         model = np.linalg.inv(place) @ matrix_of(self.actor)
         program.SetUniformMatrix(PLACE, _vtk_matrix(model))
-        units = stage.texture_units()
+        units = stage.applied.texture_units()
         numbers = data.bind(units[1:])
         images.use(units[0])
         numbers |= {"decal_images": units[0], "decal_mapping": int(stage.mapping)}

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, cast
 
-import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonCore import vtkCommand
 
+from decals.checks import finite, shown, whole
 from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
@@ -22,44 +20,16 @@ from decals.render import Renderer, SceneLike
 from decals.scenes.scene import Box, SceneObject, bounds_of
 from decals.scenes.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
+from decals.vtk.applied import Applied
 from decals.vtk.boxes import box_around
 from decals.vtk.camera import vtk_projection
 from decals.vtk.context import WindowContext
 from decals.vtk.frame import Frame, Look
-from decals.vtk.injection import Injection
 from decals.vtk.modes import complaints
+from decals.vtk.picking import Hit, hidden, hit_at
 
-INJECTED_TEXTURES = 5
-"""Images, records and the three arrays of the index."""
-
-
-@dataclass(frozen=True, eq=False)
-class Hit:
-    """What lies behind a place in a window.
-
-    Attributes
-    ----------
-    object_id
-        Index of the object in the scene.
-    owner
-        Number of the topmost decal there, -1 for none.
-    position, normal
-        float32[3] each, in the scene's coordinates.
-    uv
-        Place in the owner's image; zero without an owner.
-    field
-        The owner's field after contact; zero without an owner.
-    depth
-        Depth in the window, from 0 to 1: larger than that of VTK's depth buffer where an actor lies in front.
-    """
-
-    object_id: int
-    owner: int
-    position: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    uv: tuple[float, float]
-    field: float
-    depth: float
+MOST_SAMPLES = 16
+"""Along each axis; graphics cards have no targets for more in a window of the usual size."""
 
 
 class Stage:
@@ -78,10 +48,10 @@ class Stage:
 
     Attributes
     ----------
-    frame_seconds
-        How long our part of the last frame took; with ``measure``, until the card had finished.
     measure
-        Whether to wait for the card, so as to know.
+        Whether frames wait for the graphics card, so that who times them knows how long they took.
+    applied
+        The stock actors that have our decals.
     drawing
         Whether VTK is drawing a frame of the renderer now.
     """
@@ -92,7 +62,7 @@ class Stage:
         self.plotter, self.vtk_renderer = plotter, renderer
         self._samples, self._draw_scale = 2, 1.0
         self._mapping, self._contact = Mapping.CORRECTED, Contact.PAPER
-        self.frame_seconds, self.measure = 0.0, False
+        self.measure = False
         self.drawing = False
         self._scene: SceneLike | None = None
         self._context = context
@@ -101,8 +71,7 @@ class Stage:
         me = weakref.ref(self)
         self._anchor = Anchor(renderer, lambda: _draw(me))
         self._placed: tuple[object, ...] = ()
-        self._injections: list[Injection] = []
-        self._units: list[int] = []
+        self.applied = Applied(self)
         self._said: set[str] = set()
         self._tags = [
             renderer.AddObserver(vtkCommand.StartEvent, lambda *_: _prepare(me)),
@@ -111,29 +80,40 @@ class Stage:
 
     @property
     def scene(self) -> SceneLike | None:
-        """What is shown; its camera is not asked, the plotter's is."""
+        """What is shown; its camera is not asked, the plotter's is.
+
+        Where pyvista cleared the renderer, or our actor was taken out of it, that is nothing any more.
+        """
+        self._notice_clearing()
         return self._scene
 
     @scene.setter
     def scene(self, scene: SceneLike | None) -> None:
-        self._scene = scene
-        self._failed = None
-        if not self._anchor.there:
-            self._placed = ()
+        _check_scene(scene)
+        self._notice_clearing()
+        self._scene, self._failed = scene, None
+        if scene is None:
+            self._anchor.leave()
         self._follow_objects(bounds_of)
+
+    def _notice_clearing(self) -> None:
+        """Forget everything where pyvista took our actor out."""
+        if self._scene is not None and not self._anchor.there:
+            self._scene = None
+            self.applied.clear()
 
     def _follow_objects(self, box: Callable[[Sequence[SceneObject]], Box]) -> None:
         """Stand around the scene's objects, if they are not those of before."""
-        objects = () if self._scene is None else tuple(self._scene.objects)
-        if len(objects) == len(self._placed) and all(
+        if self._scene is None:
+            return
+        objects = tuple(self._scene.objects)
+        known = len(objects) == len(self._placed) and all(
             a is b for a, b in zip(objects, self._placed, strict=True)
-        ):
+        )
+        if known and self._anchor.there:
             return
         self._placed = objects
-        if objects:
-            self._anchor.place(box(cast(Sequence[SceneObject], objects)))
-        else:
-            self._anchor.leave()
+        self._anchor.place(box(cast(Sequence[SceneObject], objects)) if objects else None)
 
     @property
     def draw_scale(self) -> float:
@@ -145,9 +125,10 @@ class Stage:
 
     @draw_scale.setter
     def draw_scale(self, scale: float) -> None:
-        if not 0.0 < scale <= 1.0:
-            raise InvalidScene(f"draw_scale must be above 0 and at most 1, got {scale}")
-        self._draw_scale = float(scale)
+        number = finite("draw_scale", scale, InvalidScene)
+        if not 0.0 < number <= 1.0:
+            raise InvalidScene(f"draw_scale: expected a number above 0 and at most 1, got {number}")
+        self._draw_scale = number
 
     @property
     def samples(self) -> int:
@@ -156,9 +137,7 @@ class Stage:
 
     @samples.setter
     def samples(self, samples: int) -> None:
-        if not isinstance(samples, int | np.integer) or samples < 1:
-            raise InvalidScene(f"samples must be a whole number from 1; got {samples!r}")
-        self._samples = int(samples)
+        self._samples = whole("samples", samples, 1, MOST_SAMPLES, InvalidScene)
 
     @property
     def mapping(self) -> Mapping:
@@ -188,43 +167,29 @@ class Stage:
 
     def apply(self, actor: Any, *, follow: bool = False) -> None:
         """Put the scene's decals into VTK's own shader of an actor; see `Component.apply`."""
-        self.remove(actor)
-        self._injections.append(Injection(self, actor, follow=follow))
+        self.applied.apply(actor, follow=follow)
 
     def remove(self, actor: Any) -> None:
         """Take the decals off an actor; nothing happens if it had none."""
-        for injection in [item for item in self._injections if item.actor is actor]:
-            injection.release()
-            self._injections.remove(injection)
-
-    def texture_units(self) -> list[int]:
-        """Texture units that are ours until the end of this frame, as many as an injected shader reads."""
-        manager = self.vtk_renderer.GetRenderWindow().GetTextureUnitManager()
-        if not self._units:
-            self._units = [manager.Allocate() for _ in range(INJECTED_TEXTURES)]
-        return self._units
+        self.applied.remove(actor)
 
     def _finish(self) -> None:
-        manager = self.vtk_renderer.GetRenderWindow().GetTextureUnitManager()
-        for unit in self._units:
-            manager.Free(unit)
-        self._units = []
         self.drawing = False
-        for injection in self._injections:
-            injection.finish()
+        self.applied.finish()
 
     def _prepare(self) -> None:
         self.drawing = True
-        self._follow_objects(box_around)  # what changes in place may do so with every frame
-        if self._scene is not None:
-            for complaint in complaints(self.vtk_renderer):
-                if complaint not in self._said:
-                    self._said.add(complaint)
-                    warnings.warn(complaint, stacklevel=2)
-        if self._injections:
-            with self.current():
-                for injection in self._injections:
-                    injection.prepare()
+        if self.scene is not None:
+            self._follow_objects(box_around)  # what changes in place may do so with every frame
+            self._complain()
+        self.applied.prepare()
+
+    def _complain(self) -> None:
+        """Say, once, what of VTK's modes does not go with what we draw."""
+        for complaint in complaints(self.vtk_renderer):
+            if complaint not in self._said:
+                self._said.add(complaint)
+                warnings.warn(complaint, stacklevel=2)
 
     @property
     def renderer(self) -> Renderer:
@@ -236,6 +201,15 @@ class Stage:
         """Make the window's context current, and keep VTK's state, within a ``with`` block."""
         with self._use_frame().context.current():
             yield
+
+    @contextmanager
+    def current_if_there(self) -> Iterator[None]:
+        """Make the window's context current if something of ours is in it; else there is nothing to do."""
+        if self._frame is None or self._frame.context.stale:
+            yield
+        else:
+            with self._frame.context.current():
+                yield
 
     def viewpoint(self) -> Projection:
         """VTK's camera, as the renderer sees it."""
@@ -254,58 +228,43 @@ class Stage:
         """Lower left corner and size of the part of the frame that VTK draws to now, in pixels."""
         return self._use_frame().context.viewport()
 
-    def at(self, x: int, y: int) -> Hit | None:
-        """Say what lies at a place in the window, in pixels from its lower left corner; None for nothing.
+    def at(self, x: float, y: float) -> Hit | None:
+        """Say what is seen at a place in the window, in pixels from its lower left corner; None for nothing.
 
-        That one pixel is drawn for it, at full resolution. Actors that lie in front do not count.
+        That one pixel is drawn for it, at full resolution. Where an actor of VTK's hid us in the last frame,
+        that is nothing; translucent actors and text over the picture hide nothing.
 
         Raises
         ------
         NoGraphics
             The window has not been rendered yet.
+        InvalidPoints
+            The place is none.
         """
-        left, low = self.vtk_renderer.GetOrigin()
+        return hit_at(self, x, y)
+
+    def hidden(self, x: int, y: int, position: ArrayLike) -> bool:
+        """Whether an actor of VTK's hid a point of ours at a pixel of the last frame; see `at`."""
+        return hidden(self, x, y, position)
+
+    def depth_at(self, x: int, y: int) -> float:
+        """Least depth that we put into the last frame at a pixel of the renderer: 1 for none.
+
+        It is 0 where that is not known any more, because the stage's renderer drew something else since.
+        """
         width, height = self.vtk_renderer.GetSize()
-        x, y = x - left, y - low
-        if self._scene is None or not (0 <= x < width and 0 <= y < height):
-            return None
-        viewpoint = self.viewpoint()
-        with self.current():
-            found = self.renderer.buffers_at(
-                self._scene,
-                x,
-                y,
-                size=(width, height),
-                mapping=self.mapping,
-                contact=self.contact,
-                viewpoint=viewpoint,
-            )
-        if found.object_id[0, 0] < 0:
-            return None
-        position = found.position[0, 0]
-        clip = viewpoint.matrix @ np.append(position.astype(np.float64), 1.0)
-        return Hit(
-            object_id=int(found.object_id[0, 0]),
-            owner=int(found.owner[0, 0]),
-            position=position,
-            normal=found.normal[0, 0],
-            uv=(float(found.uv[0, 0, 0]), float(found.uv[0, 0, 1])),
-            field=float(found.field[0, 0]),
-            depth=float(0.5 * clip[2] / clip[3] + 0.5),
-        )
+        return 0.0 if self._frame is None else self._frame.nearest(x, y, (width, height))
 
     def draw(self) -> None:
         """Draw into the frame that VTK is drawing; called by the anchor."""
         scene = self._scene
         if scene is None or self.vtk_renderer.GetSelector() is not None or self._failed is scene:
             return
-        begin = time.perf_counter()
         try:
             self._draw(scene)
         except Exception:
             self._failed = scene  # say it once, not with every frame
             raise
-        self.frame_seconds = time.perf_counter() - begin
 
     def _draw(self, scene: SceneLike) -> None:
         frame = self._use_frame()
@@ -331,18 +290,20 @@ class Stage:
 
     def release(self) -> None:
         """Leave the renderer and give everything back; the window must still be there. Twice is harmless."""
+        self.applied.clear()
         self._anchor.release()
         for tag in self._tags:
             self.vtk_renderer.RemoveObserver(tag)
         if self._frame is not None and not self._frame.context.stale:
-            with self.current():
-                for injection in self._injections:
-                    injection.release()
-        self._injections.clear()
-        if self._frame is not None and not self._frame.context.stale:
             self._frame.release()
         self._frame = None
         self._scene = None
+
+
+def _check_scene(scene: object) -> None:
+    """Refuse what has no objects, decals and images to draw."""
+    if scene is not None and not all(hasattr(scene, name) for name in ("objects", "decals", "images")):
+        raise InvalidScene(f"scene: expected a Scene, or None, got {shown(scene)}; decals.cover makes one")
 
 
 def _prepare(stage: weakref.ref[Stage]) -> None:

@@ -5,6 +5,8 @@ from typing import Any
 
 import pyvista as pv
 
+from decals.checks import instance
+from decals.errors import InvalidScene
 from decals.scenes.scene import Scene
 from decals.vtk.component import Component
 
@@ -22,6 +24,7 @@ def show(scene: Scene, **options: Any) -> Any:
     options
         As for pyvista's ``Plotter.show``, which gets them and whose result comes back.
     """
+    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
     plotter = pv.Plotter()
     stage: Component = plotter.decals
     stage.add_scene(scene)

@@ -44,6 +44,7 @@ class Marks:
         )
         self._actor.mapper.dataset = self._lines
         self._actor.use_bounds = False
+        self._actor.ForceTranslucentOn()  # so that it leaves no depth: what it surrounds is not behind it
         self._status: Any = plotter.add_text(
             "", position=(12, 10), font_size=9, color="black", render=False, name="decals-status"
         )

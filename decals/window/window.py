@@ -4,12 +4,14 @@ import os
 import sys
 import time
 import weakref
+from collections.abc import Sequence
 from typing import Any
 
 import pyvista as pv
 
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
 from blobtree import BlobTreeError
+from decals.checks import shown, whole
 from decals.edit.actions import Actions
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
@@ -18,12 +20,16 @@ from decals.errors import DecalsError, InvalidEdit, InvalidScene, NoGraphics
 from decals.render.libraries import require_gl
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
+from decals.surfaces.surface import Floats
+from decals.vtk.stage import MOST_SAMPLES
 from decals.window.bindings import Bindings
 from decals.window.grip import Grip
 from decals.window.marks import Marks
 from decals.window.quality import Quality
 
 SIZE = (1200, 800)
+LARGEST = 16384
+"""Pixels that a window may have along each side, as many as VTK draws."""
 BACKGROUND = ((0.80, 0.82, 0.85), (0.96, 0.96, 0.95))
 """Colours at the bottom and at the top."""
 
@@ -72,8 +78,10 @@ class EditWindow:
     ) -> None:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
-        if len(size) != 2 or min(size) < 1:
-            raise InvalidScene(f"size: expected width and height of at least 1 pixel, got {tuple(size)}")
+        size = _checked_size(size)
+        whole("samples", samples, 1, MOST_SAMPLES, InvalidScene)
+        if path is not None and not isinstance(path, str | os.PathLike):
+            raise InvalidScene(f"path: expected a path to save to, got {shown(path)}")
         require_gl()
         if not off_screen:
             self.require_screen()
@@ -85,7 +93,7 @@ class EditWindow:
         self.actions.camera, self.actions.interrupt = self._camera, self.worker.cancel
         self.plotter = _plotter(off_screen, size)
         self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
-        self.tools = Tools(self.actions, self._ray)
+        self.tools = Tools(self.actions, self._ray, self._hidden)
         self._open_stage()
         self.marks = Marks(self.plotter)
         self.grip = Grip(self.plotter, self.actions, lambda whole: self.redraw(whole=whole))
@@ -208,6 +216,10 @@ class EditWindow:
         rays = self.stage.viewpoint().rays(width, height)
         return rays.origins(x, y), rays.directions(x, y)
 
+    def _hidden(self, x: float, y: float, position: Floats) -> bool:
+        """Whether an actor that was added to the plotter hides a point of a surface."""
+        return bool(self.stage.hidden(int(x), int(y), position))
+
     def _camera(self) -> Camera | None:
         """The camera to save: VTK's, if it is one of ours."""
         view = self.plotter.camera
@@ -277,6 +289,14 @@ def view(
     with EditWindow(scene, path=path, size=size) as window:
         window.show()
         return window.document.scene
+
+
+def _checked_size(size: object) -> tuple[int, int]:
+    """Give width and height of a window, or `InvalidScene`."""
+    if not isinstance(size, Sequence) or len(size) != 2:
+        raise InvalidScene(f"size: expected width and height in pixels, got {shown(size)}")
+    width, height = (whole("size", side, 1, LARGEST, InvalidScene) for side in size)
+    return width, height
 
 
 def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:

@@ -5,6 +5,7 @@ import numpy as np
 from decals.edit import (
     Add,
     AddImage,
+    AddObject,
     Alter,
     Carry,
     ChangeImage,
@@ -16,15 +17,21 @@ from decals.edit import (
     PaintPrimitive,
     Relax,
     RemoveImage,
+    RemoveObject,
     ResizePrimitive,
     Scale,
     Turn,
 )
 from decals.edit.trees import primitive_paths
 from decals.scenes.camera import Camera
-from decals.scenes.scene import DecalImage, TreeObject
-from tests.edit.scenes import one
+from decals.scenes.scene import DecalImage, MeshObject, TreeObject
+from tests.edit.scenes import TREE, box, one
 
+OBJECTS = (
+    TreeObject("more", TREE.translate((0, 3, 0))),
+    MeshObject("crate", *box((-1, -4, -1), (1, -2, 1))),
+    MeshObject("chest", *box((2, -1, -1), (3, 1, 1))),
+)
 PICTURES = (DecalImage.load("rivet"), DecalImage.load("tile"))
 
 
@@ -38,7 +45,7 @@ class Monkey:
         self.makers = (
             self.add, self.delete, self.alter, self.scale, self.turn, self.carry, self.duplicate,
             self.add_image, self.change_image, self.remove_image, self.look, self.primitive,
-            self.primitive, self.relax, self.scatter,
+            self.primitive, self.relax, self.scatter, self.add_object, self.remove_object,
         )  # fmt: skip
 
     def command(self):
@@ -54,6 +61,8 @@ class Monkey:
         return self.rng.permutation(there)[: self.rng.integers(1, 5)]
 
     def place(self):
+        if not self.document.objects:
+            return self.rng.normal(size=(2, 3)).astype(np.float32)
         item = self.document.objects[self.rng.integers(len(self.document.objects))]
         positions, normals = item.surface.sample(1, int(self.rng.integers(1 << 30)))
         return positions[0], normals[0]
@@ -118,6 +127,12 @@ class Monkey:
                 number, path, 0.0 if self.nonsense() else float(self.rng.uniform(0.9, 1.1))
             )
         return MovePrimitive(number, path, self.rng.normal(0, 0.05, 3) * (np.nan if self.nonsense() else 1))
+
+    def add_object(self):
+        return AddObject("none" if self.nonsense() else OBJECTS[self.rng.integers(len(OBJECTS))])
+
+    def remove_object(self):
+        return RemoveObject(int(self.rng.integers(-1, 4)))
 
     def relax(self):
         return Relax(self.place()[0] * (np.nan if self.nonsense() else 1))

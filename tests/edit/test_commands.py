@@ -6,6 +6,7 @@ import pytest
 from decals.edit import (
     Add,
     AddImage,
+    AddObject,
     Alter,
     Carry,
     ChangeImage,
@@ -16,16 +17,17 @@ from decals.edit import (
     Look,
     Relax,
     RemoveImage,
+    RemoveObject,
     Scale,
     Scatter,
     Turn,
     nearest,
 )
 from decals.edit.population import lying_on
-from decals.errors import InvalidDecals, InvalidEdit
-from decals.scenes.scene import DecalImage
+from decals.errors import InvalidDecals, InvalidEdit, InvalidMesh, InvalidScene
+from decals.scenes.scene import DecalImage, MeshObject, TreeObject
 from decals.seeds.neighbours import FacingTree
-from tests.edit.scenes import digest, one, scene
+from tests.edit.scenes import TREE, box, digest, one, scene
 
 
 @pytest.fixture
@@ -172,10 +174,14 @@ NAN = np.array([np.nan, 0, 0], np.float32)
         (Alter.each([0], colour=2), InvalidEdit, "'layers', got 'colour'"),
         (Alter.each([0], tints=[0, 2, 0]), InvalidDecals, "tints"),
         (Add(one(images=[7])), InvalidEdit, "add the image first"),
-        (Carry([0], NAN, np.ones(3, np.float32)), InvalidEdit, "a position and a normal"),
-        (Carry([0], np.zeros(3, np.float32), np.zeros(3, np.float32)), InvalidEdit, "a normal"),
+        (Carry([0], NAN, np.ones(3, np.float32)), InvalidEdit, "position: expected three finite numbers"),
+        (
+            Carry([0], np.zeros(3, np.float32), np.zeros(3, np.float32)),
+            InvalidEdit,
+            "a zero vector",
+        ),
         (Relax(NAN), InvalidEdit, "place"),
-        (Scatter((2,), 5), InvalidEdit, "objects from 0 to 1, got 2"),
+        (Scatter((2,), 5), InvalidEdit, "object: .* from 0 to 1, got 2"),
         (Scatter((0,), -5), InvalidEdit, "got -5"),
         (Coat((-1,), one()), InvalidEdit, "0 to 1, got -1"),
     ],
@@ -195,3 +201,82 @@ def test_looking_is_a_command_too(session):
     assert session.document.scene.camera.position == (9, 9, 9)
     session.undo()
     assert session.document.camera is camera
+
+
+CRATE = MeshObject("crate", *box((2, -1, -1), (4, 1, 1)))
+
+
+def test_an_object_is_added_and_decals_go_onto_it(session):
+    document = session.document
+    first = digest(document)
+    session.do(AddObject(CRATE))
+    assert document.objects[2] is CRATE
+    session.do(Carry([3], np.array([3, 0, 1], np.float32), np.array([0, 0, 1], np.float32)))
+    assert lying_on(document, [2]).tolist() == [3]
+    session.undo()
+    session.undo()
+    assert digest(document) == first
+
+
+def test_an_object_goes_with_the_decals_that_lie_on_it_and_comes_back_with_them(session):
+    document = session.document
+    session.do(AddObject(CRATE))
+    first = digest(document)
+    lying = lying_on(document, [0])
+    assert 0 < len(lying) < 60
+    session.do(RemoveObject(0))
+    assert [item.name for item in document.objects] == ["box", "crate"]
+    assert not document.decals.has(lying).any()
+    assert len(document.decals) == 60 - len(lying)
+    last = digest(document)
+    session.undo()
+    assert digest(document) == first
+    session.redo()
+    assert digest(document) == last
+
+
+def test_all_objects_may_go(session):
+    first = digest(session.document)
+    for _ in range(2):
+        session.do(RemoveObject(0))
+    assert session.document.objects == ()
+    assert len(session.document.decals) == 0
+    assert session.document.scene.objects == ()
+    with pytest.raises(InvalidEdit, match="object: expected nothing, as there is none, got 0"):
+        session.do(RemoveObject(0))
+    session.undo()
+    session.undo()
+    assert digest(session.document) == first
+
+
+@pytest.mark.parametrize(
+    ("command", "error", "message"),
+    [
+        (AddObject(None), InvalidEdit, "a MeshObject or a TreeObject to add, got None"),
+        (AddObject(TreeObject("box", TREE)), InvalidScene, "'box' twice"),
+        (AddObject(TreeObject("hollow", TREE - TREE.scale(3))), InvalidMesh, "surface"),
+        (RemoveObject(2), InvalidEdit, "from 0 to 1, got 2"),
+        (RemoveObject(-1), InvalidEdit, "from 0 to 1, got -1"),
+    ],
+)
+def test_objects_that_cannot_come_or_go(session, command, error, message):
+    before = digest(session.document)
+    with pytest.raises(error, match=message):
+        session.do(command)
+    assert digest(session.document) == before
+
+
+def test_a_coat_that_was_made_for_what_is_no_more_is_refused(session):
+    coat = Scatter((1,), 20).coat(session.document.objects, 2)
+    session.do(RemoveObject(0))
+    with pytest.raises(InvalidEdit, match="0 to 0, got 1"):
+        session.do(coat)
+    session.do(AddObject(CRATE))
+    before = digest(session.document)
+    with pytest.raises(InvalidEdit, match="changed while its new coat was made"):
+        session.do(coat)
+    assert digest(session.document) == before
+    session.undo()
+    session.undo()
+    session.do(coat)
+    assert len(lying_on(session.document, [1])) == 20

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import PIL.Image
@@ -9,7 +10,8 @@ import pytest
 import pyvista as pv
 
 from blobtree import Point
-from decals.errors import InvalidDecals, InvalidImage, InvalidScene
+from decals.errors import InvalidDecals, InvalidImage, InvalidScene, NoGraphics
+from decals.grid.editor import DecalEditor
 from decals.model import PLAIN, Decals
 from decals.scenes.scene import DecalImage, MeshObject, TreeObject
 from decals.vtk.component import Component
@@ -129,19 +131,27 @@ def test_a_scaled_plotter_scales_us(plotter: Factory) -> None:
     assert high == pytest.approx(0.5 * wide, abs=3)
 
 
-def test_a_cleared_plotter_takes_scenes_again(plotter: Factory) -> None:
+WIPES = ["clear", "clear_actors"]
+
+
+@pytest.mark.parametrize("wipe", WIPES)
+def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(plotter: Factory, wipe: str) -> None:
     pl = plotter()
     pl.decals.add_scene(both())
-    first = shot(pl)
-    pl.clear()
-    assert (shot(pl) == shot(pl)[0, 0]).all()
-    pl.decals.clear()
-    pl.decals.add_scene(both())
-    np.testing.assert_array_equal(shot(pl), first)
+    shot(pl)
+    getattr(pl, wipe)()
+    empty = shot(pl)
+    assert (empty == empty[0, 0]).all()
+    assert pl.decals.scene.objects == ()
+    assert pl.decals.stage.scene is None
+    thing = pl.decals.add_mesh(pv.Cube(), name="blob")  # a name that was taken before
+    assert pl.decals.scene.objects == (thing,)
+    assert len(pl.decals.scene.decals) == 0
+    assert (shot(pl) != empty).any()
 
 
-@pytest.mark.parametrize("wipe", ["clear", "clear_actors"])
-def test_a_scene_comes_back_after_pyvista_cleared_the_plotter(plotter: Factory, wipe: str) -> None:
+@pytest.mark.parametrize("wipe", WIPES)
+def test_a_cleared_plotter_takes_the_same_scene_again(plotter: Factory, wipe: str) -> None:
     pl = plotter()
     pl.decals.add_scene(both())
     first = shot(pl)
@@ -149,6 +159,84 @@ def test_a_scene_comes_back_after_pyvista_cleared_the_plotter(plotter: Factory, 
     assert (shot(pl) != first).any()
     pl.decals.add_scene(both())
     np.testing.assert_array_equal(shot(pl), first)
+    pl.decals.clear()
+    assert (shot(pl) != first).any()
+    pl.decals.add_scene(both())
+    np.testing.assert_array_equal(shot(pl), first)
+
+
+@pytest.mark.parametrize("wipe", WIPES)
+def test_clearing_takes_decals_off_actors_too(plotter: Factory, wipe: str) -> None:
+    pl = plotter()
+    actor = pl.add_mesh(pv.Sphere(), color="tan")
+    bare = shot(pl)
+    pl.decals.add(decals_at(0).replace(positions=[[0, 0, 0.5]]), images=["rivet"])
+    pl.decals.apply(actor)
+    pl.view_xy()
+    pl.decals.stage.samples = 1
+    assert (shot(pl) != bare).any()
+    getattr(pl, wipe)()
+    if wipe == "clear":
+        pl.enable_lightkit()
+    pl.add_actor(actor)
+    without = shot(pl)
+    pl.decals.add(decals_at(0).replace(positions=[[0, 0, 0.5]]), images=["rivet"])
+    np.testing.assert_array_equal(shot(pl), without)
+    pl.decals.apply(actor)
+    assert (shot(pl) != without).any()
+
+
+def test_what_changes_in_place_does_not_come_back_by_itself(plotter: Factory) -> None:
+    document = SimpleNamespace(
+        objects=both().objects, decals=DecalEditor(both().decals), images=both().images
+    )
+    pl = plotter()
+    pl.decals.scene = document
+    shot(pl)
+    pl.clear_actors()
+    document.objects = both().objects[:1]
+    empty = shot(pl)
+    assert (empty == empty[0, 0]).all()
+    assert pl.decals.stage.scene is None
+
+
+def test_one_cleared_subplot_leaves_the_others(plotter: Factory) -> None:
+    pl = plotter(shape=(1, 2))
+    for column in range(2):
+        pl.subplot(0, column)
+        pl.decals.add_implicit(TREE)
+    pl.renderer.clear_actors()
+    assert [stage.scene is None for stage in pl.decals.stages] == [False, True]
+
+
+def test_decals_may_be_applied_before_there_are_any(plotter: Factory) -> None:
+    pl = plotter()
+    actor = pl.add_mesh(pv.Sphere(), color="tan")
+    pl.decals.apply(actor)
+    pl.view_xy()
+    bare = shot(pl)
+    pl.decals.add(decals_at(0).replace(positions=[[0, 0, 0.5]]), images=["rivet"])
+    assert (shot(pl) != bare).any()
+    assert tuple(pl.bounds) == tuple(actor.bounds)
+
+
+def test_an_actor_of_the_name_that_we_had_is_the_users(plotter: Factory) -> None:
+    pl = plotter()
+    pl.add_mesh(pv.Cube(), name="decals")
+    pl.decals.add_implicit(TREE)
+    assert "decals" in pl.renderer.actors
+    assert len(pl.decals.scene.objects) == 1
+
+
+def test_a_closed_plotter_says_so(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    component = pl.decals
+    pl.close()
+    for ask in (lambda: component.scene, lambda: component.add_implicit(TREE), component.clear):
+        with pytest.raises(NoGraphics, match="was closed"):
+            ask()
 
 
 def test_colours_have_names_and_images_paths(plotter: Factory, tmp_path: Path) -> None:
@@ -167,6 +255,14 @@ def test_colours_have_names_and_images_paths(plotter: Factory, tmp_path: Path) -
         (lambda it: it.add([decals_at(0)], images=["scale"]), "expected Decals to add, got list"),
         (lambda it: it.add(decals_at(0), images="scale"), "write \\['scale'\\]"),
         (lambda it: it.add(decals_at(0), images=[None]), "expected uint8 pixels"),
+        (lambda it: it.add(decals_at(0), images=5), "expected a list of images, got 5"),
+        (lambda it: it.add_implicit(TREE, name=5), "name: expected a str, got 5"),
+        (lambda it: it.add_implicit("knot"), "expected a BlobTree, got str"),
+        (lambda it: it.add_mesh(pv.Cube(), name=["a"]), "name: expected a str"),
+        (lambda it: it.add_mesh(pv.Cube(), color=10**400), "colour: expected three finite numbers"),
+        (lambda it: it.add_mesh(pv.Cube(), color={}), "colour: expected three finite numbers"),
+        (lambda it: it.add_scene(None), "scene: expected a Scene, got None"),
+        (lambda it: setattr(it, "scene", [both()]), "scene: expected a Scene"),
         (lambda it: it.apply(None), "expected an actor to lay decals on, got NoneType"),
         (lambda it: it.apply(pv.Cube()), "expected an actor to lay decals on, got PolyData"),
     ],

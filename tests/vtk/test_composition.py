@@ -8,7 +8,7 @@ from scipy.ndimage import binary_erosion
 from blobtree import Point
 from decals.render import Buffers
 from decals.scenes.scene import TreeObject
-from decals.vtk import Stage
+from decals.vtk import Stage, anchor
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import both, shot
@@ -237,7 +237,7 @@ def test_moving_the_whole_scene(plotter: Factory) -> None:
     pl.decals.add_implicit(BALL)
     place(pl)
     shot(pl)
-    pl.renderer.actors["decals"].SetPosition(0, 0, 0.7)
+    pl.renderer.actors[anchor.NAME].SetPosition(0, 0, 0.7)
     found = pl.decals.stage.at(80, 60)
     seen = shot(pl)
     assert red(seen)[:60].sum() > 2 * red(seen)[60:].sum()

@@ -55,7 +55,7 @@ def stage_with(
     actor = pl.add_mesh(mesh, **look)
     pl.decals.add(decals, images=["scale"])
     stage = pl.decals.stage
-    stage._injections.append(injection.Injection(stage, actor, paint=paint))
+    stage.applied._injections.append(injection.Injection(stage, actor, paint=paint))
     pl.camera_position = [(2.0, -2.6, 2.4), (0, 0, 0), (0, 0, 1)]
     pl.reset_camera_clipping_range()
     return pl, actor

@@ -116,7 +116,7 @@ def test_a_failing_scene_says_so_once_and_recovers(
 @pytest.mark.parametrize("scale", [0.0, -1.0, 1.5, float("nan")])
 def test_impossible_scales_are_refused(plotter: Factory, scale: float) -> None:
     stage = plotter().decals.stage
-    with pytest.raises(InvalidScene, match="draw_scale must be"):
+    with pytest.raises(InvalidScene, match="draw_scale: expected"):
         stage.draw_scale = scale
     assert stage.draw_scale == 1.0
 

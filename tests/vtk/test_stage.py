@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from decals.errors import InvalidScene, NoGraphics
+from decals.errors import InvalidPoints, InvalidScene, NoGraphics
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
@@ -156,11 +156,49 @@ def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pyte
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("samples", 0), ("samples", 1.5), ("samples", "2"), ("contact", 7), ("mapping", "chord")],
+    [
+        *[("samples", wrong) for wrong in (0, 1.5, "2", True, 10**9, None)],
+        *[("draw_scale", wrong) for wrong in (0.0, 1.5, "x", None, float("nan"))],
+        ("contact", 7),
+        ("mapping", "chord"),
+        ("scene", 5),
+        ("scene", "knot"),
+    ],
 )
 def test_what_a_stage_cannot_be_set_to_is_said_at_once(plotter: Factory, name: str, value: object) -> None:
     stage = plotter().decals.stage
     before = getattr(stage, name)
-    with pytest.raises(InvalidScene, match=f"{name} must be .* got {value!r}"):
+    with pytest.raises(InvalidScene, match=f"{name}( must be|: expected).* got {value!r}"):
         setattr(stage, name, value)
     assert getattr(stage, name) == before
+
+
+@pytest.mark.parametrize("place", [(float("nan"), 0), (0, float("inf")), ("x", 0), (0, None), ([1], 2)])
+def test_a_place_that_is_none_is_refused(plotter: Factory, place: tuple[float, float]) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    with pytest.raises(InvalidPoints, match=r"[xy]: expected a finite number"):
+        pl.decals.stage.at(*place)
+
+
+def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    stage = pl.decals.stage
+    whole, part = stage.at(80, 60), stage.at(80.9, 60.2)
+    assert whole is not None
+    assert part is not None
+    np.testing.assert_array_equal(whole.position, part.position)
+    assert stage.at(1e300, -1e300) is None
+    assert stage.at(-0.1, 60) is None
+
+
+def test_more_samples_than_targets_can_have_are_refused(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    stage = pl.decals.stage
+    with stage.current(), pytest.raises(InvalidScene, match="take fewer a pixel"):
+        stage.renderer.draw(both(), size=(160, 120), samples=1000)

@@ -7,8 +7,10 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
+import pyvista as pv
 
 from decals.edit.commands import Scale
+from decals.edit.objects import RemoveObject
 from decals.edit.population import lying_on
 from decals.errors import InvalidEdit, InvalidScene, NoGraphics
 from decals.scenes.camera import Camera
@@ -264,10 +266,19 @@ def test_a_closed_window_says_so_and_its_session_goes_on(opened):
     assert driver.session.undo() is not None
 
 
-@pytest.mark.parametrize("size", [(0, 90), (-5, 10), (120,)])
+SIZES = [(0, 90), (-5, 10), (120,), None, 120, (10**9, 5), ("a", "b"), (float("nan"), 5)]
+
+
+@pytest.mark.parametrize("size", SIZES)
 def test_a_window_without_pixels_is_refused(size):
-    with pytest.raises(InvalidScene, match="size: expected width and height"):
+    with pytest.raises(InvalidScene, match="size: expected"):
         EditWindow(scene(), off_screen=True, size=size)
+
+
+@pytest.mark.parametrize("options", [{"samples": 0}, {"samples": None}, {"samples": 99}, {"path": 5}])
+def test_samples_and_paths_that_are_none_are_refused(options):
+    with pytest.raises(InvalidScene, match=f"{next(iter(options))}: expected"):
+        EditWindow(scene(), off_screen=True, **options)
 
 
 def test_what_is_no_scene_is_refused():
@@ -342,3 +353,47 @@ def test_two_windows_at_once(opened):
     assert (len(one.document.decals), len(two.document.decals)) == (59, 60)
     assert (one.shot() != two.shot()).any()
     assert isinstance(one.window, EditWindow)
+
+
+def test_what_an_actor_hides_is_neither_picked_nor_gone_to(driver):
+    (number, at), (other, there) = islice(driver.visible(), 2)
+    ray = driver.window._ray(*there)
+    ball = pv.Sphere(radius=0.12, center=ray[0] + 0.5 * (driver.document.decals[other].positions[0] - ray[0]))
+    driver.plotter.add_mesh(ball, reset_camera=False, name="ball")
+    driver.shot()
+    driver.click(there)
+    assert driver.window.actions.selection == ()
+    driver.key("a", there)
+    assert driver.window.actions.message == "point at a surface"
+    driver.click(at)
+    assert driver.window.actions.selection == (number,)
+    before = driver.state
+    driver.event("LeftButtonPressEvent", at)
+    driver.event("MouseMoveEvent", there)
+    assert driver.state == before
+    driver.event("LeftButtonReleaseEvent", there)
+    driver.plotter.remove_actor("ball")
+    driver.shot()
+    driver.click(there)
+    assert driver.window.actions.selection == (other,)
+
+
+def test_what_surrounds_a_selected_decal_hides_nothing(driver):
+    _, at = next(driver.visible())
+    driver.click(at)
+    driver.shot()
+    seen = [driver.pixel(point) for point in driver.window.marks.lines.points]
+    assert all(driver.window.tools.at(*place) is not None for place in seen)
+
+
+def test_an_object_that_is_removed_is_not_held_any_more(driver):
+    point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
+    driver.key("m", driver.pixel(point))
+    assert driver.window.grip.widget is not None
+    driver.session.do(RemoveObject(0))
+    driver.window.redraw(whole=True)
+    assert driver.window.actions.grip is None
+    assert driver.window.grip.widget is None
+    driver.key("z", ctrl=True)
+    driver.key("m", driver.pixel(point))
+    assert driver.window.grip.widget is not None

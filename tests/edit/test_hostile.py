@@ -1,0 +1,165 @@
+"""Whatever a session, a command or a window is given: an error of ours, and nothing has changed."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from blobtree import BlobTreeError
+from decals.checks import finite, triple, whole
+from decals.edit import (
+    Add,
+    AddImage,
+    AddObject,
+    Alter,
+    Carry,
+    ChangeImage,
+    Coat,
+    Document,
+    EditSession,
+    Look,
+    MovePrimitive,
+    PaintPrimitive,
+    Relax,
+    RemoveImage,
+    RemoveObject,
+    ResizePrimitive,
+    Scale,
+    Scatter,
+    Turn,
+    first_hit,
+    outline,
+    pick,
+    primitive_near,
+    primitive_paths,
+)
+from decals.errors import DecalsError, InvalidEdit, InvalidPoints, InvalidScene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject
+from tests.edit.scenes import TREE, digest, one, scene
+
+RIVET = DecalImage.load("rivet")
+NUMBERS = (0, 1, -3, 10**400, 1e300, float("nan"), float("inf"), True, 0.5, np.float32(2), np.array(np.nan))
+OTHERS = (None, "x", "", b"x", [], {}, object(), [None], ["x"], np.zeros((2, 2)), TREE, one(), RIVET, Scale)
+ROWS = ((1, 2), (0, 0, 0), (1e300, 0, 0), (float("nan"), 0, 0), np.ones(3), [1, 2, 3])
+anything = st.sampled_from((*NUMBERS, *OTHERS, *ROWS))
+
+COMMANDS = {
+    "add": Add,
+    "alter": lambda x: Alter([1], x),
+    **{
+        f"alter {name}": lambda x, name=name: Alter.each([1, 2], **{name: x})
+        for name in ("positions", "normals", "tangents", "radii", "images", "spill", "layers", "tints")
+    },
+    "scale": lambda x: Scale([1], x),
+    "scale whom": lambda x: Scale(x, 1.5),
+    "turn": lambda x: Turn([1], x),
+    "carry": lambda x: Carry([1], x, (0, 0, 1)),
+    "carry normal": lambda x: Carry([1], (0, 0, 1), x),
+    "add an image": AddImage,
+    "change which image": lambda x: ChangeImage(x, RIVET),
+    "change an image": lambda x: ChangeImage(0, x),
+    "remove an image": RemoveImage,
+    "look": Look,
+    "add an object": AddObject,
+    "remove an object": RemoveObject,
+    "move": lambda x: MovePrimitive(0, (0,), x),
+    "move in which": lambda x: MovePrimitive(x, (0,), (0, 0, 0.1)),
+    "move which": lambda x: MovePrimitive(0, x, (0, 0, 0.1)),
+    "move which child": lambda x: MovePrimitive(0, (x,), (0, 0, 0.1)),
+    "resize": lambda x: ResizePrimitive(0, (0, 0), x),
+    "paint": lambda x: PaintPrimitive(0, (0, 0), x),
+    "relax": Relax,
+    "scatter where": lambda x: Scatter(x, 3),
+    "scatter on which": lambda x: Scatter((x,), 3),
+    "scatter": lambda x: Scatter((1,), x),
+    "scatter from which seed": lambda x: Scatter((1,), 3, x),
+    "coat where": lambda x: Coat(x, one()),
+    "coat": lambda x: Coat((1,), x),
+    "nothing": lambda x: x,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def session():
+    return EditSession(scene())
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+@pytest.mark.parametrize("name", COMMANDS)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    deadline=None,
+    max_examples=40,
+)
+@given(x=anything)
+def test_commands_do_something_or_say_why_not(session, name, x):
+    before = digest(session.document)
+    try:
+        session.do(COMMANDS[name](x))
+    except (DecalsError, BlobTreeError):
+        assert digest(session.document) == before
+    while session.undo():
+        pass
+    assert digest(session.document) == before
+
+
+@pytest.mark.parametrize(
+    ("ask", "error"),
+    [
+        (lambda x: EditSession(x), InvalidScene),
+        (lambda x: Document(x), InvalidScene),
+        (lambda x: EditSession(scene()).do(x), InvalidEdit),
+        (lambda x: Scene(objects=[x], camera=Camera((0, 0, 1))), InvalidScene),
+        (lambda x: Scene(objects=(), camera=x), InvalidScene),
+        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), images=[x]), InvalidScene),
+        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), decals=x), InvalidScene),
+        (lambda x: TreeObject("tree", x), InvalidScene),
+        (lambda x: TreeObject(x, TREE), InvalidScene),
+        (lambda x: MeshObject("mesh", x, [[0, 1, 2]]), DecalsError),
+        (lambda x: DecalImage(x, RIVET.pixels), InvalidScene),
+        (lambda x: DecalImage("rivet", x), InvalidScene),
+        (lambda x: DecalImage.load(x), InvalidScene),
+        (lambda x: Camera(x), InvalidScene),
+        (lambda x: Camera((0, 0, 1), fov=x), InvalidScene),
+        (lambda x: pick(Document(scene()), x, (0, 0, 1)), InvalidPoints),
+        (lambda x: pick(Document(scene()), (0, 0, 1), x), InvalidPoints),
+        (lambda x: first_hit(scene().objects, x, (0, 0, 1)), InvalidPoints),
+        (lambda x: outline(Document(scene()), x), InvalidEdit),
+        (lambda x: primitive_near(TREE, x), InvalidEdit),
+        (lambda x: primitive_paths(x), InvalidEdit),
+    ],
+)
+@pytest.mark.parametrize("wrong", [None, 10**400, float("nan"), {}, object(), [None], np.zeros((2, 2))])
+def test_what_is_of_the_wrong_kind_is_named(ask, error, wrong):
+    with pytest.raises(error, match="expected"):
+        ask(wrong)
+
+
+@pytest.mark.parametrize("path", [None, 5, "", [], b"x", object()])
+def test_a_session_is_saved_to_paths_alone(path):
+    with pytest.raises(InvalidEdit, match="expected a path to save to"):
+        EditSession(scene()).save(path)
+
+
+def test_a_camera_to_save_is_one(tmp_path):
+    session = EditSession(scene())
+    with pytest.raises(InvalidScene, match="camera: expected a Camera"):
+        session.save(tmp_path / "scene.json", camera=(0, 0, 1))
+    assert not list(tmp_path.iterdir())
+
+
+@given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(), st.none(), st.lists(st.floats())))
+def test_checks_give_what_fits_or_say_what_came(value):
+    fits = isinstance(value, int | float) and abs(value) < 1e308
+    checked(finite, value, fits)
+    checked(lambda *args: whole(*args[:2], -3, 3, args[2]), value, type(value) is int and -3 <= value <= 3)
+    checked(triple, value, isinstance(value, list) and len(value) == 3 and np.isfinite(value).all())
+
+
+def checked(check, value, fits):
+    if fits:
+        np.testing.assert_array_equal(check("it", value, InvalidEdit), value)
+    else:
+        with pytest.raises(InvalidEdit, match=r"it: expected .*, got "):
+            check("it", value, InvalidEdit)
