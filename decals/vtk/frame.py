@@ -10,6 +10,7 @@ from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
 from decals.render import Renderer, SceneLike, Size
 from decals.render.targets import Targets
+from decals.render.tile import CameraBuffer
 from decals.scenes.viewpoint import Projection
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
@@ -38,6 +39,8 @@ class Frame:
     ----------
     drawn
         Whether the last call of `draw` drew.
+    camera
+        The block from which VTK's shaders read the camera, where they show our decals.
     """
 
     def __init__(self, context: WindowContext) -> None:
@@ -50,6 +53,7 @@ class Frame:
         with context.current():
             self.renderer = Renderer(context)
             self._composite = Composite(context)
+            self.camera = CameraBuffer(context)
 
     def draw(self, scene: SceneLike, look: Look, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's own targets; ``wait`` until the card has finished."""
@@ -97,6 +101,7 @@ class Frame:
         with self.context.current():
             self.renderer.release()
             self._composite.release()
+            self.camera.release()
 
 
 def _shown(scene: SceneLike) -> tuple[object, ...]:

@@ -14,7 +14,7 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from decals.field.contact import Contact
 from decals.render.decal_data import DecalData, library
 from decals.render.textures import ImageArray
-from decals.render.tile import CameraBuffer, Picture, Rectangle
+from decals.render.tile import Picture, Rectangle
 from decals.scenes.viewpoint import Floats
 from decals.vtk.camera import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, SmoothNormals, polygon_mapper
@@ -74,7 +74,6 @@ class Injection:
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._stage = weakref.ref(stage)
         self._written: tuple[Contact, bool] | None = None
-        self._camera: CameraBuffer | None = None
         me = weakref.ref(self)
 
         def bind(_caller: object, _event: str, program: Any) -> None:
@@ -171,12 +170,10 @@ class Injection:
 
     def _use_camera(self, stage: Stage, frame: Floats) -> None:
         """Fill the camera's block for the frame that VTK is drawing, which may be larger than the window."""
-        if self._camera is None:
-            self._camera = CameraBuffer(stage.renderer.context)
         x, y, width, height = stage.viewport()
         view = vtk_projection(stage.vtk_renderer, frame)
         whole = Picture.of(view, (width, height), UNIT_BOX)
-        self._camera.use(whole.part(Rectangle(-x, -y, width, height)))
+        stage.camera.use(whole.part(Rectangle(-x, -y, width, height)))
 
     def release(self) -> None:
         """Leave the actor as it was."""
@@ -184,9 +181,6 @@ class Injection:
         self._mapper.RemoveObserver(self._tag)
         if self._normals.leave(self.actor.GetMapper()):
             self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
-        if self._camera is not None:
-            self._camera.release()
-            self._camera = None
 
 
 def _vtk_matrix(matrix: Floats) -> vtkMatrix4x4:

@@ -17,6 +17,7 @@ from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.render import Renderer, SceneLike
+from decals.render.tile import CameraBuffer
 from decals.scenes.scene import Box, SceneObject, bounds_of
 from decals.scenes.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
@@ -195,6 +196,11 @@ class Stage:
     def renderer(self) -> Renderer:
         """The renderer in the window's context; use it inside ``with stage.current():``."""
         return self._use_frame().renderer
+
+    @property
+    def camera(self) -> CameraBuffer:
+        """The block from which VTK's shaders read the camera, in the window's context."""
+        return self._use_frame().camera
 
     @contextmanager
     def current(self) -> Iterator[None]:

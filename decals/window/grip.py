@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pyvista as pv
+from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 
 from decals.edit.actions import Actions
 from decals.surfaces.surface import Floats
@@ -13,7 +13,10 @@ from decals.surfaces.surface import Floats
 SIZE = 0.03
 """Radius of the handle, in diagonals of the scene."""
 
-COLOR = (0.2, 0.6, 1.0)
+COLOR, TAKEN = (0.2, 0.6, 1.0), (1.0, 0.75, 0.8)
+"""Of the handle, and while it is held."""
+ROUND = 16
+"""Sides of the ball that is drawn."""
 
 
 class Grip:
@@ -21,17 +24,16 @@ class Grip:
 
     Parameters
     ----------
-    plotter
-        Where.
+    renderer
+        The vtkRenderer in which it is seen.
     actions
         Know what is held, and move it.
     redraw
         Called after every step, and with True at the end.
     """
 
-    def __init__(self, plotter: pv.BasePlotter, actions: Actions, redraw: Callable[[bool], None]) -> None:
-        self._plotter: Any
-        self._plotter, self._actions, self._redraw = plotter, actions, redraw
+    def __init__(self, renderer: Any, actions: Actions, redraw: Callable[[bool], None]) -> None:
+        self._renderer, self._actions, self._redraw = renderer, actions, redraw
         self._widget: Any = None
         self._held: Any = None
         self._start: Floats = np.zeros(3, np.float32)
@@ -52,13 +54,17 @@ class Grip:
 
     def _make(self, center: Floats) -> Any:
         low, high = self._actions.session.document.scene.bounds
-        widget = self._plotter.add_sphere_widget(
-            lambda _center: None,
-            center=tuple(center.tolist()),
-            radius=SIZE * float(np.linalg.norm(high - low)),
-            color=COLOR,
-            test_callback=False,
-        )
+        widget = vtkSphereWidget()
+        widget.SetRepresentationToSurface()
+        widget.GetSphereProperty().SetColor(*COLOR)
+        widget.GetSelectedSphereProperty().SetColor(*TAKEN)
+        widget.SetThetaResolution(ROUND)
+        widget.SetPhiResolution(ROUND)
+        widget.SetRadius(SIZE * float(np.linalg.norm(high - low)))
+        widget.SetCenter(*center.tolist())
+        widget.SetInteractor(self._renderer.GetRenderWindow().GetInteractor())
+        widget.SetCurrentRenderer(self._renderer)
+        widget.On()
         me = weakref.ref(self)
         for event, name in (
             ("StartInteractionEvent", "begin"),
@@ -93,8 +99,9 @@ class Grip:
     def release(self) -> None:
         """Take the handle away."""
         if self._widget is not None:
-            self._plotter.clear_sphere_widgets()
             self._widget.RemoveAllObservers()
+            if self._renderer.GetRenderWindow() is not None:  # else somebody closed the window before us
+                self._widget.Off()
             self._widget = self._held = None
 
 

@@ -83,6 +83,11 @@ class Marks:
         wide = (width - 24) / (LETTER * max(map(len, lines)))
         self._help.prop.SetFontSize(max(6, min(LARGEST, int(min(tall, wide)))))
 
+    def release(self) -> None:
+        """Take everything out of the plotter."""
+        for actor in (self._actor, self._status, self._help):
+            self._plotter.remove_actor(actor, render=False)
+
     @property
     def status(self) -> str:
         """The line of text at the bottom."""

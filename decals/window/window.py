@@ -1,10 +1,8 @@
 """A window in which decals are pushed by hand."""
 
 import os
-import sys
 import time
 import weakref
-from collections.abc import Sequence
 from typing import Any
 
 import pyvista as pv
@@ -16,7 +14,7 @@ from decals.edit.actions import Actions
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
 from decals.edit.tools import Ray, Tools
-from decals.errors import DecalsError, InvalidEdit, InvalidScene, NoGraphics
+from decals.errors import DecalsError, InvalidEdit, InvalidScene
 from decals.render.libraries import require_gl
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
@@ -24,14 +22,9 @@ from decals.surfaces.surface import Floats
 from decals.vtk.stage import MOST_SAMPLES
 from decals.window.bindings import Bindings
 from decals.window.grip import Grip
+from decals.window.home import SIZE, checked_size, lent_plotter, new_plotter, require_screen
 from decals.window.marks import Marks
 from decals.window.quality import Quality
-
-SIZE = (1200, 800)
-LARGEST = 16384
-"""Pixels that a window may have along each side, as many as VTK draws."""
-BACKGROUND = ((0.80, 0.82, 0.85), (0.96, 0.96, 0.95))
-"""Colours at the bottom and at the top."""
 
 TICK = 100
 """Milliseconds between looks at the background work."""
@@ -58,13 +51,16 @@ class EditWindow:
         Whether to do without a screen; events are then the caller's.
     samples
         Samples a pixel along each axis, at rest.
+    plotter
+        Edit in the active subplot of this one, such as pyvistaqt's or one that trame serves, in place of a
+        window of our own. It stays open, and ``size`` and ``off_screen`` are its own.
 
     Raises
     ------
     NoGraphics
         There is no OpenGL, or no screen for a window.
     InvalidScene
-        There is no scene to edit, or no pixel in the window.
+        There is no scene to edit, no pixel in the window, or no interaction in the plotter.
     """
 
     def __init__(
@@ -75,41 +71,51 @@ class EditWindow:
         size: tuple[int, int] = SIZE,
         off_screen: bool = False,
         samples: int = 2,
+        plotter: pv.BasePlotter | None = None,
     ) -> None:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
-        size = _checked_size(size)
+        size = checked_size(size)
         whole("samples", samples, 1, MOST_SAMPLES, InvalidScene)
         if path is not None and not isinstance(path, str | os.PathLike):
             raise InvalidScene(f"path: expected a path to save to, got {shown(path)}")
         require_gl()
-        if not off_screen:
-            self.require_screen()
+        self._guest = plotter is not None
+        self.plotter: Any = lent_plotter(plotter) if plotter is not None else new_plotter(off_screen, size)
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
         self.document = self.session.document
         self.samples, self._closed = samples, False
         self.worker, self.quality = Worker(), Quality()
         self.actions = Actions(self.session, path=path, run=self._start)
         self.actions.camera, self.actions.interrupt = self._camera, self.worker.cancel
-        self.plotter = _plotter(off_screen, size)
-        self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
         self.tools = Tools(self.actions, self._ray, self._hidden)
         self._open_stage()
         self.marks = Marks(self.plotter)
-        self.grip = Grip(self.plotter, self.actions, lambda whole: self.redraw(whole=whole))
-        self._bindings = Bindings(self, self.plotter.iren.interactor)
-        self._moved = 0.0
+        self.grip = Grip(self.stage.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole))
+        self._interactor = self.plotter.iren.interactor
+        self._bindings = Bindings(self, self._interactor)
+        self._timer, self._moved = 0, 0.0
         self._whole: tuple[int, ...] = self._shown
 
     def _open_stage(self) -> None:
-        self.plotter.decals.add_scene(self.document.scene)
+        self.plotter.decals.add_scene(
+            self.document.scene, camera=not (self._guest and self.plotter.renderer.camera_set)
+        )
         self.stage = self.plotter.decals.stage
         self.stage.scene = self.document
         self.stage.measure, self.stage.samples = True, self.samples
         me = weakref.ref(self)
         self._began = 0.0
-        self.plotter.renderer.AddObserver("StartEvent", lambda *_: _timed(me, begin=True))
-        self.plotter.renderer.AddObserver("EndEvent", lambda *_: _timed(me, begin=False))
+        renderer = self.stage.vtk_renderer
+        self._timing = [
+            renderer.AddObserver("StartEvent", lambda *_: _timed(me, begin=True)),
+            renderer.AddObserver("EndEvent", lambda *_: _timed(me, begin=False)),
+        ]
+
+    @property
+    def ticking(self) -> bool:
+        """Whether a timer calls `tick`; where none does, such as off screen, frames are whole at once."""
+        return not getattr(self.plotter, "off_screen", False)
 
     # -- what is seen -----------------------------------------------------------------------------------
 
@@ -121,7 +127,7 @@ class EditWindow:
         if not whole:
             self.moving()
             self.plotter.render()
-        elif self.plotter.off_screen:
+        elif not self.ticking:
             self.rest()
         else:
             if self._whole != self._shown:
@@ -208,7 +214,7 @@ class EditWindow:
 
     def _ray(self, x: float, y: float) -> Ray | None:
         """The ray through the middle of a pixel."""
-        renderer = self.plotter.renderer
+        renderer = self.stage.vtk_renderer
         (left, low), (width, height) = renderer.GetOrigin(), renderer.GetSize()
         x, y = x - left + 0.5, y - low + 0.5
         if not (0 <= x <= width and 0 <= y <= height):
@@ -222,25 +228,17 @@ class EditWindow:
 
     def _camera(self) -> Camera | None:
         """The camera to save: VTK's, if it is one of ours."""
-        view = self.plotter.camera
+        view = self.stage.vtk_renderer.camera
         if view.parallel_projection:
             return None
         return Camera(tuple(view.position), tuple(view.focal_point), tuple(view.up), view.view_angle)
 
     # -- opening and closing ----------------------------------------------------------------------------
 
-    @staticmethod
-    def require_screen() -> None:
-        """Raise `NoGraphics` where a window has no screen: VTK would do without one silently."""
-        here = sys.platform.startswith("linux")
-        if here and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-            raise NoGraphics(
-                "expected a screen for the window, got none (DISPLAY is not set); log in with a desktop, "
-                "use `ssh -X`, or draw pictures with `implicit-decals render`"
-            )
+    require_screen = staticmethod(require_screen)
 
     def show(self) -> None:
-        """Open the window, and stay until it is closed; off screen, draw the first frame.
+        """Open the window, and stay until it is closed; off screen and in a lent plotter, draw a frame.
 
         Raises
         ------
@@ -251,14 +249,18 @@ class EditWindow:
             raise InvalidEdit("the window was closed; open another EditWindow on its session")
         self.actions_shown()
         self.plotter.iren.initialize()
-        self.plotter.iren.interactor.CreateRepeatingTimer(TICK)
-        interactive = not self.plotter.off_screen
+        if self.ticking:
+            self._timer = self._interactor.CreateRepeatingTimer(TICK)
+        if self._guest:
+            self.plotter.render()
+            return
+        interactive = self.ticking
         self.plotter.show(auto_close=False, interactive=interactive)
         if interactive:
             self.close()
 
     def close(self) -> None:
-        """Close the window, and give everything back. Twice is harmless."""
+        """Close the window, or leave the plotter that was lent. Twice is harmless."""
         if self._closed:
             return
         self._closed = True
@@ -267,7 +269,21 @@ class EditWindow:
         self.actions.release()
         self.grip.release()
         self._bindings.release()
-        self.plotter.close()
+        if not self._guest:
+            self.plotter.close()
+        elif self.plotter.render_window is not None:  # otherwise it was closed before us
+            self._leave()
+
+    def _leave(self) -> None:
+        """Take out of a lent plotter what we put there."""
+        self.marks.release()
+        if self._timer:
+            self._interactor.DestroyTimer(self._timer)
+        for tag in self._timing:
+            self.stage.vtk_renderer.RemoveObserver(tag)
+        self.stage.scene, self.stage.measure = None, False
+        self.stage.draw_scale = 1.0
+        self.plotter.render()
 
     def __enter__(self) -> "EditWindow":
         return self
@@ -289,25 +305,6 @@ def view(
     with EditWindow(scene, path=path, size=size) as window:
         window.show()
         return window.document.scene
-
-
-def _checked_size(size: object) -> tuple[int, int]:
-    """Give width and height of a window, or `InvalidScene`."""
-    if not isinstance(size, Sequence) or len(size) != 2:
-        raise InvalidScene(f"size: expected width and height in pixels, got {shown(size)}")
-    width, height = (whole("size", side, 1, LARGEST, InvalidScene) for side in size)
-    return width, height
-
-
-def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
-    """Make an empty window; its methods are wrapped in ways that type checkers do not follow.
-
-    It does without VTK's multisampling: what we draw is smoothed by ourselves, and without a graphics card
-    half of the time of a frame would go there.
-    """
-    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
-    plotter.disable_anti_aliasing()
-    return plotter
 
 
 def _timed(me: "weakref.ref[EditWindow]", *, begin: bool) -> None:

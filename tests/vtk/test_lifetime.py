@@ -151,3 +151,18 @@ def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
         pl.decals.stage.at(80, 60)
         pl.render_window.MakeCurrent()
         assert pl.decals.stage.renderer.context.gl.error == "GL_NO_ERROR"
+
+
+def test_a_window_that_is_given_another_context_shows_the_same(plotter: Factory) -> None:
+    """Qt makes one anew when a widget is docked elsewhere; here the window is ended and drawn again."""
+    pl = plotter()
+    pl.decals.add_scene(both())
+    pl.decals.apply(pl.add_mesh(pv.Sphere(center=(0, 0, 1), radius=0.4)))
+    first = shot(pl)
+    for _ in range(2):
+        old = pl.decals.stage.renderer.context
+        pl.render_window.Finalize()
+        np.testing.assert_array_equal(shot(pl), first)
+        assert old.stale
+        assert pl.decals.stage.renderer.context is not old
+        np.testing.assert_array_equal(shot(pl), first)

@@ -9,8 +9,9 @@ from tests.edit.scenes import digest
 class Driver:
     """A window and what can be done to it."""
 
-    def __init__(self, window: EditWindow):
+    def __init__(self, window: EditWindow, renderer=None):
         self.window = window
+        self.renderer = renderer or window.plotter.renderer
         self.document, self.session = window.document, window.session
         self.plotter = window.plotter
         self._interactor = window.plotter.iren.interactor
@@ -37,13 +38,14 @@ class Driver:
         self.event("MouseWheelForwardEvent" if up else "MouseWheelBackwardEvent", at, **modifiers)
 
     def pixel(self, point):
-        size = self.plotter.renderer.GetSize()
+        corner, size = np.array(self.renderer.GetOrigin()), self.renderer.GetSize()
         clip = self.window.stage.viewpoint().matrix @ np.append(np.asarray(point, float), 1.0)
-        return tuple(((clip[:2] / clip[3] + 1) / 2 * size).astype(int).tolist())
+        return tuple((corner + (clip[:2] / clip[3] + 1) / 2 * size).astype(int).tolist())
 
     def visible(self):
         """Numbers of decals that show at their own centre, and where; from the middle of the window on."""
-        decals, middle = self.document.decals, np.array(self.plotter.renderer.GetSize()) / 2
+        decals = self.document.decals
+        middle = np.add(self.renderer.GetOrigin(), np.array(self.renderer.GetSize()) / 2)
         places = [(self.pixel(decals[n].positions[0]), n) for n in decals.numbers.tolist()]
         for at, number in sorted(places, key=lambda place: np.hypot(*(np.array(place[0]) - middle))):
             found = self.window.tools.at(*at)
@@ -60,7 +62,7 @@ class Driver:
         stage = self.window.stage
         with stage.current():
             found = stage.renderer.buffers(
-                self.document, size=tuple(self.plotter.renderer.GetSize()), viewpoint=stage.viewpoint()
+                self.document, size=tuple(self.renderer.GetSize()), viewpoint=stage.viewpoint()
             )
         return found.owner, found.uv
 

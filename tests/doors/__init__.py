@@ -1,0 +1,1 @@
+"""Doors to our pictures: Qt windows, browsers, notebooks. What they need is optional."""

@@ -1,0 +1,98 @@
+"""Editing in somebody's plotter: it is edited in as in a window of ours, and left as it was."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.edit.population import lying_on
+from decals.errors import InvalidScene
+from decals.window import EditWindow
+from tests.edit.scenes import scene
+from tests.vtk.conftest import Factory, plotter
+from tests.vtk.scenes import shot
+from tests.window.driver import Driver
+
+__all__ = ["plotter"]
+
+
+def take_hold(driver: Driver) -> None:
+    """Of a primitive of the tree."""
+    on_tree = lying_on(driver.document, [0])
+    driver.key("m", next(at for number, at in driver.visible() if number in on_tree))
+    assert driver.window.grip.widget is not None
+
+
+def test_hands_in_a_subplot_that_is_no_longer_the_active_one(plotter: Factory) -> None:
+    pl = plotter(shape=(1, 2), window_size=(320, 120))
+    ball = pl.add_mesh(pv.Sphere())
+    pl.subplot(0, 1)
+    empty = shot(pl)
+    window = EditWindow(scene(), plotter=pl)
+    window.show()
+    pl.subplot(0, 0)
+    renderer = pl.renderers[1]
+    driver = Driver(window, renderer)
+    first, state = driver.shot(), driver.state
+    np.testing.assert_array_equal(first[:, :155], empty[:, :155])
+    _, at = next(driver.visible())
+    driver.click(at)
+    driver.drag(at, (at[0] + 4, at[1]), (at[0] + 12, at[1] + 3))
+    assert driver.session.labels == ("move",)
+    assert (driver.shot() != first).any()
+    driver.key("z", ctrl=True)
+    assert driver.state == state
+    window.close()
+    assert list(pl.renderers[0].actors.values()) == [ball]
+    assert not pl.renderers[1].actors
+    np.testing.assert_array_equal(shot(pl), empty)
+    assert driver.session._listeners == []
+
+
+def test_the_handle_is_ours_alone(plotter: Factory) -> None:
+    pl = plotter(shape=(1, 2), window_size=(320, 120))
+    theirs = pl.add_sphere_widget(lambda _center: None, center=(0, 0, 0), radius=0.2)
+    pl.subplot(0, 1)
+    window = EditWindow(scene(), plotter=pl)
+    window.show()
+    pl.subplot(0, 0)
+    driver = Driver(window, pl.renderers[1])
+    take_hold(driver)
+    assert window.grip.widget.GetCurrentRenderer() is pl.renderers[1]
+    window.close()
+    assert window.grip.widget is None
+    assert theirs.GetEnabled()
+
+
+def test_a_window_that_goes_with_the_handle_in_it(plotter: Factory) -> None:
+    pl = plotter()
+    window = EditWindow(scene(), plotter=pl)
+    window.show()
+    driver = Driver(window)
+    take_hold(driver)
+    pl.close()
+    window.close()
+    assert window.grip.widget is None
+
+
+def test_a_camera_that_stands_somewhere_stays_there(plotter: Factory) -> None:
+    pl = plotter()
+    with EditWindow(scene(), plotter=pl):
+        assert pl.camera.position == pytest.approx(scene().camera.position)
+    pl.camera_position = [(0, -9, 1), (0, 0, 0), (0, 0, 1)]
+    with EditWindow(scene(), plotter=pl):
+        assert pl.camera.position == (0, -9, 1)
+
+
+def test_a_plotter_that_was_closed_first(plotter: Factory) -> None:
+    pl = plotter()
+    window = EditWindow(scene(), plotter=pl)
+    window.show()
+    pl.close()
+    window.close()
+    with pytest.raises(InvalidScene, match="this one was closed"):
+        EditWindow(scene(), plotter=pl)
+
+
+def test_what_is_no_plotter_is_refused() -> None:
+    with pytest.raises(InvalidScene, match="a pyvista plotter to edit in, got str"):
+        EditWindow(scene(), plotter="window")  # type: ignore[arg-type]
