@@ -54,7 +54,7 @@ class Grip:
 
     def _make(self, center: Floats) -> Any:
         low, high = self._actions.session.document.scene.bounds
-        widget = vtkSphereWidget()
+        widget: Any = vtkSphereWidget()  # its stubs know events by number alone
         widget.SetRepresentationToSurface()
         widget.GetSphereProperty().SetColor(*COLOR)
         widget.GetSelectedSphereProperty().SetColor(*TAKEN)
