@@ -86,6 +86,7 @@ class Actions:
         self.grip: tuple[int, Path] | None = None
         self.camera: Callable[[], Camera | None] = lambda: None
         self.interrupt: Callable[[], None] = lambda: None
+        self._grip_offset: Floats = np.zeros(3, np.float32)
         self._run = run or self._do_at_once
         self._coats = 0
         self._series: tuple[str, object] | None = None
@@ -263,7 +264,13 @@ class Actions:
     # -- primitives -------------------------------------------------------------------------------------
 
     def _grip(self, cursor: Cursor) -> None:
-        self.grip = None if self.grip else self._primitive(cursor)
+        if self.grip:
+            self.grip, self.message = None, "let go"
+            return
+        found = _surface(cursor)
+        self.grip = self._primitive(lambda: found)
+        self._grip_offset = found.position - self._grip_middle
+        self.message = "drag the blue ball to move the primitive, m to let go"
 
     def _thicker(self, cursor: Cursor, factor: float = THICKER) -> None:
         self._do(ResizePrimitive(*self._primitive(cursor), factor))
@@ -277,6 +284,8 @@ class Actions:
         self._do(PaintPrimitive(number, path, TINTS[self._coats % len(TINTS)]))
 
     def _primitive(self, cursor: Cursor) -> tuple[int, Path]:
+        if self.grip is not None:
+            return self.grip
         found = _surface(cursor)
         item = self.session.document.objects[found.object]
         if not isinstance(item, TreeObject):
@@ -285,7 +294,15 @@ class Actions:
 
     @property
     def grip_center(self) -> Floats:
-        """Where the held primitive is: the middle of its box, ``float32[3]``."""
+        """Where the primitive is held, ``float32[3]``: on the surface, where the cursor was at first."""
+        assert self.grip is not None
+        surface = self.session.document.objects[self.grip[0]].surface
+        position: Floats = surface.project((self._grip_middle + self._grip_offset)[None])[0][0]
+        return position
+
+    @property
+    def _grip_middle(self) -> Floats:
+        """Middle of the box of the held primitive: it goes where the primitive goes."""
         assert self.grip is not None
         item = self.session.document.objects[self.grip[0]]
         assert isinstance(item, TreeObject)

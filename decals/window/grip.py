@@ -20,7 +20,7 @@ ROUND = 16
 
 
 class Grip:
-    """A ball in the middle of the primitive that is held; dragging it drags the primitive.
+    """A ball on the surface where a primitive is held; dragging it drags the primitive.
 
     Parameters
     ----------

@@ -245,13 +245,15 @@ def test_primitives_under_the_cursor(hands):
     hands.tools.key("m", *at)
     number, path = hands.actions.grip
     assert number == 0
-    assert hands.actions.grip_center.tolist() == [0, 0, 0]
+    assert hands.actions.grip_center == pytest.approx([0, 0, 1], abs=0.03)  # on the surface, under the cursor
+    assert "drag the blue ball" in hands.actions.message
     hands.actions.begin_grip()
     for step in (0.1, 0.2, 0.3):
         hands.actions.move_grip((0, step, 0))
     hands.actions.settle()
     moved = primitive_at(hands.document.objects[0].tree, path)
     assert moved.center == pytest.approx((0, 0.3, 0))
+    assert hands.actions.grip_center == pytest.approx([0, 0.3, 1], abs=0.03)
     assert hands.session.labels == ("move a primitive",)
     hands.tools.key("bracketright", *at)
     hands.tools.key("bracketright", *at)

@@ -126,8 +126,11 @@ def test_what_is_selected_is_outlined(driver):
 
 def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
     point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
+    bare = driver.shot()
     driver.key("m", driver.pixel(point))
     first, state = driver.shot(), driver.state
+    ball = (first != bare).any(axis=-1) & (first[..., 2] > first[..., 0] + 30)
+    assert ball[119 - driver.pixel(point)[1], driver.pixel(point)[0]], "the handle is seen"
     number, path = driver.window.actions.grip
     widget = driver.window.grip.widget
     center = driver.window.actions.grip_center
