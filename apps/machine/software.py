@@ -49,8 +49,11 @@ def warp_devices() -> list[str]:
     """Name the devices that Warp computes on."""
     import warp as wp
 
-    import blobtree  # noqa: F401 -- it keeps Warp from printing while it starts
+    import blobtree  # noqa: F401 -- it keeps Warp from introducing itself
 
+    from .warp_start import start_warp
+
+    start_warp()
     return [f"{device.alias} ({device.name})" for device in wp.get_devices()]
 
 
