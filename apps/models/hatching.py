@@ -19,7 +19,9 @@ from .shapes import egg
 Floats = NDArray[np.float32]
 
 COUNT = 1100
-EYE_RADIUS = 0.17
+EYE_RADIUS = 0.23
+_CLEARING = 0.17
+"""Scales whose centres lie nearer to an eye's make room for it; the eye fills it and pushes those around."""
 _EYES = np.array([[1.06, 2.29, 0.45], [1.06, 2.29, -0.45]], np.float32)
 """Where the creature's eyes look from, before they are put onto its surface."""
 
@@ -104,4 +106,4 @@ def _with_eyes(scales: Decals, body: TreeObject) -> Decals:
         radii=np.full(len(positions), EYE_RADIUS, np.float32),
         images=np.full(len(positions), len(_SCALES), np.int32),
     )
-    return Decals.concatenate([scales[gaps > EYE_RADIUS], eyes])
+    return Decals.concatenate([scales[gaps > _CLEARING], eyes])

@@ -18,7 +18,7 @@ def spanning() -> Scene:
 
     The decal belongs to neither; each point of both surfaces asks the same field (the paper's figure 5).
     """
-    vertices, faces = rounded_box((-0.85, 0.0, 0.0), half=(1.15, 1.05, 0.95), exponent=8.0)
+    vertices, faces = rounded_box((-0.85, 0.0, 0.0), half=(1.15, 1.05, 0.95), rounding=0.25)
     box = MeshObject("box", vertices, faces, color=_SAND)
     balls = (
         Point((0.42, 0.0, -0.52), radius=1.50, color=_BLUE),

@@ -32,7 +32,7 @@ def _volume(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> float:
         torus_knot,
         lambda: torus_knot(turns=3, windings=5, along=200, around=16, tube=0.1),
         lambda: egg((1, 2, 3), radius=0.5, height=0.7),
-        lambda: rounded_box((0, 0, 0), half=(1, 2, 3)),
+        lambda: rounded_box((0, 0, 0), half=(1, 2, 3), rounding=0.3),
     ],
 )
 def test_meshes_are_closed_and_wound_outward(make: Callable[[], MeshArrays]) -> None:
@@ -53,9 +53,11 @@ def test_the_knot_has_its_tube_everywhere() -> None:
 
 
 def test_sizes_are_those_asked_for() -> None:
-    vertices, _ = rounded_box((1, 0, 0), half=(1, 2, 3))
+    vertices, _ = rounded_box((1, 0, 0), half=(1, 2, 3), rounding=0.5)
     assert np.allclose(vertices.min(axis=0), [0, -2, -3], atol=0.01)
     assert np.allclose(vertices.max(axis=0), [2, 2, 3], atol=0.01)
+    out = np.abs(vertices - [1, 0, 0]) - [0.5, 1.5, 2.5]  # beyond the box of which this is the offset
+    assert np.allclose(np.linalg.norm(np.maximum(out, 0), axis=1), 0.5, atol=1e-5)
     vertices, _ = egg((0, 5, 0), radius=0.5, height=0.7)
     assert np.allclose([vertices[:, 1].min(), vertices[:, 1].max()], [4.3, 5.7], atol=1e-3)
 
