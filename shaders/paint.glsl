@@ -11,19 +11,18 @@ uniform sampler2D g_color;
 // color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
 Pixel pixel_at(ivec2 texel) {
     Pixel pixel;
-    pixel.color = vec4(0.0);
+    pixel.color = texelFetch(g_color, texel, 0);  // half the bytes of a position, which the background need not read
     vec4 found = vec4(-1.0, 0.0, 0.0, 0.0);
-    vec4 position = texelFetch(g_position, texel, 0);
-    if (position.w > 0.0) {
-        pixel.color = vec4(texelFetch(g_color, texel, 0).rgb, 1.0);
 #ifdef DECALS
+    if (pixel.color.w > 0.0) {
+        vec3 position = texelFetch(g_position, texel, 0).xyz;
         vec3 normal = texelFetch(g_normal, texel, 0).xyz;
-        DecalHit hit = decal_at(position.xyz, normal);
-        vec4 color = decal_color(hit, position.xyz, normal, ray_direction(vec2(texel) + 0.5));
+        DecalHit hit = decal_at(position, normal);
+        vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
         pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;
         found = vec4(float(hit.owner), hit.field, hit.uv);
-#endif
     }
+#endif
 #ifdef TWO_TARGETS
     pixel.buffers = found;
 #endif

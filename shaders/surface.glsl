@@ -5,7 +5,7 @@ uniform int object_id;  // index in the scene
 struct Surface {
     vec4 position;  // xyz, object_id + 1; w = 0 is background
     vec4 normal;    // xyz: unit (zero where a mesh's cancel), smooth; w: 1 where the outside is seen, else -1
-    vec4 color;     // rgb: linear light
+    vec4 color;     // rgb: linear light; w: 1, and 0 in the background
 };
 
 Surface surface_at(vec3 position, vec3 normal, vec3 srgb, bool outside) {

@@ -11,9 +11,12 @@ import warp as wp
 from numpy.typing import NDArray
 
 from decals.grid import kernels as kernels
-from decals.grid.cells import EMPTY, EXPONENT_OF_ONE, EXPONENTS
+from decals.grid.cells import ALONE, EMPTY, EXPONENT_OF_ONE, EXPONENTS
 
 NOTHING = np.iinfo(np.int32)
+
+MOST_CELLS = 24
+"""Cells a decal, on average, up to which sizes join: twice as many as are usual in cells of its own size."""
 
 
 class IndexArrays(NamedTuple):
@@ -22,11 +25,34 @@ class IndexArrays(NamedTuple):
     levels: Any
     table: Any
     ids: Any
+    parity: int
 
 
 def build_index(positions: Any, influence: Any, ranks: Any) -> IndexArrays:
     """Index decals whose arrays (vec3, float32, int32) lie on one device."""
     return _Builder(positions, influence, ranks).build()
+
+
+class _Sizes(NamedTuple):
+    """Of each decal, its cells' exponent, number, and the sum of these; of each exponent, the ranks there."""
+
+    parity: int
+    exponents: Any
+    counts: Any
+    ends: Any
+    cells: int
+    lowest: NDArray[np.int32]
+    highest: NDArray[np.int32]
+
+    @property
+    def used(self) -> NDArray[np.int64]:
+        """Numbers of the exponents that there are, one for each level."""
+        return np.flatnonzero(self.lowest != NOTHING.max)
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """What is worse: each level costs every look-up, each cell memory."""
+        return len(self.used), self.cells
 
 
 class _Builder:
@@ -36,33 +62,46 @@ class _Builder:
 
     def build(self) -> IndexArrays:
         if not self.count:
-            return IndexArrays(
-                wp.zeros(0, dtype=wp.vec4, device=self.device), self.empty_table(1), self.whole(0)
-            )
+            nothing = wp.zeros(0, dtype=wp.vec4, device=self.device)
+            return IndexArrays(nothing, self.empty_table(1), self.whole(0), ALONE)
         order = self.drawing_order()
-        exponents, counts, ends = (self.whole(self.count) for _ in range(3))
-        lowest = self.filled(EXPONENTS, NOTHING.max)
-        highest = self.filled(EXPONENTS, NOTHING.min)
-        decals = [self.positions, self.influence]
-        self.launch(
-            kernels.measure_decals,
-            self.count,
-            [*decals, self.ranks, order],
-            [exponents, counts, lowest, highest],
-        )
-        wp.utils.array_scan(counts, ends, inclusive=True)
-        entries = int(ends[self.count - 1 :].numpy()[0])
-        levels, level_of = _levels(lowest.numpy(), highest.numpy())
-        keys, owners = wp.empty(entries, dtype=wp.vec3i, device=self.device), self.whole(2 * entries)
+        sizes = self.joined_sizes(order)
+        levels, level_of = _levels(sizes)
+        keys, owners = wp.empty(sizes.cells, dtype=wp.vec3i, device=self.device), self.whole(2 * sizes.cells)
         numbers: Any = wp.array(level_of, dtype=wp.int32, device=self.device)
         self.launch(
             kernels.list_cells,
             self.count,
-            [*decals, order, exponents, numbers, ends, counts],
+            [self.positions, self.influence, order, sizes.exponents, numbers, sizes.ends, sizes.counts],
             [keys, owners],
         )
         table, ids = self.gathered(keys, owners)
-        return IndexArrays(wp.array(levels, dtype=wp.vec4, device=self.device), table, ids)
+        return IndexArrays(wp.array(levels, dtype=wp.vec4, device=self.device), table, ids, sizes.parity)
+
+    def joined_sizes(self, order: Any) -> "_Sizes":
+        """Sizes joined in pairs where that makes levels fewer and cells not too many."""
+        best = self.sizes(order, ALONE)
+        used = best.used - EXPONENT_OF_ONE
+        for parity in (0, 1):
+            if len(np.unique(used - ((used & 1) != parity))) < len(best.used):
+                other = self.sizes(order, parity)
+                if other.cells <= MOST_CELLS * self.count and other.cost < best.cost:
+                    best = other
+        return best
+
+    def sizes(self, order: Any, parity: int) -> "_Sizes":
+        exponents, counts, ends = (self.whole(self.count) for _ in range(3))
+        lowest = self.filled(EXPONENTS, NOTHING.max)
+        highest = self.filled(EXPONENTS, NOTHING.min)
+        self.launch(
+            kernels.measure_decals,
+            self.count,
+            [self.positions, self.influence, self.ranks, order, parity],
+            [exponents, counts, lowest, highest],
+        )
+        wp.utils.array_scan(counts, ends, inclusive=True)
+        cells = int(ends[self.count - 1 :].numpy()[0])
+        return _Sizes(parity, exponents, counts, ends, cells, lowest.numpy(), highest.numpy())
 
     def drawing_order(self) -> Any:
         """Numbers of the decals by rank, then number."""
@@ -107,13 +146,11 @@ def table_size(cells: int) -> int:
     return 1 << (2 * cells).bit_length()
 
 
-def _levels(
-    lowest: NDArray[np.int32], highest: NDArray[np.int32]
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def _levels(sizes: _Sizes) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Levels (index.py) and, for each exponent, which level it is."""
-    used = np.flatnonzero(lowest != NOTHING.max)
-    size = np.exp2(used.astype(np.float64) - EXPONENT_OF_ONE)
+    used = sizes.used
+    width = np.exp2(used.astype(np.float64) - EXPONENT_OF_ONE)
     level_of = np.full(EXPONENTS, EMPTY, np.int32)
     level_of[used] = np.arange(len(used))
-    columns = [1.0 / size, size, lowest[used], highest[used]]
+    columns = [1.0 / width, width, sizes.lowest[used], sizes.highest[used]]
     return np.column_stack(columns).astype(np.float32), level_of

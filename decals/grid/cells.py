@@ -23,7 +23,13 @@ EXPONENTS = 256
 """Number of cell sizes that there may be: 2^(e − EXPONENT_OF_ONE) for e from 0."""
 
 EXPONENT_OF_ONE = 128
-NEIGHBOURHOOD = 27
+
+ALONE = -1
+"""In place of a parity: each size of decals has its own cells. With one, sizes join in pairs (`joined`)."""
+
+NEIGHBOURHOOD = 125
+"""Most cells of a decal: of its own size at most 3 along each axis, of half its size 5."""
+
 LEVEL_SHIFT = 24
 EMPTY = -1
 
@@ -77,24 +83,45 @@ def widened(v: wp.vec3) -> wp.vec3d:
 
 
 @wp.func
-def cell_exponent(position: wp.vec3, influence: wp.float32) -> wp.int32:
-    """Exponent e of a decal's cell size 2^e in (ρ, 2ρ], or larger where float32 positions are coarser."""
+def joined(exponent: wp.int32, parity: wp.int32) -> wp.int32:
+    """Exponent of the cells that a size has: its own, or the next finer if it is not of the given parity."""
+    if parity != ALONE and (exponent & 1) != parity:
+        return exponent - 1
+    return exponent
+
+
+@wp.func
+def cell_exponent(position: wp.vec3, influence: wp.float32, parity: wp.int32) -> wp.int32:
+    """Exponent e of a decal's cell size 2^e in (ρ, 2ρ], of half that where it joins smaller decals.
+
+    It is larger where float32 positions are coarser.
+    """
     centre = widened(position)
     reach = grown_reach(influence)
     farthest = wp.max(wp.max(wp.abs(centre[0]), wp.abs(centre[1])), wp.abs(centre[2])) + reach
-    return wp.max(exponent_above(reach), exponent_above(wp.min(farthest, LARGEST)) - FINEST)
+    return wp.max(joined(exponent_above(reach), parity), exponent_above(wp.min(farthest, LARGEST)) - FINEST)
+
+
+@wp.func
+def cell_at(point: wp.vec3d, width: wp.float64) -> wp.vec3d:
+    """Cell of a point, counted from the origin."""
+    return wp.vec3d(wp.floor(point[0] / width), wp.floor(point[1] / width), wp.floor(point[2] / width))
 
 
 @wp.func
 def lowest_cell(position: wp.vec3, influence: wp.float32, width: wp.float64) -> wp.vec3d:
-    """Corner of the 3 × 3 × 3 cells that hold a decal's ball, counted from the origin."""
-    centre = widened(position)
+    """Lowest of the block of cells that holds a decal's ball, counted from the origin."""
     reach = grown_reach(influence)
-    return wp.vec3d(
-        wp.floor((centre[0] - reach) / width),
-        wp.floor((centre[1] - reach) / width),
-        wp.floor((centre[2] - reach) / width),
-    )
+    return cell_at(widened(position) - wp.vec3d(reach, reach, reach), width)
+
+
+@wp.func
+def cells_across(position: wp.vec3, influence: wp.float32, width: wp.float64) -> wp.vec3i:
+    """Number of cells in that block, along each axis."""
+    reach = grown_reach(influence)
+    highest = cell_at(widened(position) + wp.vec3d(reach, reach, reach), width)
+    apart = highest - lowest_cell(position, influence, width)
+    return wp.vec3i(wp.int32(apart[0]) + 1, wp.int32(apart[1]) + 1, wp.int32(apart[2]) + 1)
 
 
 @wp.func
@@ -104,9 +131,18 @@ def beside(x: wp.float64, cell: wp.float64, width: wp.float64) -> wp.float64:
 
 
 @wp.func
-def neighbour(lowest: wp.vec3d, number: wp.int32) -> wp.vec3d:
-    """One of the 3 × 3 × 3 cells."""
-    return lowest + wp.vec3d(wp.float64(number / 9), wp.float64((number / 3) % 3), wp.float64(number % 3))
+def cells_in(across: wp.vec3i) -> wp.int32:
+    """Number of cells of a block."""
+    return across[0] * across[1] * across[2]
+
+
+@wp.func
+def neighbour(lowest: wp.vec3d, across: wp.vec3i, number: wp.int32) -> wp.vec3d:
+    """One cell of a block."""
+    row = number / across[2]
+    return lowest + wp.vec3d(
+        wp.float64(row / across[1]), wp.float64(row % across[1]), wp.float64(number % across[2])
+    )
 
 
 @wp.func

@@ -8,8 +8,9 @@ import warp as wp
 from decals.field.stack import end_of_lower
 from decals.grid.cells import (
     EMPTY,
-    NEIGHBOURHOOD,
     cell_key,
+    cells_across,
+    cells_in,
     first_slot,
     lowest_cell,
     neighbour,
@@ -72,10 +73,11 @@ def take_out(
     position = xyz(ball)
     width = power_of_two(exponent)
     corner = lowest_cell(position, ball[3], width)
+    across = cells_across(position, ball[3], width)
     mask = table.shape[0] - 1
     touched = wp.int32(0)
-    for number in range(NEIGHBOURHOOD):
-        cell = neighbour(corner, number)
+    for number in range(cells_in(across)):
+        cell = neighbour(corner, across, number)
         if touches(position, ball[3], cell, width):
             head = table[slot_of(cell_key(cell, level), table, mask)][3]
             end = head + 1 + ids[head]
@@ -106,20 +108,21 @@ def put_in(
     position = xyz(ball)
     width = power_of_two(exponent)
     corner = lowest_cell(position, ball[3], width)
+    across = cells_across(position, ball[3], width)
     mask = table.shape[0] - 1
     needed = wp.int32(0)
-    for number in range(NEIGHBOURHOOD):
-        cell = neighbour(corner, number)
+    for number in range(cells_in(across)):
+        cell = neighbour(corner, across, number)
         if touches(position, ball[3], cell, width):
             needed += room_needed(slot_of(cell_key(cell, level), table, mask), table, rooms, ids)
     state[TOUCHED] = 0
     state[FITS] = 1
-    if state[IDS_END] + needed > ids.shape[0] or 4 * (state[CELLS] + NEIGHBOURHOOD) > 3 * table.shape[0]:
+    if state[IDS_END] + needed > ids.shape[0] or 4 * (state[CELLS] + cells_in(across)) > 3 * table.shape[0]:
         state[FITS] = 0
         return
     touched = wp.int32(0)
-    for number in range(NEIGHBOURHOOD):
-        cell = neighbour(corner, number)
+    for number in range(cells_in(across)):
+        cell = neighbour(corner, across, number)
         if touches(position, ball[3], cell, width):
             key = cell_key(cell, level)
             slot = slot_of(key, table, mask)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidDecals
 from decals.grid import edit_kernels as kernels
-from decals.grid.cells import FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
+from decals.grid.cells import ALONE, FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
 from decals.grid.index import DecalIndex
 from decals.grid.journal import Journal, Range
 from decals.grid.rows import DecalRows, as_numbers, with_spare
@@ -241,7 +241,9 @@ class DecalEditor:
         x, y, z, influence = self.arrays[RECORDS][RECORD * number].tolist()
         reach = influence * REACH_WITH_SLACK
         farthest = max(abs(x), abs(y), abs(z)) + reach
-        return max(math.frexp(reach)[1], math.frexp(farthest)[1] - FINEST)
+        own = math.frexp(reach)[1]
+        joins = self._parity != ALONE and own % 2 != self._parity
+        return max(own - joins, math.frexp(farthest)[1] - FINEST)
 
     def _rebuild(self) -> None:
         """Lay the index out anew, with spare room."""
@@ -251,6 +253,7 @@ class DecalEditor:
         index = DecalIndex.build(records[:, 0, :3], records[:, 0, 3], ranks)
         levels = np.zeros((MOST_LEVELS, 4), np.float32)
         levels[: index.level_count] = index.levels
+        self._parity = index.parity
         self._level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
         table, ids = index.table.copy(), index.ids.copy()
         full = np.flatnonzero(table[:, 0] >= 0)

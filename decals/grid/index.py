@@ -2,7 +2,9 @@
 
 It replaces the paper's octree (section 3.4). Each decal is stored once for every cell that its ball of
 radius ρ = REACH·s touches, on the one level whose cells are larger than ρ and at most 2ρ wide: at most 27
-cells. A look-up reads one cell per level. Three flat arrays go to the device:
+cells. A look-up reads one cell per level, so sizes join in pairs where that leaves fewer levels: the larger
+of two takes the cells of the smaller, half as wide, which also have fewer candidates. A decal then has at
+most 125 cells, and they have 24 on average at most. Three flat arrays go to the device:
 
     levels  float32[l, 4]   per level: (cells per unit length, cell size, lowest rank, highest rank)
     table   int32[2^k, 4]   slots of an open-addressing hash table: (x + level·2²⁴, y, z, head), x < 0: empty
@@ -21,7 +23,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from decals.grid.build import build_index
-from decals.grid.cells import LEVEL_SHIFT
+from decals.grid.cells import ALONE, LEVEL_SHIFT
 from decals.grid.lookup import count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, Decals
 
@@ -47,23 +49,24 @@ class DeviceIndex:
     def of(cls, decals: Decals, device: Any = None) -> Self:
         """Index decals on a device, without a copy elsewhere."""
         placed = _device_arrays(decals.positions, decals.influence, decals.ranks, device)
-        levels, table, ids = build_index(*placed)
+        levels, table, ids, _ = build_index(*placed)
         return cls(len(levels), levels, table, len(table) - 1, ids)
 
 
 @dataclass(frozen=True, eq=False)
 class DecalIndex:
-    """Hash grid of as many levels as there are size classes."""
+    """Hash grid of as many levels as there are size classes, or pairs of them (`cells.joined`)."""
 
     levels: NDArray[np.float32]
     table: Ints
     ids: Ints
+    parity: int = ALONE
 
     @classmethod
     def build(cls, positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike = DEFAULT_RANK) -> Self:
         """Index decals by position (float32[n, 3]), radius of influence (float32[n]) and rank (int32[n])."""
         arrays = build_index(*_device_arrays(positions, influence, ranks, "cpu"))
-        return cls(arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy())
+        return cls(arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy(), arrays.parity)
 
     @classmethod
     def of(cls, decals: Decals) -> Self:

@@ -9,9 +9,10 @@ import warp as wp
 from decals.grid.cells import (
     EMPTY,
     EXPONENT_OF_ONE,
-    NEIGHBOURHOOD,
     cell_exponent,
     cell_key,
+    cells_across,
+    cells_in,
     first_slot,
     lowest_cell,
     neighbour,
@@ -38,6 +39,7 @@ def measure_decals(
     influence: wp.array(dtype=wp.float32),
     ranks: wp.array(dtype=wp.int32),
     order: wp.array(dtype=wp.int32),
+    parity: wp.int32,
     exponents: wp.array(dtype=wp.int32),
     counts: wp.array(dtype=wp.int32),
     lowest: wp.array(dtype=wp.int32),
@@ -46,12 +48,13 @@ def measure_decals(
     """Of each decal in drawing order: its cells' exponent and number; of each exponent, the ranks there."""
     i = wp.tid()
     decal = order[i]
-    exponent = cell_exponent(positions[decal], influence[decal])
+    exponent = cell_exponent(positions[decal], influence[decal], parity)
     width = power_of_two(exponent)
     corner = lowest_cell(positions[decal], influence[decal], width)
+    across = cells_across(positions[decal], influence[decal], width)
     count = wp.int32(0)
-    for number in range(NEIGHBOURHOOD):
-        if touches(positions[decal], influence[decal], neighbour(corner, number), width):
+    for number in range(cells_in(across)):
+        if touches(positions[decal], influence[decal], neighbour(corner, across, number), width):
             count += 1
     exponents[i] = exponent
     counts[i] = count
@@ -77,9 +80,10 @@ def list_cells(
     level = level_of[exponents[i] + EXPONENT_OF_ONE]
     width = power_of_two(exponents[i])
     corner = lowest_cell(positions[decal], influence[decal], width)
+    across = cells_across(positions[decal], influence[decal], width)
     place = ends[i] - counts[i]
-    for number in range(NEIGHBOURHOOD):
-        cell = neighbour(corner, number)
+    for number in range(cells_in(across)):
+        cell = neighbour(corner, across, number)
         if touches(positions[decal], influence[decal], cell, width):
             keys[place] = cell_key(cell, level)
             owners[place] = decal

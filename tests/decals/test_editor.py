@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decals.errors import InvalidDecals
+from decals.field.contact import REACH
 from decals.field.evaluate import evaluate
 from decals.grid.editor import IDS, RECORDS, TABLE, DecalEditor
 from decals.grid.index import DecalIndex
@@ -27,8 +28,13 @@ def some(rng, count, *, space=1.0):
     )
 
 
-def lists(offsets, ids):
-    return [sorted(ids[a:b].tolist()) for a, b in pairwise(offsets)]
+def acting(decals, points, offsets, ids):
+    """Of each point's candidates, sorted, those that act there; larger cells have more that do not."""
+    which = np.repeat(np.arange(len(points)), np.diff(offsets))
+    away = np.linalg.norm(points[which].astype(float) - decals.positions[ids], axis=1)
+    there = away <= REACH * decals.influence[ids]
+    ends = np.concatenate([[0], np.cumsum(there)])[offsets]
+    return [sorted(ids[there][a:b].tolist()) for a, b in pairwise(ends)]
 
 
 def check(editor, points):
@@ -36,11 +42,13 @@ def check(editor, points):
     decals, numbers = editor.decals, editor.numbers
     fresh = DecalIndex.of(decals)
     offsets, ids = fresh.candidates(points)
-    assert lists(*editor.index.candidates(points)) == lists(offsets, numbers[ids])
+    found, listed = editor.index.candidates(points)
+    assert np.isin(listed, numbers).all()
+    every = everything(editor)
+    assert acting(every, points, found, listed) == acting(every, points, offsets, numbers[ids])
     rows = editor.arrays[RECORDS].reshape(-1, 4, 4)[numbers].reshape(-1, 4)
     assert np.array_equal(rows, decals.packed())
     seen = evaluate(decals, points, points)
-    every = everything(editor)
     edited = evaluate(every, points, points, index=editor.index)
     owner = np.where(seen.owner < 0, -1, numbers[seen.owner] if len(numbers) else -1)
     assert np.array_equal(edited.owner, owner)

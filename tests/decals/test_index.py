@@ -41,6 +41,10 @@ def check(positions, influence, points):
     return index, found
 
 
+def two_sizes(rng):
+    return rng.random((2000, 3)), rng.choice([0.06, 0.11], 2000)
+
+
 def uniform(rng):
     return rng.random((2000, 3)), np.full(2000, 0.1)
 
@@ -89,7 +93,7 @@ def at_the_limits(rng):
 
 
 SETS = [uniform, tiling, six_decades, nested, coincident, coincident_and_equal, far_away, far_away_and_tiny]
-SETS += [two_clusters_far_apart, on_cell_corners, at_the_limits]
+SETS += [two_sizes, two_clusters_far_apart, on_cell_corners, at_the_limits]
 
 
 @pytest.mark.parametrize("make", SETS)
@@ -218,6 +222,30 @@ def test_hundreds_of_thousands_in_one_point():
     index = DecalIndex.build(np.zeros((200_000, 3)), np.full(200_000, 0.7))
     ids = index.candidates([[0.1, 0.1, 0.1]])[1]
     assert np.array_equal(ids, np.arange(200_000))
+
+
+@pytest.mark.parametrize(
+    ("counts", "joined"),
+    [
+        ((300, 300), 1),
+        ((30, 0, 30), 2),
+        ((30, 30, 30), 2),
+        ((30, 30, 30, 30), 2),
+        ((1, 1000), 2),
+        ((1, 0, 300, 300), 2),
+        ((300,), 1),
+    ],
+)
+def test_sizes_join_in_pairs_while_cells_are_few(counts, joined):
+    """Neighbouring sizes share a level, unless most decals would take too many cells for it."""
+    rng = np.random.default_rng(2)
+    exponents = np.repeat(np.arange(len(counts)) - 5, counts)
+    positions, influence = rng.random((len(exponents), 3)), 0.65 * 2.0**exponents / REACH
+    positions, influence = np.float32(positions), np.float32(influence)
+    index, found = check(positions, influence, near(rng, positions, influence, 500))
+    assert found > 100
+    assert index.level_count == joined
+    assert len(index.ids) - (index.table[:, 0] >= 0).sum() <= 24 * len(positions)
 
 
 @pytest.mark.gpu
