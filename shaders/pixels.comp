@@ -1,6 +1,7 @@
 // The same pass as pixels.frag as a compute shader, for GLSL 4.30 on: an invocation a pixel.
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
-uniform ivec2 target_size;
+uniform ivec2 target_size;  // rows below the first one are left as they are
+uniform int first_row;
 
 //@ slot body
 
@@ -10,7 +11,7 @@ layout(binding = 1) writeonly uniform image2D out_buffers;
 #endif
 
 void main() {
-    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
     if (any(greaterThanEqual(texel, target_size))) {
         return;
     }

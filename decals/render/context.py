@@ -21,6 +21,9 @@ BASELINE = 330
 ANISOTROPY = 8.0
 """How much longer than wide a pixel's footprint in an image may be before it blurs."""
 
+DEPTH = "depth"
+"""Kind of textures that hold depths."""
+
 SOFTWARE_TURNS = 65_535
 """Turns after which Mesa's software rasteriser ends all loops of a pixel together, without a word
 (LP_MAX_TGSI_LOOP_ITERATIONS)."""
@@ -90,6 +93,7 @@ class Context:
         self._programs: dict[tuple[str, str], moderngl.Program] = {}
         self._compute_programs: dict[str, moderngl.ComputeShader] = {}
         self._wished_entry = checked_entry(self, entry) if entry else None
+        self._stock: dict[tuple[tuple[int, int], str], list[moderngl.Texture]] = {}
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         self.anisotropy = _anisotropy(gl)
         self.most_turns = SOFTWARE_TURNS if _is_software(gl) else None
@@ -176,9 +180,28 @@ class Context:
                 raise compile_error(str(error), {"compute_shader": source}) from error
         return self._compute_programs[source.text]
 
+    def texture(self, size: tuple[int, int], kind: str) -> moderngl.Texture:
+        """Give a new texture: of four components of a kind, as moderngl names it, or of ``"depth"``."""
+        stock = self._stock.get((size, kind))
+        return stock.pop() if stock else self._new_texture(size, kind)
+
+    def stock(self, size: tuple[int, int], kind: str) -> None:
+        """Make a texture for those who will ask for one like it: where memory comes slowly, one at a time."""
+        self._stock.setdefault((size, kind), []).append(self._new_texture(size, kind))
+
+    def _new_texture(self, size: tuple[int, int], kind: str) -> moderngl.Texture:
+        return self.gl.depth_texture(size) if kind == DEPTH else self.gl.texture(size, 4, dtype=kind)
+
+    def clear_stock(self) -> None:
+        """Give back the textures that nobody asked for."""
+        for texture in (texture for stock in self._stock.values() for texture in stock):
+            texture.release()
+        self._stock.clear()
+
     def release(self) -> None:
         """Give the programs back, and the context if it is owned. Calling twice is harmless."""
         with self.current():
+            self.clear_stock()
             programs: list[Program] = [*self._programs.values(), *self._compute_programs.values()]
             for program in programs:
                 program.release()

@@ -12,6 +12,7 @@ from decals.render.context import Context
 from decals.render.decal_data import DecalData, library
 from decals.render.entry import PixelPass, Program, pixel_pass
 from decals.render.gbuffer import GBuffer
+from decals.render.parts import WHOLE, Part
 from decals.render.textures import ImageArray
 from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
 
@@ -34,8 +35,8 @@ class DecalPass:
     """
 
     def __init__(self, context: Context, size: tuple[int, int], *, buffers: bool = False) -> None:
-        self.paint = context.gl.texture(size, 4, dtype="f2")
-        self.decal = context.gl.texture(size, 4, dtype="f4") if buffers else None
+        self.paint = context.texture(size, "f2")
+        self.decal = context.texture(size, "f4") if buffers else None
         self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
         self._reading = context.gl.framebuffer(self._targets)
         self._context = context
@@ -49,8 +50,9 @@ class DecalPass:
         images: ImageArray | None,
         mapping: Mapping,
         contact: Contact,
+        part: Part = WHOLE,
     ) -> None:
-        """Paint a tile; without decals (or images for them) only the objects' own colours are seen.
+        """Paint rows of a tile; without decals (or images for them) only the objects' own colours are seen.
 
         ``mapping`` is how images are laid onto curved surface, ``contact`` how decals push each other.
         """
@@ -63,7 +65,7 @@ class DecalPass:
             set_uniform(program, "decal_images", FIRST_UNIT)
             set_uniform(program, "decal_mapping", int(mapping))
             decals.use(program, FIRST_UNIT + 1)
-        painting.run(tile.width, tile.height)
+        painting.run(tile.width, tile.height, part)
 
     def read_decal(self, tile: Tile) -> NDArray[np.float32]:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 from decals.errors import InvalidScene
 from decals.render.context import Context
 from decals.render.gbuffer import GBuffer
+from decals.render.parts import WHOLE, Part
 from decals.render.tile import Tile
 from decals.scenes.viewpoint import Bounds
 
@@ -23,13 +24,13 @@ class Drawable(Protocol):
         """Whether `draw` goes through the depth test; what does not is drawn after all that does."""
         ...
 
-    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer) -> None:
-        """Put the object into the G-buffer wherever it is nearer than what is there.
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
+        """Put the object, or a part of it, into the G-buffer wherever it is nearer than what is there.
 
-        The tile's camera is bound already (`decals.render.tile.attach_camera`), depth test and targets are
-        set. What is rasterised writes through ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth;
-        the rest writes to the textures and leaves the depth alone (`GBuffer.complete_depth` adds it where
-        somebody asks for it). Other state that is changed here is put back.
+        The tile's camera is bound already (`decals.render.tile.attach_camera`). What is rasterised writes
+        through ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth; the rest writes to the
+        textures and leaves the depth alone (`GBuffer.complete_depth` adds it where somebody asks for it).
+        State that is changed beyond `GBuffer.use` is put back.
         """
         ...
 

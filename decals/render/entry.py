@@ -15,6 +15,7 @@ import moderngl
 import numpy as np
 
 from decals.errors import NoGraphics
+from decals.render.parts import WHOLE, Part
 from implicit_decals.shaders import Source, compose
 
 if TYPE_CHECKING:
@@ -55,8 +56,8 @@ class PixelPass(Protocol):
         """What takes the uniforms."""
         ...
 
-    def run(self, width: int, height: int) -> None:
-        """Fill the lower left part of this size of all targets."""
+    def run(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Fill these rows of the lower left part of this size of all targets."""
         ...
 
     def release(self) -> None:
@@ -115,10 +116,10 @@ class FragmentPass:
         self._framebuffer = context.gl.framebuffer(list(targets))
         self._gl = context.gl
 
-    def run(self, width: int, height: int) -> None:
-        """Fill the lower left part of this size of all targets."""
+    def run(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Fill these rows of the lower left part of this size of all targets."""
+        limit(self._framebuffer, width, height, part)
         self._framebuffer.use()
-        self._framebuffer.viewport = (0, 0, width, height)
         self._gl.enable_only(moderngl.NOTHING)
         self._array.render(vertices=3)
 
@@ -139,18 +140,32 @@ class ComputePass:
         self._targets = tuple(targets)
         self._gl = context.gl
 
-    def run(self, width: int, height: int) -> None:
-        """Fill the lower left part of this size of all targets."""
+    def run(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Fill these rows of the lower left part of this size of all targets."""
         for unit, target in enumerate(self._targets):
             target.bind_to_image(unit, read=False, write=True)
         program = self.program
         assert isinstance(program, moderngl.ComputeShader)
-        program["target_size"] = width, height
-        program.run(-(-width // GROUP), -(-height // GROUP))
+        run_rows(program, width, part.of(height))
         self._gl.memory_barrier()
 
     def release(self) -> None:
         """Nothing but targets and program was made."""
+
+
+def limit(framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
+    """Let what is drawn into a framebuffer fall into rows of the lower left part of this size."""
+    first, last = part.of(height)
+    framebuffer.viewport = (0, 0, width, height)
+    framebuffer.scissor = (0, first, width, last - first)
+
+
+def run_rows(program: moderngl.ComputeShader, width: int, rows: tuple[int, int]) -> None:
+    """Invoke a compute shader for every pixel of rows, from the first to before the last."""
+    first, last = rows
+    program["first_row"] = first
+    program["target_size"] = width, last
+    program.run(-(-width // GROUP), -(-(last - first) // GROUP))
 
 
 _chosen: dict[str, Entry] = {}

@@ -4,8 +4,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.render.context import Context
-from decals.render.entry import GROUP, Entry
+from decals.render.context import DEPTH, Context
+from decals.render.entry import GROUP, Entry, limit, run_rows
+from decals.render.parts import WHOLE, Part
 from decals.render.tile import Rectangle, Tile, attach_camera, read_floats, set_uniform
 from implicit_decals.shaders import compose
 
@@ -23,10 +24,10 @@ class GBuffer:
 
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
         self.size = size
-        self.position = context.gl.texture(size, 4, dtype="f4")
-        self.normal = context.gl.texture(size, 4, dtype="f4")
-        self.color = context.gl.texture(size, 4, dtype="f2")
-        self.depth = context.gl.depth_texture(size)
+        self.position = context.texture(size, "f4")
+        self.normal = context.texture(size, "f4")
+        self.color = context.texture(size, "f2")
+        self.depth = context.texture(size, DEPTH)
         for texture in (self.position, self.normal, self.color):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._framebuffer = context.gl.framebuffer([self.position, self.normal, self.color], self.depth)
@@ -36,35 +37,38 @@ class GBuffer:
         self._clearing = _clearing(context) if context.entry is Entry.COMPUTE else None
         self._gl = context.gl
 
-    def begin(self, width: int, height: int) -> None:
-        """Clear the lower left part of this size, and let the next draws fall there."""
-        self._framebuffer.use()  # before anything is cleared: it ends the scissors that others left on
-        self._framebuffer.viewport = (0, 0, width, height)
+    def use(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Let the next draws fall into these rows of the lower left part of this size."""
+        self._bind(self._framebuffer, width, height, part)
+
+    def _bind(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
+        limit(framebuffer, width, height, part)
+        framebuffer.use()
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
+
+    def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Clear these rows of the lower left part of this size."""
         if self._clearing is None:
+            self.use(width, height, part)  # before anything is cleared: it ends scissors that others left on
             self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         else:
-            self._clear_by_compute(self._clearing, width, height)
+            self._clear_by_compute(self._clearing, width, height, part)
+            self._bind(self._depth_alone, width, height, part)
             self._depth_alone.clear(depth=1.0)
-            self._framebuffer.use()
 
-    def _clear_by_compute(self, program: moderngl.ComputeShader, width: int, height: int) -> None:
+    def _clear_by_compute(self, program: moderngl.ComputeShader, width: int, height: int, part: Part) -> None:
         for unit, texture in enumerate((self.position, self.normal, self.color)):
             texture.bind_to_image(unit, read=False, write=True)
-        set_uniform(program, "target_size", (width, height))
-        program.run(-(-width // GROUP), -(-height // GROUP))
+        run_rows(program, width, part.of(height))
         self._gl.memory_barrier()
 
-    def complete_depth(self, width: int, height: int) -> None:
+    def complete_depth(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Give the surface that is no rasterised object's its depth too, in the lower left part of this size.
 
         Only who goes on with the depth buffer needs it: in the other targets such surface is whole.
         """
-        self._depth_alone.use()
-        self._depth_alone.viewport = (0, 0, width, height)
-        self._gl.enable_only(moderngl.DEPTH_TEST)
-        self._gl.depth_func = "<"
+        self._bind(self._depth_alone, width, height, part)
         self.position.use(0)
         set_uniform(self._depth_program, "g_position", 0)
         self._screen.render(vertices=3)

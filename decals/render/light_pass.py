@@ -6,6 +6,7 @@ from decals.render.context import Context
 from decals.render.decal_pass import use_textures
 from decals.render.entry import pixel_pass
 from decals.render.gbuffer import GBuffer
+from decals.render.parts import WHOLE, Part
 from decals.render.tile import MARGIN, Tile, attach_camera, set_uniform
 
 BODY = "lit.glsl"
@@ -23,12 +24,19 @@ class LightPass:
     """
 
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
-        self.light = context.gl.texture(size, 4, dtype="f2")
+        self.light = context.texture(size, "f2")
         self._pass = pixel_pass(context, BODY, [self.light])
         attach_camera(self._pass.program)
 
-    def draw(self, gbuffer: GBuffer, paint: moderngl.Texture, tile: Tile, ambient_radius: float) -> None:
-        """Light a tile.
+    def draw(
+        self,
+        gbuffer: GBuffer,
+        paint: moderngl.Texture,
+        tile: Tile,
+        ambient_radius: float,
+        part: Part = WHOLE,
+    ) -> None:
+        """Light rows of a tile, all of which must be in the G-buffer.
 
         ``ambient_radius`` is how far away surroundings may be to keep light out, in the scene's units.
         """
@@ -38,7 +46,7 @@ class LightPass:
         set_uniform(program, "tile_size", (tile.width, tile.height))
         set_uniform(program, "ambient_radius", ambient_radius)
         set_uniform(program, "ambient_limit", MARGIN)
-        self._pass.run(tile.width, tile.height)
+        self._pass.run(tile.width, tile.height, part)
 
     def release(self) -> None:
         """Give the memory back."""

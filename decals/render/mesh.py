@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from decals.render.context import Context
 from decals.render.gbuffer import GBuffer
+from decals.render.parts import WHOLE, Part
 from decals.render.tile import Tile, attach_camera, set_uniform
 from decals.scenes.viewpoint import Bounds
 from implicit_decals.shaders import compose
@@ -29,6 +30,7 @@ class MeshDrawable:
     def __init__(self, context: Context, mesh: MeshLike) -> None:
         rows = mesh_rows(mesh)
         faces = np.ascontiguousarray(mesh.faces, np.int32)
+        self._faces = len(faces)
         self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
         self._program = attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
         self._vertices = context.gl.buffer(rows.tobytes())
@@ -46,10 +48,13 @@ class MeshDrawable:
         """Always."""
         return True
 
-    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer) -> None:
-        """Rasterise the faces, both sides."""
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
+        """Rasterise the faces, or a part of them, both sides."""
+        gbuffer.use(tile.width, tile.height)
         set_uniform(self._program, "object_id", object_id)
-        self._array.render()
+        first, last = part.of(self._faces)
+        if last > first:
+            self._array.render(first=3 * first, vertices=3 * (last - first))
 
     def release(self) -> None:
         """Give the memory back."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from functools import partial
 from types import TracebackType
 from typing import Self
 
@@ -19,27 +19,20 @@ from decals.render.canvas import BufferCanvas, Buffers, Canvas
 from decals.render.context import Context
 from decals.render.decal_data import DecalData
 from decals.render.drawables import Drawable, drawable_for
+from decals.render.drawing import Drawing
 from decals.render.entry import Entry
 from decals.render.kept import Kept
+from decals.render.parts import WHOLE, Step
 from decals.render.resolve import STUDIO, Background
 from decals.render.scene_like import SceneLike
-from decals.render.targets import Size, Targets
+from decals.render.steps import Uploaded, steps_of
+from decals.render.targets import KINDS, Size, Targets
 from decals.render.textures import ImageArray
 from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Rectangle, Tile, largest_tile, tiles
-from decals.scenes.viewpoint import Bounds, Viewpoint
+from decals.scenes.viewpoint import Viewpoint
 
-AMBIENT_RADIUS = 0.1
-"""How far away surroundings may be to keep light out, relative to the scene's diagonal."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Uploaded:
-    """A scene on the graphics card."""
-
-    drawables: list[Drawable]
-    decals: DecalData | None
-    images: ImageArray | None
-    bounds: Bounds
+WHOLE_SLOT, BUFFERS_SLOT = "whole", "buffers"
+"""Which targets pictures at once are drawn into, and pictures with what lies behind their pixels."""
 
 
 class Renderer:
@@ -68,7 +61,7 @@ class Renderer:
         self._drawables: Kept[Drawable] = Kept()
         self._decals: Kept[DecalData] = Kept()
         self._images: Kept[ImageArray] = Kept()
-        self._targets: dict[bool, Targets] = {}
+        self._targets: dict[str, Targets] = {}
         with self.context.current():
             self._camera = CameraBuffer(self.context)
 
@@ -156,7 +149,7 @@ class Renderer:
             uploaded = self._upload(scene)
             picture = Picture.of(viewpoint or scene.camera, size, uploaded.bounds)
             tile = picture.part(Rectangle(x, y, 1, 1))
-            targets = self._targets_for((1, 1), buffers=True)
+            targets = self._targets_for(BUFFERS_SLOT, (1, 1))
             self._draw_tile(uploaded, tile, targets, mapping, contact)
             canvas = BufferCanvas((1, 1))
             canvas.place(targets, Tile(picture, 0, 0, 1, 1, Rectangle(0, 0, 1, 1)))
@@ -177,6 +170,29 @@ class Renderer:
         Light and depth of all samples are in the targets until something else is drawn. The context must be
         current. Arguments and errors as for `render`.
         """
+        drawing = self.drawing(
+            scene, size=size, samples=samples, mapping=mapping, contact=contact, viewpoint=viewpoint
+        )
+        drawing.complete()
+        self.sweep()
+        return drawing.targets
+
+    def drawing(
+        self,
+        scene: SceneLike,
+        *,
+        size: Size,
+        samples: int = 1,
+        mapping: Mapping = Mapping.CORRECTED,
+        contact: Contact = Contact.PAPER,
+        viewpoint: Viewpoint | None = None,
+        slot: str = WHOLE_SLOT,
+    ) -> Drawing:
+        """Give a scene's picture in the making: it is drawn part by part, and stays on the graphics card.
+
+        It needs a scene and a viewpoint that stay as they are. Drawings of different slots, any texts, do
+        not overwrite each other. The context must be current. Other arguments and errors as for `render`.
+        """
         _check_size(size, samples)
         full = size[0] * samples, size[1] * samples
         if max(full) > self.context.max_texture_size:
@@ -184,14 +200,17 @@ class Renderer:
                 f"expected at most {self.context.max_texture_size} samples along each axis, got {full[0]} x "
                 f"{full[1]}; take fewer a pixel, or `render` draws in parts"
             )
-        uploaded = self._upload(scene)
-        targets = self._targets_for(full, buffers=False)
-        tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
-        self._draw_tile(uploaded, tile, targets, mapping, contact)
-        if not all(drawable.rasterised for drawable in uploaded.drawables):
-            targets.gbuffer.complete_depth(tile.width, tile.height)
-        self._sweep()
-        return targets
+
+        def steps(targets: Targets) -> list[Step]:
+            uploaded = self._upload(scene)  # again each time: others may draw in between
+            tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
+            self._camera.use(tile)
+            done = steps_of(uploaded, tile, targets, mapping, contact)
+            if not all(drawable.rasterised for drawable in uploaded.drawables):
+                done.append(partial(targets.gbuffer.complete_depth, *full))
+            return done
+
+        return Drawing(self._making(slot, full), steps, self.context.gl.finish)
 
     def time_frame(
         self,
@@ -237,32 +256,27 @@ class Renderer:
             uploaded = self._upload(scene)
             full = size[0] * samples, size[1] * samples
             picture = Picture.of(viewpoint or scene.camera, full, uploaded.bounds)
-            targets = self._targets_for(largest_tile(size, samples, limit=self._max_tile), buffers=buffers)
+            slot = BUFFERS_SLOT if buffers else WHOLE_SLOT
+            targets = self._targets_for(slot, largest_tile(size, samples, limit=self._max_tile))
             for tile in tiles(picture, samples, limit=self._max_tile):
                 self._draw_tile(uploaded, tile, targets, mapping, contact)
                 yield tile, targets
-            self._sweep()
+            self.sweep()
 
     def _draw_tile(
-        self, uploaded: _Uploaded, tile: Tile, targets: Targets, mapping: Mapping, contact: Contact
+        self, uploaded: Uploaded, tile: Tile, targets: Targets, mapping: Mapping, contact: Contact
     ) -> None:
         self._camera.use(tile)
         targets.picture = None
-        targets.gbuffer.begin(tile.width, tile.height)
-        for object_id, drawable in sorted(
-            enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised
-        ):
-            drawable.draw(object_id, tile, targets.gbuffer)
-        targets.decal_pass.draw(targets.gbuffer, tile, uploaded.decals, uploaded.images, mapping, contact)
-        radius = AMBIENT_RADIUS * _diagonal(uploaded.bounds)
-        targets.light_pass.draw(targets.gbuffer, targets.decal_pass.paint, tile, radius)
+        for step in steps_of(uploaded, tile, targets, mapping, contact):
+            step(WHOLE)
 
-    def _upload(self, scene: SceneLike) -> _Uploaded:
+    def _upload(self, scene: SceneLike) -> Uploaded:
         drawables = [self._drawable(thing) for thing in scene.objects]
-        bounds = _union([drawable.bounds for drawable in drawables])
-        return _Uploaded(drawables, *self.uploads(scene), bounds)
+        return Uploaded(drawables, *self.uploads(scene))
 
-    def _sweep(self) -> None:
+    def sweep(self) -> None:
+        """Give back what was uploaded for other pictures than those since the last sweep."""
         for kept in (self._drawables, self._decals, self._images):
             kept.sweep()
 
@@ -284,14 +298,26 @@ class Renderer:
             data.update(decals)
         return data, images
 
-    def _targets_for(self, size: Size, *, buffers: bool) -> Targets:
-        """Give targets of a size; those of the last picture of this kind if they fit exactly."""
-        targets = self._targets.get(buffers)
+    def _targets_for(self, slot: str, size: Size) -> Targets:
+        """Give targets of a size; those of the slot's last picture if they fit exactly."""
+        targets = self._targets.get(slot)
         if targets is None or targets.gbuffer.size != size:
             if targets is not None:
                 targets.release()
-            targets = self._targets[buffers] = Targets(self.context, size, buffers=buffers)
+            targets = self._targets[slot] = Targets(self.context, size, buffers=slot == BUFFERS_SLOT)
         return targets
+
+    def _making(self, slot: str, size: Size) -> Iterator[Targets | None]:
+        """Give targets of a size; before that, None after each piece of them: memory may come slowly."""
+        held = self._targets.get(slot)
+        if held is None or held.gbuffer.size != size:
+            if held is not None:
+                self._targets.pop(slot).release()
+            self.context.clear_stock()
+            for kind in KINDS:
+                self.context.stock(size, kind)
+                yield None
+        yield self._targets_for(slot, size)
 
     def release(self) -> None:
         """Give everything back. Calling twice is harmless."""
@@ -312,18 +338,6 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.release()
-
-
-def _union(boxes: Sequence[Bounds]) -> Bounds:
-    """Box around boxes; around none of them, a point."""
-    if not boxes:
-        return np.zeros(3), np.zeros(3)
-    lower, upper = zip(*boxes, strict=True)
-    return np.min(lower, axis=0), np.max(upper, axis=0)
-
-
-def _diagonal(bounds: Bounds) -> float:
-    return float(np.linalg.norm(np.subtract(bounds[1], bounds[0])))
 
 
 def _check_size(size: Size, samples: int) -> None:

@@ -41,7 +41,7 @@ class ResolvePass:
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
         self._program = context.program(compose("screen.vert"), compose("resolve.frag"))
         self._array = context.gl.vertex_array(self._program, [])
-        self._target = context.gl.texture(size, 4, dtype="f1")
+        self._target = context.texture(size, "f1")
         self._framebuffer = context.gl.framebuffer([self._target])
         self._gl = context.gl
 

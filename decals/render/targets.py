@@ -1,12 +1,15 @@
 """What one tile is drawn into."""
 
-from decals.render.context import Context
+from decals.render.context import DEPTH, Context
 from decals.render.decal_pass import DecalPass
 from decals.render.gbuffer import GBuffer
 from decals.render.light_pass import LightPass
 from decals.render.resolve import ResolvePass
 
 Size = tuple[int, int]
+
+KINDS = ("f4", "f4", "f2", DEPTH, "f2", "f2", "f1")
+"""Of the textures that targets without buffers are made of."""
 
 
 class Targets:

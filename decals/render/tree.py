@@ -12,6 +12,7 @@ from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import GROUP, Entry, Program
 from decals.render.gbuffer import GBuffer
+from decals.render.parts import WHOLE, Part
 from decals.render.tape_shader import Kinds, tracing_shader
 from decals.render.tile import Rectangle, Tile, attach_camera, set_uniform
 from decals.scenes.viewpoint import Bounds
@@ -57,13 +58,13 @@ class TreeDrawable:
         """Where a fragment shader sends the rays."""
         return isinstance(self._tracer, _FragmentTracer)
 
-    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer) -> None:
-        """Trace the rays of all pixels on which the box falls."""
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
+        """Trace the rays of all pixels on which the box falls, or of a part of their rows."""
         for unit, texture in enumerate(self._textures):
             texture.use(unit)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
             set_uniform(self._tracer.program, name, value)
-        self._tracer.run(tile, gbuffer)
+        self._tracer.run(tile, gbuffer, part)
 
     def release(self) -> None:
         """Give the memory back."""
@@ -92,7 +93,8 @@ class _FragmentTracer:
         self._box = {"box_lower": bounds[0], "box_upper": bounds[1]}
         self._gl = context.gl
 
-    def run(self, tile: Tile, gbuffer: GBuffer) -> None:
+    def run(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
+        gbuffer.use(tile.width, tile.height, part)
         for name, corner in self._box.items():
             set_uniform(self.program, name, tuple(np.asarray(corner).tolist()))
         self._gl.enable(moderngl.CULL_FACE)
@@ -115,16 +117,17 @@ class _ComputeTracer:
         self._bounds = bounds
         self._gl = context.gl
 
-    def run(self, tile: Tile, gbuffer: GBuffer) -> None:
-        part = covered(self._bounds, tile)
-        if part.width == 0 or part.height == 0:
+    def run(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
+        box = covered(self._bounds, tile)
+        first, last = part.of(box.height)
+        if box.width == 0 or first == last:
             return
-        set_uniform(self.program, "rectangle", (part.x, part.y, part.width, part.height))
+        set_uniform(self.program, "rectangle", (box.x, box.y + first, box.width, last - first))
         gbuffer.position.bind_to_image(POSITION, read=True, write=True)
         gbuffer.normal.bind_to_image(NORMAL, read=False, write=True)
         gbuffer.color.bind_to_image(COLOR, read=False, write=True)
         self._gl.memory_barrier()
-        self.program.run(-(-part.width // GROUP), -(-part.height // GROUP))
+        self.program.run(-(-box.width // GROUP), -(-(last - first) // GROUP))
         self._gl.memory_barrier()
 
     def release(self) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
 from decals.render import Renderer, SceneLike, Size
+from decals.render.drawing import Drawing
+from decals.render.renderer import WHOLE_SLOT
 from decals.render.targets import Targets
 from decals.render.tile import CameraBuffer
 from decals.scenes.viewpoint import Projection
@@ -25,6 +27,30 @@ class Look:
     samples: int
     mapping: Mapping
     contact: Contact
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """All that a picture depends on: things that are told apart by identity, and values."""
+
+    things: tuple[object, ...]
+    values: tuple[object, ...]
+
+    @classmethod
+    def of(cls, scene: SceneLike, look: Look, viewpoint: Projection) -> Self:
+        """What a picture of a scene depends on; of that an editor alone changes, and counts its versions."""
+        things = (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
+        version = scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
+        return cls(things, (look, viewpoint.matrix.tobytes(), version))
+
+    def same(self, other: Seen | None) -> bool:
+        """Whether two pictures are the same."""
+        return (
+            other is not None
+            and self.values == other.values
+            and len(self.things) == len(other.things)
+            and all(a is b for a, b in zip(self.things, other.things, strict=True))
+        )
 
 
 class Frame:
@@ -46,10 +72,10 @@ class Frame:
     def __init__(self, context: WindowContext) -> None:
         self.context = context
         self.drawn = False
-        self._shown: tuple[object, ...] = ()
-        self._values: tuple[object, ...] = ()
+        self._shown: Seen | None = None
         self._targets: Targets | None = None
         self._magnified = False
+        self._coming: tuple[Seen, Drawing] | None = None
         with context.current():
             self.renderer = Renderer(context)
             self._composite = Composite(context)
@@ -57,27 +83,56 @@ class Frame:
 
     def draw(self, scene: SceneLike, look: Look, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's own targets; ``wait`` until the card has finished."""
-        shown = _shown(scene)
-        version = scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
-        values = (look, viewpoint.matrix.tobytes(), version)
-        same = len(shown) == len(self._shown) and all(a is b for a, b in zip(shown, self._shown, strict=True))
-        if same and values == self._values and self._targets is not None and self._targets.picture is self:
+        seen = Seen.of(scene, look, viewpoint)
+        if self._targets is not None and self._shows(seen):
             self.drawn = False
             return self._targets
         with self.context.current():
-            self._targets = self.renderer.draw(
-                scene,
-                size=look.size,
-                samples=look.samples,
-                mapping=look.mapping,
-                contact=look.contact,
-                viewpoint=viewpoint,
-            )
+            drawing = self._drawing(scene, look, viewpoint, WHOLE_SLOT)
+            drawing.complete()
+            self.renderer.sweep()
             if wait:
                 self.context.gl.finish()
-        self._targets.picture = self
-        self._shown, self._values, self.drawn = shown, values, True
-        return self._targets
+        self._show(seen, drawing)
+        self.drawn = True
+        return drawing.targets
+
+    def prepare(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> float | None:
+        """Draw for about so long on a frame that is to come; once it is done, `draw` has nothing to do.
+
+        Whatever changes meanwhile, it begins anew. What is shown stays. Gives the seconds that the frame has
+        taken, none where it is shown already; None while it is not done.
+        """
+        seen = Seen.of(scene, look, viewpoint)
+        if self._shows(seen):
+            return 0.0
+        with self.context.current():
+            if self._coming is None or not seen.same(self._coming[0]):
+                self._coming = seen, self._drawing(scene, look, viewpoint, f"samples {look.samples}")
+            drawing = self._coming[1]
+            if not drawing.advance(seconds):
+                return None
+        self._coming = None
+        self._show(seen, drawing)
+        return drawing.seconds
+
+    def _shows(self, seen: Seen) -> bool:
+        return seen.same(self._shown) and self._targets is not None and self._targets.picture is self
+
+    def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection, slot: str) -> Drawing:
+        return self.renderer.drawing(
+            scene,
+            size=look.size,
+            samples=look.samples,
+            mapping=look.mapping,
+            contact=look.contact,
+            viewpoint=viewpoint,
+            slot=slot,
+        )
+
+    def _show(self, seen: Seen, drawing: Drawing) -> None:
+        self._shown, self._targets = seen, drawing.targets
+        drawing.targets.picture = self
 
     def nearest(self, x: int, y: int, size: Size) -> float:
         """Least depth that was drawn at a pixel of a frame of this size: 1 for nothing, 0 for not known."""
@@ -96,14 +151,8 @@ class Frame:
 
     def release(self) -> None:
         """Give everything back."""
-        self._targets = None
-        self._shown = ()
+        self._shown = self._targets = self._coming = None
         with self.context.current():
             self.renderer.release()
             self._composite.release()
             self.camera.release()
-
-
-def _shown(scene: SceneLike) -> tuple[object, ...]:
-    """The values, frozen but for an editor's, that a picture of a scene depends on."""
-    return (*scene.objects, scene.decals, *(image.pixels for image in scene.images))

@@ -16,7 +16,7 @@ from decals.checks import finite, shown, whole
 from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
-from decals.render import Renderer, SceneLike
+from decals.render import Renderer, SceneLike, Size
 from decals.render.tile import CameraBuffer
 from decals.scenes.scene import Box, SceneObject, bounds_of
 from decals.scenes.viewpoint import Floats, Projection
@@ -69,6 +69,7 @@ class Stage:
         self._context = context
         self._frame: Frame | None = None
         self._failed: object = None
+        self._drawn_size: Size | None = None
         me = weakref.ref(self)
         self._anchor = Anchor(renderer, lambda: _draw(me))
         self._placed: tuple[object, ...] = ()
@@ -266,27 +267,47 @@ class Stage:
         scene = self._scene
         if scene is None or self.vtk_renderer.GetSelector() is not None or self._failed is scene:
             return
-        try:
+        with self._failing(scene):
             self._draw(scene)
-        except Exception:
-            self._failed = scene  # say it once, not with every frame
-            raise
 
     def _draw(self, scene: SceneLike) -> None:
         frame = self._use_frame()
         viewport = frame.context.viewport()
-        size, samples = self._drawn_size(viewport[2:])
-        look = Look(size, max(samples, 1), self.mapping, self.contact)
+        look = self._look(viewport[2:], self.draw_scale, self.samples)
         targets = frame.draw(scene, look, self.viewpoint(), wait=self.measure)
+        samples = 0 if self.draw_scale < 1.0 else look.samples  # 0: magnified
         frame.composite(self.vtk_renderer.GetRenderWindow(), viewport, targets, samples)
+        self._drawn_size = viewport[2:]
 
-    def _drawn_size(self, viewport: tuple[int, int]) -> tuple[tuple[int, int], int]:
-        """Size in pixels and samples of what is drawn; 0 samples where it is to be magnified."""
-        if self.draw_scale < 1.0:
-            width, height = (max(1, round(self.draw_scale * side)) for side in viewport)
-            return (width, height), 0
-        supersampled = viewport[0] > self.vtk_renderer.GetSize()[0]
-        return viewport, 1 if supersampled else self.samples
+    def _look(self, size: Size, scale: float, samples: int) -> Look:
+        """How the part of a window is drawn that has this size."""
+        if scale < 1.0:
+            width, height = (max(1, round(scale * side)) for side in size)
+            return Look((width, height), 1, self.mapping, self.contact)
+        supersampled = size[0] > self.vtk_renderer.GetSize()[0]
+        return Look(size, 1 if supersampled else samples, self.mapping, self.contact)
+
+    def prepare(self, samples: int, seconds: float) -> float | None:
+        """Draw for about so long on a whole frame with so many samples, and show nothing of it yet.
+
+        Gives the seconds that it has taken in all, None while it is not done. From then on frames with a
+        `draw_scale` of 1 and these `samples` show it. What changes meanwhile makes it begin anew.
+        """
+        scene = self.scene
+        if scene is None or self._failed is scene or self._drawn_size is None:
+            return 0.0
+        look = self._look(self._drawn_size, 1.0, samples)
+        with self._failing(scene):
+            return self._use_frame().prepare(scene, look, self.viewpoint(), seconds)
+
+    @contextmanager
+    def _failing(self, scene: SceneLike) -> Iterator[None]:
+        """Draw a scene that cannot be drawn no more: whoever waits for it hears of it once."""
+        try:
+            yield
+        except Exception:
+            self._failed = scene
+            raise
 
     def _use_frame(self) -> Frame:
         """Give what draws; made anew where the window has another context than before."""

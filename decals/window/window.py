@@ -26,8 +26,17 @@ from decals.window.home import SIZE, checked_size, lent_plotter, new_plotter, re
 from decals.window.marks import Marks
 from decals.window.quality import Quality
 
-TICK = 100
-"""Milliseconds between looks at the background work."""
+TICK = 20
+"""Milliseconds between looks at what goes on."""
+
+SLICE = 0.04
+"""Seconds that are drawn on a whole frame at a time; in between the window listens."""
+
+NEWS = 0.1
+"""Seconds between two pictures of how far the background work is."""
+
+GLANCE = 0.25
+"""Size of the very first frame, when nobody knows how fast the machine is."""
 
 REST = 0.2
 """Seconds without any movement after which a whole frame is drawn."""
@@ -94,7 +103,7 @@ class EditWindow:
         self.grip = Grip(self.stage.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole))
         self._interactor = self.plotter.iren.interactor
         self._bindings = Bindings(self, self._interactor)
-        self._timer, self._moved = 0, 0.0
+        self._timer, self._moved, self._told = 0, 0.0, 0.0
         self._whole: tuple[int, ...] = self._shown
 
     def _open_stage(self) -> None:
@@ -167,15 +176,19 @@ class EditWindow:
         self.plotter.render()
 
     def _refine(self) -> None:
-        """Draw better than now: first at the window's size, then, at the next tick, with all samples.
-
-        In between the window listens, so whoever goes on waits for one frame at most.
-        """
-        if self.stage.draw_scale < 1.0 < self.samples:
-            self.stage.draw_scale, self.stage.samples = 1.0, 1
-            self.plotter.render()
-        else:
+        """Draw better than now, slice by slice: first at the window's size, then with all samples."""
+        samples = 1 if self.stage.draw_scale < 1.0 else self.samples
+        if self.quality.expected(samples) > SLICE:
+            seconds = self.stage.prepare(samples, SLICE)
+            if seconds is None:
+                return
+            if seconds:
+                self.quality.saw(samples, seconds)
+        if samples == self.samples:
             self.rest()
+        else:
+            self.stage.draw_scale, self.stage.samples = 1.0, samples
+            self.plotter.render()
 
     def _timed(self, *, begin: bool) -> None:
         if begin:
@@ -188,14 +201,14 @@ class EditWindow:
 
     def tick(self) -> None:
         """Look after the background work, and draw a whole frame once nothing moves."""
-        busy = self.worker.busy
-        if busy:
+        now = time.perf_counter()
+        if self.worker.busy and now - self._told > NEWS:
+            self._told = now
             self._finish()
             self.marks.say(self._status())
-        if self._moved and time.perf_counter() - self._moved > REST and not self.tools.dragging:
-            self._refine()
-        elif busy:
             self.plotter.render()
+        elif self._moved and now - self._moved > REST and not self.tools.dragging:
+            self._refine()
 
     def _start(self, job: Job) -> None:
         if not self.worker.start(job):
@@ -251,6 +264,7 @@ class EditWindow:
         self.plotter.iren.initialize()
         if self.ticking:
             self._timer = self._interactor.CreateRepeatingTimer(TICK)
+            self.stage.draw_scale, self._moved = GLANCE, time.perf_counter() - REST
         if self._guest:
             self.plotter.render()
             return

@@ -19,6 +19,7 @@ import numpy as np
 
 from decals.edit import EditSession
 from decals.window import EditWindow
+from decals.window.window import REST
 from tests.bench.scenes import bench_scene
 from tests.window.driver import Driver
 
@@ -31,6 +32,8 @@ TARGETS = {
     "creature_turn_ms": "≤ 100",
     "creature_primitive_ms": "≤ 100",
     "creature_scatter_longest_ms": "≤ 100",
+    "knot_rest_longest_block_ms": "≤ 100",
+    "creature_rest_longest_block_ms": "≤ 100",
 }
 MODELS = ("knot", "creature")
 STEPS = 25
@@ -65,14 +68,21 @@ def drag(driver: Driver, name: str, steps: int) -> Figures:
     _, at = next(driver.visible())
     driver.click(at)
     driver.event("LeftButtonPressEvent", at)
+    stage = driver.window.stage
+    draw, drawn = stage.draw, []
+    stage.draw = lambda: drawn.append(timed(draw)[0])  # type: ignore[method-assign]
     times = [
         timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
         for place in around(at, steps + WARM)
     ]
+    del stage.draw
     scale = driver.window.stage.draw_scale
     driver.event("LeftButtonReleaseEvent", at)
     driver.key("z", ctrl=True)
-    return medians(f"{name}_drag", times) | {f"{name}_drag_scale": scale}
+    return medians(f"{name}_drag", times) | {
+        f"{name}_drag_scale": scale,
+        f"{name}_drag_draw_ms": float(np.median(drawn[WARM:] or drawn)),
+    }
 
 
 def turn(driver: Driver, name: str, steps: int) -> Figures:
@@ -140,6 +150,27 @@ def whole(window: EditWindow, name: str) -> Figures:
     return {f"{name}_whole_ms": float(wall), f"{name}_whole_busy_ms": float(used)}
 
 
+def rest(window: EditWindow, name: str) -> Figures:
+    """Let everything rest after a movement, until the frame is whole, four samples a pixel.
+
+    The longest block is the longest time between two chances for the window to listen.
+    """
+    window.samples = 2
+    window.redraw(whole=False)
+    window._moved -= REST
+    begin, longest, slices = time.perf_counter(), 0.0, 0
+    while window._moved:
+        longest = max(longest, timed(window.tick)[0])
+        slices += 1
+    seconds = time.perf_counter() - begin
+    window.samples = 1
+    return {
+        f"{name}_rest_longest_block_ms": longest,
+        f"{name}_rest_slices": slices,
+        f"{name}_rest_s": seconds,
+    }
+
+
 def measure(models: tuple[str, ...], size: tuple[int, int], count: int, steps: int) -> Figures:
     """Measure one model after another."""
     figures: Figures = {}
@@ -148,6 +179,7 @@ def measure(models: tuple[str, ...], size: tuple[int, int], count: int, steps: i
         with EditWindow(session, off_screen=True, size=size, samples=1) as window:
             window.show()
             figures |= whole(window, name)
+            figures |= rest(window, name)
             window.rest = window.plotter.render  # type: ignore[method-assign]
             driver = Driver(window)
             kinds = (drag, turn, primitive, scatter) if name == "creature" else (drag, turn)

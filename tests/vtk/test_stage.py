@@ -13,6 +13,7 @@ from decals.grid.editor import DecalEditor
 from decals.render import TRANSPARENT
 from decals.scenes.scene import MeshObject
 from decals.vtk.component import triangles
+from decals.vtk.stage import Stage
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import both, shot
@@ -116,6 +117,57 @@ def test_the_stages_renderer_may_draw_other_things_in_between(plotter: Factory) 
             stage.renderer.render(other, size=size, samples=1)
             stage.renderer.draw(other, size=size)
         np.testing.assert_array_equal(shot(pl), first)
+
+
+def prepared(stage: Stage, samples: int) -> int:
+    """Prepare a frame by the smallest parts; how many there were."""
+    for turns in range(1, 10_000):
+        shown = stage.prepare(samples, 0.0)
+        if shown is not None:
+            assert shown > 0
+            return turns
+    raise AssertionError("the frame is never done")
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory, samples: int) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    stage = pl.decals.stage
+    stage.samples = samples
+    whole = shot(pl)
+    stage.draw_scale = 0.5
+    small = shot(pl)
+    assert stage.prepare(samples, 0.0) is None
+    np.testing.assert_array_equal(shot(pl), small)
+    assert not stage.drawn
+    assert prepared(stage, samples) > 100
+    assert stage.prepare(samples, 0.0) == 0.0
+    stage.draw_scale = 1.0
+    np.testing.assert_array_equal(shot(pl), whole)
+    assert not stage.drawn
+
+
+def test_what_changes_while_a_frame_is_prepared_is_in_it(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    stage = pl.decals.stage
+    stage.draw_scale = 0.5
+    shot(pl)
+    for _ in range(100):
+        stage.prepare(2, 0.0)
+    pl.camera.position = np.array(pl.camera.position) + 0.1
+    pl.decals.scene = both().replace(decals=both().decals[:60])
+    shot(pl)
+    prepared(stage, 2)
+    stage.draw_scale = 1.0
+    seen = shot(pl)
+    assert not stage.drawn
+    stage.draw_scale = 0.5
+    shot(pl)
+    stage.draw_scale = 1.0
+    np.testing.assert_array_equal(shot(pl), seen)
+    assert stage.drawn
 
 
 def test_an_editors_changes_are_drawn(plotter: Factory) -> None:

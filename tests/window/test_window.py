@@ -223,17 +223,36 @@ def test_frames_that_are_shown_again_say_nothing_of_the_machine(driver):
     assert driver.window.quality.expected(2.0) == pytest.approx(10.0)
 
 
-def test_what_rests_is_drawn_better_tick_by_tick(driver, monkeypatch):
-    window, drawn = driver.window, []
+def test_what_rests_is_drawn_better_slice_by_slice(driver, monkeypatch):
+    """Ticks draw parts, never a frame; whoever moves something in between waits for none of it."""
+    window, stage = driver.window, driver.window.stage
+    whole = driver.shot()
+    monkeypatch.setattr("decals.window.window.SLICE", 0.0)
     window.quality.saw(2.0, 10.0)
     window.redraw(whole=False)
     window.tick()
-    assert window.stage.draw_scale < 1
+    assert stage.draw_scale < 1
     monkeypatch.setattr("decals.window.window.REST", 0.0)
-    for _ in range(3):
+    frames = []
+    drawing = stage.draw
+
+    def counted():
+        drawing()
+        frames.append((stage.draw_scale, stage.samples, stage.drawn))
+
+    monkeypatch.setattr(stage, "draw", counted)
+    for _ in range(100):
         window.tick()
-        drawn.append((window.stage.draw_scale, window.stage.samples))
-    assert drawn == [(1.0, 1), (1.0, 2), (1.0, 2)]
+    assert frames == []
+    window.redraw(whole=False)
+    ticks = 0
+    while window._moved:
+        window.tick()
+        ticks += 1
+    assert ticks > 500
+    assert [look for *look, _ in frames[1:]] == [[1.0, 1], [1.0, 2]]
+    assert not any(drawn for *_, drawn in frames[1:])
+    np.testing.assert_array_equal(driver.shot(), whole)
 
 
 def test_saving_keeps_the_windows_camera(opened, tmp_path):

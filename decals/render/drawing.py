@@ -1,0 +1,105 @@
+"""Pictures in the making, for whoever must not wait for a whole one."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+from decals.render.parts import Part, Step
+from decals.render.targets import Targets
+
+UNITS = 1024
+"""Parts of a step begin and end at multiples of 1 / UNITS."""
+LEAST, FIRST, MOST = 4, 8, 16
+"""Units that are drawn at once: at least, in the beginning, and at most, because rows that show
+much may follow rows that show nothing."""
+SHARE = 0.25
+"""Of the time that is given, so much should go by between two looks at the clock."""
+
+
+class Drawing:
+    """A picture in the making: the same as `Renderer.draw` gives at once, bit for bit.
+
+    Parameters
+    ----------
+    targets
+        Ends with what is drawn into; before that come Nones, while it is being made.
+    steps
+        Gives what is to be drawn into the targets, always the same; asked whenever somebody goes on.
+    finish
+        Waits until the card has done what it was told.
+    clock
+        Seconds.
+
+    Attributes
+    ----------
+    done
+        Whether the picture is in the targets.
+    seconds
+        What drawing it has taken until now.
+    """
+
+    def __init__(
+        self,
+        targets: Iterator[Targets | None],
+        steps: Callable[[Targets], Sequence[Step]],
+        finish: Callable[[], None],
+        *,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._making = targets
+        self._targets: Targets | None = None
+        self.done, self.seconds = False, 0.0
+        self._steps, self._finish, self._clock = steps, finish, clock
+        self._number, self._at, self._step = 0, 0, FIRST
+
+    @property
+    def targets(self) -> Targets:
+        """What is drawn into; the picture is there once `done`."""
+        while self._targets is None:
+            self._targets = next(self._making)
+        return self._targets
+
+    def advance(self, seconds: float) -> bool:
+        """Draw for about so long, one part at least; say whether the picture is done.
+
+        The context must be current, and what is shown as it was when the drawing began.
+        """
+        begin = before = self._clock()
+        steps: Sequence[Step] = ()
+        while not self.done and before - begin <= (1.0 - SHARE) * seconds:
+            if self._targets is None:
+                self._targets = next(self._making)
+                before = self._clock()
+                continue
+            steps = steps or self._begin(self._targets)
+            self._draw(steps)
+            now = self._clock()
+            self._pace(now - before, SHARE * seconds)
+            before = now
+        self.seconds += before - begin
+        return self.done
+
+    def complete(self) -> None:
+        """Draw all that is missing at once."""
+        for number, step in enumerate(self._begin(self.targets)):
+            if number >= self._number:
+                step(Part(self._at / UNITS if number == self._number else 0.0))
+        self.done = True
+
+    def _begin(self, targets: Targets) -> Sequence[Step]:
+        targets.picture = None
+        return self._steps(targets)
+
+    def _draw(self, steps: Sequence[Step]) -> None:
+        """Draw the next part."""
+        end = min(self._at + self._step, UNITS)
+        steps[self._number](Part(self._at / UNITS, end / UNITS))
+        self._finish()
+        self._at = end
+        if end == UNITS:
+            self._number, self._at = self._number + 1, 0
+            self.done = self._number == len(steps)
+
+    def _pace(self, took: float, wished: float) -> None:
+        """Choose the size of the next part: steps differ, so each begins small."""
+        fitting = self._step * wished / max(took, 1e-9)
+        self._step = FIRST if self._at == 0 else int(min(max(fitting, LEAST), MOST))

@@ -1,0 +1,22 @@
+"""Pieces of a picture: what is drawn part by part is the same as the whole at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """From where to where in something that is drawn part by part: rows, or faces; 0 to 1."""
+
+    begin: float = 0.0
+    end: float = 1.0
+
+    def of(self, count: int) -> tuple[int, int]:
+        """Number of the first of these many, and of the first after the last."""
+        return round(self.begin * count), round(self.end * count)
+
+
+WHOLE = Part()
+
+Step = Callable[[Part], None]
+"""Something that a picture takes. Its parts, one after the other, are the same as the whole at once."""
