@@ -15,6 +15,14 @@ VIEWPORT = 0x0BA2
 FRAMEBUFFER = 0x8D40
 """GL_FRAMEBUFFER."""
 
+VTK_VERSION = 320
+"""OpenGL that VTK makes do with. Some drivers give just that, and do more."""
+
+_TRIAL = """#version 330 core
+out vec4 place;
+void main() { place = vec4(0.0); gl_Position = place; }
+"""
+
 _idle: dict[str, list[moderngl.Context]] = {}
 """What windows that are gone leave behind, by driver: moderngl never gives all of its memory back."""
 
@@ -38,11 +46,24 @@ def _attach(window: Any) -> moderngl.Context:
                 f"expected a window that draws through EGL, GLX, WGL or macOS, got a {window.GetClassName()} "
                 f"({error}); set the environment variable VTK_DEFAULT_OPENGL_WINDOW to another kind"
             ) from error
-        return moderngl.create_context(context=loader)
+        gl = moderngl.create_context(require=VTK_VERSION, context=loader)
+        _require_language(gl)
+        return gl
     gl = idle.pop()
     gl.fbo = gl.detect_framebuffer()  # as create_context does: the old window's is gone
     gl.mglo.fbo = gl.fbo.mglo
     return gl
+
+
+def _require_language(gl: moderngl.Context) -> None:
+    """Refuse a context that cannot take our shaders; its version may be no more than what VTK asked for."""
+    try:
+        gl.program(vertex_shader=_TRIAL).release()
+    except moderngl.Error as error:
+        here = f"{gl.info['GL_RENDERER']}, OpenGL {gl.info['GL_VERSION']}"
+        raise NoGraphics(
+            f"expected a window that takes shaders of version 3.30, got {here}; a newer driver may help"
+        ) from error
 
 
 class WindowContext(Context):
