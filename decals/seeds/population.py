@@ -71,14 +71,14 @@ class World:
 
     def __init__(
         self,
-        surfaces: Sequence[Surface],
+        surfaces: Surface | Sequence[Surface],
         seed: int,
         *,
         density: Density | None = None,
         mask: Mask | None = None,
         device: str = "cpu",
     ) -> None:
-        self.surfaces = tuple(surfaces)
+        self.surfaces = surfaces_of(surfaces)
         self.device = device
         self._seed, self._density, self._mask = seed, density, mask
         self.settling = Settling(self.surfaces, self._outside if mask is not None else None, device)
@@ -87,11 +87,12 @@ class World:
         self.masses = np.array([mass for _, mass in measures])
         self._rims: dict[int, Rims] = {}
 
-    def deformed(self, surfaces: Sequence[Surface]) -> "World":
+    def deformed(self, surfaces: Surface | Sequence[Surface]) -> "World":
         """Other surfaces in place of these, one for one, under the same rules."""
-        if len(surfaces) != len(self.surfaces):
-            raise InvalidSeeding(f"expected {len(self.surfaces)} surfaces as before, got {len(surfaces)}")
-        return World(surfaces, self._seed, density=self._density, mask=self._mask, device=self.device)
+        others = surfaces_of(surfaces)
+        if len(others) != len(self.surfaces):
+            raise InvalidSeeding(f"expected {len(self.surfaces)} surfaces as before, got {len(others)}")
+        return World(others, self._seed, density=self._density, mask=self._mask, device=self.device)
 
     @property
     def area(self) -> float:

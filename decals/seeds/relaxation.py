@@ -59,7 +59,7 @@ class Relaxation:
     Parameters
     ----------
     surfaces
-        Where the particles live.
+        Where the particles live: one or several.
     count
         How many there are, exactly, the fixed ones included.
     spacing
@@ -87,7 +87,7 @@ class Relaxation:
 
     def __init__(
         self,
-        surfaces: Sequence[Surface],
+        surfaces: Surface | Sequence[Surface],
         *,
         count: int | None = None,
         spacing: float | None = None,
@@ -264,21 +264,24 @@ class Relaxation:
         self._fixed = np.delete(self._fixed, number)
         self._relax_near(sites, place)
 
-    def deform(self, surfaces: Sequence[Surface]) -> None:
+    def deform(self, surfaces: Surface | Sequence[Surface]) -> None:
         """Take other surfaces in place of those there are, one for one, and carry the particles along.
 
         On a mesh with the same faces each stays at its place in its face; elsewhere it is put onto the new
-        surface where that is closest, on a tree along the field. Who ends up hidden or barred starts again at
-        random. Counts stay, of each surface too; the spacing follows the area. A few calls of `step` even
+        surface where that is closest, on a tree along the field. Where that would heap them up, the surface
+        having gone too far, they first move as the box around it. Who ends up hidden or barred starts again
+        at random. Counts stay, of each surface too; the spacing follows the area. A few calls of `step` even
         out what was stretched; nothing else changes, so a viewer may show every one.
 
         Raises
         ------
         InvalidSeeding
-            If there are not as many surfaces as before, or particles have no visible area to lie on.
+            If there are not as many surfaces as before, particles have no visible area to lie on, or they
+            would end up in a heap all the same; nothing has changed then.
         """
         world = self.world.deformed(surfaces)
-        sites = freed(world, carried(self.world, world, self.sites), self._fixed, stream=self.steps)
+        sites = carried(self.world, world, self.sites, self.spacing)
+        sites = freed(world, sites, self._fixed, stream=self.steps)
         self.world = world
         self.spacing = ideal_spacing(world.mass, self.count)
         self._scouts = Scouts(world, self.sizes_at)

@@ -129,3 +129,52 @@ def test_impossible_deformations_are_refused():
     empty = Relaxation([plane()], count=0)
     empty.deform([plane(2.0)])
     assert empty.count == 0
+
+
+def test_a_tree_that_jumps_far_away_takes_everybody_with_it():
+    """The nearest place of a ball ten radii off is a small cap of it."""
+    relaxation = Relaxation([blob(0.0)], count=400)
+    relaxation.run()
+    before = relaxation.positions
+    relaxation.deform([blob(20.0)])
+    assert relaxation.positions == pytest.approx(before + np.float32([20, 0, 0]), abs=2e-3)
+    assert relaxation.statistics().rho > 0.8
+
+
+@pytest.mark.parametrize("factors", [(3.0, 3.0, 3.0), (4.0, 1.0, 1.0)])
+def test_a_mesh_of_other_faces_far_away_takes_everybody_with_it(factors):
+    relaxation = Relaxation(sphere(), count=300)
+    relaxation.run()
+    other = sphere(level=5)
+    far = MeshSurface(other.vertices * np.float32(factors) + np.float32([0, 50, 0]), other.faces)
+    relaxation.deform(far)
+    gaps = np.linalg.norm(far.project(relaxation.positions)[0] - relaxation.positions, axis=1)
+    assert gaps.max() < 1e-4 * relaxation.spacing
+    for _ in range(40):
+        relaxation.step()
+    assert relaxation.statistics().rho > 0.6
+
+
+def test_who_cannot_follow_is_told_so_and_nothing_changes():
+    """A ball becomes two crumbs at the far corners of a large box."""
+    relaxation = Relaxation([sphere()], count=300, iterations=40)
+    relaxation.run()
+    positions, spacing, world = relaxation.positions.copy(), relaxation.spacing, relaxation.world
+    corner = [[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0], [0, 0, 0.02]]
+    crumbs = np.concatenate([np.add(corner, 30.0), np.add(corner, 60.0)])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    with pytest.raises(InvalidSeeding, match="surface 0: expected one that its 300 seeds can follow"):
+        relaxation.deform([MeshSurface(crumbs, np.concatenate([faces, faces + 4]))])
+    assert np.array_equal(relaxation.positions, positions)
+    assert relaxation.spacing == spacing
+    assert relaxation.world is world
+    relaxation.step()
+    assert relaxation.statistics().rho > 0.5
+
+
+@pytest.mark.parametrize("wrong", [None, 5, [None], "x", [sphere(), None], []])
+def test_what_is_no_surface_cannot_be_deformed_to(wrong):
+    relaxation = Relaxation([sphere()], count=20, iterations=2)
+    with pytest.raises(InvalidSeeding, match="expected"):
+        relaxation.deform(wrong)
+    assert relaxation.count == 20
