@@ -4,6 +4,7 @@ BlobTreeError (ValueError)
 ├── InvalidNode         a node was given a parameter that makes no field
 ├── InvalidPoints       points to evaluate are not a finite n×3 array
 ├── InvalidResolution   a cell size or resolution that no grid can have
+├── InvalidDevice       a Warp device that there is not
 ├── InvalidFile         a file that holds no BlobTree
 ├── InvalidDefinition   an own skeleton or operator is not what its definition claims
 ├── UnknownKind         a node of an own kind that this process has no definition of
@@ -27,6 +28,10 @@ class InvalidPoints(BlobTreeError):
 
 class InvalidResolution(BlobTreeError):
     """A cell size or resolution that no grid can have."""
+
+
+class InvalidDevice(BlobTreeError):
+    """A Warp device that there is not."""
 
 
 class InvalidFile(BlobTreeError):

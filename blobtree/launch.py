@@ -10,6 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from blobtree.errors import InvalidDevice
+
 SLICES_PER_THREAD = 4
 """More slices than threads even out slices of unequal cost."""
 
@@ -27,6 +29,15 @@ PAGES_WORTH_SHARING = 1024
 @cache
 def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix="blobtree")
+
+
+def known_device(device: Any = None) -> str:
+    """The name of a Warp device, by default the current one; `InvalidDevice` if there is none such."""
+    try:
+        return str(wp.get_device(device))
+    except (TypeError, ValueError):
+        there = ", ".join(repr(str(one)) for one in wp.get_devices())
+        raise InvalidDevice(f"device: expected a Warp device ({there}), got {device!r}") from None
 
 
 def launch(

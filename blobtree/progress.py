@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from blobtree.errors import Cancelled
+from blobtree.errors import BlobTreeError, Cancelled
 
 Progress = Callable[[str, float], None]
 """Called with the stage in plain words and the fraction of it that is done, from 0 to 1."""
@@ -13,6 +13,9 @@ Cancel = Callable[[], bool]
 
 def watched(progress: Progress | None, cancel: Cancel | None) -> Progress:
     """A callback that passes reports on and raises `Cancelled` at the first one after `cancel` says so."""
+    for name, callback in (("progress", progress), ("cancel", cancel)):
+        if callback is not None and not callable(callback):
+            raise BlobTreeError(f"{name}: expected a function or None, got {callback!r}")
 
     def report(stage: str, fraction: float) -> None:
         if cancel is not None and cancel():

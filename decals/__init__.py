@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .errors import (
         DecalsError,
         InvalidDecals,
+        InvalidDevice,
         InvalidEdit,
         InvalidImage,
         InvalidMesh,
@@ -69,6 +70,7 @@ __all__ = [
     "ImplicitSurface",
     "Interaction",
     "InvalidDecals",
+    "InvalidDevice",
     "InvalidEdit",
     "InvalidImage",
     "InvalidMesh",
@@ -120,6 +122,7 @@ _HOMES = {
     "errors": (
         "DecalsError",
         "InvalidDecals",
+        "InvalidDevice",
         "InvalidEdit",
         "InvalidImage",
         "InvalidMesh",

@@ -52,5 +52,5 @@ def triple(name: str, value: Any, error: type[DecalsError]) -> NDArray[np.float6
 def shown(value: object) -> str:
     """Show what came in a few words: numbers and text as they are, other things by their type."""
     if isinstance(value, int | float | str | bytes | list | tuple | np.number | np.ndarray) or value is None:
-        return f"{value!r:.60}"
+        return " ".join(f"{value!r:.60}".split())
     return f"a {type(value).__name__}"

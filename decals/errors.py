@@ -6,6 +6,7 @@
     ├── InvalidDecals(ValueError)             arrays that are no decals: shapes, NaN, radius ≤ 0, ...
     ├── InvalidMesh(ValueError)               a mesh that has no surface: empty, NaN, zero area, ...
     ├── InvalidPoints(ValueError)             points or directions that are none: shapes, NaN, ...
+    ├── InvalidDevice(ValueError)             a Warp device that there is not
     ├── InvalidSeeding(ValueError)            an impossible wish for seeds: negative count, no surface, ...
     ├── InvalidImage(ValueError)              a file or array that is no image
     ├── InvalidScene(ValueError)              a scene or scene file that does not hold together
@@ -31,6 +32,10 @@ class InvalidMesh(DecalsError, ValueError):
 
 class InvalidPoints(DecalsError, ValueError):
     """Points or directions that are none."""
+
+
+class InvalidDevice(DecalsError, ValueError):
+    """A Warp device that there is not."""
 
 
 class InvalidSeeding(DecalsError, ValueError):

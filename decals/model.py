@@ -43,7 +43,8 @@ RECORD = 4
 DEFAULT_RANK = 4 * LAYERS + 1
 """Rank of a contact decal of layer 0."""
 
-_MOST_IMAGES = 2**24  # the packed record carries an image's index as a float32
+MOST_IMAGES = 2**24
+"""Images that there may be: the packed record carries an image's number as a float32."""
 
 Floats = NDArray[np.float32]
 
@@ -129,7 +130,7 @@ class Decals:
             "normals": normals.astype(np.float32),
             "tangents": orthogonal(unit("tangents", tangents), normals).astype(np.float32),
             "radii": radii.astype(np.float32),
-            "images": whole("images", self.images, count, low=PLAIN, high=_MOST_IMAGES - 1, default=0),
+            "images": whole("images", self.images, count, low=PLAIN, high=MOST_IMAGES - 1, default=0),
             "spill": flags("spill", self.spill, count),
             "interactions": whole(
                 "interactions", self.interactions, count, low=0, high=2, default=Interaction.CONTACT

@@ -16,7 +16,7 @@ from blobtree.launch import fresh_memory
 from blobtree.meshing.chord import FIRST_RESOLUTION, MOST_PASSES, SMALLEST, finer, largest_error
 from blobtree.meshing.creases import sharpened
 from blobtree.meshing.surface import Surface, extract_surface
-from blobtree.nodes.tree import Node
+from blobtree.nodes.tree import Node, checked_tree
 from blobtree.progress import Cancel, Progress, watched
 from blobtree.sparse.cells import build_cells
 from blobtree.sparse.grid import Grid, aligned_grid
@@ -90,11 +90,14 @@ def polygonize(
 
     Raises
     ------
+    InvalidNode, InvalidDevice
+        `tree` or `device` is none.
     InvalidResolution
         Several or senseless sizes were given, more cells than can be counted, or none that are small enough.
     Cancelled
         `cancel` said so.
     """
+    checked_tree(tree)
     if chord_error is None:
         return Polygonizer(
             tree,
@@ -154,7 +157,7 @@ class Polygonizer:
 
     Raises
     ------
-    InvalidResolution, Cancelled
+    InvalidNode, InvalidDevice, InvalidResolution, Cancelled
         As for `polygonize`; the last mesh stays.
     """
 
@@ -169,6 +172,7 @@ class Polygonizer:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
     ) -> None:
+        checked_tree(tree)
         self._device = device
         self._creases = creases
         self._cell_size = _cell_size(tree, resolution, cell_size)
@@ -213,6 +217,7 @@ class Polygonizer:
     ) -> Surface:
         """The same without bringing the triangles to the host."""
         report = watched(progress, cancel)
+        checked_tree(tree)
         self._surface, self._shown, self._meetings = self._extract(tree, self._surface, report)
         self._tree, self._mesh = tree, None
         return self._shown

@@ -1,10 +1,13 @@
 """Meshes for display: a vertex on a crease in several copies, one with the normal of each side."""
 
+import reprlib
+
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.errors import InvalidPoints
 from blobtree.meshing.polygonize import Mesh
-from blobtree.nodes.tree import Node
+from blobtree.nodes.tree import Node, checked_tree
 
 INWARD = 0.05
 """How far into a triangle, over the way to its middle, its side of a crease is looked at."""
@@ -21,6 +24,9 @@ def split_creases(tree: Node, mesh: Mesh) -> Mesh:
     A renderer that blends normals over triangles then shows creases as edges. The sides share positions but
     no vertices any more, so the mesh is no longer closed.
     """
+    checked_tree(tree)
+    if not isinstance(mesh, Mesh):
+        raise InvalidPoints(f"mesh: expected what polygonize() returns, got {reprlib.repr(mesh)}")
     if mesh.meetings is None:
         return mesh
     faces = mesh.faces.copy()

@@ -31,6 +31,7 @@ from blobtree.nodes.tree import (
     Transform,
     Twist,
     Union,
+    checked_tree,
 )
 from blobtree.own.operator import OwnCombination
 from blobtree.own.registry import find_kind
@@ -207,7 +208,8 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def to_document(root: Node) -> Document:
-    """The tree as records."""
+    """The tree as records; InvalidNode for what is no tree."""
+    checked_tree(root)
     order = postorder(root)
     place = {id(node): index for index, node in enumerate(order)}
     return Document("blobtree", VERSION, tuple(_record(node, place) for node in order))
@@ -241,6 +243,8 @@ def from_json(text: bytes | str) -> Node:
     """The tree that a JSON text holds; InvalidFile where it holds none."""
     try:
         document = msgspec.json.decode(text, type=Document)
+    except TypeError:
+        raise InvalidFile(f"expected JSON as text or bytes, got {type(text).__name__}") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InvalidFile(f"not a BlobTree of version {VERSION}: {error}") from None
     except RecursionError:
@@ -255,6 +259,8 @@ def save(root: Node, path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str]) -> Node:
     """Read the tree in the file `path`; InvalidFile where it holds none, OSError where it cannot be read."""
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidFile(f"path: expected the path of a file, got {path!r}")
     try:
         return from_json(Path(path).read_bytes())
     except InvalidFile as error:

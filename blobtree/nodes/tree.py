@@ -7,6 +7,7 @@
 """
 
 import math
+import reprlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -316,6 +317,13 @@ class Twist(Node):
     def parameters(self) -> tuple[float, ...]:
         """The turn per unit in radians."""
         return (math.radians(self.degrees),)
+
+
+def checked_tree(tree: object) -> Node:
+    """`tree`, if it is one; InvalidNode otherwise."""
+    if not isinstance(tree, Node):
+        raise InvalidNode(f"tree: expected a BlobTree node such as Point(...), got {reprlib.repr(tree)}")
+    return tree
 
 
 def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:

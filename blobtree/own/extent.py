@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.vocabulary import only
 from blobtree.kernel_options import KERNEL_OPTIONS
-from blobtree.launch import launch
+from blobtree.launch import known_device, launch
 from blobtree.tapes.dispatch import closest, stride
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -112,7 +112,7 @@ def skeleton_boxes(skeleton: Skeleton, texels: Floats, sizes: Floats) -> tuple[F
     sizes
         Largest number (n,) among the parameters of each.
     """
-    device = str(wp.get_device())
+    device = known_device()
     count = len(texels)
     tape = np.concatenate([texels, np.zeros((count, 1, 4))], axis=1).reshape(-1, 4)
     reaches = np.clip(FARTHEST * np.maximum(sizes, 1.0), None, LARGEST_REACH)

@@ -109,6 +109,10 @@ def parameters_of(
         One has a type that fits on no tape or a name that every node has, or limits that allow nothing.
     """
     taken = {"_", *dir(base), "radius", "color", "operands"}
+    if not isinstance(limits, Mapping | None):
+        raise source.refusal(
+            f"limits: expected {{parameter: (smallest or None, largest or None), ...}}, got {limits!r}"
+        )
     given = dict(limits or {})
     parameters = []
     for name in own:

@@ -92,7 +92,7 @@ def own_source(function: Any, *, returns: Any) -> OwnSource:
 def kind_name(source: OwnSource, name: str | None) -> str:
     """What files call the kind that is made of a function: `name`, or the function's own."""
     wanted = source.name if name is None else name
-    if not PLAIN_NAME.fullmatch(wanted):
+    if not isinstance(wanted, str) or not PLAIN_NAME.fullmatch(wanted):
         raise source.refusal(f"name: expected letters, digits and single underscores, got {wanted!r}")
     return wanted
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.formulas.vocabulary import Vocabulary
-from blobtree.launch import launch
+from blobtree.launch import known_device, launch
 from blobtree.memory import demand_memory
 from blobtree.progress import Progress
 from blobtree.sparse.cull import count_reaching, name_children, pieces_of, write_reaching
@@ -100,7 +100,7 @@ def build_cells(
             f"tree: its tape takes {len(tape.data):,} texels, at most {MOST_TEXELS:,} can be counted; "
             "split the model"
         )
-    place = str(wp.get_device(device))
+    place = known_device(device)
     if previous is not None and not _comparable(previous, tape, grid, place):
         previous = None
     levels = [_root(tape, grid, previous, place)]

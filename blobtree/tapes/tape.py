@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from blobtree.errors import InvalidNode
 from blobtree.formulas.kernels import RIM
 from blobtree.formulas.vocabulary import BUILT_IN, Vocabulary, vocabulary_of
+from blobtree.launch import known_device
 from blobtree.tapes.program import (
     EnterWarp,
     Instruction,
@@ -87,7 +88,7 @@ class Tape:
 
     def on(self, device: str | None = None) -> DeviceTape:
         """This tape on a Warp device, by default the current one."""
-        return _upload(self, str(wp.get_device(device)))
+        return _upload(self, known_device(device))
 
 
 @lru_cache(maxsize=64)

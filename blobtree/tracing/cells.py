@@ -9,6 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.formulas.vocabulary import Vocabulary
+from blobtree.launch import known_device
 from blobtree.sparse.cells import SparseCells, build_cells
 from blobtree.sparse.grid import BRANCHING, CHILDREN, grid_from
 from blobtree.sparse.refine import SURELY_OUTSIDE
@@ -83,12 +84,12 @@ def tracing_cells(tree: "Node", *, device: str | None = None) -> TracingCells:
 
     `device` is the Warp device that makes them, by default the current one.
     """
-    return _tracing_cells(tree.tape, *_corners(tree), str(wp.get_device(device)))
+    return _tracing_cells(tree.tape, *_corners(tree), known_device(device))
 
 
 def device_cells(tree: "Node", *, device: str | None = None) -> DeviceCells:
     """The same in a device's memory."""
-    return _device_cells(tree.tape, *_corners(tree), str(wp.get_device(device)))
+    return _device_cells(tree.tape, *_corners(tree), known_device(device))
 
 
 def trace_tolerance(bounds: Bounds) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree.errors import InvalidPoints
 from blobtree.kernel_options import KERNEL_OPTIONS
-from blobtree.launch import launch
+from blobtree.launch import known_device, launch
 from blobtree.tapes.evaluate import field_color, field_gradient
 from blobtree.tracing.cells import device_cells
 from blobtree.tracing.rays import trace_ray
@@ -150,4 +150,5 @@ def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> 
         raise InvalidPoints("directions: expected vectors with a length, got a zero vector")
     # Squares of tiny components would vanish from a length; powers of two change no bit of a direction.
     headings = np.ldexp(headings, -np.frexp(largest)[1][:, None])
-    return [wp.array(array, dtype=wp.vec3, device=device) for array in (starts, headings)]
+    place = known_device(device)
+    return [wp.array(array, dtype=wp.vec3, device=place) for array in (starts, headings)]

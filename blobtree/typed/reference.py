@@ -91,12 +91,42 @@ def remainder(a: Any, b: Any) -> Any:
     return np.fmod(a, b)
 
 
-_ARITHMETIC = {"_divided": divided, "_remainder": remainder}
+MOST_TURNS = 65_535
+"""Turns that the loops of one call may take: as many as the software rasteriser llvmpipe lets one take."""
+
+
+class EndlessLoop(RuntimeError):
+    """The loops of a function turn more often than any device should."""
+
+
+def counted(turns: int, line: int) -> int:
+    """One turn more; `EndlessLoop` beyond the last."""
+    if turns >= MOST_TURNS:
+        raise EndlessLoop(f"the loop in line {line} takes more than {MOST_TURNS:,} turns; let it end sooner")
+    return turns + 1
+
+
+_HELPERS = {"_divided": divided, "_remainder": remainder, "_counted": counted}
 _WORDS: dict[type[ast.operator], str] = {ast.Div: "_divided", ast.Mod: "_remainder"}
 
 
-class _Arithmetic(ast.NodeTransformer):
-    """Operators that mean something else in Python than on devices become calls."""
+class _AsOnDevices(ast.NodeTransformer):
+    """Operators that mean something else in Python than on devices become calls; loops count turns."""
+
+    def __init__(self, first: int) -> None:
+        self._first = first
+
+    def visit_For(self, node: ast.For) -> ast.stmt:
+        return self._counting(node)
+
+    def visit_While(self, node: ast.While) -> ast.stmt:
+        return self._counting(node)
+
+    def _counting(self, node: ast.For | ast.While) -> ast.stmt:
+        line = self._first + node.lineno - 1
+        self.generic_visit(node)
+        node.body[:0] = ast.parse(f"_turns = _counted(_turns, {line})").body
+        return node
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
@@ -113,7 +143,7 @@ class _Arithmetic(ast.NodeTransformer):
 
 
 def _in_words(function: FunctionType, scope: dict[str, Any]) -> FunctionType:
-    """`function` over `scope`, at the same lines, with a device's arithmetic."""
+    """`function` over `scope`, at the same lines, with a device's arithmetic and loops that end."""
     lines, first = inspect.getsourcelines(function)
     tree = ast.parse(textwrap.dedent("".join(lines)))
     (definition,) = tree.body
@@ -122,7 +152,9 @@ def _in_words(function: FunctionType, scope: dict[str, Any]) -> FunctionType:
     definition.returns = None
     for argument in definition.args.args:
         argument.annotation = None
-    ast.increment_lineno(_Arithmetic().visit(tree), first - 1)
+    _AsOnDevices(first).visit(tree)
+    definition.body[:0] = ast.parse("_turns = 0").body
+    ast.increment_lineno(tree, first - 1)
     exec(compile(ast.fix_missing_locations(tree), function.__code__.co_filename, "exec"), scope)
     result: FunctionType = scope[function.__name__]
     return result
@@ -152,7 +184,7 @@ class _Reading:
     def function(self, function: FunctionType) -> FunctionType:
         if function not in self._made:
             seen = {name: self._substitute(value) for name, value in references(function).items()}
-            scope = {**function.__globals__, **seen, "float": self._float, **_ARITHMETIC}
+            scope = {**function.__globals__, **seen, "float": self._float, **_HELPERS}
             self._made[function] = _in_words(function, scope)
         return self._made[function]
 

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidSeeding
+from decals.model import MOST_IMAGES
+from decals.wishes import numbers, whole
 
 Wide = NDArray[np.float64]
 
@@ -23,11 +25,10 @@ class ImageChoice(Enum):
 
 def odds(images: int, weights: ArrayLike | None) -> Wide:
     """Share of each image, ``float64[images]``; `InvalidSeeding` for numbers that are no shares."""
-    if isinstance(images, bool) or not isinstance(images, int | np.integer) or images < 1:
-        raise InvalidSeeding(f"images: expected a whole number of at least 1, got {images!r}")
+    whole("images", images, 1, most=MOST_IMAGES)
     if weights is None:
         return np.full(images, 1.0 / images)
-    given = np.asarray(weights, dtype=np.float64)
+    given = numbers("weights", weights)
     if given.shape != (images,):
         raise InvalidSeeding(f"weights: expected shape [{images}], got {list(given.shape)}")
     if not (np.isfinite(given).all() and (given >= 0).all() and given.sum() > 0):

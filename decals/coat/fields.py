@@ -5,8 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import shown
+from decals.errors import InvalidSeeding
 from decals.seeds.neighbours import FacingTree
 from decals.surfaces.surface import Floats, unit_rows
+from decals.wishes import answers
 
 RING = 8
 """Neighbours of a point from which its curvature is estimated, and with which its cross is smoothed."""
@@ -94,6 +97,16 @@ def smooth_crosses(
 
 def gradient_of(function: Callable[[Floats], ArrayLike]) -> Callable[[Floats], NDArray[np.float64]]:
     """Make a field of directions from a function of ``points[n, 3]`` to ``[n]``: its gradient."""
+    if not callable(function):
+        raise InvalidSeeding(f"function: expected one of points to numbers, got {shown(function)}")
+
+    def value(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = answers("gradient_of", function, points)
+        if found.shape != (len(points),):
+            raise InvalidSeeding(
+                f"gradient_of: expected shape [{len(points)}] from the function, got {list(found.shape)}"
+            )
+        return found
 
     def gradient(points: Floats) -> NDArray[np.float64]:
         wide = points.astype(np.float64)
@@ -101,7 +114,7 @@ def gradient_of(function: Callable[[Floats], ArrayLike]) -> Callable[[Floats], N
             return wide
         step = DIFFERENCE * max(float(np.linalg.norm(np.ptp(wide, axis=0))), float(np.abs(wide).max()), 1e-9)
         shifts = step * np.eye(3)
-        sides = [[np.asarray(function(wide + sign * shift)) for sign in (1, -1)] for shift in shifts]
+        sides = [[value(wide + sign * shift) for sign in (1, -1)] for shift in shifts]
         return np.stack([(plus - minus) / (2.0 * step) for plus, minus in sides], axis=1)
 
     return gradient

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.errors import InvalidSeeding
 from decals.seeds.population import Sites, World
 from decals.surfaces.surface import Flags, Floats, unit_rows
+from decals.wishes import number
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,7 @@ class Jitter:
     def __post_init__(self) -> None:
         for name in ("position", "size", "angle"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise InvalidSeeding(f"{name} of a jitter: expected a number from 0 upward, got {value!r}")
+            number(f"{name} of a jitter", value, "a number from 0 upward", lambda given: given >= 0)
 
     def places(self, world: World, sites: Sites, spacings: Floats, movable: Flags, seed: int) -> Sites:
         """Move sites about on their surfaces; who would be hidden or barred stays."""

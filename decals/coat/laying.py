@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import instance
 from decals.coat.choosing import ImageChoice, at_random, by_rank, odds
 from decals.coat.fields import bends
 from decals.coat.jitter import Jitter
@@ -12,6 +13,7 @@ from decals.errors import InvalidSeeding
 from decals.model import Decals
 from decals.seeds.population import Sites, World
 from decals.seeds.relaxation import Relaxation
+from decals.wishes import number, whole
 
 SAMPLES = 64
 """Samples for each decal from which its size is measured."""
@@ -42,6 +44,10 @@ def lay(
     InvalidSeeding
         For a factor, direction, number of images or weights that make no sense.
     """
+    instance(
+        "relaxation", relaxation, Relaxation, InvalidSeeding, "seed(surfaces, ...) does both in one call"
+    )
+    whole("seed", seed)
     shares, disorder = wishes(factor, images, weights, sizing, choice, jitter), jitter or Jitter()
     if relaxation.count == 0:
         return Decals.empty()
@@ -79,8 +85,7 @@ def wishes(
             raise InvalidSeeding(f"{name}: expected one of {known}, got {value!r}")
     if not isinstance(jitter, Jitter | None):
         raise InvalidSeeding(f"jitter: expected a Jitter, got {jitter!r}")
-    if not (np.isfinite(factor) and factor > 0):
-        raise InvalidSeeding(f"factor: expected a number above 0, got {factor!r}")
+    number("factor", factor, "a number above 0", lambda value: value > 0)
     return odds(images, weights)
 
 

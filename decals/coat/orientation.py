@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from decals.coat.fields import curvature_directions, smooth_crosses
 from decals.errors import InvalidSeeding
 from decals.surfaces.surface import Floats, unit_rows
+from decals.wishes import answers, numbers
 
 
 class Orientation(Enum):
@@ -69,11 +70,10 @@ def _directions(
     direction: ArrayLike | Callable[[Floats], ArrayLike], positions: Floats
 ) -> NDArray[np.float64]:
     """One finite vector for each position, of length 1 or 0."""
-    given = direction(positions) if callable(direction) else direction
-    try:
-        vectors = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidSeeding(f"direction: expected numbers, got {given!r:.80}") from error
+    if callable(direction):
+        vectors = answers("direction", direction, positions)
+    else:
+        vectors = numbers("direction", direction)
     expected = positions.shape if callable(direction) else (3,)
     if vectors.shape != expected:
         raise InvalidSeeding(f"direction: expected shape {list(expected)}, got {list(vectors.shape)}")

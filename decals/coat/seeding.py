@@ -10,12 +10,12 @@ from decals.coat.jitter import Jitter
 from decals.coat.laying import lay, wishes
 from decals.coat.orientation import Direction
 from decals.coat.sizing import Sizing
-from decals.errors import InvalidSeeding
 from decals.model import Decals
 from decals.seeds.polishing import CLOSE
 from decals.seeds.population import Density, Mask, surfaces_of
 from decals.seeds.relaxation import Relaxation
 from decals.surfaces.surface import Surface
+from decals.wishes import function_or_none, number
 
 SPREADING = 0.8
 """Part of the whole work that the relaxation takes, for progress bars."""
@@ -90,8 +90,8 @@ def seed(
         that make no sense, or nothing to lie on.
     """
     given = surfaces_of(surfaces)
-    if not 0.0 <= regularity <= 1.0:
-        raise InvalidSeeding(f"regularity: expected a number from 0 to 1, got {regularity!r}")
+    number("regularity", regularity, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0)
+    function_or_none("progress", progress)
     wishes(factor, images, weights, sizing, choice, jitter)  # before the long work, not after it
     tell = progress or (lambda stage, fraction: None)
     relaxation = Relaxation(

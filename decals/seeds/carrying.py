@@ -55,8 +55,8 @@ def _taken(number: int, old: Surface, new: Surface, start: _Placed, spacing: flo
         if not _collapsed(start, found, spacing, _growth(old, new)):
             return found
     raise InvalidSeeding(
-        f"surface {number}: expected one that its {len(points)} seeds can follow, got one on which they would "
-        "end up in a heap; deform it in smaller steps, or make another Relaxation"
+        f"surface {number}: expected one that its {len(points)} seeds can follow, got one on which they "
+        "would end up in a heap; deform it in smaller steps, or make another Relaxation"
     )
 
 

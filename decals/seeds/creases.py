@@ -5,15 +5,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from decals.checks import instance
 from decals.errors import InvalidSeeding
 from decals.seeds.placing import MOST_SEEDS
 from decals.seeds.population import Mask
 from decals.surfaces.edges import edges_of
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Floats
+from decals.surfaces.surface import Floats, as_points
+from decals.wishes import number
 
 Wide = NDArray[np.float64]
 
@@ -51,8 +53,14 @@ class Creases:
     """
 
     def __init__(self, surface: MeshSurface, *, angle: float = 40.0, rims: bool = True) -> None:
-        if not 0.0 < angle < 180.0:
-            raise InvalidSeeding(f"angle: expected degrees above 0 and below 180, got {angle!r}")
+        instance(
+            "surface",
+            surface,
+            MeshSurface,
+            InvalidSeeding,
+            "a tree has none that a mesh shows: polygonize it first",
+        )
+        number("angle", angle, "degrees above 0 and below 180", lambda value: 0.0 < value < 180.0)
         self._vertices, self._edges = _sharp_edges(surface, angle, rims)
         self.segments: Wide = self._vertices[self._edges]
 
@@ -61,9 +69,9 @@ class Creases:
         """Length of all lines together."""
         return float(np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1).sum())
 
-    def distance(self, points: Floats) -> Wide:
+    def distance(self, points: ArrayLike) -> Wide:
         """Distance of each point to the nearest line, ``float64[n]``; infinity where there is no line."""
-        wide = points.astype(np.float64)
+        wide = as_points(points).astype(np.float64)
         if len(self.segments) == 0 or len(wide) == 0:
             return np.full(len(wide), np.inf)
         samples = self._samples
@@ -75,8 +83,7 @@ class Creases:
 
     def mask(self, *, apart: float) -> Mask:
         """Places at least so far from all lines: with half a spacing no decal straddles one."""
-        if not 0.0 <= apart < np.inf:
-            raise InvalidSeeding(f"apart: expected a length from 0 upward, got {apart!r}")
+        number("apart", apart, "a length from 0 upward", lambda value: value >= 0)
         return lambda points: self.distance(points) >= apart
 
     def points(self, spacing: float) -> Floats:
@@ -85,8 +92,7 @@ class Creases:
         Corners, where lines meet, end or turn sharply, are among them. Give them to `decals.seed` as its
         ``fixed`` places: decals line up along the creases, and the others keep away from them.
         """
-        if not (np.isfinite(spacing) and spacing > 0):
-            raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
+        number("spacing", spacing, "a length above 0", lambda value: value > 0)
         if spacing < self.length / MOST_SEEDS:
             raise InvalidSeeding(
                 f"spacing: {spacing:g} makes more than {MOST_SEEDS:,} places; take a larger one"

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.seeds.neighbours import FacingTree
+from decals.surfaces.surface import Floats
+
 BEYOND = 2.0
 """Particles farther than this many spacings are no neighbours when evenness is measured."""
 
@@ -56,6 +59,15 @@ def evenness(distances: NDArray[np.float64], spacing: float) -> Spacing:
         cv6=_variation(six),
         ringed=len(six) / len(distances),
     )
+
+
+def evenness_of(positions: Floats, normals: Floats, sizes: Floats, spacing: float) -> Spacing:
+    """Figures of oriented points where `sizes` are the spacings wished for, and `spacing` a typical one."""
+    tree = FacingTree(positions, normals)
+    distances, indices = tree.nearest(positions, normals, count=6, skip_self=True)
+    wide = sizes.astype(np.float64)
+    distances /= 0.5 * (wide[:, None] + np.where(indices >= 0, wide[indices], 1.0))
+    return evenness(spacing * distances, spacing)
 
 
 def ideal_spacing(area: float, count: int) -> float:

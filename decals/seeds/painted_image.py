@@ -5,11 +5,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import shown
 from decals.errors import InvalidImage, InvalidSeeding
 from decals.images import load_image
 from decals.seeds.population import Density, Mask
 from decals.seeds.projections import Projection
 from decals.surfaces.surface import Floats
+from decals.wishes import answers, number
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue in grey (Rec. 709)."""
@@ -39,13 +41,18 @@ class PaintedImage:
         self, image: str | Path | ArrayLike, projection: Projection, *, repeat: bool = False
     ) -> None:
         self.grey = _grey(load_image(str(image)) if isinstance(image, str | Path) else image)
+        if not callable(projection):
+            raise InvalidSeeding(
+                f"projection: expected one such as Planar.over(surface), or a function of points, "
+                f"got {shown(projection)}"
+            )
         self.projection = projection
         self.repeat = repeat
 
     def __call__(self, points: Floats) -> NDArray[np.float64]:
         """Grey values at points, ``float64[n]``, between the centres of pixels by bilinear interpolation."""
         height, width = self.grey.shape
-        places = np.asarray(self.projection(points), dtype=np.float64)
+        places = answers("projection", self.projection, points)
         if places.shape != (len(points), 2) or not np.isfinite(places).all():
             raise InvalidSeeding(
                 f"projection: expected finite uv of shape [{len(points)}, 2], got {list(places.shape)}"
@@ -67,14 +74,12 @@ class PaintedImage:
         Only the ratio of the two counts. For no seeds at all where it is black, give a `mask` as well.
         """
         for name, value in (("black", black), ("white", white)):
-            if not (np.isfinite(value) and value > 0):
-                raise InvalidSeeding(
-                    f"{name}: expected a number above 0, got {value!r}; bar places by a mask"
-                )
+            number(name, value, "a number above 0 (places are barred by a mask)", lambda grey: grey > 0)
         return lambda points: black + (white - black) * self(points)
 
     def mask(self, *, above: float = 0.5) -> Mask:
         """Where seeds may lie: where the image is brighter than that."""
+        number("above", above, "a number", np.isfinite)
         return lambda points: self(points) > above
 
     def _within(self, ticks: NDArray[np.float64], count: int) -> NDArray[np.int64]:

@@ -1,13 +1,12 @@
 """How many particles there are, and where those lie that are given."""
 
-from typing import Any, cast
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidSeeding
 from decals.seeds.population import Sites, World
 from decals.surfaces.surface import as_points
+from decals.wishes import number, whole
 
 MOST_SEEDS = 100_000_000
 """Seeds in one population; some hundred bytes are needed for each."""
@@ -19,29 +18,13 @@ def nobody() -> Sites:
     return Sites(none, none, np.zeros(0, np.int32))
 
 
-def check(name: str, value: int, least: int) -> None:
-    """Raise `InvalidSeeding` unless the value is a whole number of at least so much."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise InvalidSeeding(f"{name}: expected a whole number, got {value!r}")
-    if value < least:
-        raise InvalidSeeding(f"{name}: expected at least {least}, got {value}")
-
-
 def count_of(count: int | None, spacing: float | None, mass: float) -> int:
     """Count that was wished for, or follows from the spacing."""
     if (count is None) == (spacing is None):
         raise InvalidSeeding("expected either a count or a spacing, got both or none; give one of them")
     if count is not None:
-        check("count", count, 0)
-        if count > MOST_SEEDS:
-            raise InvalidSeeding(f"count: expected at most {MOST_SEEDS:,}, got {count:,}")
-        return int(count)
-    try:
-        length = float(cast(Any, spacing))
-    except (TypeError, ValueError):
-        length = np.nan
-    if not 0.0 < length < np.inf:
-        raise InvalidSeeding(f"spacing: expected a length above 0, got {spacing!r}")
+        return whole("count", count, most=MOST_SEEDS)
+    length = number("spacing", spacing, "a length above 0", lambda value: value > 0)
     if length < np.sqrt(2.0 * mass / (np.sqrt(3.0) * MOST_SEEDS)):
         raise InvalidSeeding(
             f"spacing: {length:g} makes more than {MOST_SEEDS:,} seeds; take a larger one, or a count"

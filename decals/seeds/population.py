@@ -1,19 +1,20 @@
 """Who lives where: visible areas, the share of each surface, and the first positions."""
 
-import reprlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import shown
 from decals.errors import InvalidSeeding
 from decals.seeds.rims import Rims
 from decals.seeds.settling import Settling, spans_of
 from decals.surfaces.ground import vectors
 from decals.surfaces.surface import Flags, Floats, Surface
+from decals.wishes import answers, device_or_error, function_or_none
 
 SCOUTS = 16384
 """Samples that estimate which part of a surface is visible."""
@@ -79,7 +80,9 @@ class World:
         device: str = "cpu",
     ) -> None:
         self.surfaces = surfaces_of(surfaces)
-        self.device = device
+        self.device = device_or_error(device)
+        function_or_none("density", density)
+        function_or_none("mask", mask)
         self._seed, self._density, self._mask = seed, density, mask
         self.settling = Settling(self.surfaces, self._outside if mask is not None else None, device)
         measures = [self._measure(number) for number in range(len(self.surfaces))]
@@ -235,34 +238,36 @@ def _evenly(weights: NDArray[np.float64], count: int) -> NDArray[np.int64]:
 
 def surfaces_of(given: object) -> tuple[Surface, ...]:
     """One surface or several as a tuple; `InvalidSeeding` for what is none."""
-    if isinstance(given, Surface):
+    if _is_surface(given):
         return (given,)
     several = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
     for one in several:
-        if not isinstance(one, Surface):
+        if not _is_surface(one):
             raise InvalidSeeding(
-                f"surfaces: expected a surface or several, got {reprlib.repr(one)}; "
+                f"surfaces: expected a surface or several, got {shown(one)}; "
                 "make one by ImplicitSurface(tree) or MeshSurface(vertices, faces)"
             )
     return several
 
 
+def _is_surface(one: object) -> TypeGuard[Surface]:
+    """Whether it is a surface; a class of surfaces has the same names, and is none."""
+    return isinstance(one, Surface) and not isinstance(one, type)
+
+
 def _answers(name: str, function: Callable[[Floats], ArrayLike], positions: Floats) -> NDArray[np.float64]:
     """One number for each position, as the user's function has it, checked."""
-    try:
-        answers = np.asarray(function(positions), dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidSeeding(f"{name}: expected numbers from the function, got {error}") from error
-    if answers.shape != (len(positions),):
+    found = answers(name, function, positions)
+    if found.shape != (len(positions),):
         raise InvalidSeeding(
-            f"{name}: expected shape [{len(positions)}], got {list(answers.shape)}; "
+            f"{name}: expected shape [{len(positions)}], got {list(found.shape)}; "
             "return one number for each point"
         )
-    if not np.isfinite(answers).all() or (name == "density" and not (answers > 0).all()):
+    if not np.isfinite(found).all() or (name == "density" and not (found > 0).all()):
         raise InvalidSeeding(
             f"{name}: expected finite numbers, and densities above zero; bar places by a mask"
         )
-    return answers
+    return found
 
 
 def shares(areas: NDArray[np.float64], count: int) -> NDArray[np.int64]:

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import instance, shown
 from decals.errors import InvalidSeeding
+from decals.seeds.population import surfaces_of
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Floats, Surface
+from decals.wishes import numbers
 
 Wide = NDArray[np.float64]
 Projection = Callable[[Floats], Wide]
@@ -26,7 +29,7 @@ _SEEN = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}
 
 def box_of(surfaces: Surface | Sequence[Surface]) -> tuple[Wide, Wide]:
     """Corners of the box around surfaces."""
-    given = [surfaces] if isinstance(surfaces, Surface) else list(surfaces)
+    given = surfaces_of(surfaces)
     if not given:
         raise InvalidSeeding("surfaces: expected at least one to lay an image over, got none")
     boxes = np.array([surface.bounds for surface in given], dtype=np.float64)
@@ -34,15 +37,15 @@ def box_of(surfaces: Surface | Sequence[Surface]) -> tuple[Wide, Wide]:
 
 
 def _vector(name: str, value: ArrayLike) -> Wide:
-    vector = np.asarray(value, dtype=np.float64)
+    vector = numbers(name, value)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InvalidSeeding(f"{name}: expected three finite numbers, got {value!r:.80}")
+        raise InvalidSeeding(f"{name}: expected three finite numbers, got {shown(value)}")
     return vector
 
 
 def _axis(name: str) -> tuple[int, int, int]:
-    if name not in _SEEN:
-        raise InvalidSeeding(f"axis: expected 'x', 'y' or 'z', got {name!r:.40}")
+    if not isinstance(name, str) or name not in _SEEN:
+        raise InvalidSeeding(f"axis: expected 'x', 'y' or 'z', got {shown(name)}")
     return _SEEN[name]
 
 
@@ -179,7 +182,8 @@ class TextureCoordinates:
     """
 
     def __init__(self, surface: MeshSurface, uv: ArrayLike) -> None:
-        given = np.asarray(uv, dtype=np.float64)
+        instance("surface", surface, MeshSurface, InvalidSeeding, "only meshes have texture coordinates")
+        given = numbers("uv", uv)
         vertices, faces = len(surface.vertices), len(surface.faces)
         if given.shape not in ((vertices, 2), (faces, 3, 2)) or not np.isfinite(given).all():
             raise InvalidSeeding(

@@ -9,18 +9,18 @@ from blobtree.progress import Progress
 from decals.errors import InvalidSeeding
 from decals.seeds.carrying import carried, freed
 from decals.seeds.crowd import Crowd
-from decals.seeds.evenness import Spacing, evenness, ideal_spacing
+from decals.seeds.evenness import Spacing, evenness_of, ideal_spacing
 from decals.seeds.homes import Homes
 from decals.seeds.local_relaxation import relax_near
 from decals.seeds.looking import Lookout
-from decals.seeds.neighbours import FacingTree
-from decals.seeds.placing import check, count_of, nobody, placed, remaining
+from decals.seeds.placing import count_of, nobody, placed, remaining
 from decals.seeds.polishing import CLOSE, polish
 from decals.seeds.population import Density, Mask, Sites, World, shares
 from decals.seeds.refilling import crowded, refill
 from decals.seeds.repulsion import CUTOFF, Law
 from decals.seeds.scouting import Scouts
-from decals.surfaces.surface import Flags, Floats, Surface
+from decals.surfaces.surface import Flags, Floats, Surface, as_points
+from decals.wishes import function_or_none, number, numbers, whole
 
 EXPONENTS = (2.0, 3.0)
 """Power law of the repulsion at the first and the last step."""
@@ -98,11 +98,9 @@ class Relaxation:
         fixed: ArrayLike | None = None,
         device: str = "cpu",
     ) -> None:
-        check("seed", seed, 0)
-        check("iterations", iterations, 1)
-        self.iterations = iterations
+        self.iterations = whole("iterations", iterations, 1)
         self.steps = 0
-        self._seed = seed
+        self._seed = whole("seed", seed)
         self.world = World(surfaces, seed, density=density, mask=mask, device=device)
         count = count_of(count, spacing, self.world.mass)
         self.spacing = ideal_spacing(self.world.mass, count)
@@ -177,7 +175,8 @@ class Relaxation:
 
     def sizes_at(self, positions: Floats) -> Floats:
         """Spacing wished for at each position, ``float32[n]``."""
-        sizes: Floats = (self.spacing / np.sqrt(self.world.density(positions))).astype(np.float32)
+        densities = self.world.density(as_points(positions, "positions"))
+        sizes: Floats = (self.spacing / np.sqrt(densities)).astype(np.float32)
         return sizes
 
     def run(
@@ -197,7 +196,16 @@ class Relaxation:
             The rho that is enough: measured at every other step, and nothing is polished beyond it.
         cancel
             Asked before every step whether to stop; the particles stay as they are then.
+
+        Raises
+        ------
+        InvalidSeeding
+            If `until` is no number, or `progress` or `cancel` cannot be called.
         """
+        if until is not None:
+            until = number("until", until, "the rho that is enough, a number above 0", lambda rho: rho > 0)
+        function_or_none("progress", progress)
+        function_or_none("cancel", cancel)
         while not self.finished and not (cancel is not None and cancel()):
             self._advance()
             if self.finished:
@@ -223,6 +231,8 @@ class Relaxation:
 
     def polish(self, rounds: int = POLISHING, *, close: float = CLOSE) -> None:
         """Part the pairs that are still closer than so many spacings by trial, as long as that helps."""
+        whole("rounds", rounds)
+        number("close", close, "a number of spacings from 0 upward", lambda value: value >= 0)
         if self.count > 1:
             crowd = self._on_device()
             self._call_home(crowd)
@@ -240,7 +250,10 @@ class Relaxation:
         InvalidSeeding
             If the surface closest to the point is barred there.
         """
-        site = placed(self.world, np.reshape(np.asarray(point, dtype=np.float32), (1, -1)))
+        place = numbers("point", point)
+        if place.shape != (3,):
+            raise InvalidSeeding(f"point: expected three numbers, got shape {list(place.shape)}")
+        site = placed(self.world, place[None])
         if not self.world.settle(site)[1].all():
             raise InvalidSeeding(f"expected a place that is neither hidden nor masked, got {point!r:.60}")
         row = int(np.searchsorted(self.surface_ids, site.surface_ids[0], side="right"))
@@ -257,8 +270,10 @@ class Relaxation:
         InvalidSeeding
             If there is no particle of that number.
         """
-        if not 0 <= number < self.count:
-            raise InvalidSeeding(f"number: expected a particle from 0 to {self.count - 1}, got {number}")
+        if whole("number", number) >= self.count:
+            raise InvalidSeeding(
+                f"number: expected a particle among the {self.count} there are, counted from 0, got {number}"
+            )
         place = self.positions[number]
         sites = Sites.joined([self.sites[:number], self.sites[number + 1 :]])
         self._fixed = np.delete(self._fixed, number)
@@ -298,12 +313,7 @@ class Relaxation:
 
     def statistics(self) -> Spacing:
         """How evenly the particles lie now."""
-        distances, indices = FacingTree(self.positions, self.normals).nearest(
-            self.positions, self.normals, count=6, skip_self=True
-        )
-        sizes = self.sizes_at(self.positions).astype(np.float64)
-        distances /= 0.5 * (sizes[:, None] + np.where(indices >= 0, sizes[indices], 1.0))
-        return evenness(self.spacing * distances, self.spacing)
+        return evenness_of(self.positions, self.normals, self.sizes_at(self.positions), self.spacing)
 
     def _least(self) -> float:
         """Least distance between particles, in spacings."""

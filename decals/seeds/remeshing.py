@@ -7,14 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.checks import instance
 from decals.errors import InvalidSeeding
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Floats
+from decals.wishes import whole
 
 FINER = 12
 """Vertices that a mesh needs for each cluster; coarser ones are subdivided first."""
 
 MOST_SUBDIVISIONS = 6
+
+MOST_PLACES = 1_000_000
+"""Places of a remesh; its clustering alone takes a minute for so many."""
 
 
 def remeshed_points(surface: MeshSurface, count: int) -> Floats:
@@ -27,10 +32,10 @@ def remeshed_points(surface: MeshSurface, count: int) -> Floats:
     Raises
     ------
     InvalidSeeding
-        If pyacvd is not installed, or the count is below 4.
+        If pyacvd is not installed, the surface is no mesh, or the count is below 4 or above `MOST_PLACES`.
     """
-    if count < 4:
-        raise InvalidSeeding(f"count: expected at least 4 for a remesh, got {count}")
+    instance("surface", surface, MeshSurface, InvalidSeeding, "polygonize a tree first")
+    whole("count", count, 4, most=MOST_PLACES)
     try:
         clustering, pyvista = import_module("pyacvd").Clustering, import_module("pyvista")
     except ImportError as error:

@@ -8,6 +8,7 @@ from decals.errors import InvalidSeeding
 from decals.seeds.population import Density
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Floats, as_points
+from decals.wishes import numbers
 
 Wide = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ def vertex_density(vertices: MeshSurface | ArrayLike, values: ArrayLike) -> Dens
         If values and vertices differ in number, or a value is not finite and above zero.
     """
     places = vertices.vertices if isinstance(vertices, MeshSurface) else as_points(vertices, "vertices")
-    given = np.asarray(values, dtype=np.float64)
+    given = numbers("values", values)
     if given.shape != (len(places),) or len(places) == 0:
         raise InvalidSeeding(f"values: expected shape [{len(places)}], got {list(given.shape)}; one a vertex")
     if not (np.isfinite(given).all() and (given > 0).all()):

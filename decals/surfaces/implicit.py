@@ -5,11 +5,13 @@ from numpy.typing import ArrayLike
 
 from blobtree import Node, polygonize
 from blobtree.tracing.trace import trace
+from decals.checks import shown
 from decals.errors import InvalidMesh
 from decals.surfaces.ground import asked, inside
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Flags, Floats, as_points, as_rays
+from decals.surfaces.surface import Flags, Floats, as_points, as_rays, as_reaches
 from decals.surfaces.tree_ground import TreeGround
+from decals.wishes import device_or_error, whole
 
 RESOLUTION = 64
 """Cells along the longest side of the tree's box from which area and samples are taken."""
@@ -41,7 +43,10 @@ class ImplicitSurface:
     """
 
     def __init__(self, tree: Node, *, resolution: int = RESOLUTION, device: str = "cpu") -> None:
-        self.tree, self.device = tree, device
+        if not isinstance(tree, Node):
+            raise InvalidMesh(f"tree: expected a BlobTree, got {shown(tree)}; meshes go into MeshSurface")
+        whole("resolution", resolution, 1)
+        self.tree, self.device = tree, device_or_error(device)
         coarse = polygonize(tree, resolution=resolution, device=device)
         if len(coarse.faces) == 0:
             raise InvalidMesh(
@@ -79,7 +84,7 @@ class ImplicitSurface:
     def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
         """Surface points near the points and the normals there."""
         queries = as_points(points)
-        reaches = np.zeros(len(queries), np.float32) if within is None else within
+        reaches = as_reaches(within, len(queries))
         return asked(self.on(self.device), queries, reaches, self.device)
 
     def normal(self, points: ArrayLike) -> Floats:

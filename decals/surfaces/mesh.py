@@ -11,7 +11,8 @@ from decals.errors import InvalidMesh
 from decals.model import LARGEST
 from decals.surfaces.ground import asked, inside, vectors
 from decals.surfaces.mesh_ground import MeshGround
-from decals.surfaces.surface import Flags, Floats, as_points, as_rays, frozen
+from decals.surfaces.surface import Flags, Floats, as_points, as_rays, as_reaches, frozen
+from decals.wishes import device_or_error, whole
 
 Faces = NDArray[np.int32]
 
@@ -46,7 +47,7 @@ class MeshSurface:
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, device: str = "cpu") -> None:
-        self.device = device
+        self.device = device_or_error(device)
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
         self.sound, normals, areas = _sound_faces(self.vertices, self.faces)
@@ -90,7 +91,8 @@ class MeshSurface:
         Within a face they lie around a sequence of low discrepancy, so that parts of large faces get their
         share, but what is near each is chance.
         """
-        rng = np.random.default_rng(seed)
+        whole("count", count)
+        rng = np.random.default_rng(whole("seed", seed))
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)
         even = rng.random(2) + np.arange(count)[:, None] * EVEN_STEPS
@@ -118,7 +120,7 @@ class MeshSurface:
     def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
         """Closest points of the mesh and the normals of their faces."""
         queries = as_points(points)
-        reaches = np.zeros(len(queries), np.float32) if within is None else within.astype(np.float32)
+        reaches = as_reaches(within, len(queries))
         return asked(self.on(self.device), queries, reaches, self.device)
 
     def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -174,7 +176,12 @@ def _as_vertices(vertices: ArrayLike) -> Floats:
 
 
 def _as_faces(faces: ArrayLike, vertex_count: int) -> Faces:
-    given = np.asarray(faces)
+    try:
+        given = np.asarray(faces)
+    except ValueError as error:  # rows of different lengths
+        raise InvalidMesh(
+            "faces: expected shape [m, 3], got rows of different lengths; triangulate polygons first"
+        ) from error
     if given.ndim != 2 or given.shape[1] != 3 or len(given) == 0:
         raise InvalidMesh(
             f"faces: expected shape [m, 3] with m > 0, got {list(given.shape)}; triangulate polygons first"

@@ -83,6 +83,16 @@ def as_points(points: ArrayLike, name: str = "points") -> Floats:
     return array
 
 
+def as_reaches(within: ArrayLike | None, count: int) -> Floats:
+    """Distances within which the surface is expected, ``float32[count]``; 0 where nobody knows."""
+    if within is None:
+        return np.zeros(count, np.float32)
+    reaches = np.asarray(within)
+    if reaches.shape != (count,) or not np.issubdtype(reaches.dtype, np.number):
+        raise InvalidPoints(f"within: expected {count} distances, one for each point, got {within!r:.60}")
+    return reaches.astype(np.float32)
+
+
 def as_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
     """Origins and unit directions (zero where there is none) of equally many rays."""
     starts, ways = as_points(origins, "origins"), as_points(directions, "directions")

@@ -178,6 +178,8 @@ def test_a_function_without_source_is_refused() -> None:
         ({"size": 3.0}, "expected .smallest or None"),
         ({"size": (float("nan"), None)}, "expected .smallest or None"),
         ({"length": (0.0, 1.0)}, "it has no parameter 'length'"),
+        ([1], "limits: expected .parameter"),
+        ("x", "limits: expected .parameter"),
     ],
 )
 def test_senseless_limits_are_refused(limits: dict[str, tuple[float, float]], message: str) -> None:
@@ -185,10 +187,32 @@ def test_senseless_limits_are_refused(limits: dict[str, tuple[float, float]], me
         define_skeleton(own_kinds.ring, limits=limits)
 
 
-@pytest.mark.parametrize("name", ["", "two words", "ümlaut", "a__b", "1st", "_x"])
-def test_senseless_names_are_refused(name: str) -> None:
+@pytest.mark.parametrize("name", ["", "two words", "ümlaut", "a__b", "1st", "_x", 5, ["x"]])
+def test_senseless_names_are_refused(name: object) -> None:
     with pytest.raises(InvalidDefinition, match="name: expected"):
         define_skeleton(own_kinds.brick, name=name)
+
+
+def never_ends(q: wp.vec3) -> wp.vec3:
+    while True:
+        q = q * 0.5
+    return q
+
+
+def counts_too_far(q: wp.vec3) -> wp.vec3:
+    for _i in range(2000000000):
+        q = q * 1.0
+    return q
+
+
+@pytest.mark.parametrize("function", [never_ends, counts_too_far])
+def test_loops_without_end_are_refused_and_not_waited_for(function: object) -> None:
+    with pytest.raises(
+        InvalidDefinition, match=r"the loop in line \d+ takes more than 65,535 turns"
+    ) as refusal:
+        define_skeleton(function)
+    line = function.__code__.co_firstlineno + 1
+    assert f"the loop in line {line} " in str(refusal.value)
 
 
 def negative(a: wp.float32, b: wp.float32) -> wp.vec3:

@@ -194,7 +194,7 @@ def test_progress_runs_from_start_to_end():
         ({"count": -1}, "count: expected at least 0, got -1"),
         ({"count": 2.5}, "count: expected a whole number"),
         ({"count": True}, "count: expected a whole number"),
-        ({"count": 10**12}, "count: expected at most 100,000,000, got 1,000,000,000,000"),
+        ({"count": 10**12}, "count: expected at most 100,000,000, got 1000000000000"),
         ({"spacing": 1e-9}, "spacing: 1e-09 makes more than 100,000,000 seeds"),
         ({"spacing": 1e-200}, "spacing: 1e-200 makes more than 100,000,000 seeds"),
         ({"spacing": "wide"}, "spacing: expected a length above 0, got 'wide'"),

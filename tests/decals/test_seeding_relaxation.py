@@ -126,7 +126,7 @@ def test_one_more_particle_and_one_less_change_the_neighbourhood_alone():
     row = relaxation.insert((1.0, 0, 0), fixed=True)
     assert np.linalg.norm(relaxation.positions[row] - [1, 0, 0]) < 0.01
     for number in (-1, 601):
-        with pytest.raises(InvalidSeeding, match="expected a particle"):
+        with pytest.raises(InvalidSeeding, match="number: expected"):
             relaxation.remove(number)
 
 
