@@ -11,8 +11,7 @@ import warp as wp
 
 from decals.field.contact import field_complement
 from decals.field.radial import are_stacked, plane_distance, power
-from decals.field.stack import end_of_lower
-from decals.grid.lookup import cell_range
+from decals.field.stack import sheet_range
 from decals.records import RECORD, RIM_RADIUS, apart, complement_of, faces, rank_of, visible_radius, xyz
 
 wp.set_module_options({"enable_backward": False})
@@ -62,14 +61,8 @@ def in_cell(
         rank = rank_of(decal, decals)
     own = power_of(q, decal, decals)
     for level in range(level_count):
-        span = cell_range(q, level, levels, table, mask, ids)
-        start = span[0]
-        if layered:
-            start = end_of_lower(span, rank, 0, decals, ids)
-        for j in range(start, span[1]):
-            if layered:
-                if rank_of(ids[j], decals) != rank:
-                    break
+        span = sheet_range(q, rank, layered, level, decals, levels, table, mask, ids)
+        for j in range(span[0], span[1]):
             if complement_of(q, n_q, ids[j], decals) <= 0.5 and power_of(q, ids[j], decals) < own:
                 if not stacked(decal, ids[j], decals):
                     return False
@@ -96,14 +89,8 @@ def uppermost_over(
         rank = rank_of(decal, decals)
     upper = wp.int32(NOBODY)
     for level in range(level_count):
-        span = cell_range(q, level, levels, table, mask, ids)
-        start = span[0]
-        if layered:
-            start = end_of_lower(span, rank, 0, decals, ids)
-        for j in range(start, span[1]):
-            if layered:
-                if rank_of(ids[j], decals) != rank:
-                    break
+        span = sheet_range(q, rank, layered, level, decals, levels, table, mask, ids)
+        for j in range(span[0], span[1]):
             if lies_over(ids[j], decal, decals) and complement_of(q, n_q, ids[j], decals) <= 0.5:
                 if upper < 0 or lies_over(ids[j], upper, decals):
                     if above < 0 or lies_over(above, ids[j], decals):
@@ -130,14 +117,8 @@ def cell_owner(
     least = wp.float32(0.0)
     holders = wp.int32(0)
     for level in range(level_count):
-        span = cell_range(q, level, levels, table, mask, ids)
-        start = span[0]
-        if layered:
-            start = end_of_lower(span, rank, 0, decals, ids)
-        for j in range(start, span[1]):
-            if layered:
-                if rank_of(ids[j], decals) != rank:
-                    break
+        span = sheet_range(q, rank, layered, level, decals, levels, table, mask, ids)
+        for j in range(span[0], span[1]):
             if complement_of(q, n_q, ids[j], decals) <= 0.5:
                 holders += 1
                 own = power_of(q, ids[j], decals)
@@ -185,14 +166,8 @@ def radial_complement(
     edge = centre + radius * ray
     end = radius
     for level in range(level_count):
-        span = cell_range(edge, level, levels, table, mask, ids)
-        start = span[0]
-        if layered:
-            start = end_of_lower(span, rank, 0, decals, ids)
-        for j in range(start, span[1]):
-            if layered:
-                if rank_of(ids[j], decals) != rank:
-                    break
+        span = sheet_range(edge, rank, layered, level, decals, levels, table, mask, ids)
+        for j in range(span[0], span[1]):
             if ids[j] != owner and faces(n_q, ids[j], decals):
                 if not stacked(owner, ids[j], decals):
                     other = visible_radius(ids[j], decals)

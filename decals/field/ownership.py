@@ -17,7 +17,7 @@ from decals.field.cells import NOBODY as CELL_NOBODY
 from decals.field.cells import cell_owner, radial_complement
 from decals.field.contact import Contact, add_push, contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import surface_offset, tangent_coordinates
-from decals.field.stack import ABOVE_ALL, end_of_lower
+from decals.field.stack import ABOVE_ALL, end_of_lower, sheet_range
 from decals.grid.lookup import cell_range
 from decals.records import RECORD, complement_of, is_sheet, rank_of, xyz
 
@@ -130,23 +130,11 @@ def pushed_complement(
     least = complement_of(q, n_q, owner, decals)
     push = wp.float32(0.0)
     for level in range(level_count):
-        lowest = rank
-        highest = rank
-        if layered:
-            lowest = int(levels[level][2])
-            highest = int(levels[level][3])
-        if lowest <= rank and highest >= rank:
-            span = cell_range(q, level, levels, table, mask, ids)
-            start = span[0]
-            if layered and lowest != rank:
-                start = end_of_lower(span, rank, 0, decals, ids)
-            for j in range(start, span[1]):
-                if layered and highest != rank:
-                    if rank_of(ids[j], decals) != rank:
-                        break
-                if ids[j] != owner:
-                    phi = contact_push(complement_of(q, n_q, ids[j], decals), least)
-                    push = add_push(push, phi, contact)
+        span = sheet_range(q, rank, layered, level, decals, levels, table, mask, ids)
+        for j in range(span[0], span[1]):
+            if ids[j] != owner:
+                phi = contact_push(complement_of(q, n_q, ids[j], decals), least)
+                push = add_push(push, phi, contact)
     return contact_complement(least, push)
 
 

@@ -8,6 +8,7 @@ A rank is four times a layer, counted from the lowest that there is, plus the de
 
 import warp as wp
 
+from decals.grid.lookup import cell_range
 from decals.records import is_sheet, rank_of
 
 wp.set_module_options({"enable_backward": False})
@@ -35,6 +36,35 @@ def end_of_lower(
         else:
             high = middle
     return low
+
+
+@wp.func
+def sheet_range(
+    q: wp.vec3,
+    rank: wp.int32,
+    layered: wp.bool,
+    level: wp.int32,
+    decals: wp.array(dtype=wp.vec4),
+    levels: wp.array(dtype=wp.vec4),
+    table: wp.array(dtype=wp.vec4i),
+    mask: wp.int32,
+    ids: wp.array(dtype=wp.int32),
+) -> wp.vec2i:
+    """(first, past last) place in ids of the decals of one level and one rank that may reach q.
+
+    Where decals are not layered, these are all.
+    """
+    if layered and (int(levels[level][2]) > rank or int(levels[level][3]) < rank):
+        return wp.vec2i(0, 0)
+    span = cell_range(q, level, levels, table, mask, ids)
+    first = span[0]
+    last = span[1]
+    if layered:
+        if int(levels[level][2]) < rank:
+            first = end_of_lower(span, rank, 0, decals, ids)
+        if int(levels[level][3]) > rank:
+            last = end_of_lower(wp.vec2i(first, last), rank + 1, 0, decals, ids)
+    return wp.vec2i(first, last)
 
 
 @wp.func
