@@ -51,6 +51,9 @@ DecalHit decal_at(vec3 q, vec3 n) {
 // Premultiplied linear colour of one decal. The derivatives are those of the undeformed image of the one decal that
 // owns the pixel, so no edge between decals, or of an object, ever shows in them.
 vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
+    if (!in_image(hit.uv)) {
+        return vec4(0.0);
+    }
     vec4 u = decal_texel(4 * hit.owner + 2);
     vec4 tint = decal_texel(4 * hit.owner + 3);
     vec4 color = vec4(1.0);

@@ -27,7 +27,8 @@ class Samples:
     owner : int32[m]
         Number of the topmost decal that shows at each point, −1 where none does.
     uv : float32[m, 2]
-        Place in the owner's image, in [0, 1]² with ½ at its centre; 0 where there is no owner.
+        Place in the owner's image, which is the disc of radius ½ around (½, ½); farther out the decal's rim
+        along the surface is behind, and nothing is drawn. 0 where there is no owner.
     field : float32[m]
         F after contact (paper, equation 5): 1 at the centre, ½ on rims and contact lines; 0 without owner.
     color : float32[m, 4] or None

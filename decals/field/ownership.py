@@ -16,10 +16,10 @@ import warp as wp
 from decals.field.cells import NOBODY as CELL_NOBODY
 from decals.field.cells import cell_owner, radial_complement
 from decals.field.contact import Contact, add_push, contact_complement, contact_push, contact_uv, rim_distance
-from decals.field.mapping import surface_offset, tangent_coordinates
+from decals.field.mapping import Mapping, drawn_distance, tangent_coordinates, unrolled
 from decals.field.stack import ABOVE_ALL, end_of_lower, sheet_range
 from decals.grid.lookup import cell_range
-from decals.records import RECORD, complement_of, is_sheet, rank_of, xyz
+from decals.records import RECORD, complement_of, is_sheet, rank_of, visible_radius, xyz
 
 wp.set_module_options({"enable_backward": False})
 
@@ -170,9 +170,15 @@ def uv_at(
     mapping: wp.int32,
     decals: wp.array(dtype=wp.vec4),
 ) -> wp.vec2:
-    """Image coordinates in the owner's image, in [0, 1]², with ½ at its centre."""
+    """Image coordinates in the owner's image: ½ at its centre, ½ from there on its rim (`in_image`)."""
     centre = xyz(decals[RECORD * owner])
     normal = xyz(decals[RECORD * owner + 1])
     tangent = xyz(decals[RECORD * owner + 2])
-    offset = surface_offset(q - centre, normal, n_q, mapping)
-    return contact_uv(tangent_coordinates(offset, normal, tangent), rim_distance(complement))
+    w = q - centre
+    rim = rim_distance(complement)
+    if mapping == Mapping.CHORD:
+        return contact_uv(tangent_coordinates(w, normal, tangent), rim)
+    small = w / visible_radius(owner, decals)
+    arc = unrolled(small, normal, n_q)
+    drawn = drawn_distance(rim, wp.length(small), arc[3])
+    return contact_uv(tangent_coordinates(xyz(arc), normal, tangent), drawn)

@@ -5,6 +5,7 @@
 
 import warp as wp
 
+from decals.field.mapping import in_image
 from decals.field.ownership import NOBODY, complement_at, owner_at, owner_below, uv_at
 from decals.field.stack import number_below
 from decals.records import RECORD, rank_of
@@ -42,6 +43,8 @@ def decal_color(
     texels: wp.array(dtype=wp.vec4),
 ) -> wp.vec4:
     """Premultiplied linear colour of one decal: its image, or white, times its tint and opacity."""
+    if not in_image(uv):
+        return wp.vec4(0.0, 0.0, 0.0, 0.0)
     image = int(decals[RECORD * decal + 2][3])
     tint = decals[RECORD * decal + 3]
     color = wp.vec4(1.0, 1.0, 1.0, 1.0)

@@ -7,7 +7,7 @@ from blobtree.formulas.kernels import RIM
 from blobtree.typed.glsl import translate_library
 from decals.errors import TooMuchData
 from decals.field.contact import Contact
-from decals.field.mapping import tangent_coordinates
+from decals.field.mapping import in_image, tangent_coordinates
 from decals.field.ownership import complement_at, owner_at, owner_below, uv_at
 from decals.field.sheet import sheet_at
 from decals.field.stack import number_below
@@ -19,7 +19,16 @@ from decals.render.context import Context
 from decals.render.entry import Program
 from decals.render.tile import set_uniform
 
-FUNCTIONS = (sheet_at, owner_at, owner_below, number_below, complement_at, uv_at, tangent_coordinates)
+FUNCTIONS = (
+    sheet_at,
+    owner_at,
+    owner_below,
+    number_below,
+    complement_at,
+    uv_at,
+    in_image,
+    tangent_coordinates,
+)
 """What ``shaders/decals.glsl`` calls."""
 
 WALKS, SEARCH = 8, 3

@@ -16,7 +16,7 @@ from decals.render import Renderer
 from decals.render.decal_data import DecalData
 from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
-from tests.decals import test_contact, test_mapping, test_radial
+from tests.decals import log_maps, test_contact, test_radial
 
 RUNS = 3
 FOLD_SLACK = 0.0
@@ -113,28 +113,12 @@ def folds(rays: int) -> Figures:
 
 
 def mapping(points: int) -> Figures:
-    """RMS error of the maps against log maps, over the radius of a decal: 0.5 on torus and ellipsoid."""
+    """RMS error of what is drawn against log maps, over the radius, 0.5; the chord's beside it."""
     figures = {}
-    surfaces: dict[str, tuple[Callable[..., object], Callable[..., object]]] = {
-        "torus": (test_mapping.torus_points, test_mapping.torus_gradient),
-        "ellipsoid": (test_mapping.ellipsoid_points, test_mapping.ellipsoid_gradient),
-    }
-    samples = {
-        name: test_mapping.discs(np.random.default_rng(3), where, gradient, points)
-        for name, (where, gradient) in surfaces.items()
-    }
-    samples["sphere"] = test_mapping.sphere(np.random.default_rng(3), points)
-    for name, (w, n_p, n_q, log) in samples.items():
-        radius = test_mapping.DECAL if name != "sphere" else np.linalg.norm(log, axis=1).max()
-        corrected, chord = (test_mapping.mapped(w, n_p, n_q, mode) for mode in reversed(Mapping))
-        length = np.linalg.norm(w, axis=1, keepdims=True)
-        for suffix, offset in (
-            ("", corrected),
-            ("_drawn", length * test_mapping.unit(corrected)),
-            ("_chord", length * test_mapping.unit(chord)),
-        ):
-            error = ((offset - log) ** 2).sum(axis=1)
-            figures[f"map_{name}{suffix}"] = float(np.sqrt(error.mean()) / radius)
+    for name in ("torus", "ellipsoid", "sphere", "cylinder"):
+        for suffix, mode in (("", Mapping.CORRECTED), ("_chord", Mapping.CHORD)):
+            error = log_maps.drawn_error(name, mapping=mode, discs=points // 10, points=10)
+            figures[f"map_{name}{suffix}"] = error
     return figures
 
 

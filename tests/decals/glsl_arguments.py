@@ -78,7 +78,8 @@ BY_NAME: dict[str, Draw] = {
     "slope_b": uniform(0, 5),
     "at": whole(0, (TEXELS - 8) // 2, step=2), "apart": place,
     "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
-    "center": place, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5), "contact": whole(0, 3),
+    "center": place, "chord": share, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5),
+    "contact": whole(0, 3),
     "decal": whole(0, DECALS),
     "above": whole(-1, DECALS),
     "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
@@ -86,7 +87,7 @@ BY_NAME: dict[str, Draw] = {
     "e_k": uniform(0.0, 0.5), "e_i": share,
     "exponent": among(1.5, 2, 3, 7, 20, 100), "parameter": among(1.5, 2, 3, 7, 20, 100), "f": field,
     "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3),
-    "inverse": uniform(-3.0, 3.0, 3), "m": place,
+    "inverse": uniform(-3.0, 3.0, 3), "length": uniform(0.0, 1.5), "m": place,
     "mapping": whole(0, 2), "n": units, "n_p": units, "n_q": units, "nearest": uniform(0.0, 1.5),
     "offset": beside(powers(-9, 9), powers(-9, 9)),
     "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
@@ -94,7 +95,8 @@ BY_NAME: dict[str, Draw] = {
     "phi": share, "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
     "rim": share,
     "speed": uniform(0.1, 3.0),
-    "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3), "v": four, "w": place,
+    "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3),
+    "uv": uniform(-0.2, 1.2, 2), "v": four, "w": place,
     "z": uniform(0.0, 1.5),
 }  # fmt: skip
 BY_FUNCTION: dict[str, dict[str, Draw]] = {
@@ -182,7 +184,10 @@ def arguments_of(typed: TypedFunction) -> dict[str, Array]:
         known |= {"e_k": least, "e_i": least + share(rng, COUNT)}
     if typed.name == "arc_over_chord":
         angle = uniform(0.0, 0.5 * np.pi)(rng, COUNT)
-        known |= {"sine": np.sin(angle), "cosine": np.cos(angle)}
+        known |= {"sine_squared": np.sin(angle) ** 2, "cosine": np.cos(angle)}
+    if typed.name == "drawn_distance":
+        chord = draws["chord"](rng, COUNT)
+        known |= {"chord": chord, "rim": chord + (1 - chord) * share(rng, COUNT)}
     if typed.name == "plane_distance":
         known["apart"] = ahead_of(known.setdefault("ray", units(rng, COUNT)), place(rng, COUNT))
     if {"n_p", "n_q"} <= set(typed.parameters):

@@ -42,7 +42,8 @@ def decals_at(decals, points, normals, *, corrected=True, reach=1.0, contact="pa
 def colors_at(decals, points, normals, color_of, *, corrected=True, contact="paper"):
     """Premultiplied colours of all decals over each other, from the lowest up.
 
-    color_of(numbers, uv) gives the premultiplied colours of these decals at these image coordinates.
+    color_of(numbers, uv) gives the premultiplied colours of these decals at these image coordinates, within
+    the disc that is an image.
     """
 
     def composed(decals, points, normals):
@@ -54,7 +55,8 @@ def colors_at(decals, points, normals, color_of, *, corrected=True, contact="pap
             uv, _ = _image_place(
                 decals, points[rows], normals[rows], owner[rows], complement[rows], corrected
             )
-            front = color_of(owner[rows], uv)
+            inside = np.hypot(*(uv - 0.5).T) <= 0.5 + 1e-5
+            front = color_of(owner[rows], uv) * inside[:, None]
             color[rows] = front + (1 - front[:, 3:]) * color[rows]
         return (color,)
 
@@ -182,34 +184,35 @@ def _tie_doubt(squared, acts):
 
 
 def _image_place(decals, points, normals, owner, complement, corrected):
-    """uv, and |q − p| over its length in the tangent plane."""
-    xy, w = _tangent_offsets(decals, points, normals, owner, corrected)
-    length = np.hypot(xy[:, 0], xy[:, 1])
-    direction = xy / np.maximum(length, 1e-300)[:, None]
-    uv = 0.5 + 0.5 * rim_distance(complement)[:, None] * direction
-    return uv, np.linalg.norm(w, axis=1) / np.maximum(length, 1e-300)
+    """uv, and |q − p| over the length in the tangent plane of what gives uv its direction."""
+    p, n, u = (a[owner].astype(np.float64) for a in (decals.positions, decals.normals, decals.tangents))
+    w = (points - p) / decals.radii[owner].astype(np.float64)[:, None]
+    chord = np.linalg.norm(w, axis=1)
+    m, length = _unrolled(w, n, normals) if corrected else (w, None)
+    xy = np.column_stack([(m * u).sum(axis=1), (m * np.cross(n, u)).sum(axis=1)])
+    shadow = np.maximum(np.linalg.norm(xy, axis=1), 1e-300)
+    drawn = np.minimum(rim_distance(complement), 1)
+    if corrected:
+        # What neighbours leave of the way to the rim, times what the arc leaves of it; or already beyond it.
+        left = (1 - drawn) * (1 - length) / np.where(length < 1, 1 - chord, 1)
+        drawn = np.where(length < 1, 1 - left, length)
+    return 0.5 + 0.5 * (drawn / shadow)[:, None] * xy, chord / shadow
 
 
-def _tangent_offsets(decals, points, normals, k, corrected):
-    """Offsets in the owners' frames, and chords."""
-    n, u = decals.normals[k].astype(np.float64), decals.tangents[k].astype(np.float64)
-    w = points - decals.positions[k]
-    m = _bent(w, n, normals) if corrected else w
-    return np.column_stack([(m * u).sum(axis=1), (m * np.cross(n, u)).sum(axis=1)]), w
+def _unrolled(w, n_p, n_q):
+    """Offset and length of the arc that starts along a surface at n_p, and ends at n_q.
 
-
-def _bent(w, n_p, n_q):
-    """Unroll the arc from n_p to n_q; then scale the chord's shadow for the change of curvature along it."""
-    heights = [(w * n).sum(axis=1, keepdims=True) for n in (n_p, n_q)]
-    shadow = w - heights[0] * n_p
-    toward = n_q - (n_p * n_q).sum(axis=1, keepdims=True) * n_p
-    sine = np.linalg.norm(toward, axis=1, keepdims=True)
-    toward = np.where(sine > 1e-4, toward / np.maximum(sine, 1e-300), 0.0)
-    half = np.arctan2(sine, (n_p * n_q).sum(axis=1, keepdims=True)) / 2
-    half = np.maximum(half, 1e-12)
-    radius = (heights[1] - heights[0]) / (4 * np.sin(half) ** 2)
-    unrolled = radius * (2 * half - np.sin(2 * half)) * toward
-    squared = np.maximum((shadow * shadow).sum(axis=1, keepdims=True), 1e-300)
-    sideways = (shadow * toward).sum(axis=1, keepdims=True) / squared
-    tighter = -(heights[0] + heights[1]) * half**2 / np.sin(half) / 2 * sideways
-    return shadow * (1 + np.clip(tighter, -0.5, 0.5)) + unrolled
+    Of an arc of radius R and angle ψ both ends lie R (1 − cos ψ) from the tangent plane at the other. Where
+    heights differ, R is that of their harmonic mean (direction), or of their geometric one (length).
+    """
+    fall, rise = -(w * n_p).sum(axis=1), (w * n_q).sum(axis=1)
+    angle = 2 * np.arctan2(np.linalg.norm(n_q - n_p, axis=1), np.linalg.norm(n_q + n_p, axis=1))
+    bends = (fall * rise > 0) & (angle > 0)
+    fall, rise, angle = (np.where(bends, a, 1.0) for a in (fall, rise, angle))
+    versine = 2 * np.sin(angle / 2) ** 2
+    radius = 2 * fall * rise / (fall + rise) / versine
+    toward = (n_q - np.cos(angle)[:, None] * n_p) / np.maximum(np.sin(angle), 1e-300)[:, None]
+    skew = (rise - fall) / (rise + fall)
+    squared = fall * rise / versine**2 * (1 + 2 * skew**2) * (angle**2 - 2 * versine)
+    longer = np.sqrt((w * w).sum(axis=1) + np.where(bends, squared, 0))
+    return w + np.where(bends, radius * (angle - np.sin(angle)), 0)[:, None] * toward, longer

@@ -28,7 +28,6 @@ KEPT_LEAST = wp.constant(wp.float64(0.21))
 TINY = wp.constant(wp.float64(1e-300))
 NEARLY = wp.constant(wp.float64(1e-3))
 UNDERFLOW = wp.constant(wp.float64(1e-36))
-FLAT = wp.constant(wp.float64(1e-4))
 CONTACT = wp.constant(1)
 SMOOTH = wp.constant(1)
 RADIAL = wp.constant(2)
@@ -237,23 +236,22 @@ def convex(q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, these: Mem
 
 
 @wp.func
-def bent(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec3d:
-    """The arc from n_p to n_q unrolled, and the chord's shadow scaled for the change of curvature."""
-    height_p = wp.dot(w, n_p)
-    height_q = wp.dot(w, n_q)
-    shadow = w - height_p * n_p
-    toward = n_q - wp.dot(n_p, n_q) * n_p
-    sine = wp.length(toward)
-    half = wp.max(HALF * wp.atan2(sine, wp.dot(n_p, n_q)), wp.float64(1e-12))
-    if sine <= FLAT:
-        return shadow
-    toward = toward / sine
-    bow = wp.sin(half)
-    radius = (height_q - height_p) / (FOUR * bow * bow)
-    unrolled = radius * (TWO * half - wp.sin(TWO * half))
-    sideways = wp.dot(shadow, toward) / wp.max(wp.dot(shadow, shadow), TINY)
-    tighter = -(height_p + height_q) * half * half / bow * HALF * sideways
-    return shadow * (ONE + wp.clamp(tighter, -HALF, HALF)) + unrolled * toward
+def unrolled(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec4d:
+    """Offset by an arc of the ends' harmonic mean height, and length by one of their geometric mean."""
+    fall = -wp.dot(w, n_p)
+    rise = wp.dot(w, n_q)
+    turn = n_q - n_p
+    angle = TWO * wp.atan2(wp.length(turn), wp.length(n_q + n_p))
+    if fall * rise <= ZERO or angle == ZERO:
+        return wp.vec4d(w[0], w[1], w[2], wp.length(w))
+    versine = HALF * wp.dot(turn, turn)
+    radius = TWO * fall * rise / ((fall + rise) * versine)
+    toward = turn + versine * n_p
+    m = w + radius * (angle - wp.sin(angle)) / wp.max(wp.sin(angle), TINY) * toward
+    skew = (rise - fall) / (rise + fall)
+    gain = fall * rise * (ONE + TWO * skew * skew) / (versine * versine)
+    length = wp.sqrt(wp.dot(w, w) + gain * (angle * angle - TWO * versine))
+    return wp.vec4d(m[0], m[1], m[2], length)
 
 
 @wp.func
@@ -263,15 +261,20 @@ def place(
     """Image coordinates of q in decal i, and |q − p| over the offset's length in the tangent plane."""
     normal = wide(these.normals[i])
     tangent = wide(these.tangents[i])
-    w = q - wide(these.positions[i])
+    w = (q - wide(these.positions[i])) / wp.float64(these.radii[i])
+    chord = wp.length(w)
     m = w
+    drawn = wp.min(rim_of(e), ONE)
     if corrected:
-        m = bent(w, normal, n)
+        bent = unrolled(w, normal, n)
+        m = wp.vec3d(bent[0], bent[1], bent[2])
+        left = (ONE - drawn) * (ONE - bent[3]) / (ONE - chord)
+        drawn = ONE - left if bent[3] < ONE else bent[3]
     x = wp.dot(m, tangent)
     y = wp.dot(m, wp.cross(normal, tangent))
-    length = wp.max(wp.sqrt(x * x + y * y), TINY)
-    r = HALF * rim_of(e) / length
-    return wp.vec3d(HALF + r * x, HALF + r * y, wp.length(w) / length)
+    shadow = wp.max(wp.sqrt(x * x + y * y), TINY)
+    r = HALF * drawn / shadow
+    return wp.vec3d(HALF + r * x, HALF + r * y, chord / shadow)
 
 
 @wp.func
