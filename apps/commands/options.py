@@ -32,6 +32,10 @@ OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=F
 """One that need not be given."""
 
 
+Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
+"""Modules that define a user's own kinds of nodes."""
+
+
 def parse_size(text: str) -> Size:
     """Read a picture size such as ``"1200x900"``."""
     match = re.fullmatch(r"(\d{1,9})[xX×](\d{1,9})", text.strip())

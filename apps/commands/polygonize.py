@@ -10,9 +10,10 @@ from decals.scenes.scene import TreeObject
 
 from ..errors import UsageError
 from ..machine.warp_start import start_warp
+from ..models.definitions import import_definitions
 from ..models.loading import load_model
 from ..output import MESH_SUFFIXES, check_output, replacing
-from .options import OptionalWhole
+from .options import Definitions, OptionalWhole
 from .progress_bars import progress_bars
 
 OptionalLength = Annotated[float | None, Parameter(show_default=False)]
@@ -28,6 +29,7 @@ def polygonize(
     chord_error: OptionalLength = None,
     creases: bool = False,
     split_normals: bool = False,
+    define: Definitions = None,
 ) -> None:
     """Write an implicit model's surface as a triangle mesh.
 
@@ -47,9 +49,13 @@ def polygonize(
         Vertices lie on the edges and corners that unions, intersections and differences leave.
     split_normals
         The same, and each side of a crease has vertices and normals of its own, so that it looks sharp.
+    define
+        A Python file or module that defines own kinds of nodes, for BlobTrees in JSON that use them. May be
+        given several times.
     """
     check_output(output, MESH_SUFFIXES)
     start_warp()
+    import_definitions(define)
     loaded = load_model(model)
     if not isinstance(loaded, TreeObject):
         raise UsageError(f"expected a BlobTree in JSON or a sample (creature, spheres), {model!r} is none")

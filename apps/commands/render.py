@@ -11,6 +11,7 @@ from decals.scenes.scene_file import save_scene
 
 from ..errors import UsageError
 from ..machine.warp_start import start_warp
+from ..models.definitions import import_definitions
 from ..models.loading import load_models
 from ..models.samples import axes_of
 from ..output import PICTURE_SUFFIXES, check_output, write_picture
@@ -19,6 +20,7 @@ from .coat import Coat
 from .options import (
     MAX_SAMPLES,
     TILE,
+    Definitions,
     OptionalWhole,
     Whole,
     check_count,
@@ -40,6 +42,7 @@ def render(
     samples: Whole = 2,
     seed: OptionalWhole = None,
     save: Path | None = None,
+    define: Definitions = None,
 ) -> None:
     """Cover models with one coat of decals and draw a picture.
 
@@ -69,6 +72,9 @@ def render(
         The same number gives the same decals. Default: 0.
     save
         Also write the scene to this JSON file, which can be rendered again.
+    define
+        A Python file or module that defines own kinds of nodes, for BlobTrees in JSON that use them. May be
+        given several times.
     """
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
@@ -77,6 +83,7 @@ def render(
     if save is not None:
         check_output(save, (".json",))
     start_warp()
+    import_definitions(define)
     loaded = load_models(model)
     if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
         raise UsageError("a saved scene brings its own decals; leave out --decals, --image and --seed")

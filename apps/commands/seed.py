@@ -19,9 +19,10 @@ from decals.seeds.projections import Planar
 
 from ..errors import UsageError
 from ..machine.warp_start import start_warp
+from ..models.definitions import import_definitions
 from ..models.loading import load_models
 from ..output import check_output
-from .options import MAX_DECALS, MAX_SEED, OptionalWhole, Whole, check_count
+from .options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, Whole, check_count
 from .progress_bars import progress_bars
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
@@ -45,6 +46,7 @@ def seed(
     black: float = 0.1,
     regularity: float = 1.0,
     seed: Whole = 0,
+    define: Definitions = None,
 ) -> None:
     """Spread seeds over models and write the decals that lie on them.
 
@@ -81,6 +83,9 @@ def seed(
         From 0, places at random, to 1, as even as can be.
     seed
         The same number gives the same decals.
+    define
+        A Python file or module that defines own kinds of nodes, for BlobTrees in JSON that use them. May be
+        given several times.
     """
     if count is not None and spacing is not None:
         raise UsageError("expected --count or --spacing, got both; leave one of them out")
@@ -92,6 +97,7 @@ def seed(
     check_count("--seed", seed, 0, MAX_SEED)
     check_output(output, SUFFIXES)
     start_warp()
+    import_definitions(define)
     objects = load_models(model)
     if isinstance(objects, Scene):
         raise UsageError("a saved scene brings its own decals; seed its models instead")

@@ -11,12 +11,13 @@ from decals.window import EditWindow
 
 from ..errors import UsageError
 from ..machine.warp_start import start_warp
+from ..models.definitions import import_definitions
 from ..models.loading import load_models
 from ..models.samples import axes_of
 from ..output import check_output
 from ..views import UPRIGHT, parse_view
 from .coat import Coat
-from .options import MAX_DECALS, MAX_SEED, OptionalWhole, check_count, parse_size
+from .options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, check_count, parse_size
 from .progress_bars import progress_bars
 
 
@@ -30,6 +31,7 @@ def view(
     size: str = "1200x800",
     seed: OptionalWhole = None,
     save: Path | None = None,
+    define: Definitions = None,
 ) -> None:
     """Open models or a scene in a window, and push decals by hand.
 
@@ -51,6 +53,9 @@ def view(
         The same number gives the same decals. Default: 0.
     save
         The JSON file that Ctrl + S writes. Default: the scene that was opened.
+    define
+        A Python file or module that defines own kinds of nodes, for BlobTrees in JSON that use them. May be
+        given several times.
     """
     pixels = parse_size(size)
     if decals is not None:
@@ -61,6 +66,7 @@ def view(
         check_output(save, (".json",))
     EditWindow.require_screen()
     start_warp()
+    import_definitions(define)
     loaded, path = load_models(model), save
     if isinstance(loaded, Scene):
         if decals is not None or image or seed is not None:

@@ -44,7 +44,7 @@ def find_kind(name: str) -> OwnKind:
         known = ", ".join(sorted(_KINDS)) or "none"
         raise UnknownKind(
             f"own kind {name!r} is not defined in this process (defined: {known}); import the module that "
-            "calls define_skeleton or define_operator for it, then try again"
+            "calls define_skeleton or define_operator for it (on the command line: --define), then try again"
         )
     return _KINDS[name]
 
