@@ -35,7 +35,7 @@ def test_the_code_blocks_run(
     assert hit.object_id == 0
     assert hit.owner >= 0
     assert str(hit.owner) in capsys.readouterr().out
-    for name in ("among", "stock", "two"):
+    for name in ("among", "stock", "two", "lights"):
         drawn = np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")).astype(int)
         kept = np.asarray(Image.open(DOCS / "images" / "pyvista" / f"{name}.png").convert("RGB")).astype(int)
         assert drawn.shape == kept.shape

@@ -1,15 +1,17 @@
-"""The light pass: studio light on what the decal pass painted."""
+"""The light pass: studio light, or somebody's lamps, on what the decal pass painted."""
 
 import moderngl
+import numpy as np
 
 from decals.render.context import Context
 from decals.render.decal_pass import use_textures
-from decals.render.entry import pixel_pass
+from decals.render.entry import PixelPass, Program, pixel_pass
 from decals.render.gbuffer import GBuffer
+from decals.render.lamps import Lamps
 from decals.render.parts import WHOLE, Part
 from decals.render.tile import MARGIN, Tile, attach_camera, set_uniform
 
-BODY = "lit.glsl"
+STUDIO, LAMPS = "lit.glsl", "lamplit.glsl"
 
 
 class LightPass:
@@ -25,8 +27,9 @@ class LightPass:
 
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
         self.light = context.texture(size, "f2")
-        self._pass = pixel_pass(context, BODY, [self.light])
-        attach_camera(self._pass.program)
+        self._context = context
+        self._passes: dict[str, PixelPass] = {}
+        self._pass(STUDIO)
 
     def draw(
         self,
@@ -34,21 +37,42 @@ class LightPass:
         paint: moderngl.Texture,
         tile: Tile,
         ambient_radius: float,
+        lamps: Lamps | None = None,
         part: Part = WHOLE,
     ) -> None:
-        """Light rows of a tile, all of which must be in the G-buffer.
+        """Light rows of a tile, all of which must be in the G-buffer, by the studio or by lamps.
 
-        ``ambient_radius`` is how far away surroundings may be to keep light out, in the scene's units.
+        ``ambient_radius`` is how far away surroundings may be to keep the studio's light out, in the
+        scene's units.
         """
-        program = self._pass.program
+        lighting = self._pass(STUDIO if lamps is None else LAMPS)
+        program = lighting.program
         use_textures(program, {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_paint": paint})
-        set_uniform(program, "tile_corner", (tile.x, tile.y))
-        set_uniform(program, "tile_size", (tile.width, tile.height))
-        set_uniform(program, "ambient_radius", ambient_radius)
-        set_uniform(program, "ambient_limit", MARGIN)
-        self._pass.run(tile.width, tile.height, part)
+        if lamps is None:
+            set_uniform(program, "tile_corner", (tile.x, tile.y))
+            set_uniform(program, "tile_size", (tile.width, tile.height))
+            set_uniform(program, "ambient_radius", ambient_radius)
+            set_uniform(program, "ambient_limit", MARGIN)
+        else:
+            _use_lamps(program, lamps)
+        lighting.run(tile.width, tile.height, part)
+
+    def _pass(self, body: str) -> PixelPass:
+        if body not in self._passes:
+            self._passes[body] = pixel_pass(self._context, body, [self.light])
+            attach_camera(self._passes[body].program)
+        return self._passes[body]
 
     def release(self) -> None:
         """Give the memory back."""
-        self._pass.release()
+        for lighting in self._passes.values():
+            lighting.release()
         self.light.release()
+
+
+def _use_lamps(program: Program, lamps: Lamps) -> None:
+    set_uniform(program, "lamp_count", len(lamps.lamps))
+    set_uniform(program, "lamp_place", tuple(np.asarray(lamps.matrix, np.float32).T.ravel().tolist()))
+    rows = program["lamps"]
+    assert isinstance(rows, moderngl.Uniform)
+    rows.write(lamps.data())

@@ -22,13 +22,24 @@ from decals.render.drawables import Drawable, drawable_for
 from decals.render.drawing import Drawing
 from decals.render.entry import Entry
 from decals.render.kept import Kept
+from decals.render.lamps import Lamps
 from decals.render.parts import WHOLE, Step
 from decals.render.resolve import STUDIO, Background
 from decals.render.scene_like import SceneLike
-from decals.render.steps import Uploaded, steps_of
+from decals.render.steps import Modes, Uploaded, steps_of
 from decals.render.targets import KINDS, Size, Targets
 from decals.render.textures import ImageArray
-from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Rectangle, Tile, largest_tile, tiles
+from decals.render.tile import (
+    MARGIN,
+    MAX_TILE,
+    CameraBuffer,
+    Picture,
+    Rectangle,
+    Tile,
+    check_size,
+    largest_tile,
+    tiles,
+)
 from decals.scenes.viewpoint import Viewpoint
 
 WHOLE_SLOT, BUFFERS_SLOT = "whole", "buffers"
@@ -75,6 +86,7 @@ class Renderer:
         mapping: Mapping = Mapping.CORRECTED,
         contact: Contact = Contact.PAPER,
         viewpoint: Viewpoint | None = None,
+        lamps: Lamps | None = None,
     ) -> NDArray[np.uint8]:
         """Draw a scene.
 
@@ -94,6 +106,8 @@ class Renderer:
             How contact decals push each other.
         viewpoint
             Where the picture is taken from, if not by the scene's camera.
+        lamps
+            Lights in place of the studio's.
 
         Returns
         -------
@@ -105,9 +119,9 @@ class Renderer:
         InvalidScene
             The scene holds an object of unknown kind, or size or samples are none.
         """
-        _check_size(size, samples)
+        check_size(size, samples)
         canvas = Canvas(size, 4, np.uint8)
-        for tile, targets in self._tiles(scene, viewpoint, size, samples, mapping, contact):
+        for tile, targets in self._tiles(scene, viewpoint, size, samples, Modes(mapping, contact, lamps)):
             light = targets.light_pass.light
             canvas.place(targets.resolve.pixels(light, tile, samples, background), tile, samples)
         return canvas.pixels
@@ -122,9 +136,9 @@ class Renderer:
         viewpoint: Viewpoint | None = None,
     ) -> Buffers:
         """Give what lies behind every pixel's centre; arguments and errors as for `render`."""
-        _check_size(size, 1)
+        check_size(size, 1)
         canvas = BufferCanvas(size)
-        for tile, targets in self._tiles(scene, viewpoint, size, 1, mapping, contact, buffers=True):
+        for tile, targets in self._tiles(scene, viewpoint, size, 1, Modes(mapping, contact), buffers=True):
             canvas.place(targets, tile)
         return canvas.buffers
 
@@ -144,13 +158,13 @@ class Renderer:
         ``(x, y)`` counts from the lower left corner; other arguments and errors are those of `buffers`.
         (Its colour knows no surroundings that keep light out.)
         """
-        _check_size(size, 1)
+        check_size(size, 1)
         with self.context.current():
             uploaded = self._upload(scene)
             picture = Picture.of(viewpoint or scene.camera, size, uploaded.bounds)
             tile = picture.part(Rectangle(x, y, 1, 1))
             targets = self._targets_for(BUFFERS_SLOT, (1, 1))
-            self._draw_tile(uploaded, tile, targets, mapping, contact)
+            self._draw_tile(uploaded, tile, targets, Modes(mapping, contact))
             canvas = BufferCanvas((1, 1))
             canvas.place(targets, Tile(picture, 0, 0, 1, 1, Rectangle(0, 0, 1, 1)))
             return canvas.buffers
@@ -164,6 +178,7 @@ class Renderer:
         mapping: Mapping = Mapping.CORRECTED,
         contact: Contact = Contact.PAPER,
         viewpoint: Viewpoint | None = None,
+        lamps: Lamps | None = None,
     ) -> Targets:
         """Draw a scene at once, without tiles, and leave it on the graphics card.
 
@@ -171,7 +186,13 @@ class Renderer:
         current. Arguments and errors as for `render`.
         """
         drawing = self.drawing(
-            scene, size=size, samples=samples, mapping=mapping, contact=contact, viewpoint=viewpoint
+            scene,
+            size=size,
+            samples=samples,
+            mapping=mapping,
+            contact=contact,
+            viewpoint=viewpoint,
+            lamps=lamps,
         )
         drawing.complete()
         self.sweep()
@@ -186,6 +207,7 @@ class Renderer:
         mapping: Mapping = Mapping.CORRECTED,
         contact: Contact = Contact.PAPER,
         viewpoint: Viewpoint | None = None,
+        lamps: Lamps | None = None,
         slot: str = WHOLE_SLOT,
     ) -> Drawing:
         """Give a scene's picture in the making: it is drawn part by part, and stays on the graphics card.
@@ -193,7 +215,7 @@ class Renderer:
         It needs a scene and a viewpoint that stay as they are. Drawings of different slots, any texts, do
         not overwrite each other. The context must be current. Other arguments and errors as for `render`.
         """
-        _check_size(size, samples)
+        check_size(size, samples)
         full = size[0] * samples, size[1] * samples
         if max(full) > self.context.max_texture_size:
             raise InvalidScene(
@@ -205,7 +227,7 @@ class Renderer:
             uploaded = self._upload(scene)  # again each time: others may draw in between
             tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
             self._camera.use(tile)
-            done = steps_of(uploaded, tile, targets, mapping, contact)
+            done = steps_of(uploaded, tile, targets, Modes(mapping, contact, lamps))
             if not all(drawable.rasterised for drawable in uploaded.drawables):
                 done.append(partial(targets.gbuffer.complete_depth, *full))
             return done
@@ -225,11 +247,11 @@ class Renderer:
         What a scene uploads is counted where it is drawn for the first time. Arguments and errors as for
         `render`.
         """
-        _check_size(size, 1)
+        check_size(size, 1)
         with self.context.current():
             self.context.gl.finish()
             begin = time.perf_counter()
-            for _ in self._tiles(scene, None, size, 1, mapping, contact):
+            for _ in self._tiles(scene, None, size, 1, Modes(mapping, contact)):
                 pass
             self.context.gl.finish()
             return time.perf_counter() - begin
@@ -246,8 +268,7 @@ class Renderer:
         viewpoint: Viewpoint | None,
         size: Size,
         samples: int,
-        mapping: Mapping,
-        contact: Contact,
+        modes: Modes,
         *,
         buffers: bool = False,
     ) -> Iterator[tuple[Tile, Targets]]:
@@ -259,16 +280,14 @@ class Renderer:
             slot = BUFFERS_SLOT if buffers else WHOLE_SLOT
             targets = self._targets_for(slot, largest_tile(size, samples, limit=self._max_tile))
             for tile in tiles(picture, samples, limit=self._max_tile):
-                self._draw_tile(uploaded, tile, targets, mapping, contact)
+                self._draw_tile(uploaded, tile, targets, modes)
                 yield tile, targets
             self.sweep()
 
-    def _draw_tile(
-        self, uploaded: Uploaded, tile: Tile, targets: Targets, mapping: Mapping, contact: Contact
-    ) -> None:
+    def _draw_tile(self, uploaded: Uploaded, tile: Tile, targets: Targets, modes: Modes) -> None:
         self._camera.use(tile)
         targets.picture = None
-        for step in steps_of(uploaded, tile, targets, mapping, contact):
+        for step in steps_of(uploaded, tile, targets, modes):
             step(WHOLE)
 
     def _upload(self, scene: SceneLike) -> Uploaded:
@@ -338,10 +357,3 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.release()
-
-
-def _check_size(size: Size, samples: int) -> None:
-    if len(size) != 2 or min(size) < 1 or samples < 1:
-        raise InvalidScene(
-            f"a picture needs a width, a height and samples of at least 1, got {size}, {samples}"
-        )

@@ -9,6 +9,7 @@ from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.render.decal_data import DecalData
 from decals.render.drawables import Drawable
+from decals.render.lamps import Lamps
 from decals.render.parts import Step
 from decals.render.targets import Targets
 from decals.render.textures import ImageArray
@@ -36,17 +37,24 @@ class Uploaded:
         return np.min(lower, axis=0), np.max(upper, axis=0)
 
 
-def steps_of(
-    uploaded: Uploaded, tile: Tile, targets: Targets, mapping: Mapping, contact: Contact
-) -> list[Step]:
+@dataclass(frozen=True)
+class Modes:
+    """How images lie on curved surface, how decals push each other, and lamps, if not the studio's."""
+
+    mapping: Mapping
+    contact: Contact
+    lamps: Lamps | None = None
+
+
+def steps_of(uploaded: Uploaded, tile: Tile, targets: Targets, modes: Modes) -> list[Step]:
     """What a tile of a scene takes, in this order; the tile's camera must be bound."""
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
     objects = sorted(enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised)
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
-    painted = gbuffer, tile, uploaded.decals, uploaded.images, mapping, contact
+    painted = gbuffer, tile, uploaded.decals, uploaded.images, modes.mapping, modes.contact
     return [
         partial(gbuffer.clear, tile.width, tile.height),
         *(partial(drawable.draw, number, tile, gbuffer) for number, drawable in objects),
         partial(targets.decal_pass.draw, *painted),
-        partial(targets.light_pass.draw, gbuffer, paint, tile, radius),
+        partial(targets.light_pass.draw, gbuffer, paint, tile, radius, modes.lamps),
     ]

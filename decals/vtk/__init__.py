@@ -4,8 +4,9 @@ Once the package is installed pyvista finds the component by itself; importing t
 """
 
 from decals.vtk.component import Component
+from decals.vtk.lights import Lights
 from decals.vtk.picking import Hit
 from decals.vtk.stage import Stage
 from decals.vtk.viewer import show
 
-__all__ = ["Component", "Hit", "Stage", "show"]
+__all__ = ["Component", "Hit", "Lights", "Stage", "show"]

@@ -18,6 +18,7 @@ from decals.render import SceneLike
 from decals.scenes.camera import Camera
 from decals.scenes.scene import CLAY, Color, DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.vtk.context import WindowContext
+from decals.vtk.lights import Lights
 from decals.vtk.modes import restore_exports, warn_of_exports
 from decals.vtk.stage import Stage
 
@@ -200,6 +201,15 @@ class Component:
             self._stages[id(renderer)] = Stage(self._plotter, renderer, self._window_context)
             warn_of_exports(self._plotter)
         return self._stages[id(renderer)]
+
+    @property
+    def lights(self) -> Lights:
+        """Who lights what the active subplot shows; see `Lights`."""
+        return self.stage.lights
+
+    @lights.setter
+    def lights(self, lights: Lights | str) -> None:
+        self.stage.lights = lights
 
     @property
     def stages(self) -> tuple[Stage, ...]:

@@ -10,6 +10,7 @@ from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
 from decals.render import Renderer, SceneLike, Size
 from decals.render.drawing import Drawing
+from decals.render.lamps import Lamps
 from decals.render.renderer import WHOLE_SLOT
 from decals.render.targets import Targets
 from decals.render.tile import CameraBuffer
@@ -21,12 +22,13 @@ from decals.vtk.picking import texels_of
 
 @dataclass(frozen=True)
 class Look:
-    """How a frame is drawn: size in pixels, samples a pixel along each axis, modes."""
+    """How a frame is drawn: size in pixels, samples a pixel along each axis, modes, lamps of VTK's."""
 
     size: Size
     samples: int
     mapping: Mapping
     contact: Contact
+    lamps: Lamps | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +129,7 @@ class Frame:
             mapping=look.mapping,
             contact=look.contact,
             viewpoint=viewpoint,
+            lamps=look.lamps,
             slot=slot,
         )
 

@@ -12,11 +12,10 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonCore import vtkCommand
 
-from decals.checks import finite, shown, whole
+from decals.checks import shown
 from decals.errors import InvalidScene
-from decals.field.contact import Contact
-from decals.field.mapping import Mapping
 from decals.render import Renderer, SceneLike, Size
+from decals.render.lamps import Lamps
 from decals.render.tile import CameraBuffer
 from decals.scenes.scene import Box, SceneObject, bounds_of
 from decals.scenes.viewpoint import Floats, Projection
@@ -26,14 +25,13 @@ from decals.vtk.boxes import box_around
 from decals.vtk.camera import vtk_projection
 from decals.vtk.context import WindowContext
 from decals.vtk.frame import Frame, Look
+from decals.vtk.lights import TOO_MANY, Lights, too_many_lights, vtk_lamps
 from decals.vtk.modes import complaints
 from decals.vtk.picking import Hit, hidden, hit_at
-
-MOST_SAMPLES = 16
-"""Along each axis; graphics cards have no targets for more in a window of the usual size."""
+from decals.vtk.settings import Settings
 
 
-class Stage:
+class Stage(Settings):
     """Draws a scene among the actors of one of pyvista's renderers.
 
     Everything may be changed at any time; the plotter's next ``render()`` shows it.
@@ -60,9 +58,8 @@ class Stage:
     def __init__(
         self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]
     ) -> None:
+        super().__init__()
         self.plotter, self.vtk_renderer = plotter, renderer
-        self._samples, self._draw_scale = 2, 1.0
-        self._mapping, self._contact = Mapping.CORRECTED, Contact.PAPER
         self.measure = False
         self.drawing = False
         self._scene: SceneLike | None = None
@@ -117,55 +114,9 @@ class Stage:
         self._placed = objects
         self._anchor.place(box(cast(Sequence[SceneObject], objects)) if objects else None)
 
-    @property
-    def draw_scale(self) -> float:
-        """Size of what is drawn relative to the window's.
-
-        Below 1, one sample a texel is drawn and magnified: for the time that things move.
-        """
-        return self._draw_scale
-
-    @draw_scale.setter
-    def draw_scale(self, scale: float) -> None:
-        number = finite("draw_scale", scale, InvalidScene)
-        if not 0.0 < number <= 1.0:
-            raise InvalidScene(f"draw_scale: expected a number above 0 and at most 1, got {number}")
-        self._draw_scale = number
-
-    @property
-    def samples(self) -> int:
-        """Samples a pixel along each axis; where VTK itself draws larger than the window, one."""
-        return self._samples
-
-    @samples.setter
-    def samples(self, samples: int) -> None:
-        self._samples = whole("samples", samples, 1, MOST_SAMPLES, InvalidScene)
-
-    @property
-    def mapping(self) -> Mapping:
-        """How images lie on curved surface; as for `decals.render.Renderer.render`."""
-        return self._mapping
-
-    @mapping.setter
-    def mapping(self, mapping: Mapping) -> None:
-        try:
-            self._mapping = Mapping(mapping)
-        except ValueError as error:
-            names = ", ".join(f"Mapping.{one.name}" for one in Mapping)
-            raise InvalidScene(f"mapping must be one of {names}; got {mapping!r}") from error
-
-    @property
-    def contact(self) -> Contact:
-        """How decals push each other; as for `decals.render.Renderer.render`."""
-        return self._contact
-
-    @contact.setter
-    def contact(self, contact: Contact) -> None:
-        try:
-            self._contact = Contact(contact)
-        except ValueError as error:
-            names = ", ".join(f"Contact.{one.name}" for one in Contact)
-            raise InvalidScene(f"contact must be one of {names}; got {contact!r}") from error
+    def lamps(self) -> Lamps | None:
+        """Lights of the renderer as `decals.render.Renderer.render` takes them; None for the studio's."""
+        return vtk_lamps(self.vtk_renderer, self.frame()) if self.lights is Lights.VTK else None
 
     def apply(self, actor: Any, *, follow: bool = False) -> None:
         """Put the scene's decals into VTK's own shader of an actor; see `Component.apply`."""
@@ -188,7 +139,10 @@ class Stage:
 
     def _complain(self) -> None:
         """Say, once, what of VTK's modes does not go with what we draw."""
-        for complaint in complaints(self.vtk_renderer):
+        found = complaints(self.vtk_renderer)
+        if self.lights is Lights.VTK and too_many_lights(self.vtk_renderer):
+            found.append(TOO_MANY)
+        for complaint in found:
             if complaint not in self._said:
                 self._said.add(complaint)
                 warnings.warn(complaint, stacklevel=2)
@@ -283,9 +237,9 @@ class Stage:
         """How the part of a window is drawn that has this size."""
         if scale < 1.0:
             width, height = (max(1, round(scale * side)) for side in size)
-            return Look((width, height), 1, self.mapping, self.contact)
+            return Look((width, height), 1, self.mapping, self.contact, self.lamps())
         supersampled = size[0] > self.vtk_renderer.GetSize()[0]
-        return Look(size, 1 if supersampled else samples, self.mapping, self.contact)
+        return Look(size, 1 if supersampled else samples, self.mapping, self.contact, self.lamps())
 
     def prepare(self, samples: int, seconds: float) -> float | None:
         """Draw for about so long on a whole frame with so many samples, and show nothing of it yet.

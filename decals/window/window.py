@@ -19,7 +19,7 @@ from decals.render.libraries import require_gl
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.surfaces.surface import Floats
-from decals.vtk.stage import MOST_SAMPLES
+from decals.vtk.settings import MOST_SAMPLES
 from decals.window.bindings import Bindings
 from decals.window.grip import Grip
 from decals.window.home import SIZE, checked_size, lent_plotter, new_plotter, require_screen
