@@ -1,9 +1,9 @@
 """Decals as data: a frozen, validated structure of arrays (paper, section 3.1)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from enum import IntEnum
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -153,7 +153,16 @@ class Decals:
     def concatenate(cls, parts: Iterable["Decals"]) -> Self:
         """All decals of all parts, in their order."""
         sources = [cls.empty(), *parts]
-        return cls(**{name: np.concatenate([getattr(p, name) for p in sources]) for name in _FIELDS})
+        return cls.of_rows({name: np.concatenate([getattr(p, name) for p in sources]) for name in _FIELDS})
+
+    @classmethod
+    def of_rows(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
+        """Decals whose arrays are rows of other decals', under the same names: nothing is checked again."""
+        made = cls.__new__(cls)
+        for name in _FIELDS:
+            arrays[name].flags.writeable = False
+            object.__setattr__(made, name, arrays[name])
+        return made
 
     def replace(self, **arrays: ArrayLike) -> Self:
         """Exchange some arrays; the result is checked again."""
@@ -165,7 +174,8 @@ class Decals:
     def __getitem__(self, rows: slice | ArrayLike) -> Self:
         """Pick some of the decals by a slice, a mask or an array of indices."""
         chosen = rows if isinstance(rows, slice) else np.atleast_1d(chosen_rows(rows))
-        return type(self)(**{name: getattr(self, name)[chosen] for name in _FIELDS})
+        arrays = {name: getattr(self, name)[chosen] for name in _FIELDS}
+        return type(self).of_rows(arrays) if arrays["radii"].ndim == 1 else type(self)(**arrays)
 
     @property
     def bitangents(self) -> Floats:

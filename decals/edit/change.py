@@ -39,6 +39,8 @@ class Rows:
     def overlaid(self, other: "Rows") -> "Rows":
         """These, and the other's for the numbers that only that one has."""
         news = ~np.isin(other.numbers, self.numbers)
+        if not news.any():
+            return self
         return Rows(
             np.concatenate([self.numbers, other.numbers[news]]),
             np.concatenate([self.there, other.there[news]]),

@@ -126,6 +126,8 @@ class Carry(OfNumbers):
         before = document.decals.take(self.numbers)
         goal = Places(*_rows(self.position, self.normal), np.zeros(1, np.int32))
         first = carried(before[:1], goal)
+        if len(before) == 1:
+            return document.with_decals(self.numbers, first)
         turn = turns(before.normals[:1], first.normals)[0]
         offsets = (before.positions[1:].astype(np.float64) - before.positions[0]) @ turn.T
         others = carried(before[1:], nearest(document.objects, first.positions + offsets))

@@ -63,7 +63,7 @@ class DecalRows:
     def take(self, numbers: ArrayLike) -> Decals:
         """Decals of these numbers, in their order."""
         rows = self.check(numbers)
-        return Decals(**{name: column[rows] for name, column in self._columns.items()})
+        return Decals.of_rows({name: column[rows] for name, column in self._columns.items()})
 
     def put(self, numbers: Numbers, decals: Decals) -> None:
         """Put decals into rows, which may be past the end."""

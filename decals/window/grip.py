@@ -30,6 +30,11 @@ class Grip:
         Know what is held, and move it.
     redraw
         Called after every step, and with True at the end.
+
+    Attributes
+    ----------
+    moving
+        Whether it is being dragged now.
     """
 
     def __init__(self, renderer: Any, actions: Actions, redraw: Callable[[bool], None]) -> None:
@@ -37,11 +42,11 @@ class Grip:
         self._widget: Any = None
         self._held: Any = None
         self._start: Floats = np.zeros(3, np.float32)
-        self._moving = False
+        self.moving = False
 
     def update(self) -> None:
         """Show the handle where the held primitive is now, or none."""
-        if self._moving:
+        if self.moving:
             return
         if self._actions.grip != self._held or self._actions.grip is None:
             self.release()
@@ -76,7 +81,7 @@ class Grip:
 
     def begin(self) -> None:
         """The handle was taken."""
-        self._moving, self._start = True, np.array(self._widget.GetCenter())
+        self.moving, self._start = True, np.array(self._widget.GetCenter())
         self._actions.begin_grip()
 
     def move(self) -> None:
@@ -87,7 +92,7 @@ class Grip:
     def end(self) -> None:
         """The handle was let go."""
         self._actions.settle()
-        self._moving = False
+        self.moving = False
         self.update()
         self._redraw(True)
 

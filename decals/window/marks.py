@@ -77,6 +77,8 @@ class Marks:
     def show_help(self, shown: bool) -> None:
         """Show the help, as large as the window allows, or hide it."""
         self._help.SetVisibility(shown)
+        if not shown:
+            return
         width, height = self._plotter.window_size
         lines = help_lines()
         tall = (height - 60) / (LINE * len(lines))

@@ -151,9 +151,11 @@ class EditWindow:
 
     def actions_shown(self) -> None:
         """Bring outlines, handle, help and status up to date."""
-        if not self.tools.dragging:
+        dragging = self.tools.dragging or self.grip.moving
+        if not dragging:
             self.grip.update()
-        self.marks.outline(self.document, self.actions.selection, self.stage.contact)
+        outlined = () if dragging else self.actions.selection  # it takes longer than the move itself
+        self.marks.outline(self.document, outlined, self.stage.contact)
         self.marks.show_help(self.actions.help)
         self.marks.say(self._status())
 

@@ -73,6 +73,16 @@ def test_slices_masks_and_index_arrays():
     assert np.array_equal(decals[-1].normals, decals.normals[-1:])
 
 
+def test_rows_are_the_same_bits_and_nobody_can_write_them():
+    decals = some(6)
+    for part in (decals[1:4], decals[[4, 0]], Decals.concatenate([decals, decals[:2]])):
+        for name in ("positions", "normals", "tangents", "radii", "images", "tints", "opacities"):
+            assert not getattr(part, name).flags.writeable, name
+    assert decals[[4, 0]].tangents.tobytes() == decals.tangents[[4, 0]].tobytes()
+    with pytest.raises(InvalidDecals, match="expected shape"):
+        decals[np.zeros((2, 2), int)]
+
+
 def test_concatenate_keeps_order_and_all_fields():
     first, second = some(3, 1), some(4, 2)
     both = Decals.concatenate([first, second])

@@ -124,6 +124,17 @@ def test_what_is_selected_is_outlined(driver):
     assert driver.window.marks.lines.n_points == 0
 
 
+def test_outlines_wait_until_a_drag_has_ended(driver):
+    _, at = next(driver.visible())
+    driver.click(at)
+    assert driver.window.marks.lines.n_lines == 1
+    driver.event("LeftButtonPressEvent", at)
+    driver.event("MouseMoveEvent", (at[0] + 9, at[1]))
+    assert driver.window.marks.lines.n_points == 0
+    driver.event("LeftButtonReleaseEvent", (at[0] + 9, at[1]))
+    assert driver.window.marks.lines.n_lines == 1
+
+
 def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
     point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
     bare = driver.shot()
