@@ -14,8 +14,8 @@ from decals.scenes.scene import DecalImage, MeshObject, Scene
 from implicit_decals.apps.measuring.coats import even_coat
 from tests.bench import record, replay, replay_counts
 from tests.bench.scenes import in_layers
+from tests.decals.render.test_decals import view_of
 from tests.decals.shapes import torus
-from tests.decals.test_render_decals import view_of
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 It stands on the paper and the design alone and shares no function with the implementation. Decals come in
 sets of equal size that do not reach each other; a point is held against the members of its own set, by
-brute force. `tests/decals/test_parity.py` holds it against the NumPy oracle.
+brute force. `tests/decals/field/test_parity.py` holds it against the NumPy oracle.
 
 Variables that a loop changes begin as literals: one that begins as a Warp constant would change the constant.
 """

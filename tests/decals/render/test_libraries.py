@@ -5,7 +5,7 @@ import pytest
 from decals.errors import NoGraphics
 from decals.render.libraries import GL_LIBRARIES, Loader, install_advice, missing_gl_libraries, require_gl
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def loader_without(*absent: str) -> Loader:

@@ -12,9 +12,9 @@ from decals.render.tape_shader import Kinds, tracing_shader
 from decals.scenes.camera import Camera
 from tests.blobtree.own_kinds import EVERYTHING, OWN_TREES, Brick, Carve, Path, Ring, Soft
 from tests.blobtree.trees import points_around
-from tests.decals.glsl_functions import run_program
+from tests.decals.glsl.functions import run_program
+from tests.decals.glsl.test_tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
 from tests.decals.shapes import View
-from tests.decals.test_glsl_tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
 from tests.oracles import blobtree as oracle
 
 RING = Ring((0, 0, 0), (0.2, 0, 1), 0.8, radius=0.25, color=(0.9, 0.3, 0.1))

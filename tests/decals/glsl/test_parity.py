@@ -13,8 +13,8 @@ from blobtree.typed.glsl import translate_library
 from decals.render.context import Context
 from decals.render.tape_shader import _dispatch
 from tests.blobtree.warp_functions import TypedFunction, call, typed_functions
-from tests.decals.glsl_arguments import COUNT, arguments_of
-from tests.decals.glsl_functions import AGREEMENT, ALL_KINDS, through_glsl
+from tests.decals.glsl.arguments import COUNT, arguments_of
+from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, through_glsl
 
 MODULES = (
     "blobtree.formulas.kernels",

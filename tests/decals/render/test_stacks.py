@@ -11,8 +11,8 @@ from decals.field.mapping import Mapping
 from decals.model import Decals
 from decals.render.renderer import Renderer
 from decals.scenes.camera import Camera
+from tests.decals.render.test_decals import WHITE, compare, plain_colors, quarters, wall
 from tests.decals.shapes import View, torus
-from tests.decals.test_render_decals import WHITE, compare, plain_colors, quarters, wall
 from tests.oracles.decals import colors_at
 
 CENTRE = (0, -1.4, 0)

@@ -15,8 +15,8 @@ from decals.render.tape_shader import tracing_shader
 from decals.render.tree import TreeDrawable
 from decals.scenes.camera import Camera
 from tests.blobtree.trees import points_around, random_trees
-from tests.decals.glsl_arguments import Array, units
-from tests.decals.glsl_functions import AGREEMENT, ALL_KINDS, run_program
+from tests.decals.glsl.arguments import Array, units
+from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, run_program
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 

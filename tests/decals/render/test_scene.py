@@ -15,8 +15,8 @@ from decals.render.context import Context
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.scenes.viewpoint import Projection
+from tests.decals.render.test_decals import compare
 from tests.decals.shapes import torus
-from tests.decals.test_render_decals import compare
 from tests.oracles.raster import edges
 
 SIZE = (96, 72)

@@ -7,8 +7,8 @@ import pytest
 
 from decals.model import LARGEST, SMALLEST_RADIUS, Decals
 from decals.render.renderer import Renderer
+from tests.decals.render.test_decals import WHITE, scattered, view_of, wall
 from tests.decals.shapes import Picture, View, torus
-from tests.decals.test_render_decals import WHITE, scattered, view_of, wall
 
 SIZE = (48, 36)
 

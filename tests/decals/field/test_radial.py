@@ -8,7 +8,7 @@ from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
 from decals.grid.index import DecalIndex
 from decals.model import Decals
-from tests.decals.radial_rays import rims_of_points, slopes_of_rays
+from tests.decals.field.radial_rays import rims_of_points, slopes_of_rays
 from tests.oracles.contact import RIM
 
 LEAST = 0.21
