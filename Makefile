@@ -17,8 +17,8 @@ help:  ## Say what each target does
 demo: $(INSTALLED) gl  ## Draw the pictures under out/
 	$(BIN)/implicit-decals demo
 
-test: $(INSTALLED) gl  ## Run the tests, less the slow ones and those that need a CUDA device
-	$(BIN)/python -m pytest -m "not slow and not gpu"
+test: $(INSTALLED) gl  ## Run the tests, less the slow ones and those that need a CUDA device or a browser
+	$(BIN)/python -m pytest -m "not slow and not gpu and not browser"
 
 check: lint types wheel  ## Check format, lint, types and the built wheel
 

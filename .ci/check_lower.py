@@ -33,7 +33,15 @@ def main() -> None:
         python = folder / "venv" / "bin" / "python"
         pip = [python, "-m", "pip", "install", "--quiet", "--editable", ".[dev]", *bounds]
         subprocess.run(pip, check=True, cwd=ROOT)
-        tests = [python, "-m", "pytest", "-m", "not slow and not gpu", "-p", "no:cacheprovider"]
+        tests = [
+            python,
+            "-m",
+            "pytest",
+            "-m",
+            "not slow and not gpu and not browser",
+            "-p",
+            "no:cacheprovider",
+        ]
         environment = os.environ | {"WARP_CACHE_PATH": str(folder / "warp-cache")}
         ran = subprocess.run([*tests, *sys.argv[1:]], cwd=ROOT, env=environment, check=False)
         if ran.returncode:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from functools import wraps
 from typing import Any
 
@@ -21,6 +22,14 @@ PEELING = (
     "depth peeling draws no translucent actors where there is multisampling, with decals or without; "
     "call `disable_anti_aliasing()` or `enable_anti_aliasing('ssaa')`"
 )
+WATCHED = "add_on_render_callback"
+"""Method of a plotter by which every view of trame-pyvista asks to hear of frames."""
+CLIENTS = {
+    "PyVistaLocalView": "draws",
+    "PyVistaRemoteLocalView": "can be switched to draw",
+    "PyVistaWasmView": "draws",
+}
+"""Those views that draw in the browser."""
 EXPORTS = ("export_html", "export_vtksz", "export_gltf", "export_obj", "export_vrml")
 """Methods of a plotter that write its actors, not its picture."""
 
@@ -46,16 +55,19 @@ def _names(render_pass: Any) -> Iterator[str]:
             yield from _names(passes.GetItemAsObject(i))
 
 
+_exporting = ContextVar("exporting", default=False)
+
+
 def warn_of_exports(plotter: pv.BasePlotter) -> None:
-    """Let a plotter's exports say that they leave out what we draw."""
-    for name in EXPORTS:
+    """Let a plotter's exports, and views that draw in a browser, say that they leave out what we draw."""
+    for name, wrapper in {**dict.fromkeys(EXPORTS, _exporter), WATCHED: _watcher}.items():
         method = getattr(plotter, name, None)
         if method is not None:
             # Around pyvista's guard against new attributes, as pyvista itself does for components.
-            plotter.__dict__[name] = _warning(name, method)
+            plotter.__dict__[name] = wrapper(name, method)
 
 
-def _warning(name: str, method: Any) -> Any:
+def _exporter(name: str, method: Any) -> Any:
     @wraps(method)
     def export(*arguments: Any, **options: Any) -> Any:
         warnings.warn(
@@ -63,12 +75,38 @@ def _warning(name: str, method: Any) -> Any:
             "For a picture call `screenshot`; for geometry add `pyvista.PolyData` of `blobtree.polygonize`",
             stacklevel=2,
         )
-        return method(*arguments, **options)
+        token = _exporting.set(True)
+        try:
+            return method(*arguments, **options)
+        finally:
+            _exporting.reset(token)
 
     return export
 
 
+def _watcher(_name: str, method: Any) -> Any:
+    @wraps(method)
+    def add(callback: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+        for name in () if _exporting.get() else _class_names(callback) & CLIENTS.keys():
+            warnings.warn(
+                f"{name} {CLIENTS[name]} in the browser, which shows VTK's own actors without decals: what "
+                "decals draws is live OpenGL where Python runs. Show the plotter with "
+                "jupyter_backend='server', or use PyVistaRemoteView",
+                stacklevel=2,
+            )
+        return method(callback, *arguments, **options)
+
+    return add
+
+
+def _class_names(callback: Callable[..., Any]) -> set[str]:
+    """Names of the classes of what a function was made for: what it is bound to, or what it closes over."""
+    owners = [getattr(callback, "__self__", None)]
+    owners += [cell.cell_contents for cell in getattr(callback, "__closure__", None) or ()]
+    return {one.__name__ for owner in owners for one in type(owner).__mro__}
+
+
 def restore_exports(plotter: pv.BasePlotter) -> None:
     """Take that back."""
-    for name in EXPORTS:
+    for name in (*EXPORTS, WATCHED):
         plotter.__dict__.pop(name, None)

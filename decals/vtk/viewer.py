@@ -12,6 +12,8 @@ from decals.vtk.component import Component
 
 REMOTE = "server"
 """pyvista's backend that draws where Python runs; the others draw in the browser, which has no decals."""
+SERVING = ("trame_pyvista", "ipywidgets", "nest_asyncio2")
+"""Packages without which pyvista cannot serve in a notebook: the extra ``browser`` has them."""
 
 
 def show(scene: Scene, **options: Any) -> Any:
@@ -29,5 +31,5 @@ def show(scene: Scene, **options: Any) -> Any:
     stage: Component = plotter.decals
     stage.add_scene(scene)
     if plotter.notebook and "jupyter_backend" not in options:
-        options["jupyter_backend"] = REMOTE if find_spec("trame_pyvista") else "static"
+        options["jupyter_backend"] = REMOTE if all(map(find_spec, SERVING)) else "static"
     return plotter.show(**options)

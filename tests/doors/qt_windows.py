@@ -8,6 +8,7 @@ import sys
 import weakref
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pyvista as pv
@@ -19,6 +20,7 @@ from qtpy.QtWidgets import QApplication, QMainWindow
 
 import decals.vtk  # noqa: F401  (pyvistaqt's windows hide how pyvista finds components)
 from decals.window import EditWindow
+from tests.doors import page as docs
 from tests.edit.scenes import scene
 from tests.vtk.scenes import both
 from tests.window.driver import Driver
@@ -216,14 +218,33 @@ def again() -> None:
     assert used() - before < 10, f"{used() - before:.1f} MB in ten windows"
 
 
+def page() -> None:
+    """The window of the page shows the page's model."""
+    session: dict[str, Any] = {}
+    pictures: list[np.ndarray] = []
+
+    def look() -> None:
+        """In place of what goes on until somebody closes the window."""
+        QApplication.processEvents()
+        pictures.append(drawn(session["plotter"]))
+        let_go(session["plotter"])
+
+    with patch.object(QApplication, "exec", staticmethod(look)):
+        exec(compile(docs.code("qt"), "pyvista.md", "exec"), session)
+    assert pictures[0].std() > 20
+
+
+CHECKS = {check.__name__: check for check in (pixels, docked, background, hands, again, page)}
+
+
 def main() -> None:
     """Run one of the functions above, by its name."""
-    app = QApplication([])
-    {"pixels": pixels, "docked": docked, "background": background, "hands": hands, "again": again}[
-        sys.argv[1]
-    ]()
+    check = CHECKS[sys.argv[1]]
+    app = None if check is page else QApplication([])
+    check()
     print("done")
-    app.quit()
+    if app is not None:
+        app.quit()
 
 
 if __name__ == "__main__":

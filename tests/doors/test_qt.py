@@ -7,7 +7,7 @@ import pytest
 from tests.display import display, run_module
 
 __all__ = ["display"]
-CHECKS = ("pixels", "docked", "background", "hands", "again")
+CHECKS = ("pixels", "docked", "background", "hands", "again", "page")
 
 
 @pytest.mark.skipif(

@@ -85,3 +85,59 @@ def test_exports_say_what_they_leave_out(plotter: Factory, tmp_path: Path) -> No
     assert len([item for item in said if "export_html writes" in str(item.message)]) == 1
     pl.close()
     assert "export_html" not in pl.__dict__
+
+
+class View:
+    """Asks to hear of frames as trame-pyvista's views do; subclasses are named like them."""
+
+    def update(self) -> None:
+        raise AssertionError("nothing is drawn here")
+
+    def hear_of(self, plotter: pv.Plotter) -> None:
+        plotter.add_on_render_callback(lambda *_: self.update(), render_event=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("PyVistaLocalView", "draws in the browser"),
+        ("PyVistaWasmView", "draws in the browser"),
+        ("PyVistaRemoteLocalView", "can be switched to draw in the browser"),
+        ("PyVistaRemoteView", None),
+        ("PyVistaRCAView", None),
+    ],
+)
+def test_views_that_draw_in_a_browser_say_what_they_leave_out(
+    plotter: Factory, name: str, words: str | None
+) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    view = type(name, (View,), {})()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        view.hear_of(pl)
+        pl.add_on_render_callback(print, render_event=True)
+    assert [str(item.message).startswith(f"{name} {words}") for item in said] == [True] * (words is not None)
+    pl.clear_on_render_callbacks()
+    pl.close()
+    assert "add_on_render_callback" not in pl.__dict__
+
+
+def test_trames_own_views_say_what_they_leave_out(plotter: Factory) -> None:
+    trame = pytest.importorskip(
+        "trame_pyvista.widgets", reason="trame is missing: pip install 'implicit-decals[browser]'"
+    )
+    from trame.app import get_server
+    from trame.ui.vuetify3 import VAppLayout
+
+    server = get_server("modes", client_type="vue3")
+    pl = plotter()
+    pl.decals.add_scene(both())
+    said: dict[str, int] = {}
+    local = modes.CLIENTS.keys() - {"PyVistaWasmView"}  # that one is fetched from the network
+    for name in ("PyVistaRemoteView", "PyVistaRCAView", *local):
+        with VAppLayout(server, template_name=name), warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            getattr(trame, name)(pl)
+        said[name] = len([item for item in warned if "where Python runs" in str(item.message)])
+    assert said == {"PyVistaRemoteView": 0, "PyVistaRCAView": 0, **dict.fromkeys(local, 1)}

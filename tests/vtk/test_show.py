@@ -39,10 +39,19 @@ def test_without_graphics_a_scene_is_text(monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.parametrize(
     ("notebook", "served", "backend"),
-    [(True, True, "server"), (True, False, "static"), (False, True, None)],
+    [
+        (True, viewer.SERVING, "server"),
+        (True, ("trame_pyvista",), "static"),
+        (True, (), "static"),
+        (False, viewer.SERVING, None),
+    ],
 )
 def test_showing_hands_over_to_pyvista(
-    plotter: Factory, monkeypatch: pytest.MonkeyPatch, notebook: bool, served: bool, backend: str | None
+    plotter: Factory,
+    monkeypatch: pytest.MonkeyPatch,
+    notebook: bool,
+    served: tuple[str, ...],
+    backend: str | None,
 ) -> None:
     seen: dict[str, Any] = {}
 
@@ -53,7 +62,7 @@ def test_showing_hands_over_to_pyvista(
 
     plotter()
     monkeypatch.setattr(pv.Plotter, "show", shown)
-    monkeypatch.setattr(viewer, "find_spec", lambda _: object() if served else None)
+    monkeypatch.setattr(viewer, "find_spec", lambda name: object() if name in served else None)
     real = pv.Plotter
     monkeypatch.setattr(pv, "Plotter", lambda: real(off_screen=True, notebook=notebook))
     assert decals.show(both(), title="a") == "what pyvista gives"
