@@ -27,19 +27,9 @@ from decals.render.parts import WHOLE, Step
 from decals.render.resolve import STUDIO, Background
 from decals.render.scene_like import SceneLike
 from decals.render.steps import Modes, Uploaded, steps_of
-from decals.render.targets import KINDS, Size, Targets
+from decals.render.targets import KINDS, Size, Targets, check_size
 from decals.render.textures import ImageArray
-from decals.render.tile import (
-    MARGIN,
-    MAX_TILE,
-    CameraBuffer,
-    Picture,
-    Rectangle,
-    Tile,
-    check_size,
-    largest_tile,
-    tiles,
-)
+from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Rectangle, Tile, largest_tile, tiles
 from decals.scenes.viewpoint import Viewpoint
 
 WHOLE_SLOT, BUFFERS_SLOT = "whole", "buffers"

@@ -8,7 +8,6 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.errors import InvalidScene
 from decals.render.context import Context
 from decals.render.entry import Program
 from decals.scenes.viewpoint import Bounds, Floats, Rays, Viewpoint
@@ -108,14 +107,6 @@ def largest_tile(size: tuple[int, int], samples: int, *, limit: int = MAX_TILE) 
 
 def _step(samples: int, limit: int) -> int:
     return max(limit // samples, 1) * samples
-
-
-def check_size(size: tuple[int, int], samples: int) -> None:
-    """Refuse pictures without pixels."""
-    if len(size) != 2 or min(size) < 1 or samples < 1:
-        raise InvalidScene(
-            f"a picture needs a width, a height and samples of at least 1, got {size}, {samples}"
-        )
 
 
 class CameraBuffer:

@@ -22,6 +22,8 @@ def relax_near(
     spacing = float(sizes[distances.argmin()])
     near = np.flatnonzero(distances < OUTER * spacing)
     moving = (distances[near] < INNER * spacing) & movable[near]
+    if not moving.any():
+        return sites
     crowd = Crowd(world, sites[near], moving, sizes[near])
     for _ in range(STEPS):
         if crowd.stale:

@@ -76,6 +76,7 @@ class Frame:
         self.drawn = False
         self._shown: Seen | None = None
         self._targets: Targets | None = None
+        self._given: Targets | None = None
         self._magnified = False
         self._coming: tuple[Seen, Drawing] | None = None
         with context.current():
@@ -138,23 +139,23 @@ class Frame:
         drawing.targets.picture = self
 
     def nearest(self, x: int, y: int, size: Size) -> float:
-        """Least depth that was drawn at a pixel of a frame of this size: 1 for nothing, 0 for not known."""
-        if self._targets is None or self._targets.picture is not self:
+        """Least depth put into VTK's frame, of this size, at a pixel: 1 for nothing, 0 for not known."""
+        if self._given is None or self._given.picture is not self:
             return 0.0
         with self.context.current():
-            gbuffer = self._targets.gbuffer
+            gbuffer = self._given.gbuffer
             return gbuffer.read_depth(texels_of(x, y, size, gbuffer.size, magnified=self._magnified))
 
     def composite(
         self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int
     ) -> None:
         """Put what was drawn into VTK's frame; see `Composite.draw`."""
-        self._magnified = samples == 0
+        self._given, self._magnified = targets, samples == 0
         self._composite.draw(window, viewport, targets, samples)
 
     def release(self) -> None:
         """Give everything back."""
-        self._shown = self._targets = self._coming = None
+        self._shown = self._targets = self._given = self._coming = None
         with self.context.current():
             self.renderer.release()
             self._composite.release()

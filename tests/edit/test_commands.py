@@ -29,6 +29,8 @@ from decals.scenes.scene import DecalImage, MeshObject, TreeObject
 from decals.seeds.neighbours import FacingTree
 from tests.edit.scenes import TREE, box, digest, one, scene
 
+CRATE = MeshObject("crate", *box((12, -1, -1), (14, 1, 1)))
+
 
 @pytest.fixture
 def session():
@@ -145,6 +147,13 @@ def test_relaxing_parts_those_that_crowd_and_leaves_the_far_ones(session):
     np.testing.assert_array_equal(after.radii, before.radii)
 
 
+def test_relaxing_where_no_decal_is_near_does_nothing(session):
+    session.do(AddObject(CRATE))
+    before = digest(session.document)
+    assert session.do(Relax((13, 1, 1))).empty
+    assert digest(session.document) == before
+
+
 def least_gap(decals):
     tree = FacingTree(decals.positions, decals.normals)
     return tree.nearest(decals.positions, decals.normals, count=1, skip_self=True)[0].min()
@@ -203,15 +212,12 @@ def test_looking_is_a_command_too(session):
     assert session.document.camera is camera
 
 
-CRATE = MeshObject("crate", *box((2, -1, -1), (4, 1, 1)))
-
-
 def test_an_object_is_added_and_decals_go_onto_it(session):
     document = session.document
     first = digest(document)
     session.do(AddObject(CRATE))
     assert document.objects[2] is CRATE
-    session.do(Carry([3], np.array([3, 0, 1], np.float32), np.array([0, 0, 1], np.float32)))
+    session.do(Carry([3], np.array([13, 0, 1], np.float32), np.array([0, 0, 1], np.float32)))
     assert lying_on(document, [2]).tolist() == [3]
     session.undo()
     session.undo()

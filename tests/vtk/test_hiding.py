@@ -127,6 +127,20 @@ def test_nothing_is_hidden_where_what_was_drawn_is_forgotten(plotter: Factory) -
     assert stage.at(80, 60) is None
 
 
+def test_a_frame_that_is_ready_but_was_not_shown_hides_nothing(plotter: Factory) -> None:
+    """What is compared is what was put into VTK's frame, not what will be."""
+    pl = plotter()
+    pl.decals.add_scene(both())
+    stage = pl.decals.stage
+    stage.draw_scale = 0.2
+    shot(pl)
+    while stage.prepare(2, 10.0) is None:
+        pass
+    found = lying_behind(stage)
+    for y, x in np.argwhere(found.object_id >= 0)[::11].tolist():
+        assert not stage.hidden(x, 119 - y, found.position[y, x]), (x, y)
+
+
 @given(st.integers(1, 60), st.integers(1, 200))
 def test_every_texel_belongs_to_a_pixel_and_every_pixel_has_some(pixels: int, texels: int) -> None:
     magnified = texels < pixels
