@@ -173,6 +173,8 @@ class Crowd:
             varied=self.varied,
             walls=self.walls(here.positions, here.normals, self.sizes, self.owners, self.may_move),
         )
+        if law.evening:
+            self._repulsion.level(here.positions)
         self._evaluate(here, self._totals[1])
 
     def step(self) -> None:

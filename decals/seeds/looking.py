@@ -11,7 +11,7 @@ from decals.model import FACING_LIMIT
 from decals.seeds.crowd import Crowd
 from decals.seeds.repulsion import WIDENING, make_grid
 from decals.seeds.rims import Walls
-from decals.seeds.search_kernels import nearest_facing, peaks
+from decals.seeds.search_kernels import nearest_facing, peaks, rings_around
 from decals.surfaces.ground import Scalars, Vectors, vectors
 from decals.surfaces.surface import Flags, Floats
 
@@ -36,6 +36,16 @@ class Lookout:
         """Particles have moved."""
         self._grid.build(self._crowd.positions, self._reach * self._crowd.spacing)
 
+    @property
+    def _seen(self) -> list[Any]:
+        """What kernels need to look at the crowd."""
+        crowd = self._crowd
+        widening = WIDENING if crowd.varied else 1.0
+        return [
+            *(self._grid.id, crowd.positions, crowd.normals, crowd.sizes),
+            *(FACING_LIMIT, self._reach, widening),
+        ]
+
     def nearness(
         self,
         points: Vectors,
@@ -53,10 +63,24 @@ class Lookout:
         """
         crowd = self._crowd
         found: Any = wp.empty(len(points), dtype=wp.float32, device=crowd.device)
-        widening = WIDENING if crowd.varied else 1.0
-        inputs = [self._grid.id, crowd.positions, crowd.normals, crowd.sizes, FACING_LIMIT, self._reach]
-        inputs += [widening, enough, own, points, normals, sizes, *walls]
+        inputs = [*self._seen, enough, own, points, normals, sizes, *walls]
         launch(nearest_facing, len(points), inputs, [found], device=crowd.device)
+        return found
+
+    def rings(
+        self, points: Vectors, normals: Vectors, sizes: Scalars, own: Scalars, walls: Walls
+    ) -> tuple[Scalars, Scalars]:
+        """Distance of each point to the nearest particle that faces it, and the mean of the six nearest.
+
+        As `nearness`, on the device; each distance is at most the reach.
+        """
+        crowd = self._crowd
+        found: tuple[Any, Any] = (
+            wp.empty(len(points), dtype=wp.float32, device=crowd.device),
+            wp.empty(len(points), dtype=wp.float32, device=crowd.device),
+        )
+        inputs = [*self._seen, own, points, normals, sizes, *walls]
+        launch(rings_around, len(points), inputs, found, device=crowd.device)
         return found
 
     def nearness_of(self, rows: NDArray[np.int64]) -> Floats:

@@ -1,8 +1,9 @@
 """Warp kernels of particle repulsion on surfaces.
 
 Particles repel each other by a soft power law of their distance, and by a stiff spring where they come too
-close (Witkin and Heckbert 1994 started the family). The soft law alone makes rings of six even and leaves
-pairs too close at each flaw of the tiling, a steep one does the reverse; together they do both.
+close (Witkin and Heckbert 1994 started the family). The soft law alone spreads them evenly and leaves
+pairs too close at each flaw of the tiling, a steep one does the reverse; together they do both. In the end
+each also wants the ring of its six nearest to be as wide as everybody's is on average.
 Each kernel thread owns one particle and adds up its neighbours in the order of the grid, so that the
 result does not depend on scheduling.
 """
@@ -15,6 +16,9 @@ import warp as wp
 from decals.seeds.rim_kernels import mirrored
 
 wp.set_module_options({"enable_backward": False})
+
+Six = wp.types.vector(6, wp.float32)
+"""Distances to the six nearest, ascending."""
 
 CLOSEST = 0.6
 """Distances below this many spacings act like it: coincident particles part at once, not by inches."""
@@ -53,9 +57,28 @@ def apart(offset: wp.vec3, i: wp.int32, j: wp.int32, tangent: wp.vec3, closest: 
 
 
 @wp.func
-def shown_beyond(q: wp.vec3, point: wp.vec3, normal: wp.vec3, depth: wp.float32) -> wp.float32:
-    """How far a neighbour's image counts: 0 on the wall and beyond it, 1 from a depth on this side of it."""
+def shown_beyond(q: wp.vec3, own: wp.bool, point: wp.vec3, normal: wp.vec3, depth: wp.float32) -> wp.float32:
+    """How far an image counts: one's own fully, a neighbour's from 0 on the wall to 1 at a depth on this side."""
+    if own:
+        return wp.length_sq(normal)
     return wp.clamp(wp.dot(q - point, normal) / depth, 0.0, 1.0)
+
+
+@wp.func
+def nearest_six(six: Six, distance: wp.float32) -> Six:
+    """Put one more distance among the six nearest."""
+    x = float(distance)
+    for k in range(6):
+        farther = wp.max(six[k], x)
+        six[k] = wp.min(six[k], x)
+        x = farther
+    return six
+
+
+@wp.func
+def mean_of_six(six: Six) -> wp.float32:
+    """Mean distance of a ring."""
+    return (six[0] + six[1] + six[2] + six[3] + six[4] + six[5]) / 6.0
 
 
 @wp.kernel
@@ -94,6 +117,48 @@ def list_neighbours(
 
 
 @wp.kernel
+def measure_rings(
+    first: wp.int32,
+    positions: wp.array(dtype=wp.vec3),
+    sizes: wp.array(dtype=wp.float32),
+    room: wp.int32,
+    counts: wp.array(dtype=wp.int32),
+    neighbours: wp.array(dtype=wp.int32),
+    weights: wp.array(dtype=wp.float32),
+    farthest: wp.float32,
+    walls: wp.int32,
+    wall_points: wp.array(dtype=wp.vec3),
+    wall_normals: wp.array(dtype=wp.vec3),
+    rings: wp.array(dtype=wp.float32),
+    rims: wp.array(dtype=wp.float32),
+) -> None:
+    """Mean distance of each particle to its six nearest, and the distance of the sixth, in spacings.
+
+    Those count that face it fully, and so do images beyond walls. Who is missing counts as if at the farthest
+    distance.
+    """
+    i = first + wp.tid()
+    p = positions[i]
+    six = Six(farthest, farthest, farthest, farthest, farthest, farthest)
+    for k in range(counts[i] + 1):
+        j = int(i)
+        listed = float(1.0)
+        if k < counts[i]:
+            j = neighbours[i * room + k]
+            listed = weights[i * room + k]
+        pair = 0.5 * (sizes[i] + sizes[j])
+        if j != i and listed >= 1.0:
+            six = nearest_six(six, wp.length(p - positions[j]) / pair)
+        for w in range(walls * i, walls * (i + 1)):
+            q = positions[j]
+            shown = shown_beyond(q, j == i, wall_points[w], wall_normals[w], ON_WALL * sizes[i])
+            if listed * shown >= 1.0:
+                six = nearest_six(six, wp.length(p - mirrored(q, wall_points[w], wall_normals[w])) / pair)
+    rings[i] = mean_of_six(six)
+    rims[i] = six[5]
+
+
+@wp.kernel
 def repel(
     first: wp.int32,
     positions: wp.array(dtype=wp.vec3),
@@ -107,6 +172,10 @@ def repel(
     exponent: wp.float32,
     core: wp.float32,
     stiffness: wp.float32,
+    evening: wp.float32,
+    rings: wp.array(dtype=wp.float32),
+    rims: wp.array(dtype=wp.float32),
+    total: wp.array(dtype=wp.float32),
     damping: wp.float32,
     longest: wp.float32,
     walls: wp.int32,
@@ -126,6 +195,9 @@ def repel(
 
     Beyond each wall lie the images of the neighbours, and of the particle itself: of that pair half the
     energy counts, and it parts by twice the move.
+
+    A particle whose ring is wider or narrower than the mean one, `total` over the count, adds half the square
+    of the difference, times `evening` and its spacing squared.
     """
     i = first + wp.tid()
     p = positions[i]
@@ -141,6 +213,7 @@ def repel(
     work = wp.float64(0.0)
     rim_value = wp.pow(cutoff, -exponent)
     rim_slope = exponent * rim_value / cutoff
+    mean = total[0] / wp.float32(positions.shape[0])
     for k in range(counts[i] + 1):
         j = int(i)
         listed = float(1.0)
@@ -156,10 +229,9 @@ def repel(
             if image > 0:
                 w = walls * i + image - 1
                 lone = wall_normals[w]
-                weight *= shown_beyond(q, wall_points[w], lone, ON_WALL * size)
+                weight *= shown_beyond(q, j == i, wall_points[w], lone, ON_WALL * size)
                 q = mirrored(q, wall_points[w], lone)
                 if j == i:
-                    weight = wp.length_sq(lone)
                     bends = 2.0
             elif j == i:
                 weight = 0.0
@@ -178,7 +250,18 @@ def repel(
                 ax = wp.dot(away, u) / x
                 ay = wp.dot(away, v) / x
                 push = weight * (pair / size) * (slope - rim_slope + stiffness * overlap)
-                bend = bends * weight * curve
+                bend = weight * curve
+                if (
+                    evening > 0.0 and weight >= 1.0
+                ):  # a sixth of how far they are apart belongs to either ring
+                    distance = wp.length(offset) / pair
+                    if distance <= rims[i]:
+                        push += evening / 6.0 * (mean - rings[i]) * size / pair
+                    if distance <= rims[j]:
+                        lever = sizes[j] / pair
+                        push += evening / 6.0 * (mean - rings[j]) * lever * sizes[j] / size
+                        bend += evening / 36.0 * lever * lever
+                bend *= bends
                 fx += push * ax
                 fy += push * ay
                 hxx += bend * ax * ax
@@ -189,6 +272,9 @@ def repel(
                 part = weight * (part + nearer * (slope - rim_slope + stiffness * overlap))
                 energy += part
                 work += wp.float64(0.5 * pair * pair * part)
+    lack = mean - rings[i]
+    energy += 0.5 * evening * lack * lack
+    work += wp.float64(0.5 * size * size * evening * lack * lack)
     energies[i] = energy
     works[i] = work
     extra = ISOTROPY * (hxx + hyy)

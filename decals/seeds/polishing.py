@@ -30,8 +30,11 @@ ALONE = 2.5
 LOTS = 0.05
 """Chance in who moves among the close ones, in spacings: the closest may have nowhere to go."""
 
-SIGHT = 1.5
+SIGHT = 2.0
 """Trials farther than this many spacings from all particles are equally lonely."""
+
+RING = 1.0
+"""Mean distance to six neighbours in a perfect tiling, in spacings."""
 
 GAIN = 1.001
 """A move must multiply the distance to the nearest neighbour by this."""
@@ -46,7 +49,7 @@ GIVE_UP = 30
 def polish(
     crowd: Crowd, *, rounds: int, seed: int, sizes_at: Callable[[Floats], Floats], close: float = CLOSE
 ) -> None:
-    """Move particles that are too close to a neighbour to the loneliest of some places around them.
+    """Move particles that are too close to a neighbour to better ones of some places around them.
 
     After farthest-point optimisation (Schlömer, Heck and Deussen 2011), by trial because normals, and with
     them who is whose neighbour, jump at sharp edges. The least distance, in spacings, never falls. Nobody
@@ -64,7 +67,8 @@ def polish(
         movers, nearest = _movers(crowd, watched, nearest, rng)
         if len(movers) == 0 or idle == GIVE_UP:
             break
-        went = _try_places(crowd, lookout, movers, nearest, seed=int(rng.integers(2**31)), sizes_at=sizes_at)
+        lot = int(rng.integers(2**31))
+        went = _try_places(crowd, lookout, movers, nearest, seed=lot, close=close, sizes_at=sizes_at)
         idle = 0 if went.any() else idle + 1
         if went.any():
             lookout.refresh()
@@ -89,9 +93,10 @@ def _try_places(
     nearest: Floats,
     *,
     seed: int,
+    close: float,
     sizes_at: Callable[[Floats], Floats],
 ) -> Flags:
-    """Move each mover to the loneliest of some random places around it; who went."""
+    """Move each mover to the best of some random places around it; who went."""
     device, count = crowd.device, len(movers)
     tries = max(TRIALS, BUDGET // count)
     rows, own = whole_numbers(movers, device), whole_numbers(np.repeat(movers, tries), device)
@@ -114,10 +119,10 @@ def _try_places(
     walls = crowd.walls(
         places, normals, sizes, crowd.owners[own].contiguous(), crowd.may_move[own].contiguous()
     )
-    nearness = lookout.nearness(places, normals, sizes, own, walls)
+    nearness, rings = lookout.rings(places, normals, sizes, own, walls)
     present: Any = wp.array(nearest, dtype=wp.float32, device=device)
     went = _new(wp.int32, count, device)
-    inputs = [tries, GAIN, rows, present, places, normals, forbidden, nearness]
+    inputs = [tries, GAIN, close, RING, rows, present, places, normals, forbidden, nearness, rings]
     launch(choose_best, count, inputs, [crowd.positions, crowd.normals, went], device=device)
     gone: Flags = went.numpy() == 1
     return gone

@@ -25,11 +25,14 @@ from decals.wishes import function_or_none, number, numbers, whole
 EXPONENTS = (2.0, 3.0)
 """Power law of the repulsion at the first and the last step."""
 
-STIFFNESS = 300.0
+STIFFNESS = 1000.0
 """Of the spring between particles that are too close, at the end."""
 
-HARDENING = (0.5, 0.8)
-"""Parts of the schedule between which the spring stiffens: soft to even out, hard to pack."""
+EVENING = 600.0
+"""Weight of rings of six that are wider or narrower than the mean one, at the end."""
+
+HARDENING = (0.6, 1.0)
+"""Parts of the schedule between which both rise from nothing: first spread, then even out and pack."""
 
 REFILLS = (0.1, 0.8, 0.05)
 """First and last part of the schedule at which crowded particles move to bare places, and the step."""
@@ -339,7 +342,8 @@ class Relaxation:
             part = min(self.steps / self.iterations, 1.0)
             exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
             self._call_home(crowd)
-            crowd.begin(Law(exponent, STIFFNESS * float(np.interp(part, HARDENING, (0.0, 1.0)))))
+            hardness = float(np.interp(part, HARDENING, (0.0, 1.0)))
+            crowd.begin(Law(exponent, STIFFNESS * hardness, EVENING * hardness))
         crowd.step()
         self._sites = None
 

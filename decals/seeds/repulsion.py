@@ -8,7 +8,7 @@ import warp as wp
 
 from blobtree.launch import launch
 from decals.model import FACING_LIMIT
-from decals.seeds.particles import list_neighbours, repel
+from decals.seeds.particles import list_neighbours, measure_rings, repel
 from decals.seeds.rims import Walls
 from decals.surfaces.ground import Scalars, Vectors
 
@@ -39,10 +39,21 @@ GRID_CELLS = (16, 128)
 
 @dataclass(frozen=True)
 class Law:
-    """How particles repel each other: the power of their distance, and the spring of those too close."""
+    """How particles repel each other.
+
+    Attributes
+    ----------
+    exponent
+        Power of their distance.
+    stiffness
+        Of the spring between those that are too close.
+    evening
+        Weight of rings that are wider or narrower than the mean one.
+    """
 
     exponent: float
     stiffness: float
+    evening: float = 0.0
 
 
 class Repulsion:
@@ -63,6 +74,11 @@ class Repulsion:
             wp.zeros(ROOM * count, dtype=wp.int32, device=device),
             wp.zeros(ROOM * count, dtype=wp.float32, device=device),
         )
+        self._rings: tuple[Any, Any] = (
+            wp.zeros(count, dtype=wp.float32, device=device),
+            wp.zeros(count, dtype=wp.float32, device=device),
+        )
+        self._total: Any = wp.zeros(1, dtype=wp.float32, device=device)
         self._grid = make_grid(count, device)
         self._sizes: Any = None
         self._walls = Walls.none(device)
@@ -90,6 +106,11 @@ class Repulsion:
         inputs = [self._grid.id, positions, normals, sizes, reach, widening, FACING_LIMIT, ROOM]
         launch(list_neighbours, self._count, inputs, self.lists, device=self._device)
 
+    def level(self, positions: Vectors) -> None:
+        """Let the mean ring, as it is now, be the one that all particles should have."""
+        self._measure(positions)
+        wp.utils.array_sum(self._rings[0], out=self._total)
+
     def evaluate(
         self,
         positions: Vectors,
@@ -101,9 +122,15 @@ class Repulsion:
         works: Scalars,
     ) -> None:
         """Write where each particle wants to go within its tangent plane, and its energy where it is."""
-        inputs = [positions, normals, self._sizes, ROOM, *self.lists]
-        inputs += [CUTOFF, law.exponent, CORE, law.stiffness, DAMPING, LONGEST, *self._walls]
+        if law.evening:
+            self._measure(positions)
+        inputs = [positions, normals, self._sizes, ROOM, *self.lists, CUTOFF, law.exponent, CORE]
+        inputs += [law.stiffness, law.evening, *self._rings, self._total, DAMPING, LONGEST, *self._walls]
         launch(repel, self._count, inputs, [moves, energies, works], device=self._device)
+
+    def _measure(self, positions: Vectors) -> None:
+        inputs = [positions, self._sizes, ROOM, *self.lists, CUTOFF, *self._walls]
+        launch(measure_rings, self._count, inputs, self._rings, device=self._device)
 
 
 def make_grid(count: int, device: str) -> Any:

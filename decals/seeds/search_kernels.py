@@ -5,6 +5,7 @@
 
 import warp as wp
 
+from decals.seeds.particles import Six, mean_of_six, nearest_six
 from decals.seeds.rim_kernels import mirrored
 
 wp.set_module_options({"enable_backward": False})
@@ -51,6 +52,56 @@ def nearest_facing(
             if x < least and wp.dot(n, normals[j]) > facing_limit:
                 least = x
     nearness[k] = least
+
+
+@wp.kernel
+def rings_around(
+    first: wp.int32,
+    grid: wp.uint64,
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    sizes: wp.array(dtype=wp.float32),
+    facing_limit: wp.float32,
+    reach: wp.float32,
+    widening: wp.float32,
+    own: wp.array(dtype=wp.int32),
+    points: wp.array(dtype=wp.vec3),
+    point_normals: wp.array(dtype=wp.vec3),
+    point_sizes: wp.array(dtype=wp.float32),
+    walls: wp.int32,
+    wall_points: wp.array(dtype=wp.vec3),
+    wall_normals: wp.array(dtype=wp.vec3),
+    nearness: wp.array(dtype=wp.float32),
+    rings: wp.array(dtype=wp.float32),
+) -> None:
+    """Distance of each point to the nearest particle that faces it, and the mean of the six nearest.
+
+    In their spacing and each at most `reach`; a point's own particle does not count. Images beyond a rim do,
+    the point's own too.
+    """
+    k = first + wp.tid()
+    p = points[k]
+    n = point_normals[k]
+    size = point_sizes[k]
+    six = Six(reach, reach, reach, reach, reach, reach)
+    for w in range(walls * k, walls * (k + 1)):
+        if wp.length_sq(wall_normals[w]) > 0.0:
+            six = nearest_six(six, wp.length(p - mirrored(p, wall_points[w], wall_normals[w])) / size)
+    j = int(0)
+    query = wp.hash_grid_query(grid, p, reach * widening * size)
+    while wp.hash_grid_query_next(query, j):
+        if j != own[k]:
+            q = positions[j]
+            pair = 0.5 * (size + sizes[j])
+            x = wp.length(p - q) / pair
+            if x < six[5] and wp.dot(n, normals[j]) > facing_limit:
+                six = nearest_six(six, x)
+                for w in range(walls * k, walls * (k + 1)):
+                    if wp.dot(q - wall_points[w], wall_normals[w]) > 0.0:
+                        image = mirrored(q, wall_points[w], wall_normals[w])
+                        six = nearest_six(six, wp.length(p - image) / pair)
+    nearness[k] = six[0]
+    rings[k] = mean_of_six(six)
 
 
 @wp.kernel
@@ -103,25 +154,35 @@ def choose_best(
     first: wp.int32,
     tries: wp.int32,
     gain: wp.float32,
+    close: wp.float32,
+    ring: wp.float32,
     rows: wp.array(dtype=wp.int32),
     present: wp.array(dtype=wp.float32),
     places: wp.array(dtype=wp.vec3),
     place_normals: wp.array(dtype=wp.vec3),
     forbidden: wp.array(dtype=wp.int32),
     nearness: wp.array(dtype=wp.float32),
+    rings: wp.array(dtype=wp.float32),
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     went: wp.array(dtype=wp.int32),
 ) -> None:
-    """Move each particle to the loneliest allowed of its places, if that is so much lonelier; 1 who went."""
+    """Move each particle to the best allowed of its places, if that is so much lonelier; 1 who went.
+
+    The best is the loneliest, or if several are not close to anybody that whose ring is most like `ring`.
+    """
     m = first + wp.tid()
-    best = float(gain * present[m])
+    least = float(gain * present[m])
+    fault = float(1.0e30)
     choice = int(-1)
     for t in range(tries):
         k = m * tries + t
-        if forbidden[k] == 0 and nearness[k] > best:
-            best = nearness[k]
-            choice = k
+        if forbidden[k] == 0 and nearness[k] >= least:
+            uneven = wp.abs(rings[k] - ring)
+            if least < close or uneven < fault:
+                choice = k
+                fault = uneven
+                least = wp.min(nearness[k], close)
     went[m] = 0
     if choice >= 0:
         positions[rows[m]] = places[choice]
