@@ -18,8 +18,6 @@ from decals.model import Decals
 from decals.scenes.scene import SceneObject
 from decals.seeds.local_relaxation import relax_near
 from decals.seeds.population import Sites, World
-from decals.seeds.relaxation import EXPONENTS, STIFFNESS
-from decals.seeds.repulsion import Law
 from decals.surfaces.surface import as_points
 
 SPACING = 3.0**0.5 / 1.03
@@ -134,7 +132,6 @@ class Relax:
             np.ones(len(rows), np.bool_),
             (SPACING * decals.radii[rows]).astype(np.float32),
             center,
-            law=Law(EXPONENTS[1], STIFFNESS),
         )
         moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
         places = Places(after.positions[moved], after.normals[moved], after.surface_ids[moved])

@@ -4,7 +4,7 @@ import numpy as np
 
 from decals.seeds.crowd import Crowd
 from decals.seeds.population import Sites, World
-from decals.seeds.repulsion import Law
+from decals.seeds.schedule import NEARBY
 from decals.surfaces.surface import Flags, Floats
 
 INNER, OUTER = 4.0, 6.5
@@ -14,9 +14,7 @@ STEPS = 16
 """Steps that a neighbourhood takes."""
 
 
-def relax_near(
-    world: World, sites: Sites, movable: Flags, sizes: Floats, center: Floats, *, law: Law
-) -> Sites:
+def relax_near(world: World, sites: Sites, movable: Flags, sizes: Floats, center: Floats) -> Sites:
     """Let the particles around a place find their rest, all others where they are."""
     distances = np.linalg.norm(sites.positions - center, axis=1)
     spacing = float(sizes[distances.argmin()])
@@ -27,7 +25,7 @@ def relax_near(
     crowd = Crowd(world, sites[near], moving, sizes[near])
     for _ in range(STEPS):
         if crowd.stale:
-            crowd.begin(law)
+            crowd.begin(NEARBY)
         crowd.step()
     found = crowd.sites()
     positions, normals = sites.positions.copy(), sites.normals.copy()

@@ -58,7 +58,7 @@ def apart(offset: wp.vec3, i: wp.int32, j: wp.int32, tangent: wp.vec3, closest: 
 
 @wp.func
 def shown_beyond(q: wp.vec3, own: wp.bool, point: wp.vec3, normal: wp.vec3, depth: wp.float32) -> wp.float32:
-    """How far an image counts: one's own fully, a neighbour's from 0 on the wall to 1 at a depth on this side."""
+    """What an image counts: one's own fully, a neighbour's from 0 on the wall to 1 at a depth before it."""
     if own:
         return wp.length_sq(normal)
     return wp.clamp(wp.dot(q - point, normal) / depth, 0.0, 1.0)

@@ -17,22 +17,11 @@ from decals.seeds.placing import count_of, nobody, placed, remaining
 from decals.seeds.polishing import CLOSE, polish
 from decals.seeds.population import Density, Mask, Sites, World, shares
 from decals.seeds.refilling import crowded, refill
-from decals.seeds.repulsion import CUTOFF, Law
+from decals.seeds.repulsion import CUTOFF
+from decals.seeds.schedule import law_at
 from decals.seeds.scouting import Scouts
 from decals.surfaces.surface import Flags, Floats, Surface, as_points
 from decals.wishes import function_or_none, number, numbers, whole
-
-EXPONENTS = (2.0, 3.0)
-"""Power law of the repulsion at the first and the last step."""
-
-STIFFNESS = 1000.0
-"""Of the spring between particles that are too close, at the end."""
-
-EVENING = 600.0
-"""Weight of rings of six that are wider or narrower than the mean one, at the end."""
-
-HARDENING = (0.6, 1.0)
-"""Parts of the schedule between which both rise from nothing: first spread, then even out and pack."""
 
 REFILLS = (0.1, 0.8, 0.05)
 """First and last part of the schedule at which crowded particles move to bare places, and the step."""
@@ -102,7 +91,7 @@ class Relaxation:
         device: str = "cpu",
     ) -> None:
         self.iterations = whole("iterations", iterations, 1)
-        self.steps = 0
+        self.steps = self._deformed = 0
         self._seed = whole("seed", seed)
         self.world = World(surfaces, seed, density=density, mask=mask, device=device)
         count = count_of(count, spacing, self.world.mass)
@@ -303,6 +292,7 @@ class Relaxation:
         self.world = world
         self.spacing = ideal_spacing(world.mass, self.count)
         self._scouts = Scouts(world, self.sizes_at)
+        self._deformed = self.steps
         self._refills |= {self.steps + k for k in range(RARELY, SETTLING + 1, RARELY)}
         self._sites, self._crowd, self._homes = sites, None, Homes(self.sizes_at)
 
@@ -310,8 +300,7 @@ class Relaxation:
         """Take other particles, and let those around the place find their rest."""
         if len(sites) > 1:
             sizes = self.sizes_at(sites.positions)
-            law = Law(EXPONENTS[1], STIFFNESS)
-            sites = relax_near(self.world, sites, ~self._fixed, sizes, place, law=law)
+            sites = relax_near(self.world, sites, ~self._fixed, sizes, place)
         self._sites, self._crowd, self._homes = sites, None, Homes(self.sizes_at)
 
     def statistics(self) -> Spacing:
@@ -339,11 +328,9 @@ class Relaxation:
         """Move every particle; those that would leave their side or get hidden stay."""
         crowd = self._on_device()
         if crowd.stale:
-            part = min(self.steps / self.iterations, 1.0)
-            exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * part
             self._call_home(crowd)
-            hardness = float(np.interp(part, HARDENING, (0.0, 1.0)))
-            crowd.begin(Law(exponent, STIFFNESS * hardness, EVENING * hardness))
+            part, rest = ((self.steps - since) / self.iterations for since in (0, self._deformed))
+            crowd.begin(law_at(part, rest))
         crowd.step()
         self._sites = None
 

@@ -40,6 +40,66 @@ def total_energy(
     return total
 
 
+def rings(positions, normals, sizes, *, farthest, facing_limit, wall=None):
+    """Mean distance of each particle to its six nearest that face it fully, and the distance of the sixth.
+
+    Images beyond the wall count, the own one too; who is missing counts as if at the farthest distance.
+    """
+    places, ways = np.asarray(positions, float), np.asarray(normals, float)
+    pairs = 0.5 * (sizes[:, None] + sizes)
+    facing = ways @ ways.T >= facing_limit
+    distances = np.linalg.norm(places[:, None] - places, axis=2) / pairs
+    distances[~facing | np.eye(len(places), dtype=bool)] = np.inf
+    if wall is not None:
+        images = places - 2.0 * ((places - wall[0]) @ wall[1])[:, None] * wall[1]
+        beyond = np.linalg.norm(places[:, None] - images, axis=2) / pairs
+        distances = np.hstack([distances, np.where(facing, beyond, np.inf)])
+    padded = np.hstack([distances, np.full((len(places), 6), np.inf)])
+    six = np.minimum(np.sort(padded, axis=1)[:, :6], farthest)
+    return six.mean(axis=1), six[:, 5]
+
+
+def ring_energy(positions, normals, sizes, *, evening, mean, **rule):
+    """Half the square of how much each ring differs from the mean one, times the squared spacing."""
+    lacks = rings(positions, normals, sizes, **rule)[0] - mean
+    return 0.5 * evening * float((sizes**2 * lacks**2).sum())
+
+
+def ring_moves(positions, normals, sizes, *, evening, mean, **rule):
+    """What rings add to the force on each particle, ``[n, 3]``, and to its curvature, ``[n, 3, 3]``.
+
+    The force is a central difference of `ring_energy`.
+    """
+    places, ways = np.asarray(positions, float), np.asarray(normals, float)
+    forces, curvatures = np.zeros((len(places), 3)), np.zeros((len(places), 3, 3))
+    for i in range(len(places)):
+        for axis in np.linalg.svd(np.eye(3) - np.outer(ways[i], ways[i]))[0].T[:2]:
+            step = 1e-6 * sizes[i]
+            ends = []
+            for sign in (-1, 1):
+                moved = places.copy()
+                moved[i] += sign * step * axis
+                ends.append(ring_energy(moved, ways, sizes, evening=evening, mean=mean, **rule))
+            forces[i] -= (ends[1] - ends[0]) / (2 * step * sizes[i]) * axis
+    images = [(places, ~np.eye(len(places), dtype=bool), np.ones((len(places), len(places))))]
+    if rule.get("wall") is not None:
+        point, normal = rule["wall"]
+        beyond = places - 2.0 * ((places - point) @ normal)[:, None] * normal
+        images.append((beyond, np.ones((len(places), len(places)), bool), 1.0 + np.eye(len(places))))
+    rims = rings(places, ways, sizes, **rule)[1]
+    for others, counted, bends in images:
+        for i, j in zip(*np.nonzero(counted & (ways @ ways.T >= rule["facing_limit"])), strict=True):
+            pair = 0.5 * (sizes[i] + sizes[j])
+            offset = places[i] - others[j]
+            distance = np.linalg.norm(offset) / pair
+            if distance <= min(rims[j], rule["farthest"] * (1 - 1e-9)):
+                away = offset / np.linalg.norm(offset)
+                away -= (away @ ways[i]) * ways[i]
+                bend = bends[i, j] * evening / 36 * (sizes[j] / pair) ** 2
+                curvatures[i] += bend * np.outer(away, away)
+    return forces, curvatures
+
+
 def moves(
     positions,
     normals,
@@ -55,6 +115,8 @@ def moves(
     isotropy,
     closest,
     wall=None,
+    evening=0.0,
+    mean=0.0,
 ):
     """Damped Newton move and energy of every particle, its neighbours at rest.
 
@@ -65,8 +127,13 @@ def moves(
     """
     positions, normals = np.asarray(positions, float), np.asarray(normals, float)
     result, energies = np.zeros_like(positions), np.zeros(len(positions))
+    forces, curvatures = np.zeros((len(positions), 3)), np.zeros((len(positions), 3, 3))
+    if evening:
+        around = {"farthest": cutoff, "facing_limit": facing_limit, "wall": wall}
+        forces, curvatures = ring_moves(positions, normals, sizes, evening=evening, mean=mean, **around)
+        energies += 0.5 * evening * (rings(positions, normals, sizes, **around)[0] - mean) ** 2
     for i, (p, n) in enumerate(zip(positions, normals, strict=True)):
-        force, curvature = np.zeros(3), np.zeros((3, 3))
+        force, curvature = forces[i].copy(), curvatures[i].copy()
         others = [(j, q, 1.0) for j, q in enumerate(positions) if j != i]
         if wall is not None:
             others += [

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
+from blobtree.launch import launch
 from decals.model import FACING_LIMIT
 from decals.seeds.crowd import Crowd
+from decals.seeds.looking import Lookout, whole_numbers
 from decals.seeds.neighbours import FacingTree
 from decals.seeds.particles import CLOSEST
 from decals.seeds.polishing import polish
@@ -12,9 +15,10 @@ from decals.seeds.population import Sites, World
 from decals.seeds.refilling import crowded, refill
 from decals.seeds.relaxation import Relaxation
 from decals.seeds.repulsion import CORE, CUTOFF, Law
+from decals.seeds.search_kernels import choose_best
 from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.coats import nearest_facing
-from tests.oracles.repulsion import total_energy
+from tests.oracles.repulsion import rings, total_energy
 
 
 def row_of(places, number=0):
@@ -129,6 +133,56 @@ def jittered(spacing, side):
     positions[:, :2] = np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
     positions[:, :2] += np.random.default_rng(3).uniform(-0.05, 0.05, (side**2, 2))
     return Sites(positions, np.tile(np.float32([0, 0, 1]), (side**2, 1)), np.zeros(side**2, np.int32))
+
+
+@pytest.mark.parametrize("surface", [sphere, plane])
+def test_rings_around_places_are_those_of_all_pairs(surface):
+    relaxation = Relaxation([surface()], count=200)
+    crowd = Crowd(
+        relaxation.world, relaxation.sites, np.ones(200, bool), relaxation.sizes_at(relaxation.positions)
+    )
+    numbers = whole_numbers(np.arange(200), "cpu")
+    walls = crowd.walls(crowd.positions, crowd.normals, crowd.sizes, crowd.owners, crowd.may_move)
+    found = Lookout(crowd, 2.0).rings(crowd.positions, crowd.normals, crowd.sizes, numbers, walls)
+    nearest, ring = (array.numpy() for array in found)
+    sites, sizes = crowd.sites(), crowd.host_sizes.astype(float)
+    middle = np.ones(200, bool)
+    wall = None
+    if walls.number:  # of the square only those who see one side of it
+        depths = 0.5 - np.abs(sites.positions[:, :2])
+        middle = (depths[:, 1] > 2.1 * sizes) & (sites.positions[:, 0] < 0)
+        wall = np.array([-0.5, 0, 0]), np.array([1.0, 0, 0])
+        assert (depths[middle, 0] < sizes[middle]).any()
+    rule = {"farthest": 2.0, "facing_limit": FACING_LIMIT}
+    expected = rings(sites.positions, sites.normals, sizes, wall=wall, **rule)[0]
+    assert middle.sum() > 20
+    assert ring[middle] == pytest.approx(expected[middle], rel=1e-5)
+    assert (nearest[middle] <= ring[middle]).all()
+
+
+def test_who_is_parted_takes_the_place_whose_ring_is_most_even():
+    rows = {
+        "positions": [[0, 0, 0], [0.5, 0, 0]],
+        "places": [[-0.2, 0, 0], [-0.5, 0, 0], [-0.6, 0, 0], [-0.7, 0, 0]],
+    }
+    arrays = {
+        name: wp.array(np.float32(values), dtype=wp.vec3, device="cpu") for name, values in rows.items()
+    }
+    ups = [wp.array(np.tile(np.float32([0, 0, 1]), (n, 1)), dtype=wp.vec3, device="cpu") for n in (4, 2)]
+    nearness, ring = (
+        wp.array(np.float32(values), dtype=wp.float32, device="cpu")
+        for values in ([0.7, 1.0, 1.1, 1.2], [1.0, 1.3, 1.2, 0.7])
+    )
+    mover, free, went = (
+        wp.array(np.int32(rows), dtype=wp.int32, device="cpu") for rows in ([0], [0] * 4, [0])
+    )
+    present = wp.array(np.float32([0.5]), dtype=wp.float32, device="cpu")
+    inputs = [4, 1.0, 0.89, 1.0, mover, present, arrays["places"], ups[0], free, nearness, ring]
+    launch(choose_best, 1, inputs, [arrays["positions"], ups[1], went], device="cpu")
+    assert went.numpy().tolist() == [1]
+    assert arrays["positions"].numpy()[0] == pytest.approx(
+        [-0.6, 0, 0]
+    )  # three are far enough, its ring is the best
 
 
 @pytest.mark.parametrize("skip_self", [False, True])

@@ -6,9 +6,11 @@ from decals.model import FACING_LIMIT
 from decals.seeds.particles import CLOSEST, ISOTROPY
 from decals.seeds.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsion
 from tests.oracles.repulsion import moves as expected_moves
-from tests.oracles.repulsion import total_energy
+from tests.oracles.repulsion import ring_energy, rings, total_energy
 
 SPACING = 0.3
+
+DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]
 
 
 def unit(vectors):
@@ -36,11 +38,12 @@ def evaluated(positions, normals, law, spacing, device="cpu"):
     repulsion = Repulsion(count, device=device)
     varied = bool(sizes.min() != sizes.max())
     repulsion.relist(places, ways, spacings, spacing=float(np.median(sizes)), varied=varied)
+    repulsion.level(places)
     repulsion.evaluate(places, ways, law, moves=moves, energies=energies, works=works)
     return moves.numpy(), energies.numpy(), works.numpy()
 
 
-def oracle(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING):
+def oracle(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING, evening=0.0, mean=0.0):
     return expected_moves(
         positions,
         normals,
@@ -54,6 +57,8 @@ def oracle(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING):
         longest=LONGEST,
         isotropy=ISOTROPY,
         closest=CLOSEST,
+        evening=evening,
+        mean=mean,
     )
 
 
@@ -67,6 +72,28 @@ def test_a_step_is_that_of_every_pair_by_itself(exponent, stiffness, varied):
     expected, expected_energies = oracle(positions, normals, **wish)
     assert np.allclose(found, expected, atol=2e-4 * SPACING)
     assert np.allclose(energies, expected_energies, rtol=1e-3)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("varied", [False, True])
+def test_rings_are_evened_by_the_slope_of_their_energy(varied, device):
+    positions, normals = sphere_points(150, seed=9)
+    sizes = (SPACING * (1.0 + 0.3 * varied * positions[:, 2])).astype(np.float32)
+    wide = sizes.astype(float)
+    law = Law(3.0, 300.0, 600.0)
+    found, energies, works = evaluated(positions, normals, law, sizes, device)
+    around = {"farthest": CUTOFF, "facing_limit": FACING_LIMIT}
+    mean = rings(positions, normals, wide, **around)[0].mean()
+    wish = {"exponent": law.exponent, "stiffness": law.stiffness, "spacing": wide}
+    expected, expected_energies = oracle(positions, normals, **wish, evening=law.evening, mean=mean)
+    assert np.allclose(found, expected, atol=2e-4 * SPACING)
+    assert np.allclose(energies, expected_energies, rtol=1e-3)
+    rule = {"cutoff": CUTOFF, "core": CORE, "closest": CLOSEST, "facing_limit": FACING_LIMIT}
+    rule |= {"exponent": law.exponent, "stiffness": law.stiffness}
+    pairs = total_energy(positions, normals, wide, **rule)
+    uneven = ring_energy(positions, normals, wide, evening=law.evening, mean=mean, **around)
+    assert uneven > 0.1 * pairs
+    assert works.sum() == pytest.approx(pairs + uneven, rel=1e-4)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])

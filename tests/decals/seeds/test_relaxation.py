@@ -45,7 +45,7 @@ def test_relaxing_makes_even():
     after = relaxation.statistics()
     assert before.rho < 0.3 < 0.88 < after.rho
     assert after.cv < 0.025 < before.cv
-    assert after.cv6 < 0.025 < before.cv6
+    assert after.cv6 < 0.014 < before.cv6  # about 0.018 if nothing evened out the rings
     assert after.ringed == 1.0
 
 

@@ -18,7 +18,8 @@ from decals.seeds.rims import Rims, Walls
 from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.repulsion import moves as expected_moves
-from tests.oracles.repulsion import total_energy
+from tests.oracles.repulsion import ring_energy, rings, total_energy
+from tests.oracles.triangles import closest_points
 
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]
 UP = np.float32([0, 0, 1])
@@ -99,6 +100,7 @@ def evaluated(positions, law, device):
     works = wp.zeros(count, dtype=wp.float64, device=device)
     repulsion = Repulsion(count, device=device)
     repulsion.relist(places, ways, spacings, spacing=1.0, varied=False, walls=walls)
+    repulsion.level(places)
     repulsion.evaluate(places, ways, law, moves=moves, energies=energies, works=works)
     return moves.numpy(), energies.numpy(), works.numpy()
 
@@ -119,6 +121,34 @@ def test_a_step_at_a_wall_is_that_among_particles_and_their_images(exponent, sti
     # what lies on both sides of a mirror has twice the energy of one side
     both = np.concatenate([positions, positions * np.float32([-1, 1, 1])])
     whole = total_energy(both, np.tile(UP, (80, 1)), np.ones(80), **rule)
+    assert works.sum() == pytest.approx(0.5 * whole, rel=1e-4)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_rings_at_a_wall_go_on_among_the_images(device):
+    positions = half_plane(40, seed=5)
+    normals, sizes = np.tile(UP, (40, 1)), np.ones(40)
+    law = Law(3.0, 300.0, 600.0)
+    moves, energies, works = evaluated(positions, law, device)
+    wall = np.zeros(3), np.array([1.0, 0, 0])
+    around = {"farthest": CUTOFF, "facing_limit": FACING_LIMIT}
+    mean = rings(positions, normals, sizes, **around, wall=wall)[0].mean()
+    rule = {"cutoff": CUTOFF, "exponent": law.exponent, "core": CORE, "stiffness": law.stiffness}
+    rule |= {"facing_limit": FACING_LIMIT, "closest": CLOSEST}
+    step = {
+        "damping": DAMPING,
+        "longest": LONGEST,
+        "isotropy": ISOTROPY,
+        "evening": law.evening,
+        "mean": mean,
+    }
+    expected, crowdedness = expected_moves(positions, normals, sizes, **rule, **step, wall=wall)
+    assert np.allclose(moves, expected, atol=2e-4)
+    assert np.allclose(energies, crowdedness, rtol=1e-3)
+    both = np.concatenate([positions, positions * np.float32([-1, 1, 1])])
+    ways, ones = np.tile(UP, (80, 1)), np.ones(80)
+    whole = total_energy(both, ways, ones, **rule)
+    whole += ring_energy(both, ways, ones, evening=law.evening, mean=mean, **around)
     assert works.sum() == pytest.approx(0.5 * whole, rel=1e-4)
 
 
@@ -223,5 +253,5 @@ def test_strips_and_scraps_of_any_shape_are_seeded(number, count, scale):
     assert relaxation.count == count
     for index, surface in enumerate((fan, strip)):
         own = relaxation.positions[relaxation.surface_ids == index]
-        gaps = np.linalg.norm(surface.project(own)[0] - own, axis=1)
+        gaps = closest_points(own, surface.vertices, surface.faces)  # slim faces want more than float32
         assert gaps.max(initial=0.0) < 1e-4 * relaxation.spacing
