@@ -117,6 +117,7 @@ class Jumpy:
         self._plane = plane(4.0)
         self.area, self.bounds = self._plane.area, self._plane.bounds
         self.sample, self.contains = self._plane.sample, self._plane.contains
+        self.raycast, self.normal = self._plane.raycast, self._plane.normal
 
     def project(self, points, *, within=None):
         positions, normals = self._plane.project(points)
