@@ -123,7 +123,7 @@ class Decals:
         tangents = floats("tangents", self.tangents, (count, 3))
         radii = floats("radii", self.radii, (count,))
         check_range("radii", radii, SMALLEST_RADIUS, LARGEST)
-        check_range("positions", np.abs(positions), 0.0, LARGEST)
+        check_range("positions", positions, -LARGEST, LARGEST)
         normals = unit("normals", normals)
         arrays = {
             "positions": positions.astype(np.float32),

@@ -55,7 +55,12 @@ def read_image(path: Path) -> NDArray[np.uint8]:
             return _to_rgba(ImageOps.exif_transpose(picture))
     except UnidentifiedImageError as error:
         raise InvalidImage(f"expected an image, {str(path)!r} is none: {_DO_THIS}") from error
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except Image.DecompressionBombError as error:
+        raise InvalidImage(
+            f"expected an image of 1 to {MAX_IMAGE_EDGE} pixels a side, "
+            f"{str(path)!r} is far larger: scale it first"
+        ) from error
+    except (OSError, SyntaxError, ValueError) as error:
         if isinstance(error, InvalidImage):
             raise
         raise InvalidImage(f"could not read the image {str(path)!r} ({error}): {_DO_THIS}") from error

@@ -168,9 +168,10 @@ def test_truncated_picture(tmp_path: Path) -> None:
         read_image(path)
 
 
-def test_too_large(tmp_path: Path) -> None:
+@pytest.mark.parametrize("size", [(MAX_IMAGE_EDGE + 1, 1), (2 * MAX_IMAGE_EDGE, 2 * MAX_IMAGE_EDGE)])
+def test_too_large(tmp_path: Path, size: tuple[int, int]) -> None:
     path = tmp_path / "a.png"
-    Image.new("1", (MAX_IMAGE_EDGE + 1, 1)).save(path)
+    Image.new("1", size).save(path)
     with pytest.raises(InvalidImage, match="scale it"):
         read_image(path)
 
