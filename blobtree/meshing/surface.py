@@ -26,6 +26,7 @@ from blobtree.meshing.reuse import (
     mark_above,
     mark_beside,
 )
+from blobtree.meshing.strays import mend_vertices
 from blobtree.meshing.vertices import list_patches, place_vertices
 from blobtree.progress import Progress
 from blobtree.sparse.cells import SparseCells
@@ -204,7 +205,11 @@ class _Extraction:
         inputs = [anew, rows, self._tables.patch_count, list_starts]
         self._launch(list_patches, len(anew), inputs, [patches])
         inputs = [patches, anew, *self._geometry, values, rows, offsets, self._tables.patch_of_edge, starts]
-        self._launch(self._cells.tape.vocabulary.kernel(place_vertices), total, inputs, outputs, step)
+        strays = self._zeros(1)
+        speak = self._cells.tape.vocabulary.kernel
+        self._launch(speak(place_vertices), total, inputs, [*outputs, strays], step)
+        if total and strays.numpy()[0]:
+            self._launch(speak(mend_vertices), total, inputs, outputs)
 
     def _copy_vertices(self, rest: Array, starts: Array, arrays: list[Array]) -> Array:
         """The other blocks' vertices; gives the new numbers of old ones."""

@@ -9,15 +9,15 @@ from blobtree.meshing.patches import EDGES
 from blobtree.sparse.blocks import child_place, grid_point
 from blobtree.sparse.grid import CHILDREN
 from blobtree.tapes.evaluate import field_color
-from blobtree.tapes.project import project_to_surface
+from blobtree.tapes.project import STALLED, project_to_surface
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 MOST_PATCHES = 4
 """Patches in one cell."""
 
-_EDGE_FIRST = wp.types.vector(length=12, dtype=wp.int32)(*(a for a, _ in EDGES))
-_EDGE_LAST = wp.types.vector(length=12, dtype=wp.int32)(*(b for _, b in EDGES))
+EDGE_FIRST = wp.types.vector(length=12, dtype=wp.int32)(*(a for a, _ in EDGES))
+EDGE_LAST = wp.types.vector(length=12, dtype=wp.int32)(*(b for _, b in EDGES))
 
 
 @wp.kernel
@@ -58,8 +58,9 @@ def place_vertices(
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     colors: wp.array(dtype=wp.vec3),
+    strays: wp.array(dtype=wp.int32),
 ) -> None:
-    """The vertex of a patch: the mean of its edge crossings, taken onto the surface."""
+    """The vertex of a patch: the mean of its edge crossings, taken onto the surface; strays are counted."""
     entry = patches[first + wp.tid()]
     patch = entry % MOST_PATCHES
     c = (entry // MOST_PATCHES) % CHILDREN
@@ -69,11 +70,19 @@ def place_vertices(
     lowest = grid_point(corner_place(base + blocks[block], 0, 0, 0), corner, cell)
     start = lowest + crossing_mean(slot, c, row, patch, values, patch_of_edge) * cell
     p, f = project_to_surface(start, 0.5 * cell, tape, spans[block])
+    if is_stray(f[0], p, start, cell):
+        wp.atomic_add(strays, 0, 1)
     color = field_color(p, tape, spans[block])
     vertex = vertex_starts[block] + int(offsets[block * CHILDREN + c]) + patch
     positions[vertex] = p
     normals[vertex] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
     colors[vertex] = wp.vec3(color[1], color[2], color[3])
+
+
+@wp.func
+def is_stray(value: wp.float32, p: wp.vec3, start: wp.vec3, cell: wp.float32) -> wp.bool:
+    """Whether Newton's method missed the surface, or left the cells whose part of the tape it knows."""
+    return wp.abs(value - ISO) > STALLED * ISO or wp.length(p - start) > cell
 
 
 @wp.func
@@ -90,8 +99,8 @@ def crossing_mean(
     crossings = float(0.0)
     for edge in range(12):
         if int(patch_of_edge[row * 12 + edge]) == patch:
-            a = _EDGE_FIRST[edge]
-            b = _EDGE_LAST[edge]
+            a = EDGE_FIRST[edge]
+            b = EDGE_LAST[edge]
             value_a = values[slot * SAMPLES + corner_sample(cell, a)]
             value_b = values[slot * SAMPLES + corner_sample(cell, b)]
             share = (ISO - value_a) / (value_b - value_a)
