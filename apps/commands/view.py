@@ -1,5 +1,6 @@
 """``implicit-decals view``: open a window in which decals are pushed by hand."""
 
+from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -19,6 +20,13 @@ from ..views import UPRIGHT, parse_view
 from .coat import Coat
 from .options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, check_count, parse_size
 from .progress_bars import progress_bars
+
+
+def new_file(folder: Path, name: str) -> Path:
+    """Give a path of a JSON file that is not there yet: NAME-decals.json, NAME-decals-2.json, ..."""
+    endings = chain([""], (f"-{number}" for number in count(2)))
+    paths = (folder / f"{name}-decals{ending}.json" for ending in endings)
+    return next(path for path in paths if not path.exists())
 
 
 def view(
@@ -52,7 +60,8 @@ def view(
     seed
         The same number gives the same decals. Default: 0.
     save
-        The JSON file that Ctrl + S writes. Default: the scene that was opened.
+        The JSON file that Ctrl + S writes. Default: the scene that was opened, or a new file here that is
+        called after the first model.
     define
         A Python file or module that defines own kinds of nodes, for BlobTrees in JSON that use them. May be
         given several times.
@@ -77,6 +86,7 @@ def view(
             coat = Coat.asked(decals, image, seed)
             where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
             scene = coat.scene(loaded, where, pixels, progress)
+        path = path or new_file(Path(), Path(model[0]).stem)
     with EditWindow(scene, path=path, size=pixels) as window:
         window.show()
         if window.session.modified:

@@ -171,7 +171,8 @@ class EditSession:
 
     def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
         """Write the scene to a file, whole or not at all (`decals.save_scene`), with a camera if given."""
-        if not isinstance(path, str | os.PathLike) or not os.fspath(path):
+        named = isinstance(path, str | os.PathLike) and os.fspath(path)
+        if not named or "\0" in str(path):
             raise InvalidEdit(f"expected a path to save to, got {shown(path)}")
         self.end()
         save_scene(self.document.scene.replace(camera=camera), path)

@@ -136,7 +136,7 @@ def test_what_is_of_the_wrong_kind_is_named(ask, error, wrong):
         ask(wrong)
 
 
-@pytest.mark.parametrize("path", [None, 5, "", [], b"x", object()])
+@pytest.mark.parametrize("path", [None, 5, "", [], b"x", object(), "a\0b"])
 def test_a_session_is_saved_to_paths_alone(path):
     with pytest.raises(InvalidEdit, match="expected a path to save to"):
         EditSession(scene()).save(path)

@@ -47,6 +47,14 @@ def test_view_opens_models_and_scenes(folder: Path, windows: list[EditWindow]) -
     assert windows[1].actions.path == Path("scene.json")
 
 
+def test_what_is_made_anew_is_saved_to_a_new_file(folder: Path, windows: list[EditWindow]) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    for path in ("ball-decals.json", "ball-decals-2.json", "ball-decals-3.json"):
+        assert run(["view", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
+        assert windows[-1].actions.path == Path(path)
+        (folder / path).write_text("somebody's")
+
+
 def test_view_says_what_was_not_saved(
     folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
