@@ -16,7 +16,7 @@ from decals.render import Renderer
 from decals.render.decal_data import DecalData
 from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
-from tests.decals import log_maps, test_contact, test_radial
+from tests.decals.field import log_maps, test_contact, test_radial
 
 RUNS = 3
 FOLD_SLACK = 0.0

@@ -9,7 +9,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tests.decals import log_maps as analytic
+from tests.decals.field import log_maps as analytic
 from tests.decals.shapes import torus
 
 Doubles = NDArray[np.float64]

@@ -14,7 +14,7 @@ from decals.scenes.scene import DecalImage, MeshObject, Scene
 from implicit_decals.apps.measuring.coats import even_coat
 from tests.bench import record, replay, replay_counts
 from tests.bench.scenes import in_layers
-from tests.decals.render.test_decals import view_of
+from tests.decals.render.pictures import view_of
 from tests.decals.shapes import torus
 
 

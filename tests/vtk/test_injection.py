@@ -14,7 +14,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.scene import MeshObject, Scene
 from decals.vtk import injection
 from decals.vtk.component import triangles
-from tests.decals.render.test_decals import in_layers, scattered
+from tests.decals.render.pictures import in_layers, scattered
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory
 from tests.vtk.scenes import shot

@@ -10,8 +10,8 @@ from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
 from decals.field.mapping import Mapping, drawn_distance, in_image, tangent_coordinates, unrolled
 from decals.model import Decals
-from tests.decals import log_maps
-from tests.decals.log_maps import DECAL, DISCS, dots, drawn_error, tangents, unit
+from tests.decals.field import log_maps
+from tests.decals.field.log_maps import DECAL, DISCS, dots, drawn_error, tangents, unit
 
 wp.set_module_options({"enable_backward": False})
 

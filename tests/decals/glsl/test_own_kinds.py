@@ -13,7 +13,7 @@ from decals.scenes.camera import Camera
 from tests.blobtree.own_kinds import EVERYTHING, OWN_TREES, Brick, Carve, Path, Ring, Soft
 from tests.blobtree.trees import points_around
 from tests.decals.glsl.functions import run_program
-from tests.decals.glsl.test_tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
+from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 

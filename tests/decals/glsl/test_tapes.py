@@ -1,7 +1,5 @@
 """Whole tapes in Warp and GLSL, and pictures of them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -9,31 +7,17 @@ from blobtree import Node, Point, Segment
 from blobtree.tapes.evaluate import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.render.context import Context
-from decals.render.drawables import register
 from decals.render.renderer import Renderer
 from decals.render.tape_shader import tracing_shader
-from decals.render.tree import TreeDrawable
 from decals.scenes.camera import Camera
 from tests.blobtree.trees import points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
-from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, run_program
+from tests.decals.glsl.functions import ALL_KINDS, run_program
+from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 
 TREES = random_trees(seed=31, count=24)
-MAIN = """
-uniform sampler2D points; uniform ivec2 part; uniform int reading; uniform vec3 heading;
-void main() {
-    ivec2 here = ivec2(gl_FragCoord.xy);
-    vec4 q = texelFetch(points, here, 0);
-    vec4 result = vec4(0.0);
-    if (reading == 0) result.xyz = field_bound(q.xyz, heading, q.w, tape, part);
-    if (reading == 1) result = field_gradient(q.xyz, tape, part);
-    if (reading == 2) result = interpret_color(q.xyz, vec3(0.0), 0.0, tape, part);
-    g_position = result;
-}
-"""
-BOUND_AND_VALUE, GRADIENT, COLOR = range(3)
 
 
 def read_tape(
@@ -44,15 +28,6 @@ def read_tape(
     textures = {"tape": tree.tape.data, "points": padded(points)}
     uniforms = {"reading": reading, "part": (0, len(tree.tape.data)), "heading": heading}
     return run_program(context, shader + MAIN, len(points), textures, uniforms)
-
-
-def padded(points: Array) -> Array:
-    return np.pad(points, ((0, 0), (0, 4 - points.shape[1]))).astype(np.float32)
-
-
-def assert_close(seen: Array, expected: Array) -> None:
-    error = np.abs(seen - expected) / np.maximum(1.0, np.abs(expected))
-    assert error.max(initial=0.0) <= AGREEMENT
 
 
 def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
@@ -87,15 +62,6 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int
         compared += int(strong.sum())
     assert compared > 0.3 * 6 * 500
 
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A tree in a scene: all that the renderer asks of one."""
-
-    tree: Node
-
-
-register(Model, TreeDrawable)
 
 MODELS = {
     "one point": Point((0, 0, 0), radius=1.0),

@@ -14,7 +14,7 @@ from decals.render import entry as entries
 from decals.render.context import Context
 from decals.render.entry import COMPUTE_BASELINE, OVERRIDE, Entry, measure
 from decals.render.renderer import Buffers, Renderer
-from tests.decals.render.test_decals import SIZE, compare, scattered, view_of
+from tests.decals.render.pictures import SIZE, compare, scattered, view_of
 from tests.decals.shapes import torus
 
 NO_COMPUTE = {"MESA_GL_VERSION_OVERRIDE": "4.1", "MESA_GLSL_VERSION_OVERRIDE": "410"}
@@ -131,7 +131,8 @@ with Context.standalone() as context:
     else:
         raise AssertionError("compute was accepted")
 from decals.render.renderer import Renderer
-from tests.decals.render.test_decals import scattered, torus, view_of
+from tests.decals.render.pictures import scattered, view_of
+from tests.decals.shapes import torus
 with Renderer() as renderer:
     view = view_of(scattered(torus(), 50, 5, radii=(0.05, 0.3)), torus())
     assert (renderer.buffers(view, size=(32, 24)).owner >= 0).any()

@@ -7,7 +7,7 @@ import pytest
 
 from decals.model import LARGEST, SMALLEST_RADIUS, Decals
 from decals.render.renderer import Renderer
-from tests.decals.render.test_decals import WHITE, scattered, view_of, wall
+from tests.decals.render.pictures import WHITE, scattered, view_of, wall
 from tests.decals.shapes import Picture, View, torus
 
 SIZE = (48, 36)

@@ -15,7 +15,7 @@ from decals.render.context import Context
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
 from decals.scenes.viewpoint import Projection
-from tests.decals.render.test_decals import compare
+from tests.decals.render.pictures import compare
 from tests.decals.shapes import torus
 from tests.oracles.raster import edges
 

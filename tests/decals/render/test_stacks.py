@@ -11,7 +11,7 @@ from decals.field.mapping import Mapping
 from decals.model import Decals
 from decals.render.renderer import Renderer
 from decals.scenes.camera import Camera
-from tests.decals.render.test_decals import WHITE, compare, plain_colors, quarters, wall
+from tests.decals.render.pictures import WHITE, compare, plain_colors, quarters, wall
 from tests.decals.shapes import View, torus
 from tests.oracles.decals import colors_at
 
