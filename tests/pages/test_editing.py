@@ -8,7 +8,7 @@ import pytest
 from decals.edit.keys import help_table
 from decals.render.libraries import install_advice, missing_gl_libraries
 
-PAGE = Path(__file__).parent.parent / "docs" / "editing.md"
+PAGE = Path(__file__).parents[2] / "docs" / "editing.md"
 
 
 def test_the_table_is_that_of_the_window() -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 
 from decals.render.libraries import install_advice, missing_gl_libraries
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def drawing() -> ModuleType:

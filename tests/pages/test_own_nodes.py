@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parent.parent / "docs" / "own-nodes.md"
+PAGE = Path(__file__).parents[2] / "docs" / "own-nodes.md"
 
 
 def test_the_code_blocks_run(

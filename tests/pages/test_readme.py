@@ -9,7 +9,7 @@ import pytest
 from decals.scenes.mesh_file import read_mesh
 from decals.scenes.scene_file import load_scene
 
-README = Path(__file__).parent.parent / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 
 
 def blocks() -> list[str]:

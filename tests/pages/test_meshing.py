@@ -8,7 +8,7 @@ import numpy as np
 
 from blobtree import Point, polygonize
 
-PAGE = Path(__file__).parent.parent / "docs" / "meshing.md"
+PAGE = Path(__file__).parents[2] / "docs" / "meshing.md"
 
 
 def test_the_code_blocks_run() -> None:

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-PAGE = Path(__file__).parent.parent / "docs" / "seeding.md"
+PAGE = Path(__file__).parents[2] / "docs" / "seeding.md"
 
 
 def test_the_code_blocks_run(capsys) -> None:
