@@ -196,6 +196,21 @@ def test_distance_in_the_image(chord, pushed, stretch):
         assert seen <= 1
 
 
+@pytest.mark.parametrize("contact", Contact)
+def test_lines_of_contact_stay_in_place(contact):
+    """Two decals of a sphere meet half-way between their centres, at their images' rims, by any mapping."""
+    apart, aside = 0.3, np.linspace(-0.3, 0.3, 41)
+    centres = np.array([[np.sin(a), 0, np.cos(a)] for a in (-apart, apart)])
+    decals = Decals(centres, centres, [[0, 1, 0]] * 2, [0.5, 0.5])
+    line = np.column_stack([0 * aside, np.sin(aside), np.cos(aside)])
+    for mapping in Mapping:
+        for side in (-1e-6, 1e-6):
+            q = unit(line + side * np.eye(3)[0])
+            seen = evaluate(decals, q, q, mapping=mapping, contact=contact, device="cpu")
+            assert (seen.owner == (side > 0)).all()
+            assert np.linalg.norm(seen.uv - 0.5, axis=1) == pytest.approx(np.full(41, 0.5), abs=1e-4)
+
+
 @settings(max_examples=200, deadline=None)
 @given(steps=st.lists(st.tuples(share, share, share), min_size=2, max_size=20))
 def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(steps):
