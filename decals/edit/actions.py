@@ -318,7 +318,17 @@ class Actions:
         """Move the held primitive by an offset from where it was at first."""
         if self.grip is not None:
             self.session.take_back()
-            self.attempt(MovePrimitive(*self.grip, offset))
+            self.attempt(MovePrimitive(*self.grip, offset, quick=True))
+
+    def end_grip(self) -> None:
+        """Let go of the held primitive; where nothing is left to lay decals on, it goes back."""
+        try:
+            if self.grip is not None:
+                self.session.document.objects[self.grip[0]].surface  # noqa: B018
+        except (DecalsError, BlobTreeError) as error:
+            self.session.cancel()
+            self.message = str(error)
+        self.settle()
 
     # -- the scene --------------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from decals.edit.document import Document
 from decals.edit.places import Places, carried, nearest
 from decals.errors import InvalidEdit
 from decals.scenes.scene import TreeObject
+from decals.surfaces.implicit import straight_onto
 from decals.surfaces.surface import as_points
 
 Path = tuple[int, ...]
@@ -178,12 +179,15 @@ class OfPrimitive:
             raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh")
         return item.tree
 
-    def exchanged(self, document: Document, node: Node, offset: ArrayLike = (0.0, 0.0, 0.0)) -> Change:
+    def exchanged(
+        self, document: Document, node: Node, offset: ArrayLike = (0.0, 0.0, 0.0), *, quick: bool = False
+    ) -> Change:
         """Put another node in place of the primitive; decals follow, with the offset as far as it counts."""
         before = self.tree(document)
         after = with_node(before, self.path, node)
         item = TreeObject(document.objects[self.object].name, after)
-        item.surface  # noqa: B018  # refuses a tree that shows nothing, before anything changes
+        if not quick:
+            item.surface  # noqa: B018  # refuses a tree that shows nothing, before anything changes
         objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
         numbers, places = _followers(document, self, item, np.asarray(offset, np.float64))
         followed = carried(document.decals.take(numbers), places)
@@ -205,7 +209,10 @@ def _followers(
     weights = following(before, edited.path, positions) if offset.any() else np.zeros(len(rows))
     wished = positions + weights[:, None] * offset
     changed = (weights * np.linalg.norm(offset) > 0) | (np.abs(item.tree(wished) - ISO) > FIELD_ERROR)
-    goal_positions, goal_normals = item.surface.project(wished[changed])
+    goal = straight_onto(item.tree, wished[changed])
+    if goal is None:
+        goal = item.surface.project(wished[changed])
+    goal_positions, goal_normals = goal
     goals = np.full(int(changed.sum()), edited.object, np.int32)
     return numbers[rows[changed]], Places(goal_positions, goal_normals, goals)
 
@@ -246,9 +253,14 @@ def _shifted(tree: Node, path: Path, offset: Doubles) -> Node:
 
 @dataclass(frozen=True, eq=False)
 class MovePrimitive(OfPrimitive):
-    """Move a primitive, or a whole branch, by an offset in the world; decals go along with their surface."""
+    """Move a primitive, or a whole branch, by an offset in the world; decals go along with their surface.
+
+    A ``quick`` one makes no surface of the tree where it can do without, so it may leave one that shows too
+    little to lay decals on: whoever moves again and again asks for the surface in the end.
+    """
 
     offset: ArrayLike
+    quick: bool = False
     label: ClassVar[str] = "move a primitive"
 
     def change(self, document: Document) -> Change:
@@ -256,7 +268,8 @@ class MovePrimitive(OfPrimitive):
         tree = self.tree(document)
         offset = triple("offset", self.offset, InvalidEdit)
         own = np.linalg.solve(world_matrix(tree, self.path), offset)
-        return self.exchanged(document, moved(node_at(tree, self.path), own), offset)
+        node = moved(node_at(tree, self.path), own)
+        return self.exchanged(document, node, offset, quick=self.quick)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,16 +1,21 @@
 """A BlobTree as a surface for decals."""
 
+from typing import Any
+
 import numpy as np
+import warp as wp
 from numpy.typing import ArrayLike
 
-from blobtree import Node, polygonize
+from blobtree import ISO, Node, polygonize
+from blobtree.launch import launch
 from blobtree.tracing.trace import trace
 from decals.checks import shown
 from decals.errors import InvalidMesh
-from decals.surfaces.ground import asked, inside
+from decals.surfaces.ground import asked, inside, vectors
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Flags, Floats, as_points, as_rays, as_reaches
-from decals.surfaces.tree_ground import TreeGround
+from decals.surfaces.tree_ground import ARRIVED, TreeGround
+from decals.surfaces.tree_queries import approach
 from decals.wishes import device_or_error, whole
 
 RESOLUTION = 64
@@ -18,6 +23,9 @@ RESOLUTION = 64
 
 STEP = 0.5
 """Longest Newton step, in cells."""
+
+ROUNDS = 4
+"""How often Newton's method goes on from where it stopped, before a mesh is asked."""
 
 
 class ImplicitSurface:
@@ -54,8 +62,7 @@ class ImplicitSurface:
                 "its parts may be too small, or cut each other away"
             )
         self._coarse = MeshSurface(coarse.vertices, coarse.faces, device=device)
-        low, high = tree.bounds
-        self._longest_step = STEP * float((high - low).max()) / resolution
+        self._longest_step = _longest_step(tree, resolution)
         self._grounds: dict[str, TreeGround] = {}
 
     def __repr__(self) -> str:
@@ -103,3 +110,35 @@ class ImplicitSurface:
     def contains(self, points: ArrayLike) -> Flags:
         """Whether the field is above the iso value."""
         return inside(self.on(self.device), as_points(points), self.device)
+
+
+def _longest_step(tree: Node, resolution: int) -> float:
+    low, high = tree.bounds
+    return STEP * float((high - low).max()) / resolution
+
+
+def straight_onto(tree: Node, points: ArrayLike, *, device: str = "cpu") -> tuple[Floats, Floats] | None:
+    """Surface points near the points and the normals there, without making an `ImplicitSurface`.
+
+    The same as that gives, but for points from which it would start again at its mesh: those go on along the
+    gradient. None where there is no point, or where one does not arrive.
+    """
+    positions = as_points(points).copy()
+    normals = np.zeros_like(positions)
+    rows = np.arange(len(positions))
+    for _ in range(ROUNDS):
+        positions[rows], normals[rows], arrived = _approached(tree, positions[rows], device)
+        rows = rows[~arrived]
+    return (positions, normals) if len(positions) and not len(rows) else None
+
+
+def _approached(tree: Node, points: Floats, device: str) -> tuple[Floats, Floats, Flags]:
+    """Where Newton's method leads to, the normals there, and whether it arrived."""
+    tape = tree.tape.on(device)
+    positions: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
+    normals: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
+    arrived: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+    inputs = [tape.data, tape.span, _longest_step(tree, RESOLUTION), ARRIVED * ISO, vectors(points, device)]
+    kernel = tree.tape.vocabulary.kernel(approach)
+    launch(kernel, len(points), inputs, [positions, normals, arrived], device=device)
+    return positions.numpy(), normals.numpy(), arrived.numpy() == 1

@@ -20,6 +20,27 @@ def settles(f: wp.vec4, tolerance: wp.float32) -> wp.bool:
 
 
 @wp.kernel
+def approach(
+    first: wp.int32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    longest_step: wp.float32,
+    tolerance: wp.float32,
+    points: wp.array(dtype=wp.vec3),
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    arrived: wp.array(dtype=wp.int32),
+) -> None:
+    """Surface point near each point, and the normal there, by Newton's method; 1 where that arrives."""
+    i = first + wp.tid()
+    p, f = project_to_surface(points[i], longest_step, tape, span)
+    positions[i] = p
+    normals[i] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+    if settles(f, tolerance):
+        arrived[i] = 1
+
+
+@wp.kernel
 def descend(
     first: wp.int32,
     tape: wp.array(dtype=wp.vec4),

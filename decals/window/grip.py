@@ -91,7 +91,7 @@ class Grip:
 
     def end(self) -> None:
         """The handle was let go."""
-        self._actions.settle()
+        self._actions.end_grip()
         self.moving = False
         self.update()
         self._redraw(True)

@@ -14,6 +14,7 @@ from decals.edit import (
     primitive_near,
     primitive_paths,
 )
+from decals.edit.actions import Actions
 from decals.edit.trees import alone, following, moved, primitive_at, with_node
 from decals.errors import InvalidEdit, InvalidMesh
 from decals.scenes.camera import Camera
@@ -172,6 +173,32 @@ def test_decals_in_a_hole_follow_the_tool():
     points = TreeObject("t", tree).surface.project([[0, 0, 0.6]])[0]
     np.testing.assert_allclose(following(tree, (1,), points), 1.0, atol=0.02)
     np.testing.assert_allclose(following(tree, (0,), points), 0.0, atol=0.02)
+
+
+@pytest.mark.parametrize("way", [(0.02, 0.03, -0.02), (0.4, 0.3, -0.2)])
+def test_a_quick_move_is_the_same_move_without_a_surface(way):
+    quick, whole = session_of(A + B), session_of(A + B)
+    quick.do(MovePrimitive(0, (1,), way, quick=True))
+    whole.do(MovePrimitive(0, (1,), way))
+    assert "surface" not in vars(quick.document.objects[0])
+    decals, tree = quick.document.decals.decals, quick.document.objects[0].tree
+    assert decals.packed().tobytes() == whole.document.decals.decals.packed().tobytes()
+    assert tree == whole.document.objects[0].tree
+    assert np.abs(tree(decals.positions) - ISO).max() < 1e-4
+
+
+def test_a_primitive_that_leaves_nothing_to_see_goes_back():
+    """A tool that swallows the whole; step by step nobody asks for the surface, letting go does."""
+    session = session_of(A - Point((1.2, 0, 0), radius=1.3), 12)
+    actions = Actions(session)
+    actions.grip = (0, (1,))
+    state = digest(session.document)
+    actions.begin_grip()
+    actions.move_grip((-1.2, 0, 0))
+    actions.end_grip()
+    assert digest(session.document) == state
+    assert session.labels == ()
+    assert "surface" in actions.message
 
 
 def test_painting_leaves_the_decals():

@@ -3,7 +3,7 @@ import pytest
 
 from blobtree import Point, Segment
 from decals.errors import InvalidMesh, InvalidPoints
-from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.implicit import ImplicitSurface, straight_onto
 from decals.surfaces.surface import Surface
 
 
@@ -47,6 +47,22 @@ def test_a_point_without_gradient_gets_a_place_and_a_normal():
     positions, normals = ball().project([[0, 0, 0]])
     assert np.linalg.norm(positions) == pytest.approx(1, abs=1e-4)
     assert np.linalg.norm(normals) == pytest.approx(1, abs=1e-4)
+
+
+def test_straight_onto_the_surface_is_the_same_without_a_mesh():
+    tree, near = blob(), ImplicitSurface(blob()).sample(200, seed=3)[0] * 1.01
+    positions, normals = straight_onto(tree, near)
+    expected = ImplicitSurface(tree).project(near)
+    np.testing.assert_array_equal(positions, expected[0])
+    np.testing.assert_array_equal(normals, expected[1])
+    far = straight_onto(tree, near * 1.15)
+    assert np.abs(tree(far[0]) - 0.5).max() < 1e-4
+    assert np.allclose(np.linalg.norm(far[1], axis=1), 1, atol=1e-5)
+
+
+def test_what_does_not_lead_straight_onto_the_surface_is_said():
+    assert straight_onto(blob(), [[0.0, 0.6, 0.5], [9.0, 9.0, 9.0]]) is None
+    assert straight_onto(blob(), np.zeros((0, 3))) is None
 
 
 def test_samples_of_a_blend_lie_on_it_with_the_normal_of_the_field():
