@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from .seeds.projections import Cylindrical, Planar, Spherical, TextureCoordinates
     from .seeds.relaxation import Relaxation
     from .seeds.remeshing import remeshed_points
-    from .seeds.vertex_density import vertex_density
+    from .seeds.vertex_density import region_mask, vertex_density
     from .surfaces.implicit import ImplicitSurface
     from .surfaces.mesh import MeshSurface
     from .surfaces.surface import Surface
@@ -103,6 +103,7 @@ __all__ = [
     "load_image",
     "load_scene",
     "read_mesh",
+    "region_mask",
     "remeshed_points",
     "save_scene",
     "seed",
@@ -153,7 +154,7 @@ _HOMES = {
     "coat.seeding": ("seed",),
     "coat.sizing": ("Sizing",),
     "surfaces.surface": ("Surface",),
-    "seeds.vertex_density": ("vertex_density",),
+    "seeds.vertex_density": ("region_mask", "vertex_density"),
     "vtk": ("show",),
     "window": ("EditWindow", "view"),
 }

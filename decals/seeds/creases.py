@@ -64,6 +64,9 @@ class Creases:
         self._vertices, self._edges = _sharp_edges(surface, angle, rims)
         self.segments: Wide = self._vertices[self._edges]
 
+    def __repr__(self) -> str:
+        return f"Creases({len(self.segments)} segments, {self.length:.6g} long)"
+
     @property
     def length(self) -> float:
         """Length of all lines together."""
@@ -82,7 +85,9 @@ class Creases:
         return found
 
     def mask(self, *, apart: float) -> Mask:
-        """Places at least so far from all lines: with half a spacing no decal straddles one."""
+        """Places at least so far from all lines: with half a spacing hardly a decal that touches its
+        neighbours reaches across one.
+        """
         number("apart", apart, "a length from 0 upward", lambda value: value >= 0)
         return lambda points: self.distance(points) >= apart
 

@@ -113,6 +113,9 @@ class Relaxation:
         self._homes = Homes(self.sizes_at)
         self._scouts = Scouts(self.world, self.sizes_at)
 
+    def __repr__(self) -> str:
+        return f"Relaxation({self.count} particles, step {self.steps} of {self.iterations})"
+
     @property
     def count(self) -> int:
         """Number of particles."""

@@ -1,13 +1,14 @@
-"""Density of seeds painted on the vertices of a mesh."""
+"""What is written on a mesh: densities at its vertices, regions of its vertices or faces."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from decals.checks import instance
 from decals.errors import InvalidSeeding
-from decals.seeds.population import Density
+from decals.seeds.population import Density, Mask
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Floats, as_points
+from decals.surfaces.surface import Flags, Floats, as_points
 from decals.wishes import numbers
 
 Wide = NDArray[np.float64]
@@ -39,6 +40,39 @@ def vertex_density(vertices: MeshSurface | ArrayLike, values: ArrayLike) -> Dens
     if not (np.isfinite(given).all() and (given > 0).all()):
         raise InvalidSeeding("values: expected finite numbers above zero; bar places by a mask")
     return _within(vertices, given) if isinstance(vertices, MeshSurface) else _among(places, given)
+
+
+def region_mask(surface: MeshSurface, flags: ArrayLike) -> Mask:
+    """Make a mask of flags on a mesh: where seeds may lie, for `seed` and `Relaxation`.
+
+    Parameters
+    ----------
+    surface
+        The mesh. Where it has as many faces as vertices, flags are those of the faces.
+    flags
+        For each face, ``bool[m]``; or for each vertex, ``bool[n]``: then half of the way between a vertex
+        inside and one outside belongs to the region.
+
+    Raises
+    ------
+    InvalidSeeding
+        If the surface is no mesh, or flags are not true or false for each face or vertex.
+    """
+    instance("surface", surface, MeshSurface, InvalidSeeding, "for a tree, give a function of points")
+    given, (faces, vertices) = numbers("flags", flags), (len(surface.faces), len(surface.vertices))
+    if given.shape not in ((faces,), (vertices,)) or not np.isin(given, (0.0, 1.0)).all():
+        raise InvalidSeeding(
+            f"flags: expected true or false for each of {faces} faces or {vertices} vertices, "
+            f"got shape {list(given.shape)}"
+        )
+    corners = np.repeat(given[:, None], 3, axis=1) if given.shape == (faces,) else given[surface.faces]
+
+    def mask(points: Floats) -> Flags:
+        rows, weights = surface.locate(points)
+        inside: Flags = (weights * corners[rows]).sum(axis=1) >= 0.5
+        return inside
+
+    return mask
 
 
 def _within(mesh: MeshSurface, values: Wide) -> Density:

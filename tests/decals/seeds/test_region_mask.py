@@ -1,0 +1,33 @@
+"""Regions of a mesh's faces or vertices as masks."""
+
+import numpy as np
+import pytest
+
+from decals.errors import InvalidSeeding
+from decals.seeds.relaxation import Relaxation
+from decals.seeds.vertex_density import region_mask
+from tests.decals.meshes import box, sphere
+
+
+def test_regions_of_faces_and_of_vertices():
+    ball = sphere()
+    middles = ball.vertices[ball.faces].mean(axis=1)
+    relaxation = Relaxation(ball, count=200, mask=region_mask(ball, middles[:, 2] > 0.2), iterations=30)
+    relaxation.run()
+    assert (middles[ball.locate(relaxation.positions)[0], 2] > 0.2).all()
+    # a zone of the unit ball is 2 pi times its height
+    assert relaxation.world.area == pytest.approx(2 * np.pi * 0.8, rel=0.05)
+    mask = region_mask(ball, ball.vertices[:, 2] > 0.0)
+    points, _ = ball.sample(4000, seed=1)
+    certain = np.abs(points[:, 2]) > 0.1
+    assert np.array_equal(mask(points)[certain], points[certain, 2] > 0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [None, "x", [True], np.zeros(5), [[True]], 2.0 * np.ones(12), np.full(12, np.nan)]
+)
+def test_flags_that_belong_to_no_mesh_are_refused(wrong):
+    with pytest.raises(InvalidSeeding, match="flags: expected"):
+        region_mask(box(), wrong)
+    with pytest.raises(InvalidSeeding, match="surface: expected a MeshSurface"):
+        region_mask(wrong, [True])
