@@ -85,9 +85,7 @@ class Creases:
         return found
 
     def mask(self, *, apart: float) -> Mask:
-        """Places at least so far from all lines: with half a spacing hardly a decal that touches its
-        neighbours reaches across one.
-        """
+        """Places at least so far from all lines: half a spacing keeps decals that touch on their side."""
         number("apart", apart, "a length from 0 upward", lambda value: value >= 0)
         return lambda points: self.distance(points) >= apart
 
