@@ -65,7 +65,7 @@ class Interaction(IntEnum):
     """Undeformed, drawn over the contact decals of its layer: eyes on scales."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Decals:
     """n decals, one row each; arrays are checked, copied and read-only.
 
@@ -170,6 +170,12 @@ class Decals:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def __repr__(self) -> str:
+        """How many, and how large: thousands of rows would bury a notebook."""
+        if len(self) == 0:
+            return "Decals(0)"
+        return f"Decals({len(self)}, radii from {self.radii.min():.3g} to {self.radii.max():.3g})"
 
     def __getitem__(self, rows: slice | ArrayLike) -> Self:
         """Pick some of the decals by a slice, a mask or an array of indices."""
