@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from contextvars import ContextVar
 from functools import wraps
 from typing import Any
@@ -102,7 +103,9 @@ def _watcher(_name: str, method: Any) -> Any:
 def _class_names(callback: Callable[..., Any]) -> set[str]:
     """Names of the classes of what a function was made for: what it is bound to, or what it closes over."""
     owners = [getattr(callback, "__self__", None)]
-    owners += [cell.cell_contents for cell in getattr(callback, "__closure__", None) or ()]
+    for cell in getattr(callback, "__closure__", None) or ():
+        with suppress(ValueError):  # a name that is bound later
+            owners.append(cell.cell_contents)
     return {one.__name__ for owner in owners for one in type(owner).__mro__}
 
 

@@ -117,6 +117,8 @@ def test_views_that_draw_in_a_browser_say_what_they_leave_out(
         warnings.simplefilter("always")
         view.hear_of(pl)
         pl.add_on_render_callback(print, render_event=True)
+        pl.add_on_render_callback(lambda *_: later, render_event=True)
+    later = None
     assert [str(item.message).startswith(f"{name} {words}") for item in said] == [True] * (words is not None)
     pl.clear_on_render_callbacks()
     pl.close()
