@@ -73,6 +73,7 @@ def test_half_of_a_ball_behind_a_plane_is_picked_where_it_is_seen(plotter: Facto
         assert (stage.at(x, 119 - y) is None) == hides[y, x], (x, y)
     assert (sure & hides).sum() > 20
     assert (sure & ~hides).sum() > 500
+    np.testing.assert_array_equal(shot(pl), seen)  # nobody noticed
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.6, 0.125])

@@ -109,6 +109,7 @@ MODES: dict[str, tuple[Prepare, Prepare, int]] = {
     "gradient and stereo": (opaque, gradient_and_stereo, 6),
     "hidden lines": (opaque, lambda pl: pl.enable_hidden_line_removal(), 1),
     "light kit": (everything, lambda pl: pl.enable_lightkit(), 1),
+    "lit by VTK's lights": (everything, lambda pl: setattr(pl.decals, "lights", "vtk"), 1),
 }
 
 
