@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
+from blobtree.progress import Progress
 from decals.coat.orientation import tangents
 from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
 from decals.edit.jobs import Job
 from decals.edit.keys import BINDINGS, CAMERA
 from decals.edit.pick import Pick
-from decals.edit.population import Relax, Scatter, lying_on
+from decals.edit.places import nearest
+from decals.edit.population import Relax, Scatter
 from decals.edit.session import Command, EditSession
 from decals.edit.trees import (
     MovePrimitive,
@@ -257,9 +259,14 @@ class Actions:
     def _scatter(self, cursor: Cursor) -> None:
         document, number = self.session.document, _surface(cursor).object
         self._coats += 1
-        wish = Scatter((number,), len(lying_on(document, [number])), self._coats)
-        objects, images = document.objects, len(document.images)
-        self._run(Job("scatter", lambda tell, stop: wish.coat(objects, images, progress=tell, cancel=stop)))
+        seed, objects, images = self._coats, document.objects, len(document.images)
+        positions = document.decals.decals.positions
+
+        def work(tell: Progress, stop: Callable[[], bool]) -> Command:
+            count = int((nearest(objects, positions).objects == number).sum())
+            return Scatter((number,), count, seed).coat(objects, images, progress=tell, cancel=stop)
+
+        self._run(Job("scatter", work))
 
     # -- primitives -------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from decals.edit.places import Places, carried, nearest
 from decals.errors import InvalidEdit
 from decals.model import Decals
 from decals.scenes.scene import SceneObject
-from decals.seeds.local_relaxation import relax_near
+from decals.seeds.local_relaxation import OUTER, relax_near
 from decals.seeds.population import Sites, World
 from decals.surfaces.surface import as_points
 
@@ -24,6 +24,9 @@ SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours in an even coat without gaps, in radii: `sizing.MARGIN` is in the radii."""
 
 MOST = 1_000_000
+
+FARTHEST = 1.01 * OUTER
+"""How far away decals are asked where they lie, in spacings, when a neighbourhood relaxes."""
 
 
 def lying_on(document: Document, objects: Sequence[int]) -> NDArray[np.int64]:
@@ -118,8 +121,10 @@ class Relax:
         numbers, decals = document.decals.numbers, document.decals.decals
         if not len(decals) or not document.objects:
             return Change()
-        closest = int(np.linalg.norm(decals.positions - center, axis=1).argmin())
-        rows = np.flatnonzero(decals.ranks == decals.ranks[closest])
+        distances = np.linalg.norm(decals.positions - center, axis=1)
+        closest = int(distances.argmin())
+        near = distances < FARTHEST * SPACING * decals.radii[closest]  # the others take no part
+        rows = np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
         if len(rows) < 2:
             return Change()
         surfaces = nearest(document.objects, decals.positions[rows]).objects

@@ -22,6 +22,7 @@ from decals.edit import (
     Scatter,
     Turn,
     nearest,
+    population,
 )
 from decals.edit.population import lying_on
 from decals.errors import InvalidDecals, InvalidEdit, InvalidMesh, InvalidScene
@@ -146,6 +147,17 @@ def test_relaxing_parts_those_that_crowd_and_leaves_the_far_ones(session):
     assert np.linalg.norm(before.positions[moved] - place, axis=1).max() < 8 * before.radii.max()
     assert least_gap(after) > 3 * least_gap(before)
     np.testing.assert_array_equal(after.radii, before.radii)
+
+
+def test_relaxing_asks_for_the_neighbourhood_alone(session, monkeypatch):
+    """However many decals there are, what a window waits for does not grow."""
+    session.do(Coat((0, 1), scene(400).decals))
+    asked, asking = [], population.nearest
+    monkeypatch.setattr(
+        population, "nearest", lambda objects, points: asked.append(len(points)) or asking(objects, points)
+    )
+    change = session.do(Relax(session.document.decals.decals.positions[0]))
+    assert len(change.after.numbers) <= sum(asked) < len(session.document.decals)
 
 
 def test_relaxing_where_no_decal_is_near_does_nothing(session):
