@@ -57,5 +57,6 @@ $(BIN)/python:
 # An editable install: only a changed pyproject.toml asks for another one.
 # setuptools warns at each that a folder may hide the package; here the folder is the package.
 $(INSTALLED): pyproject.toml | $(BIN)/python
-	PYTHONWARNINGS="ignore:Editable installation" $(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@echo "Installing what pyproject.toml asks for into $(VENV): the first time 1.5 GB, in some minutes"
+	@PYTHONWARNINGS="ignore:Editable installation" $(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@

@@ -9,6 +9,7 @@ from decals.scenes.scene import DecalImage, Scene, SceneObject
 
 from ..views import Size, View, frame
 from .options import MAX_DECALS, MAX_SEED, check_count
+from .progress_bars import FINDING
 
 DEFAULT_COUNT = 500
 DEFAULT_IMAGES = ("scale",)
@@ -32,6 +33,7 @@ class Coat:
 
     def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
         """Cover objects with the decals and look at them."""
+        progress(FINDING, 0.0)
         return Scene(
             objects=tuple(objects),
             camera=frame(objects, view, size),

@@ -14,7 +14,7 @@ from ..models.hatching import hatching, mosaic
 from ..models.spanning import spanning
 from ..output import check_output, write_picture
 from .options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
-from .progress_bars import progress_bars
+from .progress_bars import FINDING, progress_bars
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 
@@ -46,6 +46,7 @@ def demo(
         check_output(output / name, (".png",))
     start_warp()
     with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:
+        progress(FINDING, 0.0)
         nest = hatching(progress=progress)
         for name, scene in zip(PICTURES, (nest, mosaic(nest), spanning()), strict=True):
             progress(f"Drawing {name}", 0.0)

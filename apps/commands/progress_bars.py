@@ -8,6 +8,9 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from blobtree import Progress as Report
 
+FINDING = "Finding the surfaces"
+"""Stage in which models become surfaces, and the first time kernels are compiled."""
+
 _COLUMNS = (TextColumn("{task.description:<34}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
 
 

@@ -23,7 +23,7 @@ from ..models.definitions import import_definitions
 from ..models.loading import load_models
 from ..output import check_output
 from .options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, Whole, check_count
-from .progress_bars import progress_bars
+from .progress_bars import FINDING, progress_bars
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
 SUFFIXES = (".json", ".csv")
@@ -101,11 +101,12 @@ def seed(
     objects = load_models(model)
     if isinstance(objects, Scene):
         raise UsageError("a saved scene brings its own decals; seed its models instead")
-    surfaces = [item.surface for item in objects]
-    density = None
-    if painted is not None:
-        density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
     with progress_bars() as progress:
+        progress(FINDING, 0.0)
+        surfaces = [item.surface for item in objects]
+        density = None
+        if painted is not None:
+            density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
         decals = seed_decals(
             surfaces,
             count=count,
