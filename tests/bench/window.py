@@ -1,4 +1,4 @@
-"""How soon the window answers: ``python -m tests.bench.window [--json PATH] [--quick] [--size WxH]``.
+"""How soon the window answers: ``python -m tests.bench.window [--json PATH] [--quick] [--only drag,turn]``.
 
 A window without a screen is driven by synthetic events among 1,000 decals; each step runs from the event to
 the finished frame. Wall time counts what else the machine does; processor time (of all threads, llvmpipe's
@@ -11,7 +11,7 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 
@@ -36,7 +36,10 @@ TARGETS = {
     "creature_rest_longest_block_ms": "≤ 100",
 }
 MODELS = ("knot", "creature")
+KINDS = ("whole", "rest", "drag", "turn", "primitive", "scatter")
 STEPS = 25
+EVERY = 1 / 60
+"""Seconds between two events of a hand, while something else goes on."""
 WARM = 8
 """Steps of each kind before those that count: programs are compiled and the size of frames found."""
 
@@ -128,6 +131,7 @@ def scatter(driver: Driver, name: str, _steps: int) -> Figures:
     while driver.window.worker.busy and driver.window.worker._thread.is_alive():
         place = 4 + (place + 3) % 200
         times.append(timed(lambda: driver.event("MouseMoveEvent", (place, 9))))  # noqa: B023
+        time.sleep(max(0.0, EVERY - 1e-3 * times[-1][0]))
     driver.event("LeftButtonReleaseEvent", (4, 4))
     last = timed(driver.window.tick)[0]
     longest = max(wall for wall, _ in times[1:])
@@ -171,31 +175,26 @@ def rest(window: EditWindow, name: str) -> Figures:
     }
 
 
-def measure(models: tuple[str, ...], size: tuple[int, int], count: int, steps: int) -> Figures:
-    """Measure one model after another."""
-    figures: Figures = {}
-    for name in models:
-        session = EditSession(bench_scene(name, count, size, seeded=True))
-        with EditWindow(session, off_screen=True, size=size, samples=1) as window:
-            window.show()
-            figures |= whole(window, name)
-            figures |= rest(window, name)
-            window.rest = window.plotter.render  # type: ignore[method-assign]
-            driver = Driver(window)
-            kinds = (drag, turn, primitive, scatter) if name == "creature" else (drag, turn)
-            for kind in kinds:
+def measure(
+    name: str, kinds: tuple[str, ...], size: tuple[int, int], count: int, steps: int
+) -> Iterator[Figures]:
+    """Measure one model, kind after kind of what may be done to it."""
+    session = EditSession(bench_scene(name, count, size, seeded=True))
+    with EditWindow(session, off_screen=True, size=size, samples=1) as window:
+        window.show()
+        at_rest = {"whole": whole, "rest": rest}
+        for kind, resting in at_rest.items():
+            if kind in kinds:
+                yield resting(window, name)
+        window.rest = window.plotter.render  # type: ignore[method-assign]
+        driver = Driver(window)
+        moving = {"drag": drag, "turn": turn}
+        if name == "creature":
+            moving |= {"primitive": primitive, "scatter": scatter}
+        for kind, step in moving.items():
+            if kind in kinds:
                 window.moving()
-                figures |= kind(driver, name, steps)
-                print(f"{name}: {kind.__name__} done", file=sys.stderr, flush=True)
-    return figures
-
-
-def report(figures: Figures, machine: str) -> str:
-    """Lay figures out for people."""
-    lines = [f"python -m tests.bench.window {' '.join(sys.argv[1:])}".rstrip(), machine, ""]
-    for name, value in figures.items():
-        lines.append(f"{name:32} {value:>12.4g}  {TARGETS.get(name, '')}".rstrip())
-    return "\n".join(lines)
+                yield step(driver, name, steps)
 
 
 def _machine() -> str:
@@ -215,13 +214,21 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--size", default="1200x800")
+    parser.add_argument("--only", default=",".join(KINDS), help=f"some of {', '.join(KINDS)}")
     arguments = parser.parse_args()
     width, height = (int(side) for side in arguments.size.split("x"))
-    machine = _machine()
-    figures = measure(MODELS, (width, height), 1000, 8 if arguments.quick else STEPS)
-    print(report(figures, machine))
-    if arguments.json:
-        arguments.json.write_text(json.dumps(figures, indent=1))
+    kinds, steps = tuple(arguments.only.split(",")), 8 if arguments.quick else STEPS
+    if not set(kinds) <= set(KINDS):
+        parser.error(f"--only: expected some of {', '.join(KINDS)}, got {arguments.only}")
+    print(f"python -m tests.bench.window {' '.join(sys.argv[1:])}".rstrip(), _machine(), sep="\n", flush=True)
+    figures: Figures = {}
+    for name in MODELS:
+        for found in measure(name, kinds, (width, height), 1000, steps):
+            figures |= found
+            for key, value in found.items():
+                print(f"{key:32} {value:>12.4g}  {TARGETS.get(key, '')}".rstrip(), flush=True)
+            if arguments.json:
+                arguments.json.write_text(json.dumps(figures, indent=1))
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ try:
     picture = shot(pl)
     with pl.decals.stage.current():
         context = pl.decals.stage.renderer.context
-        print(context.gl.version_code, context.entry)
+        print(context.gl.version_code, context.entry, context.name)
 except NoGraphics as error:
     raise SystemExit(f"refused: {error}")
 np.save(sys.argv[1], picture)
@@ -49,10 +49,10 @@ def test_a_context_of_version_3_2_that_can_do_more(plotter: Factory, tmp_path: P
     pl.decals.add_scene(both())
     expected = shot(pl)
     done = in_a_process(tmp_path / "old.npy", MESA_GL_VERSION_OVERRIDE="3.2", IMPLICIT_DECALS_ENTRY=entry)
-    if done.stdout.split()[:1] != ["320"] and done.returncode == 0:
-        pytest.skip(f"not Mesa: {done.stdout}")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["320", entry]
+    if "Mesa" not in done.stdout:
+        pytest.skip(f"not Mesa: {done.stdout}")
+    assert done.stdout.split()[:2] == ["320", entry]
     apart = np.abs(np.load(tmp_path / "old.npy") - expected).max(axis=2)
     assert (apart > 1).mean() < 0.005  # silhouettes, where compute shaders trace
 
@@ -62,6 +62,6 @@ def test_a_context_that_cannot_take_our_shaders_is_refused(plotter: Factory, tmp
     done = in_a_process(
         tmp_path / "old.npy", MESA_GL_VERSION_OVERRIDE="3.2", MESA_GLSL_VERSION_OVERRIDE="150"
     )
-    if done.returncode == 0 and not done.stdout.startswith("320"):
+    if done.returncode == 0 and "Mesa" not in done.stdout:
         pytest.skip(f"not Mesa: {done.stdout}")
     assert "takes shaders of version 3.30" in done.stderr, done.stderr
