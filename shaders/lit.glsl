@@ -5,19 +5,19 @@
 //@ include ambient.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
-uniform sampler2D g_paint;  // rgb: linear albedo, decals included; w: 1, and 0 in the background
+uniform sampler2D g_paint;  // rgb: linear albedo, decals included
 
 // color: linear light, premultiplied
 Pixel pixel_at(ivec2 texel) {
-    vec4 paint = texelFetch(g_paint, texel, 0);
-    if (paint.w <= 0.0) {
+    vec4 position = texelFetch(g_position, texel, 0);
+    if (position.w <= 0.0) {
         return Pixel(vec4(0.0));
     }
-    vec3 position = texelFetch(g_position, texel, 0).xyz;
     vec4 side = texelFetch(g_normal, texel, 0);
     vec3 ray = ray_direction(vec2(texel) + 0.5);
     vec3 toward_eye = -normalize(ray);
     vec3 seen = visible_normal(side.w * side.xyz, toward_eye);
-    float open_ = openness(g_position, texel, position, seen, ray);
-    return Pixel(vec4(clamp(shade(paint.rgb, seen, toward_eye, open_), 0.0, 1.0), 1.0));
+    float open_ = openness(g_position, texel, position.xyz, seen, ray);
+    vec3 albedo = texelFetch(g_paint, texel, 0).rgb;
+    return Pixel(vec4(clamp(shade(albedo, seen, toward_eye, open_), 0.0, 1.0), 1.0));
 }
