@@ -6,8 +6,8 @@
     editor.delete(number)
     editor.changes(since=version)                  {"index_ids": [(first, past last), ...], ...}
 
-Look-ups give exactly what an index that is built anew would give. Numbers stay: a deleted decal leaves a gap,
-which `put` alone fills again.
+Look-ups find the decals that act at a point, as in an index that is built anew; cells may differ from its.
+Numbers stay: a deleted decal leaves a gap, which `put` alone fills again.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Editing: after any edits, look-ups give what an index built anew gives, and only their bytes changed."""
+"""Editing: after any edits, look-ups find who acts, as in an index built anew; only their bytes changed."""
 
 import time
 from itertools import pairwise
