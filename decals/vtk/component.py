@@ -217,7 +217,10 @@ class Component:
         return tuple(self._stages.values())
 
     def _window_context(self) -> WindowContext:
-        if self._context is None or self._context.stale:
+        if self._context is not None and self._context.stale:
+            self._context.release()
+            self._context = None
+        if self._context is None:
             self._context = WindowContext(self._plotter.render_window)
         return self._context
 

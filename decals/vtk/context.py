@@ -115,8 +115,12 @@ class WindowContext(Context):
             state.Pop()
 
     def release(self) -> None:
-        """Give back the programs; the context is the window's. Calling twice is harmless."""
-        super().release()
+        """Give back the programs; the context is the window's. Calling twice is harmless.
+
+        A stale context took its programs with it.
+        """
+        if not self.stale:
+            super().release()
         if self._attached:
             _idle.setdefault(_driver(self._window), []).append(self.gl)
             self._attached = False

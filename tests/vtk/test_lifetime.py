@@ -165,4 +165,5 @@ def test_a_window_that_is_given_another_context_shows_the_same(plotter: Factory)
         np.testing.assert_array_equal(shot(pl), first)
         assert old.stale
         assert pl.decals.stage.renderer.context is not old
+        assert pl.decals.stage.renderer.context.gl is old.gl  # moderngl would keep another's memory for good
         np.testing.assert_array_equal(shot(pl), first)
