@@ -194,9 +194,8 @@ class Component:
     @property
     def stage(self) -> Stage:
         """What draws in the active subplot."""
+        self._require_window()
         renderer = self._plotter.renderer
-        if self._plotter.render_window is None:
-            raise NoGraphics("the plotter was closed; make another, as pyvista asks for too")
         if id(renderer) not in self._stages:
             self._stages[id(renderer)] = Stage(self._plotter, renderer, self._window_context)
             warn_of_exports(self._plotter)
@@ -216,7 +215,12 @@ class Component:
         """What draws, in all subplots that show something through us."""
         return tuple(self._stages.values())
 
+    def _require_window(self) -> None:
+        if self._plotter.render_window is None:
+            raise NoGraphics("the plotter was closed; make another, as pyvista asks for too")
+
     def _window_context(self) -> WindowContext:
+        self._require_window()
         if self._context is not None and self._context.stale:
             self._context.release()
             self._context = None

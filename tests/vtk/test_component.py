@@ -232,9 +232,14 @@ def test_a_closed_plotter_says_so(plotter: Factory) -> None:
     pl = plotter()
     pl.decals.add_scene(both())
     shot(pl)
-    component = pl.decals
+    component, stage = pl.decals, pl.decals.stage
     pl.close()
-    for ask in (lambda: component.scene, lambda: component.add_implicit(TREE), component.clear):
+    for ask in (
+        lambda: component.scene,
+        lambda: component.add_implicit(TREE),
+        component.clear,
+        stage.viewport,
+    ):
         with pytest.raises(NoGraphics, match="was closed"):
             ask()
 
