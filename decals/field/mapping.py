@@ -78,7 +78,8 @@ def unrolled(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec4:
     stretch = arc_over_chord(x, cosine)
     per = 1.0 / (a + b)
     y = (b - a) * per
-    m = w + bend * per * (stretch - cosine) / (x * cosine) * turn
+    toward = turn + 2.0 * x * n_p  # across n_p: near opposed normals, what is along it would drown the rest
+    m = w + bend * per * (stretch - cosine) / (x * cosine) * toward
     arc = squared + bend * (1.0 + 2.0 * y * y) * (stretch * stretch - 1.0) / x
     return wp.vec4(m[0], m[1], m[2], wp.sqrt(arc))
 
