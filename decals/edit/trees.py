@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -206,7 +207,9 @@ def _followers(
     places = nearest(document.objects, decals.positions[rows])
     rows = rows[places.objects == edited.object]
     positions = decals.positions[rows].astype(np.float64)
-    weights = following(before, edited.path, positions) if offset.any() else np.zeros(len(rows))
+    weights = (
+        _kept_following(before, edited.path, positions.tobytes()) if offset.any() else np.zeros(len(rows))
+    )
     wished = positions + weights[:, None] * offset
     changed = (weights * np.linalg.norm(offset) > 0) | (np.abs(item.tree(wished) - ISO) > FIELD_ERROR)
     goal = straight_onto(item.tree, wished[changed])
@@ -244,6 +247,14 @@ def following(tree: Node, path: Path, points: Doubles) -> Doubles:
     squared = np.einsum("ni,ni->n", slope, slope)
     shares = -np.einsum("ni,ni->n", change, slope) / np.where(squared > 0, squared, 1.0)
     weights: Doubles = np.clip(shares, 0.0, 1.0)
+    return weights
+
+
+@lru_cache(maxsize=1)
+def _kept_following(tree: Node, path: Path, points: bytes) -> Doubles:
+    """`following` of float64 points; every step of a drag asks it of where the drag began."""
+    weights = following(tree, path, np.frombuffer(points).reshape(-1, 3))
+    weights.flags.writeable = False
     return weights
 
 

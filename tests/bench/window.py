@@ -157,20 +157,22 @@ def whole(window: EditWindow, name: str) -> Figures:
 def rest(window: EditWindow, name: str) -> Figures:
     """Let everything rest after a movement, until the frame is whole, four samples a pixel.
 
-    The longest block is the longest time between two chances for the window to listen.
+    The longest block is the longest time between two chances for the window to listen, on the clock and in
+    processor time of all threads, which other work on the machine does not lengthen.
     """
     window.samples = 2
     window.redraw(whole=False)
     window._moved -= REST
-    begin, longest, slices = time.perf_counter(), 0.0, 0
+    begin, ticks = time.perf_counter(), []
     while window._moved:
-        longest = max(longest, timed(window.tick)[0])
-        slices += 1
+        ticks.append(timed(window.tick))
     seconds = time.perf_counter() - begin
     window.samples = 1
+    longest, used = np.max(ticks, axis=0)
     return {
-        f"{name}_rest_longest_block_ms": longest,
-        f"{name}_rest_slices": slices,
+        f"{name}_rest_longest_block_ms": float(longest),
+        f"{name}_rest_longest_used_ms": float(used) * (os.cpu_count() or 1),
+        f"{name}_rest_slices": len(ticks),
         f"{name}_rest_s": seconds,
     }
 
