@@ -27,8 +27,14 @@ PAGES_WORTH_SHARING = 1024
 
 
 @cache
+def _cores() -> int:
+    """How many there are; asking the system takes as long as a small launch."""
+    return os.cpu_count() or 1
+
+
+@cache
 def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix="blobtree")
+    return ThreadPoolExecutor(max_workers=_cores(), thread_name_prefix="blobtree")
 
 
 def known_device(device: Any = None) -> str:
@@ -59,7 +65,7 @@ def launch(
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
     per_thread = SLICES_PER_THREAD if step is None else WATCHED_SLICES_PER_THREAD
-    slices = min((os.cpu_count() or 1) * per_thread, -(-count // SMALLEST_SLICE))
+    slices = min(_cores() * per_thread, -(-count // SMALLEST_SLICE))
     bounds = [count * i // slices for i in range(slices + 1)]
     wp.load_module(kernel.module, device=device)
 
@@ -83,5 +89,5 @@ def fresh_memory(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     array = np.empty(shape, dtype)
     pages = array.reshape(-1).view(np.uint8)[::PAGE]
     if len(pages) > PAGES_WORTH_SHARING:
-        list(_threads().map(lambda part: part.fill(0), np.array_split(pages, os.cpu_count() or 1)))
+        list(_threads().map(lambda part: part.fill(0), np.array_split(pages, _cores())))
     return array

@@ -64,6 +64,8 @@ class Marks:
 
     def outline(self, document: Document, numbers: tuple[int, ...], contact: Contact) -> None:
         """Outline decals; the last one exactly."""
+        if not numbers and not self._lines.n_points:
+            return
         chosen = numbers[-MOST:]
         lines = [outline(document, chosen[-1], contact=contact)] if chosen else []
         lines += list(rims(document, np.array(chosen[:-1], np.int64)))
