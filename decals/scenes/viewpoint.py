@@ -81,6 +81,7 @@ class Projection:
             raise InvalidScene(
                 "a projection must not flatten the world; its near and far planes may coincide"
             )
+        matrix.flags.writeable = False
         object.__setattr__(self, "matrix", matrix)
 
     @property

@@ -1,5 +1,6 @@
 """VTK's camera as the renderer sees it."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,4 +27,10 @@ def vtk_projection(renderer: Any, model: Floats | None = None) -> Projection:
     camera = renderer.GetActiveCamera()
     matrix = camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
     world = np.asarray(pv.array_from_vtkmatrix(matrix), np.float64)
-    return Projection(world if model is None else world @ model)
+    return _projection((world if model is None else world @ model).tobytes())
+
+
+@lru_cache(maxsize=8)
+def _projection(matrix: bytes) -> Projection:
+    """Give the projection of a matrix of float64; one step of a hand asks several times."""
+    return Projection(np.frombuffer(matrix).reshape(4, 4))
