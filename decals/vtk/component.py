@@ -197,8 +197,9 @@ class Component:
         self._require_window()
         renderer = self._plotter.renderer
         if id(renderer) not in self._stages:
+            if not self._stages:
+                warn_of_exports(self._plotter)
             self._stages[id(renderer)] = Stage(self._plotter, renderer, self._window_context)
-            warn_of_exports(self._plotter)
         return self._stages[id(renderer)]
 
     @property

@@ -42,8 +42,12 @@ class Seen:
     def of(cls, scene: SceneLike, look: Look, viewpoint: Projection) -> Self:
         """What a picture of a scene depends on; of that an editor alone changes, and counts its versions."""
         things = (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
-        version = scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
-        return cls(things, (look, viewpoint.matrix.tobytes(), version))
+        return cls(things, (look, viewpoint.matrix.tobytes(), _version(scene)))
+
+    @classmethod
+    def tried(cls, scene: SceneLike, *how: object) -> Self:
+        """What it depends on whether a scene can be drawn at all, not how it is seen and lit."""
+        return cls((scene, scene.objects, scene.images, scene.decals), (*how, _version(scene)))
 
     def same(self, other: Seen | None) -> bool:
         """Whether two pictures are the same."""
@@ -53,6 +57,11 @@ class Seen:
             and len(self.things) == len(other.things)
             and all(a is b for a, b in zip(self.things, other.things, strict=True))
         )
+
+
+def _version(scene: SceneLike) -> int:
+    """Which of a scene's decals: an editor counts; others stay as they are."""
+    return scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
 
 
 class Frame:

@@ -18,6 +18,7 @@ from decals.render.tile import Picture, Rectangle
 from decals.scenes.viewpoint import Floats
 from decals.vtk.camera import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, SmoothNormals, polygon_mapper
+from decals.vtk.replacements import Additions, Place
 from implicit_decals.shaders import compose
 
 if TYPE_CHECKING:
@@ -27,23 +28,24 @@ POSITION, NORMAL, PLACE = "decalPositionVSOutput", "decalNormalVSOutput", "decal
 NO_SHIFT_SCALE = 0
 UNIT_BOX = np.zeros(3), np.ones(3)
 
-VERTEX_DECLARATION = f"""//VTK::TCoord::Dec
-in vec3 decalNormalMC;
+DECLARATIONS, BODY, COLOR = "//VTK::TCoord::Dec", "//VTK::TCoord::Impl", "//VTK::Color::Impl"
+"""Tags behind which our code stands: where functions are declared, in main, and where colours are known."""
+
+VERTEX_DECLARATION = f"""in vec3 decalNormalMC;
 uniform mat4 {PLACE};
 out vec3 {POSITION};
 out vec3 {NORMAL};
 """
-VERTEX = f"""//VTK::TCoord::Impl
-  {POSITION} = ({PLACE} * vertexMC).xyz;
+VERTEX = f"""  {POSITION} = ({PLACE} * vertexMC).xyz;
   {NORMAL} = transpose(inverse(mat3({PLACE}))) * decalNormalMC;
 """
-GEOMETRY_DECLARATION = "//VTK::TCoord::Dec\n" + "".join(
+GEOMETRY_DECLARATION = "".join(
     f"in vec3 {name}[];\nout vec3 {name.replace('VSOutput', 'GSOutput')};\n" for name in (POSITION, NORMAL)
 )
-GEOMETRY = "//VTK::TCoord::Impl\n" + "".join(
+GEOMETRY = "".join(
     f"    {name.replace('VSOutput', 'GSOutput')} = {name}[i];\n" for name in (POSITION, NORMAL)
 )
-FRAGMENT_DECLARATION = f"//VTK::TCoord::Dec\nin vec3 {POSITION};\nin vec3 {NORMAL};\n"
+FRAGMENT_DECLARATION = f"in vec3 {POSITION};\nin vec3 {NORMAL};\n"
 PAINT = f"""
   vec4 decals = injected_decals({POSITION}, {NORMAL});
   diffuseColor = decal_over(diffuseColor, diffuseIntensity, decals);
@@ -73,7 +75,10 @@ class Injection:
         self._give_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._stage = weakref.ref(stage)
-        self._written: tuple[Contact, bool] | None = None
+        self._additions = Additions(actor)
+        self._known: tuple[Contact, bool] | None = None
+        self._code: dict[Place, str] = {}
+        self._written = False
         me = weakref.ref(self)
 
         def bind(_caller: object, _event: str, program: Any) -> None:
@@ -95,9 +100,10 @@ class Injection:
         self._give_normals()  # somebody may have given it other data
         stage, data, _ = found
         wanted = stage.contact, data.layered
-        if wanted != self._written:
-            self._write(library(stage.contact, layered=data.layered))
-            self._written = wanted
+        if wanted != self._known:
+            self._known, self._code = wanted, _code(library(stage.contact, layered=data.layered), self._paint)
+        self._additions.write(self._code)
+        self._written = True
 
     def _give_normals(self) -> None:
         """Let the mesh have smooth normals, unless the injection of another stage gives them."""
@@ -111,36 +117,16 @@ class Injection:
         if self.actor.GetNumberOfConsumers() > 1:
             self._erase()
 
-    def _write(self, functions: str) -> None:
-        """Put our code behind VTK's own; tags stay, for what VTK puts there."""
-        text = compose("inject.glsl", slots={"functions": functions}, version=None).text
-        shader = self.actor.GetShaderProperty()
-        shader.AddVertexShaderReplacement("//VTK::TCoord::Dec", True, VERTEX_DECLARATION, False)
-        shader.AddVertexShaderReplacement("//VTK::TCoord::Impl", True, VERTEX, False)
-        shader.AddGeometryShaderReplacement("//VTK::TCoord::Dec", True, GEOMETRY_DECLARATION, False)
-        shader.AddGeometryShaderReplacement("//VTK::TCoord::Impl", True, GEOMETRY, False)
-        shader.AddFragmentShaderReplacement("//VTK::TCoord::Dec", True, FRAGMENT_DECLARATION + text, False)
-        shader.AddFragmentShaderReplacement(
-            "//VTK::Color::Impl", True, "//VTK::Color::Impl\n" + self._paint, False
-        )
-
     def _erase(self) -> None:
-        """Leave VTK's shader as it was."""
-        if self._written is None:
-            return
-        shader = self.actor.GetShaderProperty()
-        for tag in ("//VTK::TCoord::Dec", "//VTK::TCoord::Impl"):
-            shader.ClearVertexShaderReplacement(tag, True)
-            shader.ClearGeometryShaderReplacement(tag, True)
-        shader.ClearFragmentShaderReplacement("//VTK::TCoord::Dec", True)
-        shader.ClearFragmentShaderReplacement("//VTK::Color::Impl", True)
-        self._written = None
+        """Leave the shader as it was."""
+        self._additions.erase()
+        self._written = False
 
     # -- whenever VTK draws the actor -------------------------------------------------------------------
 
     def bind(self, program: Any) -> None:
         """Give VTK's program what ours would have: decals, images, camera."""
-        found = self._found() if self._written is not None else None
+        found = self._found() if self._written else None
         if found is None or not found[0].drawing:  # another renderer may draw the actor too
             return
         stage, data, images = found
@@ -181,6 +167,19 @@ class Injection:
         self._mapper.RemoveObserver(self._tag)
         if self._normals.leave(self.actor.GetMapper()):
             self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
+
+
+def _code(functions: str, paint: str) -> dict[Place, str]:
+    """Our code for each stage of a shader, behind VTK's own."""
+    text = compose("inject.glsl", slots={"functions": functions}, version=None).text
+    return {
+        ("Vertex", DECLARATIONS): VERTEX_DECLARATION,
+        ("Vertex", BODY): VERTEX,
+        ("Geometry", DECLARATIONS): GEOMETRY_DECLARATION,
+        ("Geometry", BODY): GEOMETRY,
+        ("Fragment", DECLARATIONS): FRAGMENT_DECLARATION + text,
+        ("Fragment", COLOR): paint,
+    }
 
 
 def _vtk_matrix(matrix: Floats) -> vtkMatrix4x4:

@@ -24,7 +24,7 @@ from decals.vtk.applied import Applied
 from decals.vtk.boxes import box_around
 from decals.vtk.camera import vtk_projection
 from decals.vtk.context import WindowContext
-from decals.vtk.frame import Frame, Look
+from decals.vtk.frame import Frame, Look, Seen
 from decals.vtk.lights import TOO_MANY, Lights, too_many_lights, vtk_lamps
 from decals.vtk.modes import complaints
 from decals.vtk.picking import Hit, hidden, hit_at
@@ -65,7 +65,7 @@ class Stage(Settings):
         self._scene: SceneLike | None = None
         self._context = context
         self._frame: Frame | None = None
-        self._failed: object = None
+        self._failed: Seen | None = None
         self._drawn_size: Size | None = None
         me = weakref.ref(self)
         self._anchor = Anchor(renderer, lambda: _draw(me))
@@ -219,10 +219,11 @@ class Stage(Settings):
     def draw(self) -> None:
         """Draw into the frame that VTK is drawing; called by the anchor."""
         scene = self._scene
-        if scene is None or self.vtk_renderer.GetSelector() is not None or self._failed is scene:
+        if scene is None or self.vtk_renderer.GetSelector() is not None:
             return
-        with self._failing(scene):
-            self._draw(scene)
+        with self._once(scene, self.draw_scale, self.samples) as hopeful:
+            if hopeful:
+                self._draw(scene)
 
     def _draw(self, scene: SceneLike) -> None:
         frame = self._use_frame()
@@ -248,19 +249,23 @@ class Stage(Settings):
         `draw_scale` of 1 and these `samples` show it. What changes meanwhile makes it begin anew.
         """
         scene = self.scene
-        if scene is None or self._failed is scene or self._drawn_size is None:
+        if scene is None or self._drawn_size is None:
             return 0.0
-        look = self._look(self._drawn_size, 1.0, samples)
-        with self._failing(scene):
-            return self._use_frame().prepare(scene, look, self.viewpoint(), seconds)
+        with self._once(scene, 1.0, samples) as hopeful:
+            if hopeful:
+                look = self._look(self._drawn_size, 1.0, samples)
+                return self._use_frame().prepare(scene, look, self.viewpoint(), seconds)
+        return 0.0
 
     @contextmanager
-    def _failing(self, scene: SceneLike) -> Iterator[None]:
-        """Draw a scene that cannot be drawn no more: whoever waits for it hears of it once."""
+    def _once(self, scene: SceneLike, scale: float, samples: int) -> Iterator[bool]:
+        """Whether there is hope to draw this: who waits for it hears once that there is none."""
+        size = tuple(self.vtk_renderer.GetSize())
+        tried = Seen.tried(scene, size, scale, samples, self.mapping, self.contact)
         try:
-            yield
+            yield not tried.same(self._failed)
         except Exception:
-            self._failed = scene
+            self._failed = tried
             raise
 
     def _use_frame(self) -> Frame:

@@ -207,6 +207,26 @@ def test_changes_show_with_the_next_frame(plotter: Factory) -> None:
     np.testing.assert_array_equal(shot(pl), bare)
 
 
+def test_what_others_put_into_the_shader_stays(plotter: Factory) -> None:
+    """Under decals, where it changes while they are there, and once they are taken off."""
+    mesh = torus()
+    decals = coat(mesh).replace(images=np.full(90, -1), tints=np.full((90, 3), [0.2, 0.3, 0.9]))
+    tag = "//VTK::Color::Impl"
+    pl, actor = stage_with(plotter, mesh, decals, lighting=False)
+    shot(pl)
+    sure = ~edges(found_by_us(pl, mesh).object_id)
+    shader = actor.GetShaderProperty()
+    for color, seen_as in (("0.0, 1.0, 0.0", [0, 255, 0]), ("1.0, 0.0, 0.0", [255, 0, 0])):
+        text = f"{tag}\n  diffuseColor = ambientColor = vec3({color});\n"
+        shader.AddFragmentShaderReplacement(tag, True, text, False)
+        theirs = (shot(pl)[sure] == seen_as).all(axis=-1)
+        assert 0.1 < theirs.mean() < 0.9  # and elsewhere decals
+    pl.decals.remove(actor)
+    assert ((shot(pl)[sure] == [255, 0, 0]).all(axis=-1)).sum() > theirs.sum() + 200
+    assert shader.GetNumberOfShaderReplacements() == 1
+    assert shader.GetNthShaderReplacementTypeAsString(0) == "Fragment"
+
+
 def test_a_mesh_that_changes_keeps_true_normals(plotter: Factory) -> None:
     mesh = torus()
     pl, actor = stage_with(plotter, mesh, coat(mesh), color="white")

@@ -167,3 +167,19 @@ def test_a_window_that_is_given_another_context_shows_the_same(plotter: Factory)
         assert pl.decals.stage.renderer.context is not old
         assert pl.decals.stage.renderer.context.gl is old.gl  # moderngl would keep another's memory for good
         np.testing.assert_array_equal(shot(pl), first)
+
+
+def test_what_could_not_be_drawn_is_tried_again_once_it_is_asked_for_otherwise(
+    plotter: Factory, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pl = plotter(window_size=(1200, 40))
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    pl.decals.stage.samples = 16
+    shot(pl)
+    pl.camera.azimuth = 1.0
+    shot(pl)
+    assert capfd.readouterr().err.count("InvalidScene: expected at most") == 1
+    pl.camera.azimuth = 0.0
+    pl.decals.stage.samples = 2
+    np.testing.assert_array_equal(shot(pl), first)

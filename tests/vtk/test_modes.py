@@ -72,13 +72,16 @@ def test_vtks_own_peeling_with_multisampling_is_as_we_say(plotter: Factory) -> N
 
 
 def test_exports_say_what_they_leave_out(plotter: Factory, tmp_path: Path) -> None:
-    pl = plotter()
+    pl = plotter(shape=(1, 2))
     pl.add_mesh(pv.Sphere())
     pl.decals.add_scene(both())
+    pl.subplot(0, 1)
+    pl.decals.add_scene(both())
     shot(pl)
-    with pytest.warns(UserWarning, match="export_obj writes VTK's own actors; .* live OpenGL"):
+    with pytest.warns(UserWarning, match="export_obj writes VTK's own actors; .* live OpenGL") as exporting:
         pl.export_obj(tmp_path / "scene.obj")
     assert (tmp_path / "scene.obj").exists()
+    assert len(exporting) == 1
     with warnings.catch_warnings(record=True) as said, suppress(ImportError, AttributeError):
         warnings.simplefilter("always")
         pl.export_html(tmp_path / "scene.html")  # pyvista wants a package for it that may not be here
