@@ -5,7 +5,6 @@ from functools import cache
 
 from blobtree.formulas.kernels import RIM
 from blobtree.typed.glsl import translate_library
-from decals.errors import TooMuchData
 from decals.field.contact import Contact
 from decals.field.mapping import in_image, tangent_coordinates
 from decals.field.ownership import complement_at, owner_at, owner_below, uv_at
@@ -18,6 +17,7 @@ from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import Program
 from decals.render.tile import set_uniform
+from decals.render.turns import Turns
 
 FUNCTIONS = (
     sheet_at,
@@ -31,9 +31,6 @@ FUNCTIONS = (
 )
 """What ``shaders/decals.glsl`` calls."""
 
-WALKS, SEARCH = 8, 3
-"""Walks over all candidates of a pixel, at most; turns of a search beside its halvings."""
-
 
 class DecalData:
     """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
@@ -41,6 +38,7 @@ class DecalData:
     def __init__(self, context: Context, decals: Decals | DecalEditor) -> None:
         self._context = context
         self._version = 0
+        self._turns = Turns(context.most_turns)
         if isinstance(decals, DecalEditor):
             self._version = decals.version
             arrays, index = decals.arrays, decals.index
@@ -52,7 +50,7 @@ class DecalData:
                 "index_table": index.table,
                 "index_ids": index.ids,
             }
-        _check_turns(context, index, layered=decals.layered)
+        self._turns.check(index, layered=decals.layered, version=self._version)
         self._textures = {name: DataTexture(context, array) for name, array in arrays.items()}
         self._describe(decals, index)
 
@@ -64,7 +62,14 @@ class DecalData:
         """Bring over what an editor changed since the last time; the number of bytes that went to the card.
 
         These must be the data of the same editor; any number of them may follow one.
+
+        Raises
+        ------
+        TooMuchData
+            More decals reach one place than the driver goes through; nothing is brought over.
         """
+        index = editor.index
+        self._turns.check(index, layered=editor.layered, version=editor.version)
         sent, since, self._version = 0, self._version, editor.version
         for name, ranges in editor.changes(since).items():
             array = editor.arrays[name]
@@ -76,7 +81,7 @@ class DecalData:
             for first, end in ranges:
                 self._textures[name].write(first, array[first:end])
                 sent += array[first:end].nbytes
-        self._describe(editor, editor.index)
+        self._describe(editor, index)
         return sent
 
     def use(self, program: Program, first_unit: int) -> None:
@@ -96,22 +101,6 @@ class DecalData:
         """Give the memory back."""
         for texture in self._textures.values():
             texture.release()
-
-
-def _check_turns(context: Context, index: DecalIndex, *, layered: bool) -> None:
-    """Refuse what a driver would cut off: the most turns of loops that a pixel may take."""
-    if context.most_turns is None:
-        return
-    lists = index.longest_lists
-    candidates = int(lists.sum())
-    each = WALKS
-    if layered:  # a search in each level's list for every decal from the top down
-        each += sum(int(count).bit_length() + SEARCH for count in lists)
-    if each * candidates > context.most_turns:
-        raise TooMuchData(
-            f"{candidates:,} decals reach the same place; expected at most {context.most_turns // each:,}: "
-            "software rendering cuts off the rest; spread them, draw on a graphics card, or use evaluate"
-        )
 
 
 @cache
