@@ -1,6 +1,7 @@
 """Checks of single values that people give: of the right type, finite, within range."""
 
 import math
+from enum import Enum
 from typing import Any, TypeVar
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from decals.errors import DecalsError
 
 T = TypeVar("T")
+E = TypeVar("E", bound=Enum)
 
 
 def instance(name: str, value: object, kind: type[T], error: type[DecalsError], advice: str) -> T:
@@ -16,6 +18,15 @@ def instance(name: str, value: object, kind: type[T], error: type[DecalsError], 
     if not isinstance(value, kind):
         raise error(f"{name}: expected a {kind.__name__}, got {shown(value)}; {advice}")
     return value
+
+
+def member(name: str, value: Any, kind: type[E], error: type[DecalsError]) -> E:
+    """Give one of an enumeration, which may come as its value, or raise an error that names all."""
+    try:
+        return kind(value)
+    except ValueError:
+        names = ", ".join(f"{kind.__name__}.{one.name}" for one in kind)
+        raise error(f"{name}: expected one of {names}, got {shown(value)}") from None
 
 
 def finite(name: str, value: Any, error: type[DecalsError]) -> float:

@@ -8,7 +8,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from decals.errors import InvalidImage, InvalidPoints
+from decals.checks import member, shown
+from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.field.sampling import color_points, sample_points
@@ -16,6 +17,7 @@ from decals.field.texels import RGBA, texel_arrays
 from decals.grid.editor import RECORDS, DecalEditor
 from decals.grid.index import DecalIndex, DeviceIndex
 from decals.model import PLAIN, Decals
+from decals.wishes import device_or_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +61,8 @@ def evaluate(
     decals : Decals or DecalEditor
         n decals; those of an editor are told by their numbers.
     points, normals : float32[m, 3]
-        Surface points and the surface's geometric normals there, of any length. A point that is not finite
-        has no owner.
+        Surface points and the surface's geometric normals there, of any length; one of length 0 faces every
+        decal. A point that is not finite has no owner.
     mapping : Mapping, optional
         How the images bend with the surface.
     contact : Contact, optional
@@ -78,7 +80,12 @@ def evaluate(
         Points and normals are not two arrays of the same shape [m, 3].
     InvalidImage
         Something that is no image, or fewer images than decals show.
+    InvalidDecals, InvalidScene, InvalidDevice
+        Something that is no decals, no mapping or contact, or no device of Warp's.
     """
+    mapping = member("mapping", mapping, Mapping, InvalidScene)
+    contact = member("contact", contact, Contact, InvalidScene)
+    device = device_or_error(device)
     places, directions = _rows("points", points), _rows("normals", normals)
     if len(places) != len(directions):
         raise InvalidPoints(f"normals: expected one for each of {len(places)} points, got {len(directions)}")
@@ -107,6 +114,8 @@ def _placed(
     """Records and index of decals."""
     if isinstance(decals, DecalEditor):
         return decals.arrays[RECORDS], decals.index.on(device)
+    if not isinstance(decals, Decals):
+        raise InvalidDecals(f"expected Decals or a DecalEditor, got {shown(decals)}; a scene has .decals")
     return decals.packed(), DeviceIndex.of(decals, device) if index is None else index.on(device)
 
 
@@ -131,7 +140,10 @@ def _colors(
 
 
 def _rows(name: str, values: ArrayLike) -> NDArray[np.float32]:
-    array = np.asarray(values, np.float32)
+    try:
+        array = np.asarray(values, np.float32)
+    except (TypeError, ValueError):
+        raise InvalidPoints(f"{name}: expected numbers of shape [m, 3], got {shown(values)}") from None
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidPoints(f"{name}: expected shape [m, 3], got {list(array.shape)}; give one row per point")
     return array

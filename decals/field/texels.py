@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.checks import shown
 from decals.errors import InvalidImage
 from decals.model import linear_light
 
@@ -28,6 +29,8 @@ def texel_arrays(images: Sequence[RGBA]) -> tuple[NDArray[np.int32], NDArray[np.
     """
     places, parts, first = [], [], 0
     for number, image in enumerate(images):
+        if not isinstance(image, np.ndarray):
+            raise InvalidImage(f"image {number} must be uint8[h, w, 4], got {shown(image)}; load it first")
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 4 or 0 in image.shape:
             raise InvalidImage(f"image {number} must be uint8[h, w, 4], got {image.dtype}{list(image.shape)}")
         height, width = image.shape[:2]

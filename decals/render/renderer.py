@@ -107,7 +107,7 @@ class Renderer:
         Raises
         ------
         InvalidScene
-            The scene holds an object of unknown kind, or size or samples are none.
+            The scene holds an object of unknown kind, or size, samples, mapping or contact are none.
         """
         check_size(size, samples)
         canvas = Canvas(size, 4, np.uint8)

@@ -5,6 +5,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from decals.checks import member
+from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.render.decal_data import DecalData
@@ -44,6 +46,10 @@ class Modes:
     mapping: Mapping
     contact: Contact
     lamps: Lamps | None = None
+
+    def __post_init__(self) -> None:
+        member("mapping", self.mapping, Mapping, InvalidScene)
+        member("contact", self.contact, Contact, InvalidScene)
 
 
 def steps_of(uploaded: Uploaded, tile: Tile, targets: Targets, modes: Modes) -> list[Step]:

@@ -1,6 +1,6 @@
 """How a stage draws: samples, size, modes and lights, checked when they are set."""
 
-from decals.checks import finite, whole
+from decals.checks import finite, member, whole
 from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
@@ -49,11 +49,7 @@ class Settings:
 
     @mapping.setter
     def mapping(self, mapping: Mapping) -> None:
-        try:
-            self._mapping = Mapping(mapping)
-        except ValueError as error:
-            names = ", ".join(f"Mapping.{one.name}" for one in Mapping)
-            raise InvalidScene(f"mapping must be one of {names}; got {mapping!r}") from error
+        self._mapping = member("mapping", mapping, Mapping, InvalidScene)
 
     @property
     def contact(self) -> Contact:
@@ -62,11 +58,7 @@ class Settings:
 
     @contact.setter
     def contact(self, contact: Contact) -> None:
-        try:
-            self._contact = Contact(contact)
-        except ValueError as error:
-            names = ", ".join(f"Contact.{one.name}" for one in Contact)
-            raise InvalidScene(f"contact must be one of {names}; got {contact!r}") from error
+        self._contact = member("contact", contact, Contact, InvalidScene)
 
     @property
     def lights(self) -> Lights:

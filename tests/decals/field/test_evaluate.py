@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from decals.errors import InvalidPoints
+from decals.errors import InvalidDecals, InvalidDevice, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.contact import REACH
 from decals.field.evaluate import evaluate
 from decals.field.mapping import Mapping
@@ -196,11 +196,35 @@ def test_nothing_and_nonsense():
         (np.zeros((2, 2)), np.zeros((2, 3)), "points: expected shape"),
         (np.zeros((2, 3)), np.zeros(3), "normals: expected shape"),
         (np.zeros((2, 3)), np.zeros((1, 3)), "one for each of 2 points, got 1"),
+        ([["a", "b", "c"]], np.zeros((1, 3)), "points: expected numbers"),
+        (np.zeros((2, 3)), [[0, 0], [1]], "normals: expected numbers"),
     ],
 )
 def test_refuses(points, normals, says):
     with pytest.raises(InvalidPoints, match=says):
         evaluate(Decals.empty(), points, normals)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "says"),
+    [
+        ({"mapping": 5}, InvalidScene, "mapping: expected one of Mapping.CHORD, Mapping.CORRECTED, got 5"),
+        ({"contact": "radial"}, InvalidScene, "contact: expected one of .*Contact.RADIAL, got 'radial'"),
+        ({"device": "cuda:99"}, InvalidDevice, "got 'cuda:99'"),
+        ({"images": ["scale"]}, InvalidImage, "image 0 must be .* got 'scale'"),
+        ({"decals": "scale"}, InvalidDecals, "expected Decals or a DecalEditor, got 'scale'"),
+    ],
+)
+def test_refuses_what_is_none(wrong, error, says):
+    one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    with pytest.raises(error, match=says):
+        evaluate(**{"decals": one, "points": np.zeros((1, 3)), "normals": np.eye(3)[2:]} | wrong)
+
+
+def test_a_normal_without_length_faces_every_decal():
+    one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    seen = evaluate(one, [[0.25, 0, 0]], [[0, 0, 0]])
+    assert (seen.owner[0], seen.uv[0].tolist()) == (0, [0.625, 0.5])
 
 
 component = st.floats(-2, 2, width=32)

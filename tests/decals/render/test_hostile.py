@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals.errors import InvalidScene
 from decals.model import LARGEST, SMALLEST_RADIUS, Decals
 from decals.render.renderer import Renderer
 from tests.decals.render.pictures import WHITE, scattered, view_of, wall
@@ -73,3 +74,11 @@ def test_a_picture_after_a_refused_one_is_as_before(renderer: Renderer) -> None:
     with pytest.raises(ValueError, match="image 0 must be"):
         renderer.render(bad, size=SIZE)
     np.testing.assert_array_equal(renderer.render(view, size=SIZE), before)
+
+
+@pytest.mark.parametrize("wrong", [{"mapping": 7}, {"mapping": "chord"}, {"contact": None}, {"contact": 3}])
+def test_modes_that_are_none_are_refused(renderer: Renderer, wrong: dict[str, Any]) -> None:
+    (name,) = wrong
+    for draw in (renderer.render, renderer.buffers):
+        with pytest.raises(InvalidScene, match=f"{name}: expected one of {name.title()}"):
+            draw(wall(WHITE.pixels), size=SIZE, **wrong)
