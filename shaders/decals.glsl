@@ -48,8 +48,8 @@ DecalHit decal_at(vec3 q, vec3 n) {
         index_level_count, index_levels, index_table, index_mask, index_ids), q, n);
 }
 
-// Premultiplied linear colour of one decal. The derivatives are those of the undeformed image of the one decal that
-// owns the pixel, so no edge between decals, or of an object, ever shows in them.
+// Premultiplied linear colour of one decal. The derivatives are those of the image of the one decal that owns
+// the pixel, rolled out and pushed by nobody, so no edge between decals, or of an object, ever shows in them.
 vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
     if (!in_image(hit.uv)) {
         return vec4(0.0);
@@ -61,8 +61,8 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
         float s = decal_texel(4 * hit.owner).w;
         vec3 n_p = decal_texel(4 * hit.owner + 1).xyz;
         float scale = 0.5 / (RIM * s);
-        vec2 dx = scale * tangent_coordinates(surface_step(q, n, ray, ray_right.xyz), n_p, u.xyz);
-        vec2 dy = scale * tangent_coordinates(surface_step(q, n, ray, ray_up.xyz), n_p, u.xyz);
+        vec2 dx = scale * tangent_coordinates(turned_back(surface_step(q, n, ray, ray_right.xyz), n_p, n), n_p, u.xyz);
+        vec2 dy = scale * tangent_coordinates(turned_back(surface_step(q, n, ray, ray_up.xyz), n_p, n), n_p, u.xyz);
         color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
     }
     return tint.w * color * vec4(tint.rgb, 1.0);

@@ -85,6 +85,17 @@ def unrolled(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec4:
 
 
 @wp.func
+def turned_back(step: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
+    """A step on the surface at q as the image rolled out has it, up to a part along n_p.
+
+    It turns as the normal does on the way to the centre: exact along an arc, where the projection onto the
+    tangent plane at the centre would be shorter by the cosine between the normals.
+    """
+    share = wp.dot(step, n_p) / wp.max(1.0 + wp.dot(n_p, n_q), SMALLEST_COSINE * SMALLEST_COSINE)
+    return step - share * n_q
+
+
+@wp.func
 def drawn_distance(rim: wp.float32, chord: wp.float32, length: wp.float32) -> wp.float32:
     """Distance ℓ in the image, of a point that the field puts at `rim`; all in radii of the rim.
 

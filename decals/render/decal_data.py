@@ -6,7 +6,7 @@ from functools import cache
 from blobtree.formulas.kernels import RIM
 from blobtree.typed.glsl import translate_library
 from decals.field.contact import Contact
-from decals.field.mapping import in_image, tangent_coordinates
+from decals.field.mapping import in_image, tangent_coordinates, turned_back
 from decals.field.ownership import complement_at, owner_at, owner_below, uv_at
 from decals.field.sheet import sheet_at
 from decals.field.stack import number_below
@@ -28,6 +28,7 @@ FUNCTIONS = (
     uv_at,
     in_image,
     tangent_coordinates,
+    turned_back,
 )
 """What ``shaders/decals.glsl`` calls."""
 

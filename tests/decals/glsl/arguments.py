@@ -104,6 +104,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "gradient_combine": {"a": beside(field, uniform(-3, 3, 3)), "b": beside(field, uniform(-3, 3, 3))},
     "color_combine": {"a": beside(field, uniform(0, 1, 3)), "b": beside(field, uniform(0, 1, 3))},
     "turned_to_local": {"v": place},
+    "turned_back": {"step": place},
     "bound_unstretch": {"f": uniform(0, 3, 3)},
     "gradient_unstretch": {"f": four},
     "bound_unwarp": {"f": uniform(0, 3, 3)},
