@@ -114,8 +114,18 @@ class Tools:
             return False
         if action == "let_go":
             self._held = None
+        if self.dragging:
+            self.actions.settle()
         self.actions.perform(action, lambda: self.at(x, y))
+        self._go_on()
         return True
+
+    def _go_on(self) -> None:
+        """After an action in its middle a drag is another entry, if what it holds is still there."""
+        if self._held is not None and not self._held.there:
+            self._held = None
+        if self._held is not None and self._strayed:
+            self._held.begin()
 
 
 class _Held:
@@ -129,7 +139,13 @@ class _Held:
         self._normal = found.normal
         self._offset: Floats = center - found.position
 
+    @property
+    def there(self) -> bool:
+        """Whether nobody deleted any of it."""
+        return bool(self._actions.session.document.decals.has(self._numbers).all())
+
     def begin(self) -> None:
+        """Let what follows be one entry."""
         self._actions.settle()
         self._actions.session.begin("move")
 

@@ -204,6 +204,10 @@ class Stage(Settings):
         """
         return hit_at(self, x, y)
 
+    def covers(self, x: int, y: int) -> bool:
+        """Whether a place in the window is in this subplot."""
+        return bool(self.vtk_renderer.IsInViewport(x, y))
+
     def hidden(self, x: int, y: int, position: ArrayLike) -> bool:
         """Whether an actor of VTK's hid a point of ours at a pixel of the last frame; see `at`."""
         return hidden(self, x, y, position)

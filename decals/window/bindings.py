@@ -19,6 +19,13 @@ EVENTS = (
     "CharEvent",
     "TimerEvent",
 )
+BEGINNINGS = (
+    "LeftButtonPressEvent",
+    "MouseWheelForwardEvent",
+    "MouseWheelBackwardEvent",
+    "KeyPressEvent",
+)
+"""Events that belong to the window in whose subplot the pointer is."""
 STYLE_EVENTS = ("StartInteractionEvent", "InteractionEvent", "EndInteractionEvent")
 """While the camera moves, VTK tells nobody but its style of the pointer."""
 
@@ -27,24 +34,41 @@ class Bindings:
     """Observers of a window's interactor and of its style; they do not keep the window alive."""
 
     def __init__(self, window: "EditWindow", interactor: Any) -> None:
-        self._interactor, self._style = interactor, interactor.GetInteractorStyle()
+        self._interactor = interactor
         self._window = weakref.ref(window)
         self._used_key = False
         me = weakref.ref(self)
         self._tags = {event: interactor.AddObserver(event, _heard(me), PRIORITY) for event in EVENTS}
-        self._style_tags = [self._style.AddObserver(event, _heard_style(me)) for event in STYLE_EVENTS]
+        self._style: Any = None
+        self._style_tags: list[int] = []
+        self._follow_style()
+
+    def _follow_style(self) -> None:
+        """Observe the style that the interactor has now; somebody may give it another at any time."""
+        style = self._interactor.GetInteractorStyle()
+        if style is self._style:
+            return
+        self._leave_style()
+        me = weakref.ref(self)
+        self._style = style
+        self._style_tags = [style.AddObserver(event, _heard_style(me)) for event in STYLE_EVENTS]
+
+    def _leave_style(self) -> None:
+        for tag in self._style_tags:
+            self._style.RemoveObserver(tag)
+        self._style_tags = []
 
     def release(self) -> None:
         """Observe no more."""
         for tag in self._tags.values():
             self._interactor.RemoveObserver(tag)
-        for tag in self._style_tags:
-            self._style.RemoveObserver(tag)
-        self._tags, self._style_tags = {}, []
+        self._leave_style()
+        self._tags = {}
 
     def hear(self, event: str) -> None:
         """Take an event of the interactor; one that is used goes nowhere else."""
         window = self._window()
+        self._follow_style()
         if window is not None and self._used(window, event):
             self._interactor.GetCommand(self._tags[event]).SetAbortFlag(1)
 
@@ -58,6 +82,9 @@ class Bindings:
         place = source.GetEventPosition()
         ctrl, shift = bool(source.GetControlKey()), bool(source.GetShiftKey())
         tools = window.tools
+        if event in BEGINNINGS and window.elsewhere(*place):
+            self._used_key = False
+            return False
         if event == "KeyPressEvent":
             self._used_key = tools.key(source.GetKeySym() or "", *place, ctrl=ctrl, shift=shift)
             used = self._used_key

@@ -1,6 +1,5 @@
 """A handle in the window that moves a primitive of a tree."""
 
-import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +8,7 @@ from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 
 from decals.edit.actions import Actions
 from decals.surfaces.surface import Floats
+from decals.window.weak import weakly
 
 SIZE = 0.03
 """Radius of the handle, in diagonals of the scene."""
@@ -70,13 +70,9 @@ class Grip:
         widget.SetInteractor(self._renderer.GetRenderWindow().GetInteractor())
         widget.SetCurrentRenderer(self._renderer)
         widget.On()
-        me = weakref.ref(self)
-        for event, name in (
-            ("StartInteractionEvent", "begin"),
-            ("InteractionEvent", "move"),
-            ("EndInteractionEvent", "end"),
-        ):
-            widget.AddObserver(event, _calling(me, name))
+        widget.AddObserver("StartInteractionEvent", weakly(self.begin))
+        widget.AddObserver("InteractionEvent", weakly(self.move))
+        widget.AddObserver("EndInteractionEvent", weakly(self.end))
         return widget
 
     def begin(self) -> None:
@@ -108,14 +104,3 @@ class Grip:
             if self._renderer.GetRenderWindow() is not None:  # else somebody closed the window before us
                 self._widget.Off()
             self._widget = self._held = None
-
-
-def _calling(me: "weakref.ref[Grip]", name: str) -> Any:
-    """An observer that does not keep the grip alive."""
-
-    def call(_widget: Any, _event: str) -> None:
-        grip = me()
-        if grip is not None:
-            getattr(grip, name)()
-
-    return call

@@ -2,7 +2,8 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 
 import pyvista as pv
@@ -58,3 +59,22 @@ def lent_plotter(plotter: Any) -> Any:
     if getattr(plotter, "iren", None) is None:
         raise InvalidScene("expected a plotter with an interactor; make pyvistaqt's with off_screen=False")
     return plotter
+
+
+def before_screenshots(plotter: Any, call: Callable[[], None]) -> Callable[[], None]:
+    """Let a plotter call something before each screenshot; what comes back ends it."""
+    method, before = plotter.screenshot, vars(plotter).get("screenshot")
+
+    @wraps(method)
+    def screenshot(*arguments: Any, **options: Any) -> Any:
+        call()
+        return method(*arguments, **options)
+
+    def end() -> None:
+        if vars(plotter).get("screenshot") is screenshot:  # otherwise somebody wrapped it again
+            del vars(plotter)["screenshot"]
+            if before is not None:
+                vars(plotter)["screenshot"] = before
+
+    vars(plotter)["screenshot"] = screenshot  # around pyvista's guard against new attributes
+    return end

@@ -2,7 +2,6 @@
 
 import os
 import time
-import weakref
 from typing import Any
 
 import pyvista as pv
@@ -11,6 +10,7 @@ import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
 from blobtree import BlobTreeError
 from decals.checks import shown, whole
 from decals.edit.actions import Actions
+from decals.edit.document import Document
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
 from decals.edit.tools import Ray, Tools
@@ -22,9 +22,17 @@ from decals.surfaces.surface import Floats
 from decals.vtk.settings import MOST_SAMPLES
 from decals.window.bindings import Bindings
 from decals.window.grip import Grip
-from decals.window.home import SIZE, checked_size, lent_plotter, new_plotter, require_screen
+from decals.window.home import (
+    SIZE,
+    before_screenshots,
+    checked_size,
+    lent_plotter,
+    new_plotter,
+    require_screen,
+)
 from decals.window.marks import Marks
 from decals.window.quality import Quality
+from decals.window.weak import weakly
 
 TICK = 20
 """Milliseconds between looks at what goes on."""
@@ -113,13 +121,13 @@ class EditWindow:
         self.stage = self.plotter.decals.stage
         self.stage.scene = self.document
         self.stage.measure, self.stage.samples = True, self.samples
-        me = weakref.ref(self)
         self._began = 0.0
         renderer = self.stage.vtk_renderer
         self._timing = [
-            renderer.AddObserver("StartEvent", lambda *_: _timed(me, begin=True)),
-            renderer.AddObserver("EndEvent", lambda *_: _timed(me, begin=False)),
+            renderer.AddObserver("StartEvent", weakly(self._frame_begins)),
+            renderer.AddObserver("EndEvent", weakly(self._frame_ends)),
         ]
+        self._end_screenshots = before_screenshots(self.plotter, weakly(self.make_whole))
 
     @property
     def ticking(self) -> bool:
@@ -177,6 +185,11 @@ class EditWindow:
         self._moved, self._whole = 0.0, self._shown
         self.plotter.render()
 
+    def make_whole(self) -> None:
+        """Draw a whole frame now, unless the last one was."""
+        if (self.stage.draw_scale, self.stage.samples) != (1.0, self.samples):
+            self.rest()
+
     def _refine(self) -> None:
         """Draw better than now, slice by slice: first at the window's size, then with all samples."""
         samples = 1 if self.stage.draw_scale < 1.0 else self.samples
@@ -192,10 +205,11 @@ class EditWindow:
             self.stage.draw_scale, self.stage.samples = 1.0, samples
             self.plotter.render()
 
-    def _timed(self, *, begin: bool) -> None:
-        if begin:
-            self._began = time.perf_counter()
-        elif self.stage.drawn:
+    def _frame_begins(self) -> None:
+        self._began = time.perf_counter()
+
+    def _frame_ends(self) -> None:
+        if self.stage.drawn:
             size = self.stage.draw_scale * self.stage.samples
             self.quality.saw(size, time.perf_counter() - self._began)
 
@@ -236,6 +250,13 @@ class EditWindow:
             return None
         rays = self.stage.viewpoint().rays(width, height)
         return rays.origins(x, y), rays.directions(x, y)
+
+    def elsewhere(self, x: int, y: int) -> bool:
+        """Whether a place is in a subplot of the same plotter that another window edits."""
+        return any(
+            stage is not self.stage and isinstance(stage.scene, Document) and stage.covers(x, y)
+            for stage in self.plotter.decals.stages
+        )
 
     def _hidden(self, x: float, y: float, position: Floats) -> bool:
         """Whether an actor that was added to the plotter hides a point of a surface."""
@@ -285,6 +306,7 @@ class EditWindow:
         self.actions.release()
         self.grip.release()
         self._bindings.release()
+        self._end_screenshots()
         if not self._guest:
             self.plotter.close()
         elif self.plotter.render_window is not None:  # otherwise it was closed before us
@@ -321,9 +343,3 @@ def view(
     with EditWindow(scene, path=path, size=size) as window:
         window.show()
         return window.document.scene
-
-
-def _timed(me: "weakref.ref[EditWindow]", *, begin: bool) -> None:
-    window = me()
-    if window is not None:
-        window._timed(begin=begin)

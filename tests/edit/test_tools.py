@@ -101,6 +101,41 @@ def test_a_selected_decal_follows_the_pointer_and_neighbours_are_left(hands):
     assert hands.actions.message == "undid: move"
 
 
+def test_actions_in_the_middle_of_a_drag_are_entries_between_its_parts(hands):
+    (_, at), *_ = hands.visible()
+    hands.click(at)
+    hands.tools.press(*at)
+    step = iter(range(6, 60, 2))
+
+    def move(times=3):
+        for _ in range(times):
+            assert hands.tools.move(at[0] + next(step), at[1])
+
+    move()
+    hands.tools.wheel(True, *at, ctrl=True)
+    move()
+    assert hands.key("z", ctrl=True)  # the second part alone
+    move()
+    hands.tools.release(*at)
+    assert hands.session.labels == ("move", "larger", "move")
+    while hands.session.undo():
+        pass
+    assert digest(hands.document) == hands.first
+
+
+def test_what_is_deleted_in_the_middle_of_a_drag_is_not_held_any_more(hands):
+    (_, at), *_ = hands.visible()
+    hands.click(at)
+    hands.tools.press(*at)
+    hands.tools.move(at[0] + 8, at[1])
+    hands.key("Delete")
+    assert not hands.tools.dragging
+    assert not hands.tools.move(at[0] + 12, at[1])
+    hands.tools.release(at[0] + 12, at[1])
+    assert hands.actions.message == "delete"
+    assert hands.session.labels == ("move", "delete")
+
+
 def test_a_drag_leads_from_one_object_to_another(hands):
     number, at = next((n, at) for n, at in hands.visible() if n in lying_on(hands.document, [0]))
     goal = next(at for n, at in hands.visible() if n in lying_on(hands.document, [1]))

@@ -48,6 +48,49 @@ def test_hands_in_a_subplot_that_is_no_longer_the_active_one(plotter: Factory) -
     assert driver.session._listeners == []
 
 
+def test_each_of_two_subplots_has_hands_of_its_own(plotter: Factory) -> None:
+    pl = plotter(shape=(1, 2), window_size=(320, 120))
+    drivers = []
+    for column in (0, 1):
+        pl.subplot(0, column)
+        window = EditWindow(scene(), plotter=pl)
+        window.show()
+        drivers.append(Driver(window, pl.renderers[column]))
+    for driver, other in (drivers, drivers[::-1]):
+        number, at = next(driver.visible())
+        before = other.state
+        driver.click(at)
+        driver.wheel(at, ctrl=True)
+        driver.key("Delete", at)
+        assert driver.session.labels == ("larger", "delete")
+        assert number not in driver.document.decals.numbers
+        assert other.state == before
+        driver.key("z", at, ctrl=True)
+        assert driver.session.labels == ("larger",)
+
+
+def test_hands_stay_where_the_plotter_gets_another_style(plotter: Factory) -> None:
+    pl = plotter()
+    window = EditWindow(scene(), plotter=pl)
+    window.show()
+    driver = Driver(window)
+    pl.enable_terrain_style()
+    number, at = next(driver.visible())
+    driver.click(at)
+    assert window.actions.selection == (number,)
+
+
+def test_screenshots_show_whole_frames(plotter: Factory) -> None:
+    pl = plotter()
+    window = EditWindow(scene(), plotter=pl)
+    window.show()
+    whole = pl.screenshot(return_img=True)
+    window.stage.draw_scale, window.stage.samples = 0.25, 1  # as while something moves
+    np.testing.assert_array_equal(pl.screenshot(return_img=True), whole)
+    window.close()
+    assert "screenshot" not in vars(pl)
+
+
 def test_the_handle_is_ours_alone(plotter: Factory) -> None:
     pl = plotter(shape=(1, 2), window_size=(320, 120))
     theirs = pl.add_sphere_widget(lambda _center: None, center=(0, 0, 0), radius=0.2)
