@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from blobtree import Mesh, Node
 from blobtree.formulas.kernels import ISO
 from blobtree.meshing.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
+from blobtree.meshing.strays import HALVINGS
 from blobtree.tapes.evaluate import colors_at, values_at
-from blobtree.tapes.project import project
+from blobtree.tapes.project import STALLED, project
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -27,12 +28,47 @@ class _Grid:
         return (self.first + indices).astype(np.float32) * np.float32(self.cell)
 
 
+@dataclass(frozen=True)
+class _Crossings:
+    """Grid edges that cross the surface, one entry for each patch that they belong to."""
+
+    vertices: Ints
+    inner: NDArray[np.float64]
+    """Grid coordinates (n, 3) of the corner inside, and `outer` of the one outside."""
+    outer: NDArray[np.float64]
+    places: NDArray[np.float64]
+    """Where a field that is linear along the edge crosses it, in grid coordinates (n, 3)."""
+
+    def means(self) -> NDArray[np.float64]:
+        """Mean crossing (m, 3) of every patch, in grid coordinates."""
+        counts = np.bincount(self.vertices)
+        sums = np.stack([np.bincount(self.vertices, axis) for axis in self.places.T], axis=1)
+        return sums / counts[:, None]
+
+    def nearest(self, tree: Node, grid: _Grid) -> Floats:
+        """Of every patch the crossing (m, 3) nearest to their mean, found by halving."""
+        inner, outer = self.inner.copy(), self.outer.copy()
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inner + outer)
+            inside = (values_at(tree.tape, grid.points(middle)) >= ISO)[:, None]
+            inner, outer = np.where(inside, middle, inner), np.where(inside, outer, middle)
+        apart = np.linalg.norm(inner - self.means()[self.vertices], axis=1)
+        order = np.lexsort((apart, self.vertices))
+        _, first = np.unique(self.vertices[order], return_index=True)
+        return grid.points(inner[order[first]])
+
+
 def polygonize(tree: Node, *, cell_size: float) -> Mesh:
     """The surface of `tree` over the same grid as `blobtree.meshing.polygonize`."""
     grid = _make_grid(tree, cell_size)
     values = values_at(tree.tape, grid.points(np.argwhere(np.ones(grid.shape, bool)))).reshape(grid.shape)
-    vertices, quads = _dual_surface(values, grid)
-    positions, normals = project(tree.tape, vertices, longest_step=0.5 * grid.cell)
+    crossings, quads = _dual_surface(values, grid)
+    starts = grid.points(crossings.means())
+    positions, normals = project(tree.tape, starts, longest_step=0.5 * grid.cell)
+    off = np.abs(values_at(tree.tape, positions) - ISO) > STALLED * ISO
+    strays = np.flatnonzero(off | (np.linalg.norm(positions - starts, axis=1) > grid.cell))
+    positions[strays] = crossings.nearest(tree, grid)[strays]
+    normals[strays] = project(tree.tape, positions[strays], longest_step=0.0)[1]
     return Mesh(positions, _split_quads(quads, positions), normals, colors_at(tree.tape, positions))
 
 
@@ -44,8 +80,8 @@ def _make_grid(tree: Node, cell_size: float) -> _Grid:
     return _Grid(first, cell_size, (nx, ny, nz))
 
 
-def _dual_surface(values: Floats, grid: _Grid) -> tuple[Floats, Ints]:
-    """One vertex per patch, at the mean of its edge crossings, and one quad (m, 4) per crossed grid edge."""
+def _dual_surface(values: Floats, grid: _Grid) -> tuple[_Crossings, Ints]:
+    """The crossings of every patch, which has one vertex, and one quad (m, 4) per crossed grid edge."""
     inside = values >= ISO
     codes = _rows(_cell_codes(inside))
     active = np.flatnonzero(PATCH_COUNT[codes.ravel()])
@@ -53,9 +89,9 @@ def _dual_surface(values: Floats, grid: _Grid) -> tuple[Floats, Ints]:
     counts = PATCH_COUNT[active_codes].astype(np.int64)
     first_vertex = np.zeros(codes.size, np.int32)
     first_vertex[active] = np.cumsum(counts) - counts
-    vertices = _crossing_means(values, codes.shape, active, active_codes, first_vertex)
+    crossings = _crossings(values, codes.shape, active, active_codes, first_vertex)
     quads = [_quads_along(axis, inside, codes, first_vertex.reshape(codes.shape)) for axis in range(3)]
-    return grid.points(vertices), np.concatenate(quads)
+    return crossings, np.concatenate(quads)
 
 
 def _cell_codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -83,29 +119,29 @@ def _shifted(corner: int, shape: tuple[int, ...]) -> tuple[slice, ...]:
     return tuple(slice(corner >> axis & 1, (corner >> axis & 1) + n) for axis, n in enumerate(shape))
 
 
-def _crossing_means(
+def _crossings(
     values: Floats,
     shape: tuple[int, ...],
     active: NDArray[np.int64],
     codes: NDArray[np.int16],
     first_vertex: Ints,
-) -> NDArray[np.float64]:
-    """Grid coordinates (n, 3) of every patch's vertex."""
+) -> _Crossings:
+    """All crossings of all patches."""
     cells = np.stack(np.unravel_index(active, shape), axis=1)
-    total = int(PATCH_COUNT[codes].astype(np.int64).sum())
-    sums, crossings = np.zeros((total, 3)), np.zeros(total)
+    vertices, inner, outer, places = [], [], [], []
     for edge, (a, b) in enumerate(EDGES):
         patch = PATCH_OF_EDGE[codes, edge]
         here = np.flatnonzero(patch >= 0)
-        ends = [cells[here] + [corner & 1, corner >> 1 & 1, corner >> 2] for corner in (a, b)]
-        value_a, value_b = (values[tuple(end.T)].astype(np.float64) for end in ends)
+        ends = [
+            (cells[here] + [corner & 1, corner >> 1 & 1, corner >> 2]).astype(np.float64) for corner in (a, b)
+        ]
+        value_a, value_b = (values[tuple(end.astype(int).T)].astype(np.float64)[:, None] for end in ends)
         share = (ISO - value_a) / (value_b - value_a)
-        vertex = first_vertex[active[here]] + patch[here]
-        crossing = ends[0] + share[:, None] * (ends[1] - ends[0])
-        for axis in range(3):
-            sums[:, axis] += np.bincount(vertex, crossing[:, axis], minlength=total)
-        crossings += np.bincount(vertex, minlength=total)
-    return sums / np.maximum(crossings, 1.0)[:, None]
+        vertices.append(first_vertex[active[here]] + patch[here])
+        places.append(ends[0] + share * (ends[1] - ends[0]))
+        inner.append(np.where(value_a >= ISO, ends[0], ends[1]))
+        outer.append(np.where(value_a >= ISO, ends[1], ends[0]))
+    return _Crossings(*(np.concatenate(parts) for parts in (vertices, inner, outer, places)))
 
 
 def _quads_along(axis: int, inside: NDArray[np.bool_], codes: NDArray[np.int16], first_vertex: Ints) -> Ints:
