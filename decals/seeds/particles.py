@@ -26,6 +26,9 @@ CLOSEST = 0.6
 ON_WALL = 0.25
 """Images of neighbours nearer to the wall than so many spacings count less: one on it is its own image."""
 
+ODD = 0.3
+"""A ring that differs from the mean one by so many spacings is one of a tip or a thin part, and let be."""
+
 ISOTROPY = 0.1
 """Share of the trace added to the curvature of the energy, so that no direction is without any."""
 
@@ -68,10 +71,11 @@ def shown_beyond(q: wp.vec3, own: wp.bool, point: wp.vec3, normal: wp.vec3, dept
 def nearest_six(six: Six, distance: wp.float32) -> Six:
     """Put one more distance among the six nearest."""
     x = float(distance)
-    for k in range(6):
-        farther = wp.max(six[k], x)
-        six[k] = wp.min(six[k], x)
-        x = farther
+    if x < six[5]:
+        for k in range(6):
+            farther = wp.max(six[k], x)
+            six[k] = wp.min(six[k], x)
+            x = farther
     return six
 
 
@@ -79,6 +83,20 @@ def nearest_six(six: Six, distance: wp.float32) -> Six:
 def mean_of_six(six: Six) -> wp.float32:
     """Mean distance of a ring."""
     return (six[0] + six[1] + six[2] + six[3] + six[4] + six[5]) / 6.0
+
+
+@wp.func
+def ring_pull(lack: wp.float32) -> wp.float32:
+    """Slope of `ring_cost`: it grows with what a ring lacks, and fades away where that is a lot."""
+    fair = wp.max(1.0 - lack * lack / (ODD * ODD), 0.0)
+    return lack * fair * fair
+
+
+@wp.func
+def ring_cost(lack: wp.float32) -> wp.float32:
+    """Half the square of what a ring lacks, to first order; a constant from `ODD` on (Tukey's biweight)."""
+    fair = wp.max(1.0 - lack * lack / (ODD * ODD), 0.0)
+    return ODD * ODD / 6.0 * (1.0 - fair * fair * fair)
 
 
 @wp.kernel
@@ -190,14 +208,14 @@ def repel(
     The energy of a pair at distance x, in its own spacing, is x^-p, shifted so that value and slope vanish
     at the cutoff, and a spring of the given stiffness within the core; below `CLOSEST` it goes on along its
     tangent. A pair's part of the total energy is that times its spacing squared, so that pressure is the
-    same where spacings differ: `works` are halves of it, `energies` leave the square out. Curvature across
-    the line of a pair is left out: it is negative.
+    same where spacings differ: `works` are halves of it. `energies` leave the square out, and rings: they
+    tell who is crowded. Curvature across the line of a pair is left out: it is negative.
 
     Beyond each wall lie the images of the neighbours, and of the particle itself: of that pair half the
     energy counts, and it parts by twice the move.
 
-    A particle whose ring is wider or narrower than the mean one, `total` over the count, adds half the square
-    of the difference, times `evening` and its spacing squared.
+    A particle whose ring is wider or narrower than the mean one, `total` over the count, adds `ring_cost` of
+    the difference, times `evening` and its spacing squared.
     """
     i = first + wp.tid()
     p = positions[i]
@@ -251,15 +269,14 @@ def repel(
                 ay = wp.dot(away, v) / x
                 push = weight * (pair / size) * (slope - rim_slope + stiffness * overlap)
                 bend = weight * curve
-                if (
-                    evening > 0.0 and weight >= 1.0
-                ):  # a sixth of how far they are apart belongs to either ring
+                # a sixth of how far they are apart belongs to either ring
+                if evening > 0.0 and weight >= 1.0:
                     distance = wp.length(offset) / pair
                     if distance <= rims[i]:
-                        push += evening / 6.0 * (mean - rings[i]) * size / pair
+                        push += evening / 6.0 * ring_pull(mean - rings[i]) * size / pair
                     if distance <= rims[j]:
                         lever = sizes[j] / pair
-                        push += evening / 6.0 * (mean - rings[j]) * lever * sizes[j] / size
+                        push += evening / 6.0 * ring_pull(mean - rings[j]) * lever * sizes[j] / size
                         bend += evening / 36.0 * lever * lever
                 bend *= bends
                 fx += push * ax
@@ -272,9 +289,7 @@ def repel(
                 part = weight * (part + nearer * (slope - rim_slope + stiffness * overlap))
                 energy += part
                 work += wp.float64(0.5 * pair * pair * part)
-    lack = mean - rings[i]
-    energy += 0.5 * evening * lack * lack
-    work += wp.float64(0.5 * size * size * evening * lack * lack)
+    work += wp.float64(size * size * evening * ring_cost(mean - rings[i]))
     energies[i] = energy
     works[i] = work
     extra = ISOTROPY * (hxx + hyy)

@@ -59,13 +59,14 @@ def rings(positions, normals, sizes, *, farthest, facing_limit, wall=None):
     return six.mean(axis=1), six[:, 5]
 
 
-def ring_energy(positions, normals, sizes, *, evening, mean, **rule):
-    """Half the square of how much each ring differs from the mean one, times the squared spacing."""
-    lacks = rings(positions, normals, sizes, **rule)[0] - mean
-    return 0.5 * evening * float((sizes**2 * lacks**2).sum())
+def ring_energy(positions, normals, sizes, *, evening, mean, odd, **rule):
+    """Tukey's biweight of how much each ring differs from the mean one, times the squared spacing."""
+    lacks = np.minimum(np.abs(rings(positions, normals, sizes, **rule)[0] - mean) / odd, 1.0)
+    costs = odd**2 / 6 * (1 - (1 - lacks**2) ** 3)
+    return evening * float((sizes**2 * costs).sum())
 
 
-def ring_moves(positions, normals, sizes, *, evening, mean, **rule):
+def ring_moves(positions, normals, sizes, *, evening, mean, odd, **rule):
     """What rings add to the force on each particle, ``[n, 3]``, and to its curvature, ``[n, 3, 3]``.
 
     The force is a central difference of `ring_energy`.
@@ -79,7 +80,7 @@ def ring_moves(positions, normals, sizes, *, evening, mean, **rule):
             for sign in (-1, 1):
                 moved = places.copy()
                 moved[i] += sign * step * axis
-                ends.append(ring_energy(moved, ways, sizes, evening=evening, mean=mean, **rule))
+                ends.append(ring_energy(moved, ways, sizes, evening=evening, mean=mean, odd=odd, **rule))
             forces[i] -= (ends[1] - ends[0]) / (2 * step * sizes[i]) * axis
     images = [(places, ~np.eye(len(places), dtype=bool), np.ones((len(places), len(places))))]
     if rule.get("wall") is not None:
@@ -117,6 +118,7 @@ def moves(
     wall=None,
     evening=0.0,
     mean=0.0,
+    odd=1.0,
 ):
     """Damped Newton move and energy of every particle, its neighbours at rest.
 
@@ -130,8 +132,8 @@ def moves(
     forces, curvatures = np.zeros((len(positions), 3)), np.zeros((len(positions), 3, 3))
     if evening:
         around = {"farthest": cutoff, "facing_limit": facing_limit, "wall": wall}
-        forces, curvatures = ring_moves(positions, normals, sizes, evening=evening, mean=mean, **around)
-        energies += 0.5 * evening * (rings(positions, normals, sizes, **around)[0] - mean) ** 2
+        wish = {"evening": evening, "mean": mean, "odd": odd}
+        forces, curvatures = ring_moves(positions, normals, sizes, **wish, **around)
     for i, (p, n) in enumerate(zip(positions, normals, strict=True)):
         force, curvature = forces[i].copy(), curvatures[i].copy()
         others = [(j, q, 1.0) for j, q in enumerate(positions) if j != i]

@@ -3,7 +3,7 @@ import pytest
 import warp as wp
 
 from decals.model import FACING_LIMIT
-from decals.seeds.particles import CLOSEST, ISOTROPY
+from decals.seeds.particles import CLOSEST, ISOTROPY, ODD
 from decals.seeds.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsion
 from tests.oracles.repulsion import moves as expected_moves
 from tests.oracles.repulsion import ring_energy, rings, total_energy
@@ -59,6 +59,7 @@ def oracle(positions, normals, *, exponent=4.0, stiffness=0.0, spacing=SPACING, 
         closest=CLOSEST,
         evening=evening,
         mean=mean,
+        odd=ODD,
     )
 
 
@@ -83,7 +84,11 @@ def test_rings_are_evened_by_the_slope_of_their_energy(varied, device):
     law = Law(3.0, 300.0, 600.0)
     found, energies, works = evaluated(positions, normals, law, sizes, device)
     around = {"farthest": CUTOFF, "facing_limit": FACING_LIMIT}
-    mean = rings(positions, normals, wide, **around)[0].mean()
+    widths = rings(positions, normals, wide, **around)[0]
+    mean = widths.mean()
+    odd = np.abs(widths - mean) > ODD
+    assert odd.any()
+    assert not odd.all()
     wish = {"exponent": law.exponent, "stiffness": law.stiffness, "spacing": wide}
     expected, expected_energies = oracle(positions, normals, **wish, evening=law.evening, mean=mean)
     assert np.allclose(found, expected, atol=2e-4 * SPACING)
@@ -91,8 +96,8 @@ def test_rings_are_evened_by_the_slope_of_their_energy(varied, device):
     rule = {"cutoff": CUTOFF, "core": CORE, "closest": CLOSEST, "facing_limit": FACING_LIMIT}
     rule |= {"exponent": law.exponent, "stiffness": law.stiffness}
     pairs = total_energy(positions, normals, wide, **rule)
-    uneven = ring_energy(positions, normals, wide, evening=law.evening, mean=mean, **around)
-    assert uneven > 0.1 * pairs
+    uneven = ring_energy(positions, normals, wide, evening=law.evening, mean=mean, odd=ODD, **around)
+    assert uneven > 0.01 * pairs
     assert works.sum() == pytest.approx(pairs + uneven, rel=1e-4)
 
 

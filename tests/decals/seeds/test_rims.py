@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from decals.coat.seeding import seed
 from decals.model import FACING_LIMIT
 from decals.seeds.creases import Creases
-from decals.seeds.particles import CLOSEST, ISOTROPY, ON_WALL
+from decals.seeds.particles import CLOSEST, ISOTROPY, ODD, ON_WALL
 from decals.seeds.relaxation import Relaxation
 from decals.seeds.repulsion import CORE, CUTOFF, DAMPING, LONGEST, Law, Repulsion
 from decals.seeds.rim_kernels import WALLS
@@ -141,6 +141,7 @@ def test_rings_at_a_wall_go_on_among_the_images(device):
         "isotropy": ISOTROPY,
         "evening": law.evening,
         "mean": mean,
+        "odd": ODD,
     }
     expected, crowdedness = expected_moves(positions, normals, sizes, **rule, **step, wall=wall)
     assert np.allclose(moves, expected, atol=2e-4)
@@ -148,7 +149,7 @@ def test_rings_at_a_wall_go_on_among_the_images(device):
     both = np.concatenate([positions, positions * np.float32([-1, 1, 1])])
     ways, ones = np.tile(UP, (80, 1)), np.ones(80)
     whole = total_energy(both, ways, ones, **rule)
-    whole += ring_energy(both, ways, ones, evening=law.evening, mean=mean, **around)
+    whole += ring_energy(both, ways, ones, evening=law.evening, mean=mean, odd=ODD, **around)
     assert works.sum() == pytest.approx(0.5 * whole, rel=1e-4)
 
 
