@@ -114,7 +114,7 @@ class DecalIndex:
         offsets : int64[m + 1]
             Point i's candidates are ids[offsets[i]:offsets[i + 1]].
         ids : int32[...]
-            Decal numbers, ascending within each level.
+            Decal numbers, level after level, each level's in the order in which they are drawn.
         """
         where: Any = wp.array(np.asarray(points, np.float32).reshape(-1, 3), dtype=wp.vec3, device="cpu")
         arguments = self.on("cpu").arguments()

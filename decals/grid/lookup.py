@@ -40,9 +40,10 @@ def cell_range(
     mask: wp.int32,
     ids: wp.array(dtype=wp.int32),
 ) -> wp.vec2i:
-    """(first, past last) place in ids of the decals of one level that may reach q, ascending; equal for none.
+    """(first, past last) place in ids of the decals of one level that may reach q; equal for none.
 
-    Open addressing with linear probing. A slot holds the whole key, so no other cell's list is ever taken.
+    They are in the order in which they are drawn. Open addressing with linear probing: a slot holds the whole
+    key, so no other cell's list is ever taken.
     """
     cells_per_unit = levels[level][0]
     x = cell_coordinate(q[0], cells_per_unit) + (level << 24)
