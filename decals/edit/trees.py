@@ -208,7 +208,9 @@ def _followers(
     rows = rows[places.objects == edited.object]
     positions = decals.positions[rows].astype(np.float64)
     weights = (
-        _kept_following(before, edited.path, positions.tobytes()) if offset.any() else np.zeros(len(rows))
+        _kept_following(before, tuple(edited.path), positions.tobytes())
+        if offset.any()
+        else np.zeros(len(rows))
     )
     wished = positions + weights[:, None] * offset
     changed = (weights * np.linalg.norm(offset) > 0) | (np.abs(item.tree(wished) - ISO) > FIELD_ERROR)

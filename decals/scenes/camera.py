@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from decals.checks import finite
+from decals.checks import finite, triple
 from decals.errors import InvalidScene
 from decals.scenes.viewpoint import Bounds, Floats, Rays
 
@@ -219,13 +219,7 @@ def _corners(bounds: Bounds) -> Floats:
 
 
 def _vector(name: str, value: ArrayLike) -> Vector:
-    try:
-        array = np.asarray(value, np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidScene(f"a camera's {name} must be three numbers, got {value!r}") from error
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InvalidScene(f"a camera's {name} must be three finite numbers, got {value!r}")
-    return _triple(array)
+    return _triple(triple(f"a camera's {name}", value, InvalidScene))
 
 
 def _triple(array: Floats) -> Vector:

@@ -164,8 +164,10 @@ class Scene:
     images: tuple[DecalImage, ...] = ()
 
     def __post_init__(self) -> None:
-        objects = _each("objects", self.objects, MeshObject | TreeObject, "make a MeshObject or a TreeObject")
-        images = _each("images", self.images, DecalImage, "DecalImage.load makes one")
+        objects = _each(
+            "objects", self.objects, (MeshObject, TreeObject), "wrap each mesh and each tree in one"
+        )
+        images = _each("images", self.images, (DecalImage,), "DecalImage.load makes one")
         object.__setattr__(self, "objects", objects)
         object.__setattr__(self, "images", images)
         instance("camera", self.camera, Camera, InvalidScene, "Camera.framing makes one")
@@ -224,15 +226,16 @@ def check_names(objects: Sequence[SceneObject]) -> None:
             raise InvalidScene(f"expected a different name for each object, got {name!r} twice; rename one")
 
 
-def _each(name: str, values: Any, kind: Any, advice: str) -> tuple[Any, ...]:
-    """Give a tuple of things of a kind, or raise InvalidScene."""
+def _each(name: str, values: Any, kinds: tuple[type, ...], advice: str) -> tuple[Any, ...]:
+    """Give a tuple of things of some kinds, or raise InvalidScene."""
+    wanted = " or ".join(kind.__name__ for kind in kinds)
     try:
         found = tuple(values)
     except TypeError:
-        raise InvalidScene(f"{name}: expected a list of them, got {shown(values)}; {advice}") from None
+        raise InvalidScene(f"{name}: expected a list of {wanted}, got {shown(values)}; {advice}") from None
     for value in found:
-        if not isinstance(value, kind):
-            raise InvalidScene(f"{name}: got {shown(value)} among them; {advice}")
+        if not isinstance(value, kinds):
+            raise InvalidScene(f"{name}: expected a list of {wanted}, got {shown(value)} in it; {advice}")
     return found
 
 
