@@ -42,9 +42,12 @@ class Quality:
         return 1.0 if self._scale is None else self._scale
 
     def expected(self, scale: float) -> float:
-        """Seconds that a frame of some size should take."""
-        fixed, each = self._model() if self._seconds else (0.0, 0.0)
-        return fixed + each * scale**2
+        """Seconds that a frame of some size should take: at most the last frame's for each of its pixels."""
+        if not self._seconds:
+            return 0.0
+        fixed, each = self._model()
+        last, seconds = next(reversed(self._seconds.items()))
+        return min(fixed + each * scale**2, seconds * max(scale / last, 1.0) ** 2)
 
     def _model(self) -> tuple[float, float]:
         """Seconds for any frame, and for one of the window's size besides."""

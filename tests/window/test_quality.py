@@ -32,6 +32,15 @@ def test_a_fast_machine_draws_whole_frames():
     assert quality.expected(2.0) == pytest.approx(0.021)
 
 
+def test_a_first_frame_that_compiled_is_soon_forgotten():
+    quality = Quality()
+    quality.saw(1.0, 3.0)
+    assert quality.scale == SCALES[-1]
+    for _ in range(len(SCALES)):
+        quality.saw(quality.scale, 0.001 + 0.002 * quality.scale**2)
+    assert quality.scale == 1.0
+
+
 def test_a_choice_stays_while_times_waver():
     quality = settled(0.01, 0.6)
     chosen = {quality.scale}
