@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from decals.checks import instance
 from decals.errors import InvalidDecals
 from decals.grid import edit_kernels as kernels
 from decals.grid.cells import ALONE, FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
@@ -50,6 +51,7 @@ class DecalEditor:
     """
 
     def __init__(self, decals: Decals) -> None:
+        _check(decals)
         self._rows = DecalRows(decals)
         self.arrays: dict[str, NDArray[Any]] = {}
         self._journal = Journal()
@@ -178,6 +180,7 @@ class DecalEditor:
     # -- how --------------------------------------------------------------------------------------------
 
     def _checked(self, numbers: ArrayLike, decals: Decals) -> NDArray[np.int64]:
+        _check(decals)
         rows = as_numbers(numbers)
         if len(rows) != len(decals):
             raise InvalidDecals(f"expected a decal for each of {len(rows)} numbers, got {len(decals)}")
@@ -298,6 +301,11 @@ def _runs(rows: NDArray[np.int64]) -> list[Range]:
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
+def _check(decals: Decals) -> None:
+    instance("decals", decals, Decals, InvalidDecals, "a scene has .decals")
+
+
 def _check_one(one: Decals) -> None:
+    _check(one)
     if len(one) != 1:
         raise InvalidDecals(f"expected one decal, got {len(one)}; `put` takes several")

@@ -22,13 +22,18 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from decals.columns import check_range, floats, whole
 from decals.grid.build import build_index
 from decals.grid.cells import ALONE, LEVEL_SHIFT
 from decals.grid.lookup import count_candidates, list_candidates
-from decals.model import DEFAULT_RANK, Decals
+from decals.model import DEFAULT_RANK, LARGEST, LAYERS, Decals
 
 Ints = NDArray[np.int32]
 Wide = NDArray[np.int64]
+
+MOST_INFLUENCE = 4.0 * LARGEST
+MOST_RANK = 8 * LAYERS - 1
+"""Of the highest layer, and more than any `Interaction` adds."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,19 @@ class DecalIndex:
 
     @classmethod
     def build(cls, positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike = DEFAULT_RANK) -> Self:
-        """Index decals by position (float32[n, 3]), radius of influence (float32[n]) and rank (int32[n])."""
-        arrays = build_index(*_device_arrays(positions, influence, ranks, "cpu"))
+        """Index decals by position (float32[n, 3]), radius of influence (float32[n]) and rank (int32[n]).
+
+        Raises
+        ------
+        InvalidDecals
+            Arrays of other shapes or lengths, NaN, infinity, or a radius below 0.
+        """
+        centres = floats("positions", positions, (-1, 3))
+        reach = floats("influence", influence, (len(centres),))
+        check_range("influence", reach, 0.0, MOST_INFLUENCE)
+        order = np.full(len(centres), ranks) if np.ndim(ranks) == 0 else ranks
+        order = whole("ranks", order, len(centres), low=0, high=MOST_RANK, default=DEFAULT_RANK)
+        arrays = build_index(*_device_arrays(centres, reach, order, "cpu"))
         return cls(arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy(), arrays.parity)
 
     @classmethod

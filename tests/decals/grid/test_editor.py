@@ -169,6 +169,9 @@ def test_refuses_what_is_no_decal_and_stays_as_it_was():
         editor.change(0, radii=[1, 2])
     with pytest.raises(InvalidDecals, match="expected one decal, got 2"):
         editor.add(some(np.random.default_rng(4), 2))
+    for wrong in (editor.add, lambda none: editor.put([1], none), DecalEditor):
+        with pytest.raises(InvalidDecals, match="decals: expected a Decals, got None"):
+            wrong(None)
     assert editor.numbers.tolist() == [0, 2]
     check(editor, np.zeros((1, 3), np.float32))
 

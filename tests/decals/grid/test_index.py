@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from decals.errors import InvalidDecals
 from decals.field.contact import REACH
 from decals.grid.index import DecalIndex, DeviceIndex
 from decals.model import Decals
@@ -259,3 +260,20 @@ def test_the_same_on_a_cuda_device():
     points = near(rng, positions, influence, 2000)
     for one, other in zip(fetched.candidates(points), here.candidates(points), strict=True):
         assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("positions", "influence", "ranks", "says"),
+    [
+        ([[0, 0, 0]] * 3, [1.0], 0, r"influence: expected shape \[3\], got \[1\]"),
+        ([[0, 0, 0]] * 2, [1.0, 1.0], [0], r"ranks: expected shape \[2\], got \[1\]"),
+        ([0, 0, 0], [1.0], 0, "positions: expected shape"),
+        ([[0, np.nan, 0]], [1.0], 0, "positions: expected finite numbers"),
+        ([[0, 0, 0]], [np.inf], 0, "influence: expected finite numbers"),
+        ([[0, 0, 0]], [-1.0], 0, "influence: expected values from 0"),
+        ([[0, 0, 0]], [1.0], -1, "ranks: expected numbers from 0"),
+    ],
+)
+def test_refuses_arrays_that_are_no_decals(positions, influence, ranks, says):
+    with pytest.raises(InvalidDecals, match=says):
+        DecalIndex.build(positions, influence, ranks)
