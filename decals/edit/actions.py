@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
 from blobtree.progress import Progress
-from decals.coat.orientation import tangents
 from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
 from decals.edit.jobs import Job
 from decals.edit.keys import BINDINGS, CAMERA
+from decals.edit.new_decals import decal_at
 from decals.edit.pick import Pick
 from decals.edit.places import nearest
 from decals.edit.population import Relax, Scatter
@@ -33,9 +33,6 @@ from decals.surfaces.surface import Floats
 
 LARGER, TURN, FAINTER, THICKER = 1.1, 7.5, 0.8, 1.05
 """What one step of the wheel or a key does: factors, and degrees."""
-
-SMALL = 0.05
-"""Radius of the very first decal, in diagonals of the scene."""
 
 TINTS = ((1.0, 1.0, 1.0), (0.95, 0.45, 0.35), (0.95, 0.8, 0.35), (0.5, 0.85, 0.5), (0.4, 0.6, 0.95))
 """sRGB tints to go through."""
@@ -180,27 +177,9 @@ class Actions:
 
     def _place(self, cursor: Cursor) -> None:
         found = _surface(cursor)
-        self._do(Add(self._new(found.position, found.normal)))
+        model = self.selection[-1] if self.selection else None
+        self._do(Add(decal_at(self.session.document, found.position, found.normal, model)))
         self.selection = (self.session.document.decals.next_number - 1,)
-
-    def _new(self, position: Floats, normal: Floats) -> Decals:
-        """A decal like the selected one, or of the usual size."""
-        document = self.session.document
-        places = position[None], normal[None]
-        if self.selection:
-            model = document.decals[self.selection[-1]]
-            way = tangents(*places, model.tangents[0], 0)
-            return model.replace(positions=places[0], normals=places[1], tangents=way)
-        radii = document.decals.decals.radii
-        low, high = document.scene.bounds
-        radius = float(np.median(radii)) if len(radii) else SMALL * float(np.linalg.norm(high - low))
-        image = 0 if document.images else PLAIN
-        return Decals(
-            *places,
-            tangents(*places, (1.0, 0.0, 0.0), 0),
-            np.array([radius], np.float32),
-            images=np.array([image]),
-        )
 
     def _duplicate(self, _cursor: Cursor) -> None:
         first = self.session.document.decals.next_number

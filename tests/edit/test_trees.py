@@ -187,6 +187,15 @@ def test_a_quick_move_is_the_same_move_without_a_surface(way):
     assert np.abs(tree(decals.positions) - ISO).max() < 1e-4
 
 
+def test_a_path_may_be_a_list():
+    one, other = session_of(A + B, 12), session_of(A + B, 12)
+    one.do(MovePrimitive(0, [1], (0, 0, 0.1)))
+    other.do(MovePrimitive(0, (1,), (0, 0, 0.1)))
+    assert one.document.objects[0].tree == other.document.objects[0].tree
+    moved = one.document.decals.decals.positions
+    np.testing.assert_array_equal(moved, other.document.decals.decals.positions)
+
+
 def test_a_primitive_that_leaves_nothing_to_see_goes_back():
     """A tool that swallows the whole; step by step nobody asks for the surface, letting go does."""
     session = session_of(A - Point((1.2, 0, 0), radius=1.3), 12)

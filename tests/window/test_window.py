@@ -1,23 +1,18 @@
 """Driven windows: what is done with mouse and keys is done to the scene, is seen, and can be undone."""
 
-import os
-import subprocess
-import sys
 from itertools import islice, pairwise
 
 import numpy as np
 import pytest
-import pyvista as pv
 
 from decals.edit.commands import Scale
 from decals.edit.objects import RemoveObject
 from decals.edit.population import lying_on
-from decals.errors import InvalidEdit, InvalidScene, NoGraphics
+from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.scenes.scene_file import load_scene
-from decals.window import EditWindow, view
-from tests.edit.scenes import scene
+from decals.window import EditWindow
 
 
 def test_a_drag_deforms_the_neighbours_and_undo_gives_back_the_first_picture(driver):
@@ -299,75 +294,6 @@ def test_a_closed_window_says_so_and_its_session_goes_on(opened):
     assert driver.session.undo() is not None
 
 
-SIZES = [(0, 90), (-5, 10), (120,), None, 120, (10**9, 5), ("a", "b"), (float("nan"), 5)]
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_a_window_without_pixels_is_refused(size):
-    with pytest.raises(InvalidScene, match="size: expected"):
-        EditWindow(scene(), off_screen=True, size=size)
-
-
-@pytest.mark.parametrize("options", [{"samples": 0}, {"samples": None}, {"samples": 99}, {"path": 5}])
-def test_samples_and_paths_that_are_none_are_refused(options):
-    with pytest.raises(InvalidScene, match=f"{next(iter(options))}: expected"):
-        EditWindow(scene(), off_screen=True, **options)
-
-
-def test_what_is_no_scene_is_refused():
-    with pytest.raises(InvalidScene, match="EditSession to edit, got NoneType"):
-        EditWindow(None, off_screen=True)
-
-
-def test_without_a_screen_a_window_says_so(monkeypatch):
-    monkeypatch.setattr(sys, "platform", "linux")
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    with pytest.raises(NoGraphics, match="DISPLAY is not set"):
-        view(scene())
-
-
-MEMORY = """
-import gc, resource, sys
-from decals.window import EditWindow
-from tests.edit.scenes import scene
-
-def once():
-    with EditWindow(scene(), off_screen=True, size=(120, 80), samples=1) as window:
-        window.show()
-
-def used():
-    gc.collect()
-    return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize() / 2**20
-
-warm, rounds, chunks = int(sys.argv[1]), int(sys.argv[2]), 5
-for _ in range(warm):
-    once()
-marks = [used()]
-for _ in range(chunks):
-    for _ in range(rounds // chunks):
-        once()
-    marks.append(used())
-grown = sorted(after - before for before, after in zip(marks, marks[1:]))
-print(grown[chunks // 2] * chunks / rounds, marks[-1] - marks[0])
-"""
-
-
-@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory is read from /proc")  # noqa: PTH110
-@pytest.mark.parametrize(("warm", "rounds"), [(3, 10), pytest.param(20, 200, marks=pytest.mark.slow)])
-def test_opening_and_closing_keeps_no_memory(warm, rounds):
-    """In a process of its own: megabytes kept by each window, and by all.
-
-    The first is a median of five chunks: allocators and drivers take memory in steps of many megabytes.
-    """
-    run = subprocess.run(
-        [sys.executable, "-c", MEMORY, str(warm), str(rounds)], capture_output=True, text=True, check=True
-    )
-    each, together = map(float, run.stdout.split()[-2:])
-    assert each < (1.0 if rounds < 50 else 0.1)
-    assert together < 60.0
-
-
 def test_an_empty_scene_can_be_opened_and_nothing_breaks(opened):
     driver = opened(Scene(objects=(), camera=Camera((0, 0, 5))))
     for key in "adikoxgmtc":
@@ -386,37 +312,6 @@ def test_two_windows_at_once(opened):
     assert (len(one.document.decals), len(two.document.decals)) == (59, 60)
     assert (one.shot() != two.shot()).any()
     assert isinstance(one.window, EditWindow)
-
-
-def test_what_an_actor_hides_is_neither_picked_nor_gone_to(driver):
-    (number, at), (other, there) = islice(driver.visible(), 2)
-    ray = driver.window._ray(*there)
-    ball = pv.Sphere(radius=0.12, center=ray[0] + 0.5 * (driver.document.decals[other].positions[0] - ray[0]))
-    driver.plotter.add_mesh(ball, reset_camera=False, name="ball")
-    driver.shot()
-    driver.click(there)
-    assert driver.window.actions.selection == ()
-    driver.key("a", there)
-    assert driver.window.actions.message == "point at a surface"
-    driver.click(at)
-    assert driver.window.actions.selection == (number,)
-    before = driver.state
-    driver.event("LeftButtonPressEvent", at)
-    driver.event("MouseMoveEvent", there)
-    assert driver.state == before
-    driver.event("LeftButtonReleaseEvent", there)
-    driver.plotter.remove_actor("ball")
-    driver.shot()
-    driver.click(there)
-    assert driver.window.actions.selection == (other,)
-
-
-def test_what_surrounds_a_selected_decal_hides_nothing(driver):
-    _, at = next(driver.visible())
-    driver.click(at)
-    driver.shot()
-    seen = [driver.pixel(point) for point in driver.window.marks.lines.points]
-    assert all(driver.window.tools.at(*place) is not None for place in seen)
 
 
 def test_an_object_that_is_removed_is_not_held_any_more(driver):
