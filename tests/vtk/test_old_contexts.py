@@ -34,9 +34,10 @@ np.save(sys.argv[1], picture)
 
 def in_a_process(path: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Draw a scene in a process of its own: Mesa reads its version when it starts."""
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("MESA_GL")}
     return subprocess.run(
         [sys.executable, "-c", SCRIPT, str(path)],
-        env={**os.environ, **environment},
+        env={**inherited, **environment},
         capture_output=True,
         text=True,
         check=False,
