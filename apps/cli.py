@@ -52,7 +52,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except OSError as error:
         return _complain(f"{error.strerror or error}: {error.filename or 'a file'}")
-    except Exception as error:
+    except Exception as error:  # which kinds are bad input is asked only now: their imports take a second
         if not isinstance(error, _bad_input()):
             raise  # a bug: its traceback is what we want to see
         return _complain(str(error))

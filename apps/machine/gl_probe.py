@@ -61,5 +61,5 @@ def describe() -> dict[str, str | int]:
 if __name__ == "__main__":
     try:
         print(json.dumps(describe()))
-    except Exception as error:
+    except Exception as error:  # whoever started the probe reads the reason, whatever it is
         sys.exit(str(error))

@@ -42,6 +42,6 @@ def _data_folder(environment: Mapping[str, str]) -> list[Path]:
 def _download_folder() -> list[Path]:
     try:
         from pyvista.examples import downloads
-    except Exception:  # reported as a package already
+    except Exception:  # a pyvista that fails to import is reported among the packages already
         return []
     return [Path(downloads.USER_DATA_PATH)]

@@ -131,7 +131,7 @@ def all_active(
     if bits(members) == 1:
         return True
     for k in range(MOST_BRANCHES):
-        if ((members >> k) & 1) == 1:  # noqa: SIM102
+        if ((members >> k) & 1) == 1:  # noqa: SIM102  (Warp evaluates both sides of `and`)
             if not is_active(x, references, members, k, cells, span):
                 return False
     return True

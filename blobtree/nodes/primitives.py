@@ -36,7 +36,7 @@ class Primitive(Node):
     @property
     def control_points(self) -> tuple[Vector, ...]:
         """Points whose convex hull holds the skeleton."""
-        raise NotImplementedError
+        raise NotImplementedError  # every kind has its own
 
     @classmethod
     def hulls(cls, primitives: Sequence["Primitive"]) -> Floats:
@@ -63,7 +63,7 @@ class Primitive(Node):
 
         For n primitives with control points (n, k, 3) and influences (n, ·).
         """
-        raise NotImplementedError
+        raise NotImplementedError  # every kind has its own
 
 
 @dataclass(frozen=True, eq=False, repr=False)

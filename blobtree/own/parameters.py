@@ -46,6 +46,7 @@ class Parameter:
 
     def checked(self, value: Any) -> Any:
         """`value` as a float, an int or a tuple of floats; InvalidNode where it is none, or off limits."""
+        result: float | tuple[float, ...]
         if self.size == 1:
             number = finite_number(self.name, value)
             if self.whole and (number != int(number) or abs(number) > LARGEST_WHOLE):
@@ -58,7 +59,7 @@ class Parameter:
                 components = ()
             if len(components) != self.size:
                 raise InvalidNode(f"{self.name}: expected {self.size} finite numbers, got {value!r}")
-            measure, result = math.hypot(*components), components  # type: ignore[assignment]
+            measure, result = math.hypot(*components), components
         if not self.low <= measure <= self.high:
             what = "a number" if self.size == 1 else "a vector of length"
             raise InvalidNode(f"{self.name}: expected {what} {self.range}, got {value!r}")

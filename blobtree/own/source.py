@@ -147,7 +147,7 @@ def _hints(python: FunctionType) -> dict[str, Any]:
     """Annotations, those written as text evaluated."""
     try:
         return inspect.get_annotations(python, eval_str=True)
-    except Exception as error:
+    except Exception as error:  # annotations in quotes are evaluated: they may raise anything
         raise InvalidDefinition(f"{python.__name__}: its annotations cannot be read: {error}") from error
 
 

@@ -142,7 +142,7 @@ def result_of(
             result = np.asarray(function(*arguments), np.float64)
     except ArithmeticError as error:
         raise source.refusal(f"for {where}: {error}; every place needs an answer") from error
-    except Exception as error:
+    except Exception as error:  # the function is the user's own
         raise source.refusal(f"for {where} it fails: {type(error).__name__}: {error}") from error
     if result.shape != (size,) or not np.isfinite(result).all():
         raise source.refusal(f"for {where} it returns {_shown(result)}; expected {size} finite numbers")

@@ -139,7 +139,7 @@ class _AsOnDevices(ast.NodeTransformer):
             self.generic_visit(node)
             return node
         read = ast.parse(ast.unparse(node.target), mode="eval").body
-        return self.visit(ast.Assign([node.target], ast.BinOp(read, node.op, node.value)))  # type: ignore[no-any-return]
+        return self.visit(ast.Assign([node.target], ast.BinOp(read, node.op, node.value)))  # type: ignore[no-any-return]  # ast.visit is untyped
 
 
 def _in_words(function: FunctionType, scope: dict[str, Any]) -> FunctionType:

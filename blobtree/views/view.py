@@ -77,7 +77,7 @@ def slice_tree(
 
 def _require_pyvista() -> None:
     try:
-        import pyvista  # noqa: F401
+        import pyvista  # noqa: F401  (only whether it is there)
     except ImportError as error:
         raise MissingPackage(
             "this needs pyvista, which is not installed; run: pip install pyvista"

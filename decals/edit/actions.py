@@ -310,7 +310,7 @@ class Actions:
         """Let go of the held primitive; where nothing is left to lay decals on, it goes back."""
         try:
             if self.grip is not None:
-                self.session.document.objects[self.grip[0]].surface  # noqa: B018
+                self.session.document.objects[self.grip[0]].surface  # noqa: B018  (asking may fail)
         except (DecalsError, BlobTreeError) as error:
             self.session.cancel()
             self.message = str(error)
