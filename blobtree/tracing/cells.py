@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from blobtree.formulas.vocabulary import Vocabulary
 from blobtree.launch import known_device
 from blobtree.sparse.cells import SparseCells, build_cells
-from blobtree.sparse.grid import BRANCHING, CHILDREN, grid_from
+from blobtree.sparse.grid import BRANCHING, grid_from
 from blobtree.sparse.refine import SURELY_OUTSIDE
 from blobtree.tapes.tape import Tape
 from blobtree.tracing.rays import EMPTY
@@ -131,17 +131,17 @@ def _table(cells: SparseCells, first_texels: Ints, counts: NDArray[np.intp]) -> 
     known = known[:x, :y, :z]
     blocks = np.where(known >= 0, np.append(first_texels, 0)[known], known)
     empty = known == SURELY_OUTSIDE
-    blocks[empty] = EMPTY - _layers(empty)[empty]
-    return blocks.astype(np.int32)
+    return np.where(empty, EMPTY - _layers(empty), blocks).astype(np.int32)
 
 
 def _refined(known: Ints, children: Ints) -> Ints:
     """What is known of blocks (n, n, n), their places or why they have none, for all their children."""
     side = len(known)
-    families = np.append(children, np.zeros(CHILDREN, np.int32)).reshape(-1, BRANCHING, BRANCHING, BRANCHING)
-    deeper = families[np.where(known >= 0, known, -1)]
-    below = np.where(known[..., None, None, None] >= 0, deeper, known[..., None, None, None])
-    return below.transpose(0, 3, 1, 4, 2, 5).reshape((side * BRANCHING,) * 3)
+    families = children.reshape(-1, BRANCHING, BRANCHING, BRANCHING)
+    below = known.repeat(BRANCHING, 0).repeat(BRANCHING, 1).repeat(BRANCHING, 2)
+    of_parents = below.reshape(side, BRANCHING, side, BRANCHING, side, BRANCHING).transpose(0, 2, 4, 1, 3, 5)
+    of_parents[known >= 0] = families[known[known >= 0]]
+    return below
 
 
 def _layers(empty: NDArray[np.bool_]) -> Ints:

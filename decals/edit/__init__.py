@@ -24,9 +24,10 @@ from decals.edit.objects import AddObject, RemoveObject
 from decals.edit.pick import Pick, outline, pick
 from decals.edit.places import Places, first_hit, nearest
 from decals.edit.population import Coat, Relax, Scatter
+from decals.edit.primitives import MovePrimitive, PaintPrimitive, ResizePrimitive
 from decals.edit.session import Command, EditSession
 from decals.edit.tools import Tools
-from decals.edit.trees import MovePrimitive, PaintPrimitive, ResizePrimitive, primitive_near, primitive_paths
+from decals.edit.trees import primitive_near, primitive_paths
 
 __all__ = [
     "Actions",

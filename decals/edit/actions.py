@@ -15,16 +15,9 @@ from decals.edit.new_decals import decal_at
 from decals.edit.pick import Pick
 from decals.edit.places import nearest
 from decals.edit.population import Relax, Scatter
+from decals.edit.primitives import MovePrimitive, PaintPrimitive, ResizePrimitive
 from decals.edit.session import Command, EditSession
-from decals.edit.trees import (
-    MovePrimitive,
-    PaintPrimitive,
-    Path,
-    ResizePrimitive,
-    alone,
-    primitive_near,
-    primitive_paths,
-)
+from decals.edit.trees import Path, alone, primitive_near, primitive_paths
 from decals.errors import DecalsError, InvalidEdit
 from decals.model import LAYERS, PLAIN, Decals
 from decals.scenes.camera import Camera

@@ -43,24 +43,20 @@ class DecalEditor:
     decals
         What there is at first; their numbers are their rows.
 
-    Attributes
-    ----------
-    arrays
-        "decal_records", "index_levels", "index_table" and "index_ids", with spare rows at the end, as
-        `Decals.packed` and `DecalIndex` lay them out. An edit may put another array in place of a full one.
+    Where many change at once the index is laid out anew, but not before somebody asks for it.
     """
 
     def __init__(self, decals: Decals) -> None:
         _check(decals)
         self._rows = DecalRows(decals)
-        self.arrays: dict[str, NDArray[Any]] = {}
+        self._arrays: dict[str, NDArray[Any]] = {}
         self._journal = Journal()
         self._shared: dict[str, Any] = {}
         self._state, self._wp_state = _shared(np.zeros(4, np.int32), wp.int32)
         self._ranges, self._wp_ranges = _shared(np.zeros((NEIGHBOURHOOD, 2), np.int32), wp.vec2i)
         self._slots, self._wp_slots = _shared(np.zeros(NEIGHBOURHOOD, np.int32), wp.int32)
         self._put(RECORDS, _records(decals.packed(), len(decals)))
-        self._rebuild()
+        self._behind = True
 
     # -- what there is ----------------------------------------------------------------------------------
 
@@ -95,8 +91,19 @@ class DecalEditor:
         return self._rows.take(self.numbers)
 
     @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Give "decal_records", "index_levels", "index_table" and "index_ids", with spare rows at the end.
+
+        They are as `Decals.packed` and `DecalIndex` lay them out. An edit may put another array in place of
+        a full one.
+        """
+        self._catch_up()
+        return self._arrays
+
+    @property
     def level_count(self) -> int:
         """Number of levels of the index."""
+        self._catch_up()
         return len(self._level_of)
 
     @property
@@ -107,7 +114,8 @@ class DecalEditor:
     @property
     def index(self) -> DecalIndex:
         """Give the index as it is now: no copy, so the next edit changes it."""
-        return DecalIndex(self.arrays[LEVELS][: self.level_count], self.arrays[TABLE], self.arrays[IDS])
+        arrays = self.arrays
+        return DecalIndex(arrays[LEVELS][: self.level_count], arrays[TABLE], arrays[IDS])
 
     # -- edits ------------------------------------------------------------------------------------------
 
@@ -139,13 +147,11 @@ class DecalEditor:
             One of them is not there; nothing changes then.
         """
         rows = self._rows.check(numbers)
-        many = self._are_many(rows)
-        if not many:
+        self._note_many(rows)
+        if not self._behind:
             for number in rows.tolist():
                 self._take_out(number)
         self._rows.drop(rows)
-        if many:
-            self._rebuild()
 
     def put(self, numbers: ArrayLike, decals: Decals) -> None:
         """Give these numbers these decals, whether they had one before, were deleted, or are new.
@@ -157,23 +163,24 @@ class DecalEditor:
             changes then.
         """
         rows = self._checked(numbers, decals)
-        many = self._are_many(rows)
-        if not many:
+        self._note_many(rows)
+        if not self._behind:
             for number in rows[self._rows.there(rows)].tolist():
                 self._take_out(number)
         self._write_records(rows, decals)
         self._rows.put(rows, decals)
-        done = many or all(map(self._put_in, rows.tolist(), decals.ranks.tolist()))
-        if many or not done:
-            self._rebuild()
+        if not self._behind:
+            self._behind = not all(map(self._put_in, rows.tolist(), decals.ranks.tolist()))
 
     @property
     def version(self) -> int:
         """Counts the changes of arrays; see `changes`."""
+        self._catch_up()
         return self._journal.version
 
     def changes(self, since: int) -> dict[str, list[Range]]:
         """Rows of each array that changed since a version: disjoint (first, past last), ascending."""
+        self._catch_up()
         known = self._journal.since(since)
         return {name: [(0, len(array))] for name, array in self.arrays.items()} if known is None else known
 
@@ -192,9 +199,9 @@ class DecalEditor:
             raise InvalidDecals(f"expected numbers from 0 to {most - 1}, got {wrong[0]}")
         return rows
 
-    def _are_many(self, rows: NDArray[np.int64]) -> bool:
-        """Whether a new index costs less than one change after another."""
-        return len(rows) > max(FEW, len(self) // 8)
+    def _note_many(self, rows: NDArray[np.int64]) -> None:
+        """Leave the index behind where a new one costs less than one change after another."""
+        self._behind = self._behind or len(rows) > max(FEW, len(self) // 8)
 
     def _take_out(self, number: int) -> None:
         exponent = self._exponent(number)
@@ -205,9 +212,9 @@ class DecalEditor:
 
     def _write_records(self, rows: NDArray[np.int64], decals: Decals) -> None:
         count = int(rows.max(initial=-1)) + 1
-        if RECORD * count > len(self.arrays[RECORDS]):
-            self._put(RECORDS, _records(self.arrays[RECORDS], count))
-        self.arrays[RECORDS].reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
+        if RECORD * count > len(self._arrays[RECORDS]):
+            self._put(RECORDS, _records(self._arrays[RECORDS], count))
+        self._arrays[RECORDS].reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
         for first, last in _runs(rows):
             self._journal.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
 
@@ -229,7 +236,7 @@ class DecalEditor:
 
     def _widen(self, exponent: int, rank: float) -> None:
         """Make sure of a level for this size that knows of this rank."""
-        levels = self.arrays[LEVELS]
+        levels = self._arrays[LEVELS]
         level = self._level_of.get(exponent)
         if level is None:
             level = self._level_of[exponent] = len(self._level_of)
@@ -241,17 +248,20 @@ class DecalEditor:
 
     def _exponent(self, number: int) -> int:
         """As `cells.cell_exponent`, from the record."""
-        x, y, z, influence = self.arrays[RECORDS][RECORD * number].tolist()
+        x, y, z, influence = self._arrays[RECORDS][RECORD * number].tolist()
         reach = influence * REACH_WITH_SLACK
         farthest = max(abs(x), abs(y), abs(z)) + reach
         own = math.frexp(reach)[1]
         joins = self._parity != ALONE and own % 2 != self._parity
         return max(own - joins, math.frexp(farthest)[1] - FINEST)
 
-    def _rebuild(self) -> None:
-        """Lay the index out anew, with spare room."""
+    def _catch_up(self) -> None:
+        """Lay the index out anew where it was left behind, with spare room."""
+        if not self._behind:
+            return
+        self._behind = False
         numbers = self.numbers
-        records = self.arrays[RECORDS].reshape(-1, RECORD, 4)[numbers]
+        records = self._arrays[RECORDS].reshape(-1, RECORD, 4)[numbers]
         ranks = np.floor(records[:, 1, 3]).astype(np.int32)
         index = DecalIndex.build(records[:, 0, :3], records[:, 0, 3], ranks)
         levels = np.zeros((MOST_LEVELS, 4), np.float32)
@@ -273,7 +283,7 @@ class DecalEditor:
         _, self._shared[ROOMS] = _shared(rooms, wp.int32)
 
     def _put(self, name: str, array: NDArray[Any]) -> None:
-        self.arrays[name], self._shared[name] = _shared(array, _TYPES[name])
+        self._arrays[name], self._shared[name] = _shared(array, _TYPES[name])
         self._journal.add(name, (0, len(array)), new=True)
 
     def _note(self) -> None:

@@ -27,6 +27,7 @@ class LightPass:
 
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
         self.light = context.texture(size, "f2")
+        self.light.repeat_x = self.light.repeat_y = False  # it may be magnified
         self._context = context
         self._passes: dict[str, PixelPass] = {}
         self._pass(STUDIO)

@@ -21,13 +21,13 @@ class Composite:
     """
 
     def __init__(self, context: Context) -> None:
-        self._program = context.program(compose("screen.vert"), compose("composite.frag"))
-        self._array = context.gl.vertex_array(self._program, [])
+        self._context = context
+        self._arrays: dict[int, moderngl.VertexArray] = {}
 
     def draw(self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int) -> None:
         """Fill a viewport; ``samples`` texels a pixel along each axis, or 0 for any size, magnified."""
         x, y, width, height = viewport
-        state = window.GetState()
+        array, state = self._array(samples), window.GetState()
         state.Push()
         window.GetShaderCache().ReleaseCurrentShader()
         state.vtkglEnable(DEPTH_TEST)
@@ -42,14 +42,23 @@ class Composite:
         }
         for unit, (name, texture) in enumerate(textures.items()):
             texture.use(unit)
-            set_uniform(self._program, name, unit)
-        set_uniform(self._program, "samples", samples)
-        set_uniform(self._program, "corner", (float(x), float(y)))
-        set_uniform(self._program, "size", (float(width), float(height)))
-        self._array.render(vertices=3)
+            set_uniform(array.program, name, unit)
+        set_uniform(array.program, "corner", (float(x), float(y)))
+        set_uniform(array.program, "size", (float(width), float(height)))
+        array.render(vertices=3)
         state.ResetGLActiveTexture()
         state.Pop()
 
+    def _array(self, samples: int) -> moderngl.VertexArray:
+        """Give what draws with so many samples: a program for each number of them."""
+        if samples not in self._arrays:
+            fragment = compose("composite.frag", defines={"SAMPLES": samples})
+            program = self._context.program(compose("screen.vert"), fragment)
+            self._arrays[samples] = self._context.gl.vertex_array(program, [])
+        return self._arrays[samples]
+
     def release(self) -> None:
         """Give the memory back."""
-        self._array.release()
+        for array in self._arrays.values():
+            array.release()
+        self._arrays.clear()

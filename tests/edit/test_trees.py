@@ -15,7 +15,8 @@ from decals.edit import (
     primitive_paths,
 )
 from decals.edit.actions import Actions
-from decals.edit.trees import alone, following, moved, primitive_at, with_node
+from decals.edit.following import Start, following
+from decals.edit.trees import alone, moved, primitive_at, with_node
 from decals.errors import InvalidEdit, InvalidMesh
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene, TreeObject
@@ -185,6 +186,44 @@ def test_a_quick_move_is_the_same_move_without_a_surface(way):
     assert decals.packed().tobytes() == whole.document.decals.decals.packed().tobytes()
     assert tree == whole.document.objects[0].tree
     assert np.abs(tree(decals.positions) - ISO).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    "tree", [A + B, Ricci([A, B.scale(1.2)], exponent=3), A - Point((0, 0, 1.2), radius=0.6)]
+)
+@pytest.mark.parametrize("path", [(0,), (1,)])
+def test_beyond_its_reach_a_node_carries_nothing_along(tree, path):
+    """What is asked of decals near the node alone is what all would have been given, bit for bit."""
+    item, other = TreeObject("tree", tree), TreeObject("other", Point((1.5, 0.2, 0.4), radius=0.9))
+    positions = seed([item.surface, other.surface], count=300).positions
+    start = Start(((item, other), 0, path), tree, positions)
+    np.testing.assert_array_equal(start.weights, following(tree, path, positions.astype(np.float64)))
+    assert 0 < (start.weights > 0).sum() < len(positions)
+
+
+def test_a_drag_in_steps_ends_as_one_move_does():
+    other = TreeObject("other", Point((2.6, 0, 0), radius=0.5))
+    tree = TreeObject("tree", A + B)
+    decals = seed([tree.surface, other.surface], count=120)
+    scene = Scene(
+        objects=(tree, other),
+        decals=decals,
+        images=(DecalImage.load("scale"),),
+        camera=Camera.framing(tree.bounds),
+    )
+    steps, at_once = EditSession(scene), EditSession(scene)
+    for path, way in (((1,), np.array([0.2, 0.1, -0.1])), ((0,), np.array([0.0, -0.3, 0.1]))):
+        actions = Actions(steps)
+        actions.grip = 0, path
+        actions.begin_grip()
+        for share in (0.2, 1.4, 0.7, 1.0):
+            actions.move_grip(share * way)
+        actions.end_grip()
+        at_once.do(MovePrimitive(0, path, way, quick=True))
+        one, same = steps.document, at_once.document
+        assert one.decals.decals.packed().tobytes() == same.decals.decals.packed().tobytes()
+        assert one.objects[0].tree == same.objects[0].tree
+    assert len(steps.labels) == len(at_once.labels) == 2
 
 
 def test_a_path_may_be_a_list():

@@ -111,6 +111,26 @@ def test_many_edits_of_many_decals():
     check(editor, rng.normal(size=(2000, 3)).astype(np.float32))
 
 
+def test_many_changes_one_after_the_other_lay_the_index_out_once(monkeypatch):
+    rng = np.random.default_rng(4)
+    built, build = [], DecalIndex.build
+    monkeypatch.setattr(DecalIndex, "build", lambda *arrays: built.append(1) or build(*arrays))
+    editor = DecalEditor(some(rng, 400))
+    version = editor.version
+    assert len(built) == 1
+    first = editor.decals
+    editor.put(np.arange(300), some(rng, 300))
+    editor.delete(np.arange(350, 400))
+    editor.put(np.arange(400), first)
+    editor.change(7, radii=[0.3])
+    assert len(built) == 1
+    assert editor.version > version
+    assert len(built) == 2
+    assert {TABLE, IDS} <= set(editor.changes(version))
+    assert len(built) == 2
+    check(editor, rng.normal(size=(500, 3)).astype(np.float32))
+
+
 def test_changes_are_all_that_changed():
     """A copy that is kept up by the changes alone is the same as the arrays, after every edit."""
     rng = np.random.default_rng(2)
