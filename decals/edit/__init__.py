@@ -26,6 +26,7 @@ from decals.edit.places import Places, first_hit, nearest
 from decals.edit.population import Coat, Relax, Scatter
 from decals.edit.primitives import MovePrimitive, PaintPrimitive, ResizePrimitive
 from decals.edit.session import Command, EditSession
+from decals.edit.shapes import AddPrimitive, DuplicatePrimitive, Join, JoinPrimitive, RemovePrimitive
 from decals.edit.tools import Tools
 from decals.edit.trees import primitive_near, primitive_paths
 
@@ -34,6 +35,7 @@ __all__ = [
     "Add",
     "AddImage",
     "AddObject",
+    "AddPrimitive",
     "Alter",
     "Carry",
     "Change",
@@ -43,8 +45,11 @@ __all__ = [
     "Delete",
     "Document",
     "Duplicate",
+    "DuplicatePrimitive",
     "EditSession",
     "Job",
+    "Join",
+    "JoinPrimitive",
     "Look",
     "MovePrimitive",
     "PaintPrimitive",
@@ -54,6 +59,7 @@ __all__ = [
     "Relax",
     "RemoveImage",
     "RemoveObject",
+    "RemovePrimitive",
     "ResizePrimitive",
     "Rows",
     "Scale",

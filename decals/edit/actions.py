@@ -8,34 +8,25 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
 from blobtree.progress import Progress
+from decals.edit.change import Change
 from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
 from decals.edit.jobs import Job
 from decals.edit.keys import BINDINGS, CAMERA
 from decals.edit.new_decals import decal_at
-from decals.edit.pick import Pick
 from decals.edit.places import nearest
 from decals.edit.population import Relax, Scatter
-from decals.edit.primitives import MovePrimitive, PaintPrimitive, ResizePrimitive
 from decals.edit.session import Command, EditSession
-from decals.edit.trees import Path, alone, primitive_near, primitive_paths
+from decals.edit.shape_actions import TINTS, Cursor, ShapeActions, under
 from decals.errors import DecalsError, InvalidEdit
 from decals.model import LAYERS, PLAIN, Decals
 from decals.scenes.camera import Camera
-from decals.scenes.scene import TreeObject
-from decals.surfaces.surface import Floats
 
-LARGER, TURN, FAINTER, THICKER = 1.1, 7.5, 0.8, 1.05
+LARGER, TURN, FAINTER = 1.1, 7.5, 0.8
 """What one step of the wheel or a key does: factors, and degrees."""
 
-TINTS = ((1.0, 1.0, 1.0), (0.95, 0.45, 0.35), (0.95, 0.8, 0.35), (0.5, 0.85, 0.5), (0.4, 0.6, 0.95))
-"""sRGB tints to go through."""
 
-Cursor = Callable[[], Pick | None]
-"""Says what is under the cursor, when somebody asks."""
-
-
-class Actions:
-    """Selection, and one method for each action of the table.
+class Actions(ShapeActions):
+    """Selection, and one method for each action of the table; those on shapes stand in `ShapeActions`.
 
     Parameters
     ----------
@@ -48,14 +39,8 @@ class Actions:
 
     Attributes
     ----------
-    selection
-        Numbers of the selected decals, in the order in which they were selected.
-    message
-        What happened last, in plain words.
     help
         Whether the help is wanted.
-    grip
-        Object and path of the primitive that is held, if any.
     camera
         Gives the camera to save with the scene; None for the document's.
     interrupt
@@ -71,18 +56,15 @@ class Actions:
         path: str | PathLike[str] | None = None,
         run: Callable[[Job], None] | None = None,
     ) -> None:
-        self.session, self.path = session, path
-        self.selection: tuple[int, ...] = ()
-        self.message = ""
+        super().__init__(session)
+        self.path = path
         self.help = False
-        self.grip: tuple[int, Path] | None = None
         self.camera: Callable[[], Camera | None] = lambda: None
         self.interrupt: Callable[[], None] = lambda: None
-        self._grip_offset: Floats = np.zeros(3, np.float32)
         self._run = run or self._do_at_once
         self._coats = 0
         self._series: tuple[str, object] | None = None
-        self.release = session.listen(lambda _change: self._forget_gone())
+        self.release = session.listen(self._forget_gone)
 
     # -- doing ------------------------------------------------------------------------------------------
 
@@ -114,24 +96,13 @@ class Actions:
         self.session.end()
         self._series = None
 
-    def _do(self, command: Command) -> None:
-        self.session.do(command)
-        self.message = command.label
-
     def _do_at_once(self, job: Job) -> None:
         self._do(job.work(lambda _stage, _fraction: None, lambda: False))
 
-    def _forget_gone(self) -> None:
-        if self.grip is not None and not self._holds(*self.grip):
-            self.grip = None
+    def _forget_gone(self, change: Change) -> None:
+        self._loosen(change)
         there = self.session.document.decals.has(np.array(self.selection, np.int64))
         self.selection = tuple(n for n, stays in zip(self.selection, there, strict=True) if stays)
-
-    def _holds(self, number: int, path: Path) -> bool:
-        """Whether there is a primitive to hold."""
-        objects = self.session.document.objects
-        item = objects[number] if number < len(objects) else None
-        return isinstance(item, TreeObject) and path in primitive_paths(item.tree)
 
     def _chosen(self) -> tuple[Decals, np.ndarray]:
         if not self.selection:
@@ -169,18 +140,29 @@ class Actions:
     # -- decals -----------------------------------------------------------------------------------------
 
     def _place(self, cursor: Cursor) -> None:
-        found = _surface(cursor)
+        found = under(cursor)
         model = self.selection[-1] if self.selection else None
         self._do(Add(decal_at(self.session.document, found.position, found.normal, model)))
         self.selection = (self.session.document.decals.next_number - 1,)
 
     def _duplicate(self, _cursor: Cursor) -> None:
+        if self._means_held:
+            self._duplicate_held()
+            return
         first = self.session.document.decals.next_number
         self._do(Duplicate(self._chosen()[1]))
         self.selection = tuple(range(first, self.session.document.decals.next_number))
 
     def _delete(self, _cursor: Cursor) -> None:
-        self._do(Delete(self._chosen()[1]))
+        if self._means_held:
+            self._delete_held()
+        else:
+            self._do(Delete(self._chosen()[1]))
+
+    @property
+    def _means_held(self) -> bool:
+        """Whether a primitive is meant, as no decal is selected."""
+        return self.grip is not None and not self.selection
 
     def _larger(self, _cursor: Cursor) -> None:
         self._do(Scale(self._chosen()[1], LARGER))
@@ -226,10 +208,10 @@ class Actions:
     # -- many -------------------------------------------------------------------------------------------
 
     def _relax(self, cursor: Cursor) -> None:
-        self._do(Relax(_surface(cursor).position))
+        self._do(Relax(under(cursor).position))
 
     def _scatter(self, cursor: Cursor) -> None:
-        document, number = self.session.document, _surface(cursor).object
+        document, number = self.session.document, under(cursor).object
         self._coats += 1
         seed, objects, images = self._coats, document.objects, len(document.images)
         positions = document.decals.decals.positions
@@ -239,75 +221,6 @@ class Actions:
             return Scatter((number,), count, seed).coat(objects, images, progress=tell, cancel=stop)
 
         self._run(Job("scatter", work))
-
-    # -- primitives -------------------------------------------------------------------------------------
-
-    def _grip(self, cursor: Cursor) -> None:
-        if self.grip:
-            self.grip, self.message = None, "let go"
-            return
-        found = _surface(cursor)
-        self.grip = self._primitive(lambda: found)
-        self._grip_offset = found.position - self._grip_middle
-        self.message = "drag the blue ball to move the primitive, m to let go"
-
-    def _thicker(self, cursor: Cursor, factor: float = THICKER) -> None:
-        self._do(ResizePrimitive(*self._primitive(cursor), factor))
-
-    def _thinner(self, cursor: Cursor) -> None:
-        self._thicker(cursor, 1.0 / THICKER)
-
-    def _next_color(self, cursor: Cursor) -> None:
-        number, path = self._primitive(cursor)
-        self._coats += 1
-        self._do(PaintPrimitive(number, path, TINTS[self._coats % len(TINTS)]))
-
-    def _primitive(self, cursor: Cursor) -> tuple[int, Path]:
-        if self.grip is not None:
-            return self.grip
-        found = _surface(cursor)
-        item = self.session.document.objects[found.object]
-        if not isinstance(item, TreeObject):
-            raise InvalidEdit(f"{item.name!r} is a mesh and has no primitives; point at a BlobTree")
-        return found.object, primitive_near(item.tree, found.position)
-
-    @property
-    def grip_center(self) -> Floats:
-        """Where the primitive is held, ``float32[3]``: on the surface, where the cursor was at first."""
-        assert self.grip is not None
-        surface = self.session.document.objects[self.grip[0]].surface
-        position: Floats = surface.project((self._grip_middle + self._grip_offset)[None])[0][0]
-        return position
-
-    @property
-    def _grip_middle(self) -> Floats:
-        """Middle of the box of the held primitive: it goes where the primitive goes."""
-        assert self.grip is not None
-        item = self.session.document.objects[self.grip[0]]
-        assert isinstance(item, TreeObject)
-        low, high = alone(item.tree, self.grip[1]).bounds
-        return np.asarray((low + high) / 2)
-
-    def begin_grip(self) -> None:
-        """Begin to move the held primitive."""
-        self.settle()
-        self.session.begin("move a primitive")
-
-    def move_grip(self, offset: ArrayLike) -> None:
-        """Move the held primitive by an offset from where it was at first."""
-        if self.grip is not None:
-            self.session.take_back()
-            self.attempt(MovePrimitive(*self.grip, offset, quick=True))
-
-    def end_grip(self) -> None:
-        """Let go of the held primitive; where nothing is left to lay decals on, it goes back."""
-        try:
-            if self.grip is not None:
-                self.session.document.objects[self.grip[0]].surface  # noqa: B018  (asking may fail)
-        except (DecalsError, BlobTreeError) as error:
-            self.session.cancel()
-            self.message = str(error)
-        self.settle()
 
     # -- the scene --------------------------------------------------------------------------------------
 
@@ -327,13 +240,6 @@ class Actions:
 
     def _help(self, _cursor: Cursor) -> None:
         self.help = not self.help
-
-
-def _surface(cursor: Cursor) -> Pick:
-    found = cursor()
-    if found is None:
-        raise InvalidEdit("point at a surface")
-    return found
 
 
 _TEXTS = {binding.action: binding.text for binding in BINDINGS if binding.action != CAMERA}

@@ -39,8 +39,10 @@ BINDINGS = (
     Binding("let_go", ("Escape",), "select none; take a drag back; stop long work", Group.DECALS),
     Binding("move", ("Drag",), "on a selected decal: move what is selected over the surfaces", Group.DECALS),
     Binding("place", ("Ctrl+Click", "a"), "a new decal under the cursor", Group.DECALS),
-    Binding("duplicate", ("d",), "duplicate", Group.DECALS),
-    Binding("delete", ("Delete", "BackSpace"), "delete", Group.DECALS),
+    Binding("duplicate", ("d",), "duplicate what is selected, or else the held primitive", Group.DECALS),
+    Binding(
+        "delete", ("Delete", "BackSpace"), "delete what is selected, or else the held primitive", Group.DECALS
+    ),
     Binding("larger", ("Ctrl+WheelUp", "plus", "equal", "KP_Add"), "larger", Group.DECALS),
     Binding("smaller", ("Ctrl+WheelDown", "minus", "KP_Subtract"), "smaller", Group.DECALS),
     Binding("turn_left", ("Shift+WheelUp", "comma"), "turn counter-clockwise", Group.DECALS),
@@ -61,6 +63,25 @@ BINDINGS = (
     ),
     Binding("thinner", ("bracketleft",), "the same primitive thinner", Group.SHAPE),
     Binding("next_color", ("c",), "next colour for the same primitive", Group.SHAPE),
+    Binding(
+        "next_join",
+        ("j",),
+        "next way to join: blend, soft, union, intersection, difference",
+        Group.SHAPE,
+    ),
+    Binding(
+        "new_ball", ("n",), "a ball blended into the tree under the cursor; it is held then", Group.SHAPE
+    ),
+    Binding("new_limb", ("l",), "the same with a limb that stands out", Group.SHAPE),
+    Binding(
+        "new_object",
+        ("Shift+n",),
+        "a ball as a new object, under the cursor or where you look",
+        Group.SHAPE,
+    ),
+    Binding(
+        "remove_object", ("Shift+Delete",), "the object under the cursor goes, with its decals", Group.SHAPE
+    ),
     Binding("undo", ("Ctrl+z",), "undo", Group.SCENE),
     Binding("redo", ("Ctrl+y", "Ctrl+Shift+z"), "redo", Group.SCENE),
     Binding("save", ("Ctrl+s",), "save", Group.SCENE),

@@ -11,7 +11,7 @@ from blobtree.nodes.primitives import Primitive
 from blobtree.nodes.tree import Combination, Transform
 from decals.checks import instance, shown, triple
 from decals.errors import InvalidEdit
-from decals.surfaces.surface import as_points
+from decals.surfaces.surface import Floats, as_points
 
 Path = tuple[int, ...]
 """Which child to take, from the root down."""
@@ -35,7 +35,7 @@ def primitive_paths(tree: Node) -> list[Path]:
     return found
 
 
-def _down(tree: Node, path: Path) -> Iterator[Node]:
+def down(tree: Node, path: Path) -> Iterator[Node]:
     """Nodes from the root to the one that a path leads to."""
     node = tree
     yield node
@@ -50,7 +50,7 @@ def _down(tree: Node, path: Path) -> Iterator[Node]:
 
 def node_at(tree: Node, path: Path) -> Node:
     """Give the node that a path leads to, or `InvalidEdit`."""
-    *_, node = _down(tree, path)
+    *_, node = down(tree, path)
     return node
 
 
@@ -74,14 +74,18 @@ def to_primitive(tree: Node, path: Path) -> Path:
 def primitive_near(tree: Node, point: ArrayLike) -> Path:
     """Path of the primitive whose field is the highest at a point; the first of equals."""
     place = as_points(triple("point", point, InvalidEdit)[None])
+    return max(primitives_around(tree, place), key=lambda path: float(alone(tree, path)(place)[0]))
+
+
+def primitives_around(tree: Node, place: Floats) -> list[Path]:
+    """Paths of the primitives whose boxes hold a place ``float32[1, 3]``, or of all where none does."""
     paths = primitive_paths(tree)
-    near = [path for path in paths if within(place, alone(tree, path))[0]] or paths
-    return max(near, key=lambda path: float(alone(tree, path)(place)[0]))
+    return [path for path in paths if within(place, alone(tree, path))[0]] or paths
 
 
 def with_node(tree: Node, path: Path, node: Node) -> Node:
     """Give the tree with another node at the end of a path."""
-    above = list(_down(tree, path))[:-1]
+    above = list(down(tree, path))[:-1]
     for parent, step in zip(reversed(above), reversed(path), strict=True):
         node = _with_child(parent, step, node)
     return node
@@ -104,7 +108,7 @@ def _with_child(parent: Node, step: int, child: Node) -> Node:
 
 def alone(tree: Node, path: Path) -> Node:
     """Give the node at a path as it lies in the world, without what it is combined with."""
-    nodes = list(_down(tree, path))
+    nodes = list(down(tree, path))
     result = nodes[-1]
     for parent, step in zip(reversed(nodes[:-1]), reversed(path), strict=True):
         if not isinstance(parent, Combination):
@@ -130,7 +134,7 @@ def world_matrix(tree: Node, path: Path) -> Doubles:
         The primitive lies below a warp, where that differs from place to place.
     """
     matrix = np.eye(3)
-    for node in list(_down(tree, path))[:-1]:
+    for node in list(down(tree, path))[:-1]:
         if isinstance(node, Transform):
             matrix = matrix @ np.asarray(node.matrix, np.float64)[:3, :3]
         elif hasattr(node, "warp"):

@@ -13,10 +13,9 @@ from decals.edit.actions import Actions
 from decals.edit.document import Document
 from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
-from decals.edit.tools import Ray, Tools
+from decals.edit.tools import Tools
 from decals.errors import DecalsError, InvalidEdit, InvalidScene
 from decals.render.libraries import require_gl
-from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.surfaces.surface import Floats
 from decals.vtk.settings import MOST_SAMPLES
@@ -30,6 +29,7 @@ from decals.window.home import (
     new_plotter,
     require_screen,
 )
+from decals.window.looking import camera_of, ray_through, view_of
 from decals.window.marks import Marks
 from decals.window.quality import Quality
 from decals.window.weak import weakly
@@ -104,8 +104,9 @@ class EditWindow:
         self.samples, self._closed = samples, False
         self.worker, self.quality = Worker(), Quality()
         self.actions = Actions(self.session, path=path, run=self._start)
-        self.actions.camera, self.actions.interrupt = self._camera, self.worker.cancel
-        self.tools = Tools(self.actions, self._ray, self._hidden)
+        self.actions.camera, self.actions.interrupt = lambda: camera_of(self.stage), self.worker.cancel
+        self.actions.view = lambda: view_of(self.stage)
+        self.tools = Tools(self.actions, lambda x, y: ray_through(self.stage, x, y), self._hidden)
         self._open_stage()
         self.marks = Marks(self.plotter)
         self.grip = Grip(self.stage.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole))
@@ -241,16 +242,6 @@ class EditWindow:
             self.actions.attempt(command)
             self.redraw(whole=True)
 
-    def _ray(self, x: float, y: float) -> Ray | None:
-        """The ray through the middle of a pixel."""
-        renderer = self.stage.vtk_renderer
-        (left, low), (width, height) = renderer.GetOrigin(), renderer.GetSize()
-        x, y = x - left + 0.5, y - low + 0.5
-        if not (0 <= x <= width and 0 <= y <= height):
-            return None
-        rays = self.stage.viewpoint().rays(width, height)
-        return rays.origins(x, y), rays.directions(x, y)
-
     def elsewhere(self, x: int, y: int) -> bool:
         """Whether a place is in a subplot of the same plotter that another window edits."""
         return any(
@@ -261,13 +252,6 @@ class EditWindow:
     def _hidden(self, x: float, y: float, position: Floats) -> bool:
         """Whether an actor that was added to the plotter hides a point of a surface."""
         return bool(self.stage.hidden(int(x), int(y), position))
-
-    def _camera(self) -> Camera | None:
-        """The camera to save: VTK's, if it is one of ours."""
-        view = self.stage.vtk_renderer.camera
-        if view.parallel_projection:
-            return None
-        return Camera(tuple(view.position), tuple(view.focal_point), tuple(view.up), view.view_angle)
 
     # -- opening and closing ----------------------------------------------------------------------------
 

@@ -2,22 +2,28 @@
 
 import numpy as np
 
+from blobtree import Point
 from decals.edit import (
     Add,
     AddImage,
     AddObject,
+    AddPrimitive,
     Alter,
     Carry,
     ChangeImage,
     Coat,
     Delete,
     Duplicate,
+    DuplicatePrimitive,
+    Join,
+    JoinPrimitive,
     Look,
     MovePrimitive,
     PaintPrimitive,
     Relax,
     RemoveImage,
     RemoveObject,
+    RemovePrimitive,
     ResizePrimitive,
     Scale,
     Turn,
@@ -45,7 +51,7 @@ class Monkey:
         self.makers = (
             self.add, self.delete, self.alter, self.scale, self.turn, self.carry, self.duplicate,
             self.add_image, self.change_image, self.remove_image, self.look, self.primitive,
-            self.primitive, self.relax, self.scatter, self.add_object, self.remove_object,
+            self.primitive, self.shape, self.relax, self.scatter, self.add_object, self.remove_object,
         )  # fmt: skip
 
     def command(self):
@@ -113,12 +119,30 @@ class Monkey:
     def look(self):
         return Look(Camera(tuple(self.rng.normal(size=3) + 5)))
 
-    def primitive(self):
+    def path(self):
+        """Of a primitive, and how many its tree has."""
         number = int(self.rng.integers(len(self.document.objects) + 1))
         paths = [(0, 9)]
         if number < len(self.document.objects) and isinstance(self.document.objects[number], TreeObject):
             paths = primitive_paths(self.document.objects[number].tree)
-        path = paths[self.rng.integers(len(paths))]
+        return number, paths[self.rng.integers(len(paths))], len(paths)
+
+    def shape(self):
+        number, path, count = self.path()
+        kind = self.rng.integers(2, 4) if count > 6 else self.rng.integers(4)
+        if kind == 0:
+            ball = Point(self.place()[0], radius=float(self.rng.uniform(0.2, 0.5)))
+            return AddPrimitive(number, path, ball, list(Join)[self.rng.integers(5)])
+        if kind == 1:
+            return DuplicatePrimitive(number, path, self.rng.normal(0, 0.5, 3))
+        if kind == 2:
+            return JoinPrimitive(
+                number, path, "weld" if self.nonsense() else list(Join)[self.rng.integers(5)]
+            )
+        return RemovePrimitive(number, path)
+
+    def primitive(self):
+        number, path, _ = self.path()
         kind = self.rng.integers(3)
         if kind == 0:
             return PaintPrimitive(number, path, self.rng.uniform(0, 1.05, 3))

@@ -4,10 +4,12 @@ from itertools import islice
 
 import pyvista as pv
 
+from decals.window.looking import ray_through
+
 
 def test_what_an_actor_hides_is_neither_picked_nor_gone_to(driver):
     (number, at), (other, there) = islice(driver.visible(), 2)
-    ray = driver.window._ray(*there)
+    ray = ray_through(driver.window.stage, *there)
     ball = pv.Sphere(radius=0.12, center=ray[0] + 0.5 * (driver.document.decals[other].positions[0] - ray[0]))
     driver.plotter.add_mesh(ball, reset_camera=False, name="ball")
     driver.shot()
