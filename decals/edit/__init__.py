@@ -4,6 +4,7 @@ No graphics and no window are needed here; `decals.window` brings both.
 """
 
 from decals.edit.actions import Actions
+from decals.edit.background import Background
 from decals.edit.change import Change, Parts, Rows
 from decals.edit.commands import (
     Add,
@@ -37,6 +38,7 @@ __all__ = [
     "AddObject",
     "AddPrimitive",
     "Alter",
+    "Background",
     "Carry",
     "Change",
     "ChangeImage",

@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
 from blobtree.progress import Progress
+from decals.edit.background import Background, are_many, doing, takes_long
 from decals.edit.change import Change
 from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
-from decals.edit.jobs import Job
 from decals.edit.keys import BINDINGS, CAMERA
 from decals.edit.new_decals import decal_at
 from decals.edit.places import nearest
 from decals.edit.population import Relax, Scatter
-from decals.edit.session import Command, EditSession
+from decals.edit.session import Command, Done, EditSession
 from decals.edit.shape_actions import TINTS, Cursor, ShapeActions, under
 from decals.errors import DecalsError, InvalidEdit
 from decals.model import LAYERS, PLAIN, Decals
@@ -34,8 +34,8 @@ class Actions(ShapeActions):
         What is edited.
     path
         Where to save.
-    run
-        Takes long work; without it, it is done at once.
+    threaded
+        Whether what takes long goes on in a thread; then somebody calls ``background.look`` now and then.
 
     Attributes
     ----------
@@ -43,8 +43,8 @@ class Actions(ShapeActions):
         Whether the help is wanted.
     camera
         Gives the camera to save with the scene; None for the document's.
-    interrupt
-        Stops long work.
+    background
+        What takes long.
     release
         Lets go of the session, which may outlive this.
     """
@@ -54,16 +54,16 @@ class Actions(ShapeActions):
         session: EditSession,
         *,
         path: str | PathLike[str] | None = None,
-        run: Callable[[Job], None] | None = None,
+        threaded: bool = False,
     ) -> None:
         super().__init__(session)
         self.path = path
         self.help = False
         self.camera: Callable[[], Camera | None] = lambda: None
-        self.interrupt: Callable[[], None] = lambda: None
-        self._run = run or self._do_at_once
+        self.background = Background(session, self._say, self.settle, threaded=threaded)
         self._coats = 0
         self._series: tuple[str, object] | None = None
+        self._stroke = object()
         self.release = session.listen(self._forget_gone)
 
     # -- doing ------------------------------------------------------------------------------------------
@@ -72,6 +72,7 @@ class Actions(ShapeActions):
         """Carry out an action; what cannot be done is said in `message`, and nothing changes."""
         series = (action, self.selection) if action in _SERIES else None
         if series != self._series:
+            self._stroke = object()
             self.session.end()
         try:
             if series is not None and series != self._series:
@@ -82,22 +83,40 @@ class Actions(ShapeActions):
         self._series = series
 
     def attempt(self, command: Command) -> bool:
-        """Do a command; what cannot be done is said in `message`."""
+        """Do a command, as hands ask for again and again; what cannot be done is said in `message`."""
         try:
-            self.session.do(command)
+            if takes_long(command):
+                self.background.follow(command.label, doing(command))
+            else:
+                self._do(command)
         except (DecalsError, BlobTreeError) as error:
             self.message = str(error)
             return False
-        self.message = command.label
         return True
 
     def settle(self) -> None:
         """End what goes on: the next action is an entry of its own."""
-        self.session.end()
-        self._series = None
+        self._series, self._stroke = None, object()
+        stroke = self._stroke
+        self.background.afterwards(lambda: self._end(stroke))
 
-    def _do_at_once(self, job: Job) -> None:
-        self._do(job.work(lambda _stage, _fraction: None, lambda: False))
+    def _end(self, stroke: object) -> None:
+        """End a stroke, unless it has ended and another one goes on."""
+        if stroke is self._stroke:
+            self.session.end()
+
+    def _say(self, text: str) -> None:
+        self.message = text
+
+    def _do(self, command: Command, done: Callable[[], None] | None = None) -> None:
+        """Do a command, in the background if it takes long; then what goes with it."""
+        if takes_long(command):
+            self.background.edit(command.label, doing(command), done)
+            return
+        self.session.do(command)
+        self.message = command.label
+        if done is not None:
+            done()
 
     def _forget_gone(self, change: Change) -> None:
         self._loosen(change)
@@ -133,9 +152,9 @@ class Actions(ShapeActions):
         self.message = f"{len(self.selection)} decals"
 
     def _let_go(self, _cursor: Cursor) -> None:
-        self.interrupt()
-        self.session.cancel()
         self.selection, self.message = (), ""
+        self.background.cancel()
+        self.session.cancel()
 
     # -- decals -----------------------------------------------------------------------------------------
 
@@ -149,9 +168,13 @@ class Actions(ShapeActions):
         if self._means_held:
             self._duplicate_held()
             return
-        first = self.session.document.decals.next_number
-        self._do(Duplicate(self._chosen()[1]))
-        self.selection = tuple(range(first, self.session.document.decals.next_number))
+        count = len(self.selection)
+
+        def select() -> None:
+            end = self.session.document.decals.next_number
+            self.selection = tuple(range(end - count, end))
+
+        self._do(Duplicate(self._chosen()[1]), select)
 
     def _delete(self, _cursor: Cursor) -> None:
         if self._means_held:
@@ -220,26 +243,45 @@ class Actions(ShapeActions):
             count = int((nearest(objects, positions).objects == number).sum())
             return Scatter((number,), count, seed).coat(objects, images, progress=tell, cancel=stop)
 
-        self._run(Job("scatter", work))
+        self.background.make("scatter", work)
 
     # -- the scene --------------------------------------------------------------------------------------
 
     def _undo(self, _cursor: Cursor) -> None:
-        label = self.session.undo()
-        self.message = "nothing to undo" if label is None else f"undid: {label}"
+        self._step_back(self.session.next_undo, "undo", _undone)
 
     def _redo(self, _cursor: Cursor) -> None:
-        label = self.session.redo()
-        self.message = "nothing to redo" if label is None else f"did again: {label}"
+        self._step_back(self.session.next_redo, "redo", _done_again)
+
+    def _step_back(self, entry: Done | None, name: str, step: Callable[[EditSession, Done], str]) -> None:
+        """Go back or forth by an entry of the stack, in the background if it is a large one."""
+        self.background.wait(making=False)
+        if entry is None:
+            self.message = f"nothing to {name}"
+        elif are_many(entry.change.after.numbers):
+            self.background.edit(name, lambda session: step(session, entry))
+        else:
+            self.message = step(self.session, entry)
 
     def _save(self, _cursor: Cursor) -> None:
         if self.path is None:
             raise InvalidEdit("nowhere to save to; name a file when you open the window")
-        self.session.save(self.path, camera=self.camera())
-        self.message = f"saved to {self.path}"
+        self.background.save(self.path, self.camera())
 
     def _help(self, _cursor: Cursor) -> None:
         self.help = not self.help
+
+
+def _undone(session: EditSession, entry: Done) -> str:
+    if session.next_undo is not entry:
+        raise InvalidEdit("something else was done meanwhile; undo again")
+    return f"undid: {session.undo()}"
+
+
+def _done_again(session: EditSession, entry: Done) -> str:
+    if session.next_redo is not entry:
+        raise InvalidEdit("something else was done meanwhile; there is nothing to redo")
+    return f"did again: {session.redo()}"
 
 
 _TEXTS = {binding.action: binding.text for binding in BINDINGS if binding.action != CAMERA}

@@ -1,16 +1,20 @@
 """What is being edited: the one owner of objects, decals, images and camera."""
 
-from typing import Any
+from contextlib import suppress
+from typing import Any, Self
 
 import numpy as np
 
 from decals.checks import instance, whole
 from decals.edit.change import NOTHING, Change, Numbers, Parts, Rows
-from decals.errors import InvalidEdit, InvalidScene
+from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.grid.editor import DecalEditor
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene, SceneObject
+
+NOWHERE = np.zeros((1, 3), np.float32)
+"""Any point: what is asked about it for the first time is made then."""
 
 
 class Document:
@@ -48,6 +52,25 @@ class Document:
     def scene(self) -> Scene:
         """A copy that stays as it is; decals are in the order of their numbers."""
         return Scene(objects=self.objects, images=self.images, camera=self.camera, decals=self.decals.decals)
+
+    def fork(self) -> Self:
+        """Give the same document again, to be changed on its own; objects and images are shared."""
+        made = type(self).__new__(type(self))
+        made._objects, made._images, made._camera = self._objects, self._images, self._camera
+        made._decals = self._decals.copy()
+        return made
+
+    def prepare(self) -> None:
+        """Lay out the index and find the surfaces, for which who asks for them first would wait."""
+        self._decals.index  # noqa: B018  (it is laid out where it is asked for)
+        for item in self._objects:
+            with suppress(InvalidMesh):  # a tree that shows nothing
+                item.surface.project(NOWHERE)
+
+    def adopt(self, other: "Document") -> None:
+        """Become another document, which nobody may use any more; renderers go on with this one."""
+        self._objects, self._images, self._camera = other._objects, other._images, other._camera
+        self._decals.adopt(other._decals)
 
     def object(self, number: int) -> SceneObject:
         """Give an object by its number, or `InvalidEdit`."""

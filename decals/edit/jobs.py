@@ -1,19 +1,21 @@
-"""Long work beside the window: one job at a time, with progress, and a way to stop it."""
+"""Long work beside the window: a thread that does one job at a time, with progress, and a way to stop it."""
 
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from blobtree.progress import Progress
-from decals.edit.session import Command
+from blobtree.progress import Cancel, Progress
 
-Work = Callable[[Progress, Callable[[], bool]], Command]
-"""Given where to tell progress and whom to ask whether to stop, makes a command that is quick."""
+Outcome = Callable[[], "Job | None"]
+"""Carries out, in the thread of the window, what a job came to; it may give a job to go on with."""
+
+Work = Callable[[Progress, Cancel], Outcome]
+"""Given where to tell progress and whom to ask whether to stop, does what takes long."""
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Work that takes long; it reads immutable things only, and what it makes is carried out afterwards."""
+    """Work that takes long. It changes nothing that others see: its outcome is carried out afterwards."""
 
     label: str
     work: Work
@@ -22,20 +24,31 @@ class Job:
 class Worker:
     """Does one job at a time in a thread of its own.
 
-    Nothing is changed from that thread: who owns the document asks `take` for the command now and then.
+    Nothing that others see is changed from that thread: who owns it asks `take` for the outcome now and then.
+
+    Parameters
+    ----------
+    lasting
+        Whether Python waits for the thread before it ends.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, lasting: bool = False) -> None:
+        self._lasting = lasting
         self._thread: threading.Thread | None = None
         self._cancelled = threading.Event()
         self._label, self._stage, self._fraction = "", "", 0.0
-        self._result: Command | None = None
+        self._outcome: Outcome | None = None
         self._error: Exception | None = None
 
     @property
     def busy(self) -> bool:
-        """Whether there is a job whose result nobody took."""
+        """Whether there is a job whose outcome nobody took."""
         return self._thread is not None
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the job was asked to stop, and nobody took note yet that it did."""
+        return self.busy and self._cancelled.is_set()
 
     @property
     def progress(self) -> tuple[str, float]:
@@ -48,32 +61,41 @@ class Worker:
             return False
         self._cancelled.clear()
         self._label, self._stage, self._fraction = job.label, "", 0.0
-        self._result = self._error = None
-        self._thread = threading.Thread(target=self._run, args=(job,), name=job.label, daemon=True)
+        self._outcome = self._error = None
+        self._thread = threading.Thread(
+            target=self._run, args=(job,), name=job.label, daemon=not self._lasting
+        )
         self._thread.start()
         return True
 
     def _run(self, job: Job) -> None:
         try:
-            self._result = job.work(self._tell, self._cancelled.is_set)
-        except Exception as error:  # it is raised where the result is asked for
+            self._outcome = job.work(self._tell, self._cancelled.is_set)
+        except Exception as error:  # it is raised where the outcome is asked for
             self._error = error
 
     def _tell(self, stage: str, fraction: float) -> None:
         self._stage, self._fraction = stage, fraction
 
     def cancel(self) -> None:
-        """Ask the job to stop; what it would have made is dropped."""
+        """Ask the job to stop; what it would have come to is dropped."""
         self._cancelled.set()
 
-    def take(self, timeout: float = 0.0) -> Command | None:
-        """Give the job's command once it is done, else None; raises what the job raised."""
+    def take(self, timeout: float | None = 0.0) -> Outcome | None:
+        """Give the job's outcome once it is done, else None; raises what the job raised.
+
+        Waits for at most so many seconds, without a limit for None.
+        """
         if self._thread is None:
             return None
         self._thread.join(timeout)
         if self._thread.is_alive():
             return None
         self._thread = None
-        if self._error is not None and not self._cancelled.is_set():
-            raise self._error
-        return None if self._cancelled.is_set() else self._result
+        outcome, error = self._outcome, self._error
+        self._outcome = self._error = None
+        if self._cancelled.is_set():
+            return None
+        if error is not None:
+            raise error
+        return outcome

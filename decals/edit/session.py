@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from blobtree.progress import Progress
 from decals.checks import shown
 from decals.edit.change import Change
 from decals.edit.document import Document
@@ -54,6 +55,7 @@ class EditSession:
         self._stroke: Done | None = None
         self._saved: Done | None = None
         self._listeners: list[Callable[[Change], None]] = []
+        self._age = 0
 
     # -- doing ------------------------------------------------------------------------------------------
 
@@ -67,6 +69,7 @@ class EditSession:
     def _carry_out(self, label: str, change: Change) -> Change:
         if change.empty:
             return change
+        self._age += 1
         self.document.put(change.after, change.parts_after)
         self._undone.clear()
         if self._stroke is None:
@@ -91,6 +94,7 @@ class EditSession:
         self.end()
         if not self._undone:
             return None
+        self._age += 1
         entry = self._undone.pop()
         self._done.append(entry)
         self.document.put(entry.change.after, entry.change.parts_after)
@@ -98,8 +102,19 @@ class EditSession:
         return entry.label
 
     def _revert(self, change: Change) -> None:
+        self._age += 1
         self.document.put(change.before, change.parts_before)
         self._tell(change)
+
+    @property
+    def next_undo(self) -> Done | None:
+        """What `undo` would take back."""
+        return self._done[-1] if self._done else None
+
+    @property
+    def next_redo(self) -> Done | None:
+        """What `redo` would do again."""
+        return self._undone[-1] if self._undone else None
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -111,11 +126,13 @@ class EditSession:
     def begin(self, label: str) -> None:
         """Let all that follows be one entry, until `end`."""
         self.end()
+        self._age += 1
         self._stroke = Done(label, Change())
 
     def end(self) -> None:
         """End a stroke; one that did nothing leaves no entry."""
         stroke, self._stroke = self._stroke, None
+        self._age += stroke is not None
         if stroke is not None and not stroke.change.empty:
             self._done.append(stroke)
 
@@ -128,6 +145,7 @@ class EditSession:
     def cancel(self) -> None:
         """Go back to where the open stroke began, and forget it."""
         self.take_back()
+        self._age += self._stroke is not None
         self._stroke = None
 
     @contextmanager
@@ -140,6 +158,30 @@ class EditSession:
             self.cancel()
             raise
         self.end()
+
+    # -- elsewhere --------------------------------------------------------------------------------------
+
+    def fork(self) -> "Fork":
+        """Give a session that is where this one is, for any thread to go on with.
+
+        What is done there is seen here once this one adopts it, at once however much it is.
+        """
+        return Fork(self)
+
+    def adopt(self, fork: "Fork") -> bool:
+        """Go on where a fork of this session is; nobody may use the fork any more.
+
+        False where something was done here since it was made: nothing happens then, and what was done to that
+        fork can be done to another.
+        """
+        if (fork.origin, fork.origin_age) != (self, self._age):
+            return False
+        self.document.adopt(fork.document)
+        self._done, self._undone, self._stroke = fork._done, fork._undone, fork._stroke
+        self._age += 1
+        for change in fork.heard:
+            self._tell(change)
+        return True
 
     # -- around it --------------------------------------------------------------------------------------
 
@@ -163,17 +205,61 @@ class EditSession:
     @property
     def modified(self) -> bool:
         """Whether there is something that was not saved."""
-        return self._stroke is not None or self._last is not self._saved
-
-    @property
-    def _last(self) -> Done | None:
-        return self._done[-1] if self._done else None
+        return self._stroke is not None or self.next_undo is not self._saved
 
     def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
         """Write the scene to a file, whole or not at all (`decals.save_scene`), with a camera if given."""
+        self.saving(path, camera=camera).write()()
+
+    def saving(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> "Saving":
+        """Give what writes the scene as it is now, whatever is done to it meanwhile."""
         named = isinstance(path, str | os.PathLike) and os.fspath(path)
         if not named or "\0" in str(path):
             raise InvalidEdit(f"expected a path to save to, got {shown(path)}")
         self.end()
-        save_scene(self.document.scene.replace(camera=camera), path)
-        self._saved = self._last
+        return Saving(self, path, camera)
+
+
+class Fork(EditSession):
+    """A session that begins where another one is.
+
+    Attributes
+    ----------
+    origin, origin_age
+        The other one, and how often it had changed.
+    heard
+        The changes since then.
+    """
+
+    def __init__(self, origin: EditSession) -> None:
+        self.origin, self.origin_age = origin, origin._age
+        self.heard: list[Change] = []
+        self.document = origin.document.fork()
+        self._done, self._undone, self._stroke = [*origin._done], [*origin._undone], origin._stroke
+        self._saved, self._age = origin._saved, origin._age
+        self._listeners = [self.heard.append]
+
+
+class Saving:
+    """Writes what a session held when this was made; any thread may do it.
+
+    Parameters
+    ----------
+    session
+        What is told, in the end, what of it was saved.
+    path, camera
+        The file, and the camera to put into it; None for the document's.
+    """
+
+    def __init__(self, session: EditSession, path: str | os.PathLike[str], camera: Camera | None) -> None:
+        self._session, self._path, self._camera = session, path, camera
+        self._document, self._last = session.document.fork(), session.next_undo
+
+    def write(self, progress: Progress | None = None) -> Callable[[], None]:
+        """Write the file; what comes back is to be called where the session is, and lets it know."""
+        save_scene(self._document.scene.replace(camera=self._camera), self._path, progress=progress)
+
+        def note() -> None:
+            self._session._saved = self._last
+
+        return note

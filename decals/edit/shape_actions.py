@@ -78,9 +78,9 @@ class ShapeActions(ABC):
     def settle(self) -> None:
         """End what goes on: the next action is an entry of its own."""
 
-    def _do(self, command: Command) -> None:
-        self.session.do(command)
-        self.message = command.label
+    @abstractmethod
+    def _do(self, command: Command, done: Callable[[], None] | None = None) -> None:
+        """Do a command, then what goes with it."""
 
     # -- holding a primitive ----------------------------------------------------------------------------
 

@@ -7,11 +7,12 @@
     editor.changes(since=version)                  {"index_ids": [(first, past last), ...], ...}
 
 Look-ups find the decals that act at a point, as in an index that is built anew; cells may differ from its.
-Numbers stay: a deleted decal leaves a gap, which `put` alone fills again.
+Numbers stay: a deleted decal leaves a gap, which `put` alone fills again. What takes long can be done
+elsewhere: `copy`, change the copy in any thread, ask it for its index there, and `adopt` it.
 """
 
 import math
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import warp as wp
@@ -48,15 +49,34 @@ class DecalEditor:
 
     def __init__(self, decals: Decals) -> None:
         _check(decals)
-        self._rows = DecalRows(decals)
+        self._begin(DecalRows(decals), _records(decals.packed(), len(decals)))
+
+    def _begin(self, rows: DecalRows, records: NDArray[np.float32]) -> None:
+        self._rows = rows
         self._arrays: dict[str, NDArray[Any]] = {}
         self._journal = Journal()
         self._shared: dict[str, Any] = {}
         self._state, self._wp_state = _shared(np.zeros(4, np.int32), wp.int32)
         self._ranges, self._wp_ranges = _shared(np.zeros((NEIGHBOURHOOD, 2), np.int32), wp.vec2i)
         self._slots, self._wp_slots = _shared(np.zeros(NEIGHBOURHOOD, np.int32), wp.int32)
-        self._put(RECORDS, _records(decals.packed(), len(decals)))
+        self._put(RECORDS, records)
         self._behind = True
+
+    # -- elsewhere --------------------------------------------------------------------------------------
+
+    def copy(self) -> Self:
+        """Give the same decals under the same numbers, to be changed on their own."""
+        made = type(self).__new__(type(self))
+        made._begin(self._rows.copy(), self._arrays[RECORDS].copy())
+        return made
+
+    def adopt(self, other: "DecalEditor") -> None:
+        """Become another editor, which nobody may use any more; who follows this one copies everything."""
+        journal, arrays = self._journal, other.arrays
+        vars(self).update(vars(other))
+        self._journal = journal
+        for name, array in arrays.items():
+            journal.add(name, (0, len(array)), new=True)
 
     # -- what there is ----------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from dataclasses import fields
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,14 @@ class DecalRows:
         self._sheets: Counter[int] = Counter(decals.ranks.tolist())
         self.count = len(decals)
         self.end = len(decals)
+
+    def copy(self) -> Self:
+        """Give the same decals again, in arrays of their own."""
+        made = type(self).__new__(type(self))
+        made._columns = {name: column.copy() for name, column in self._columns.items()}
+        made._there, made._sheets = self._there.copy(), self._sheets.copy()
+        made.count, made.end = self.count, self.end
+        return made
 
     @property
     def numbers(self) -> Numbers:

@@ -29,7 +29,9 @@ import msgspec
 from msgspec import Raw, Struct
 
 from blobtree.nodes.io import write_atomically
+from blobtree.progress import Progress, watched
 from decals.errors import DecalsError, InvalidScene
+from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
 from decals.scenes.decal_records import DecalRecord, decals_of, records_of
 from decals.scenes.object_records import (
@@ -42,6 +44,9 @@ from decals.scenes.object_records import (
     relative,
 )
 from decals.scenes.scene import DecalImage, Scene
+
+PART = 500
+"""Decals that are described at a time."""
 
 FORMAT = "implicit-decals-scene"
 VERSION = 1
@@ -68,10 +73,11 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
     decals: list[DecalRecord]
 
 
-def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
     """Write a scene to a JSON file, whole or not at all.
 
-    Meshes with a ``source`` and images are written as references, other meshes in full.
+    Meshes with a ``source`` and images are written as references, other meshes in full. Progress is told now
+    and then.
 
     Raises
     ------
@@ -85,7 +91,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
             f"expected an existing folder for the scene, found none at {str(folder)!r}; make it first"
         )
     try:
-        write_atomically(path, to_json(scene, folder=folder))
+        write_atomically(path, to_json(scene, folder=folder, progress=progress))
     except OSError as error:
         raise InvalidScene(f"could not write the scene {str(path)!r} ({error.strerror})") from error
 
@@ -120,7 +126,7 @@ def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
         raise InvalidScene(f"{str(path)!r}: {error}") from error
 
 
-def to_json(scene: Scene, *, folder: Path) -> bytes:
+def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> bytes:
     """Write a scene as UTF-8 JSON whose paths are relative to ``folder``; one object or decal a line."""
     camera = scene.camera
     parts = {
@@ -129,7 +135,7 @@ def to_json(scene: Scene, *, folder: Path) -> bytes:
         "objects": _lines(record_of(item, folder) for item in scene.objects),
         "images": [relative(image.source, folder) for image in scene.images],
         "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
-        "decals": _lines(records_of(scene.decals)),
+        "decals": _lines(_decal_records(scene.decals, watched(progress, None))),
     }
     fields = [
         b"  %b: %b" % (msgspec.json.encode(key), msgspec.json.encode(value)) for key, value in parts.items()
@@ -174,6 +180,13 @@ def _decode(text: bytes) -> _SceneRecord:
 
 def _lower_first(text: str) -> str:
     return text[:1].lower() + text[1:]
+
+
+def _decal_records(decals: Decals, tell: Progress) -> Iterator[DecalRecord]:
+    """Describe decals, some at a time: numbers become text by calls that let no other thread go on."""
+    for first in range(0, len(decals), PART):
+        tell("save", first / len(decals))
+        yield from records_of(decals[first : first + PART])
 
 
 def _lines(records: Iterator[Any]) -> Raw:

@@ -7,14 +7,12 @@ from typing import Any
 import pyvista as pv
 
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
-from blobtree import BlobTreeError
 from decals.checks import shown, whole
 from decals.edit.actions import Actions
 from decals.edit.document import Document
-from decals.edit.jobs import Job, Worker
 from decals.edit.session import EditSession
 from decals.edit.tools import Tools
-from decals.errors import DecalsError, InvalidEdit, InvalidScene
+from decals.errors import InvalidEdit, InvalidScene
 from decals.render.libraries import require_gl
 from decals.scenes.scene import Scene
 from decals.surfaces.surface import Floats
@@ -102,9 +100,10 @@ class EditWindow:
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
         self.document = self.session.document
         self.samples, self._closed = samples, False
-        self.worker, self.quality = Worker(), Quality()
-        self.actions = Actions(self.session, path=path, run=self._start)
-        self.actions.camera, self.actions.interrupt = lambda: camera_of(self.stage), self.worker.cancel
+        self.quality = Quality()
+        self.actions = Actions(self.session, path=path, threaded=True)
+        self.background = self.actions.background
+        self.actions.camera = lambda: camera_of(self.stage)
         self.actions.view = lambda: view_of(self.stage)
         self.tools = Tools(self.actions, lambda x, y: ray_through(self.stage, x, y), self._hidden)
         self._open_stage()
@@ -169,10 +168,8 @@ class EditWindow:
         self.marks.say(self._status())
 
     def _status(self) -> str:
-        if not self.worker.busy:
-            return self.actions.message or "h: help"
-        stage, fraction = self.worker.progress
-        return f"{stage}: {100 * fraction:.0f} %"
+        told = (self.background.progress, self.actions.message)
+        return "   ".join(filter(None, told)) or "h: help"
 
     def moving(self) -> None:
         """Draw the next frames at the size that is done in time."""
@@ -218,29 +215,15 @@ class EditWindow:
 
     def tick(self) -> None:
         """Look after the background work, and draw a whole frame once nothing moves."""
-        now = time.perf_counter()
-        if self.worker.busy and now - self._told > NEWS:
+        now, dragging = time.perf_counter(), self.tools.dragging or self.grip.moving
+        if self.background.look(dragging=dragging):
+            self.redraw(whole=not dragging)
+        elif self.background.busy and now - self._told > NEWS:
             self._told = now
-            self._finish()
             self.marks.say(self._status())
             self.plotter.render()
         elif self._moved and now - self._moved > REST and not self.tools.dragging:
             self._refine()
-
-    def _start(self, job: Job) -> None:
-        if not self.worker.start(job):
-            self.actions.message = "wait for what goes on, or press Escape"
-
-    def _finish(self) -> None:
-        try:
-            command = self.worker.take()
-        except (DecalsError, BlobTreeError) as error:
-            self.actions.message = str(error)
-            return
-        if command is not None:
-            self.actions.settle()
-            self.actions.attempt(command)
-            self.redraw(whole=True)
 
     def elsewhere(self, x: int, y: int) -> bool:
         """Whether a place is in a subplot of the same plotter that another window edits."""
@@ -281,11 +264,24 @@ class EditWindow:
             self.close()
 
     def close(self) -> None:
-        """Close the window, or leave the plotter that was lent. Twice is harmless."""
+        """Close the window, or leave the plotter that was lent, once what goes to a file is there.
+
+        Twice is harmless. What else goes on is stopped.
+
+        Raises
+        ------
+        InvalidScene
+            The file could not be written; the window is closed all the same.
+        """
         if self._closed:
             return
         self._closed = True
-        self.worker.cancel()
+        try:
+            self.background.close()
+        finally:
+            self._close()
+
+    def _close(self) -> None:
         self.session.end()
         self.actions.release()
         self.grip.release()

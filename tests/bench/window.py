@@ -199,7 +199,8 @@ def measure(
                 yield step(driver, name, steps)
 
 
-def _machine() -> str:
+def machine() -> str:
+    """Say on what this runs."""
     packages = ", ".join(f"{name} {version(name)}" for name in ("vtk", "pyvista", "moderngl", "warp-lang"))
     with EditWindow(bench_scene("knot", 10, (64, 48)), off_screen=True, size=(64, 48)) as window:
         window.show()
@@ -222,7 +223,7 @@ def main() -> None:
     kinds, steps = tuple(arguments.only.split(",")), 8 if arguments.quick else STEPS
     if not set(kinds) <= set(KINDS):
         parser.error(f"--only: expected some of {', '.join(KINDS)}, got {arguments.only}")
-    print(f"python -m tests.bench.window {' '.join(sys.argv[1:])}".rstrip(), _machine(), sep="\n", flush=True)
+    print(f"python -m tests.bench.window {' '.join(sys.argv[1:])}".rstrip(), machine(), sep="\n", flush=True)
     figures: Figures = {}
     for name in MODELS:
         for found in measure(name, kinds, (width, height), 1000, steps):

@@ -4,18 +4,21 @@ import threading
 
 import pytest
 
-from decals.edit import Scale
 from decals.edit.jobs import Job, Worker
 
 
-def test_a_job_gives_its_command_and_tells_how_far_it_is():
+def nothing():
+    return None
+
+
+def test_a_job_gives_its_outcome_and_tells_how_far_it_is():
     worker, told, go = Worker(), threading.Event(), threading.Event()
 
     def work(tell, stop):
         tell("thinking", 0.5)
         told.set()
         assert go.wait(5)
-        return Scale([0], 2.0)
+        return nothing
 
     assert worker.take() is None
     assert worker.start(Job("double", work))
@@ -25,25 +28,27 @@ def test_a_job_gives_its_command_and_tells_how_far_it_is():
     assert worker.take() is None
     assert not worker.start(Job("another", work))
     go.set()
-    command = worker.take(timeout=5)
-    assert isinstance(command, Scale)
+    assert worker.take(timeout=5) is nothing
     assert not worker.busy
 
 
-def test_a_cancelled_job_makes_nothing():
+def test_a_cancelled_job_comes_to_nothing():
     worker, begun = Worker(), threading.Event()
 
     def work(tell, stop):
         begun.set()
         while not stop():
             pass
-        return Scale([0], 2.0)
+        return nothing
 
     worker.start(Job("endless", work))
     assert begun.wait(5)
+    assert not worker.stopping
     worker.cancel()
+    assert worker.stopping
     assert worker.take(timeout=5) is None
     assert not worker.busy
+    assert not worker.stopping
 
 
 def test_what_a_job_raises_is_raised_where_it_is_asked_for():

@@ -52,6 +52,14 @@ class Driver:
             if found is not None and found.owner == number:
                 yield number, at
 
+    def finish(self):
+        """Let the window see what goes on in the background come to its end."""
+        while self.window.background.busy:
+            for worker in (self.window.background._edits, self.window.background._saves):
+                if worker._thread is not None:
+                    worker._thread.join(30)
+            self.window.tick()
+
     def shot(self):
         """The whole frame, ``uint8[h, w, 3]``."""
         self.window.rest()

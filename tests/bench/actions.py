@@ -1,0 +1,194 @@
+"""How long each action blocks the window: ``python -m tests.bench.actions [--json PATH] [--quick]``.
+
+Every gesture of the key table is made in a window without a screen, among 1,000, 20,000 and 100,000 decals,
+on a mesh and on a tree. What counts is the longest time between two chances for the window to listen: the
+event itself and each look after the background work, with all that a frame brings to the graphics card, but
+without the drawing. Where something goes on in the background its whole time stands behind.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from decals.edit import EditSession
+from decals.edit.keys import BINDINGS, CAMERA
+from decals.window import EditWindow
+from tests.bench.scenes import bench_scene
+from tests.bench.window import Figures, machine
+from tests.window.driver import Driver
+
+TARGET = 100.0
+"""Milliseconds that the window may be deaf."""
+COUNTS = (1_000, 20_000, 100_000)
+MODELS = ("knot", "creature")
+SIZE = (600, 400)
+RUNS = 3
+KEYS = {"pick": "Click", "pick_also": "Shift+Click"}
+"""Gestures that are no keys, where the table has no key for an action."""
+OF_SELECTED = (
+    "duplicate", "delete", "larger", "smaller", "turn_left", "turn_right", "next_image", "previous_image",
+    "next_tint", "fainter", "stronger", "layer_up", "layer_down", "next_interaction",
+)  # fmt: skip
+BEFORE = {"redo": "undo"}
+"""What is done first, untimed."""
+UNTOUCHED = ("undo", "redo", "save", "help", "pick", "pick_also", "pick_all", "let_go", "grip", "move")
+"""Actions that are not taken back afterwards."""
+
+
+class Hand:
+    """Does one thing after another in a window, and measures how long that blocks."""
+
+    def __init__(self, window: EditWindow) -> None:
+        self.driver, self.window = Driver(window), window
+        window.plotter.render = self._bring  # a frame but for its drawing
+        self.at = self._place()
+
+    def _bring(self) -> None:
+        stage = self.window.stage
+        with stage.current():
+            stage.renderer._upload(self.window.document)
+            stage.renderer.context.gl.finish()
+
+    def _place(self) -> tuple[int, int]:
+        """A place where a decal shows."""
+        width, height = SIZE
+        rng = np.random.default_rng(0)
+        for x, y in rng.integers((width // 4, height // 4), (3 * width // 4, 3 * height // 4), (1000, 2)):
+            found = self.window.tools.at(int(x), int(y))
+            if found is not None and found.owner >= 0:
+                return int(x), int(y)
+        raise RuntimeError("no decal is seen")
+
+    def gesture(self, one: str) -> None:
+        """Make a gesture of the key table."""
+        *modifiers, name = one.split("+")
+        held = {"ctrl": "Ctrl" in modifiers, "shift": "Shift" in modifiers}
+        if name == "Click":
+            self.driver.click(self.at, **held)
+        elif name.startswith("Wheel"):
+            self.driver.wheel(self.at, up=name == "WheelUp", **held)
+        else:
+            self.driver.key(name, self.at, **held)
+
+    def blocks(self, step: Callable[[], None]) -> tuple[float, float]:
+        """Longest time that a step, and what it leaves to the background, is deaf; its whole time; in ms."""
+        begin = time.perf_counter()
+        times = [_timed(step)]
+        while self.window.background.busy:
+            self.window._told = 0.0
+            times.append(_timed(self.window.tick))
+            time.sleep(0.005)
+        return max(times), 1e3 * (time.perf_counter() - begin)
+
+    def drag(self) -> tuple[float, float]:
+        """Drag what is selected; the longest of press, moves and release."""
+        x, y = self.at
+        events = [("LeftButtonPressEvent", self.at)]
+        events += [("MouseMoveEvent", (x + step, y)) for step in (4, 8, 12)]
+        events += [("LeftButtonReleaseEvent", (x + 12, y))]
+        found = [
+            self.blocks(lambda name=name, place=place: self.driver.event(name, place))  # type: ignore[misc]
+            for name, place in events
+        ]
+        return max(block for block, _ in found), sum(whole for _, whole in found)
+
+
+def _timed(step: Callable[[], object]) -> float:
+    begin = time.perf_counter()
+    step()
+    return 1e3 * (time.perf_counter() - begin)
+
+
+def cases() -> Iterator[tuple[str, str, str, str]]:
+    """Name, action, gesture, and what is selected before: "", "one" or "all"."""
+    for binding in BINDINGS:
+        if binding.action == CAMERA:
+            continue
+        keys = [one for one in binding.gestures if "Wheel" not in one and "Click" not in one]
+        gesture = KEYS.get(binding.action) or keys[0]
+        if binding.action in OF_SELECTED or binding.action == "move":
+            for selected in ("one", "all"):
+                yield f"{binding.action}_{selected}", binding.action, gesture, selected
+        else:
+            yield binding.action, binding.action, gesture, ""
+    for action in ("undo", "redo"):
+        yield f"{action}_all", action, "Ctrl+z" if action == "undo" else "Ctrl+y", "all"
+
+
+def measure(hand: Hand, action: str, gesture: str, selected: str) -> tuple[float, float]:
+    """Median of a few runs of one case: longest block and whole time."""
+    found = []
+    for run in range(RUNS + 1):
+        hand.blocks(lambda: hand.gesture("Escape"))
+        if selected:
+            hand.gesture("Click")
+        if selected == "all":
+            hand.gesture("Ctrl+a")
+        hand.blocks(lambda: None)
+        if action in ("undo", "redo"):
+            hand.blocks(lambda: hand.gesture("plus" if selected else "a"))
+        if action in BEFORE:
+            hand.blocks(lambda: hand.gesture("Ctrl+z"))
+        steps = len(hand.window.session.labels)
+        times = hand.drag() if action == "move" else hand.blocks(lambda: hand.gesture(gesture))
+        found.append(times)
+        hand.blocks(lambda: hand.window.actions.settle())
+        while len(hand.window.session.labels) > (steps if action not in ("undo", "redo") else 0):
+            hand.blocks(lambda: hand.gesture("Ctrl+z"))
+        if action == "grip" and hand.window.actions.grip:
+            hand.gesture("m")
+        if action == "help" and run == RUNS:
+            hand.window.actions.help = False
+    block, whole = np.median(found[1:], axis=0)
+    return float(block), float(whole)
+
+
+def scene_figures(model: str, count: int, only: tuple[str, ...], folder: Path) -> Iterator[Figures]:
+    """Measure all cases in one scene."""
+    session = EditSession(bench_scene(model, count, SIZE))
+    with EditWindow(session, path=folder / "scene.json", off_screen=True, size=SIZE, samples=1) as window:
+        window.show()
+        hand = Hand(window)
+        for name, action, gesture, selected in cases():
+            if only and action not in only:
+                continue
+            block, whole = measure(hand, action, gesture, selected)
+            yield {f"{model}_{count}_{name}_block_ms": block, f"{model}_{count}_{name}_whole_ms": whole}
+
+
+def main() -> None:
+    """Measure, print, and write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--quick", action="store_true", help="1,000 decals alone")
+    parser.add_argument("--counts", default=",".join(map(str, COUNTS)))
+    parser.add_argument("--models", default=",".join(MODELS))
+    parser.add_argument("--only", default="", help="some of the actions, as decals.edit.keys names them")
+    arguments = parser.parse_args()
+    counts = COUNTS[:1] if arguments.quick else tuple(int(count) for count in arguments.counts.split(","))
+    only = tuple(filter(None, arguments.only.split(",")))
+    print(f"python -m tests.bench.actions {' '.join(sys.argv[1:])}".rstrip(), machine(), sep="\n", flush=True)
+    print(f"target: no block above {TARGET:g} ms; longest block ms, whole time ms")
+    figures: Figures = {}
+    with TemporaryDirectory() as folder:
+        for model in arguments.models.split(","):
+            for count in counts:
+                for found in scene_figures(model, count, only, Path(folder)):
+                    figures |= found
+                    (key, block), (_, whole) = found.items()
+                    over = "over" if block > TARGET else ""
+                    print(f"{key[:-9]:44} {block:>9.1f} {whole:>9.1f} {over}".rstrip(), flush=True)
+                    if arguments.json:
+                        arguments.json.write_text(json.dumps(figures, indent=1))
+
+
+if __name__ == "__main__":
+    main()
