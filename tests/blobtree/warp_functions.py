@@ -7,7 +7,9 @@ Warp reads kernels from files, so a file of kernels is written per module; its t
 the compiled kernels, is the same in every run.
 """
 
+import atexit
 import importlib.util
+import shutil
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -95,7 +97,9 @@ def _kernels(module_name: str) -> dict[str, tuple[wp.Kernel, TypedFunction]]:
     """Name → kernel over arrays, of every typed function of the module of this name."""
     functions = typed_functions(import_module(module_name))
     generated = f"generated_{module_name.replace('.', '_')}"
-    path = Path(tempfile.mkdtemp(prefix="kernels-")) / f"{generated}.py"
+    folder = Path(tempfile.mkdtemp(prefix="kernels-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)  # Warp reads the file as long as it runs
+    path = folder / f"{generated}.py"
     path.write_text("\n".join([_HEAD, *(_kernel_source(module_name, function) for function in functions)]))
     spec = importlib.util.spec_from_file_location(generated, path)
     assert spec is not None
