@@ -7,7 +7,7 @@ from decals.checks import instance
 from decals.coat.choosing import ImageChoice, at_random, by_rank, odds
 from decals.coat.fields import bends
 from decals.coat.jitter import Jitter
-from decals.coat.orientation import Direction, tangents
+from decals.coat.orientation import Direction, check_direction, tangents
 from decals.coat.sizing import Sizing, covering_radii, delaunay_radii, touching_radii
 from decals.errors import InvalidSeeding
 from decals.model import Decals
@@ -48,7 +48,7 @@ def lay(
         "relaxation", relaxation, Relaxation, InvalidSeeding, "seed(surfaces, ...) does both in one call"
     )
     whole("seed", seed)
-    shares, disorder = wishes(factor, images, weights, sizing, choice, jitter), jitter or Jitter()
+    shares, disorder = wishes(factor, direction, images, weights, sizing, choice, jitter), jitter or Jitter()
     if relaxation.count == 0:
         return Decals.empty()
     spacings = relaxation.sizes_at(relaxation.positions)
@@ -72,6 +72,7 @@ def lay(
 
 def wishes(
     factor: float,
+    direction: Direction,
     images: int,
     weights: ArrayLike | None,
     sizing: Sizing,
@@ -86,6 +87,7 @@ def wishes(
     if not isinstance(jitter, Jitter | None):
         raise InvalidSeeding(f"jitter: expected a Jitter, got {jitter!r}")
     number("factor", factor, "a number above 0", lambda value: value > 0)
+    check_direction(direction)
     return odds(images, weights)
 
 

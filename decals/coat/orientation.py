@@ -66,22 +66,31 @@ def _along_surface(orientation: Orientation, positions: Floats, normals: Floats)
     return smooth_crosses(positions, normals, curved)
 
 
+def check_direction(direction: Direction) -> None:
+    """Raise `InvalidSeeding` for what can be no direction; a function is known only once it is asked."""
+    if direction is not None and not isinstance(direction, Orientation) and not callable(direction):
+        _checked(numbers("direction", direction), (3,))
+
+
 def _directions(
     direction: ArrayLike | Callable[[Floats], ArrayLike], positions: Floats
 ) -> NDArray[np.float64]:
     """One finite vector for each position, of length 1 or 0."""
     if callable(direction):
-        vectors = answers("direction", direction, positions)
+        vectors = _checked(answers("direction", direction, positions), positions.shape)
     else:
-        vectors = numbers("direction", direction)
-    expected = positions.shape if callable(direction) else (3,)
-    if vectors.shape != expected:
-        raise InvalidSeeding(f"direction: expected shape {list(expected)}, got {list(vectors.shape)}")
-    if not np.isfinite(vectors).all():
-        raise InvalidSeeding(
-            "direction: expected finite numbers, got NaN or infinity; return zeros where there is none"
-        )
+        vectors = _checked(numbers("direction", direction), (3,))
     rows = np.broadcast_to(vectors, positions.shape)
     largest = np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
     scaled: NDArray[np.float64] = rows / np.where(largest > 0, largest, 1.0)
     return scaled
+
+
+def _checked(vectors: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    if vectors.shape != shape:
+        raise InvalidSeeding(f"direction: expected shape {list(shape)}, got {list(vectors.shape)}")
+    if not np.isfinite(vectors).all():
+        raise InvalidSeeding(
+            "direction: expected finite numbers, got NaN or infinity; return zeros where there is none"
+        )
+    return vectors

@@ -92,7 +92,7 @@ def seed(
     given = surfaces_of(surfaces)
     number("regularity", regularity, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0)
     function_or_none("progress", progress)
-    wishes(factor, images, weights, sizing, choice, jitter)  # before the long work, not after it
+    wishes(factor, direction, images, weights, sizing, choice, jitter)  # before the long work, not after it
     tell = progress or (lambda stage, fraction: None)
     relaxation = Relaxation(
         given,
