@@ -81,7 +81,7 @@ def evaluate(
     InvalidImage
         Something that is no image, or fewer images than decals show.
     InvalidDecals, InvalidScene, InvalidDevice
-        Something that is no decals, no mapping or contact, or no device of Warp's.
+        Something that is no decals or an index of others, no mapping or contact, or no device of Warp's.
     """
     mapping = member("mapping", mapping, Mapping, InvalidScene)
     contact = member("contact", contact, Contact, InvalidScene)
@@ -116,7 +116,14 @@ def _placed(
         return decals.arrays[RECORDS], decals.index.on(device)
     if not isinstance(decals, Decals):
         raise InvalidDecals(f"expected Decals or a DecalEditor, got {shown(decals)}; a scene has .decals")
-    return decals.packed(), DeviceIndex.of(decals, device) if index is None else index.on(device)
+    if index is None:
+        return decals.packed(), DeviceIndex.of(decals, device)
+    if not isinstance(index, DecalIndex) or index.count != len(decals):
+        came = f"one of {index.count}" if isinstance(index, DecalIndex) else shown(index)
+        raise InvalidDecals(
+            f"index: expected the index of these {len(decals)} decals, got {came}; DecalIndex.of makes it"
+        )
+    return decals.packed(), index.on(device)
 
 
 def _colors(

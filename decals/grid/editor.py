@@ -135,7 +135,9 @@ class DecalEditor:
     def index(self) -> DecalIndex:
         """Give the index as it is now: no copy, so the next edit changes it."""
         arrays = self.arrays
-        return DecalIndex(arrays[LEVELS][: self.level_count], arrays[TABLE], arrays[IDS])
+        return DecalIndex(
+            arrays[LEVELS][: self.level_count], arrays[TABLE], arrays[IDS], self.next_number, self._parity
+        )
 
     # -- edits ------------------------------------------------------------------------------------------
 

@@ -60,11 +60,22 @@ class DeviceIndex:
 
 @dataclass(frozen=True, eq=False)
 class DecalIndex:
-    """Hash grid of as many levels as there are size classes, or pairs of them (`cells.joined`)."""
+    """Hash grid of as many levels as there are size classes, or pairs of them (`cells.joined`).
+
+    Attributes
+    ----------
+    levels, table, ids
+        As in the head of this file.
+    count
+        Decals that it is of: the numbers in its lists are smaller.
+    parity
+        Which sizes join larger ones (`cells.joined`).
+    """
 
     levels: NDArray[np.float32]
     table: Ints
     ids: Ints
+    count: int
     parity: int = ALONE
 
     @classmethod
@@ -82,7 +93,8 @@ class DecalIndex:
         order = np.full(len(centres), ranks) if np.ndim(ranks) == 0 else ranks
         order = whole("ranks", order, len(centres), low=0, high=MOST_RANK, default=DEFAULT_RANK)
         arrays = build_index(*_device_arrays(centres, reach, order, "cpu"))
-        return cls(arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy(), arrays.parity)
+        lists = arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy()
+        return cls(*lists, count=len(centres), parity=arrays.parity)
 
     @classmethod
     def of(cls, decals: Decals) -> Self:

@@ -213,6 +213,8 @@ def test_refuses(points, normals, says):
         ({"device": "cuda:99"}, InvalidDevice, "got 'cuda:99'"),
         ({"images": ["scale"]}, InvalidImage, "image 0 must be .* got 'scale'"),
         ({"decals": "scale"}, InvalidDecals, "expected Decals or a DecalEditor, got 'scale'"),
+        ({"index": "scale"}, InvalidDecals, "index: expected the index of these 1 decals, got 'scale'"),
+        ({"index": DecalIndex.build(np.zeros((9, 3)), np.ones(9))}, InvalidDecals, "got one of 9"),
     ],
 )
 def test_refuses_what_is_none(wrong, error, says):

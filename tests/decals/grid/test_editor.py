@@ -57,15 +57,14 @@ def check(editor, points):
 
 def everything(editor):
     """All decals that ever were, so that numbers are rows; the index lists the living alone."""
-    last = int(editor.numbers.max(initial=-1))
     filler = some(np.random.default_rng(0), 1)
     parts = []
-    for number in range(last + 1):
+    for number in range(editor.next_number):
         try:
             parts.append(editor[number])
         except InvalidDecals:
             parts.append(filler)
-    return Decals.concatenate(parts)
+    return Decals.concatenate(parts) if parts else Decals.empty()
 
 
 EDITS = st.lists(

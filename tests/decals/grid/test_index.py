@@ -255,7 +255,7 @@ def test_the_same_on_a_cuda_device():
     positions, influence = np.float32(rng.random((5000, 3))), np.float32(10.0 ** rng.uniform(-3, -0.5, 5000))
     decals = Decals(positions, positions + 1, rng.normal(size=(5000, 3)), influence * 0.45)
     there = DeviceIndex.of(decals, "cuda:0")
-    fetched = DecalIndex(there.levels.numpy(), there.table.numpy(), there.ids.numpy())
+    fetched = DecalIndex(there.levels.numpy(), there.table.numpy(), there.ids.numpy(), len(decals))
     here = DecalIndex.of(decals)
     points = near(rng, positions, influence, 2000)
     for one, other in zip(fetched.candidates(points), here.candidates(points), strict=True):
