@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.render import Renderer
 from decals.scenes.scene import Scene
 from decals.scenes.scene_file import save_scene
@@ -40,6 +42,8 @@ def render(
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x900",
     samples: Whole = 2,
+    contact: Literal["paper", "smooth", "radial"] = "paper",
+    mapping: Literal["corrected", "chord"] = "corrected",
     seed: OptionalWhole = None,
     save: Path | None = None,
     define: Definitions = None,
@@ -68,6 +72,11 @@ def render(
         Width and height of the picture in pixels.
     samples
         Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine.
+    contact
+        How neighbours push each other: as in the paper, smoothly where three meet, or along rays, which never
+        folds an image.
+    mapping
+        How images lie on curved surface: corrected for how it bends, or flat, at the chord's length.
     seed
         The same number gives the same decals. Default: 0.
     save
@@ -98,4 +107,11 @@ def render(
         if save is not None:
             save_scene(scene, save)
         progress("Drawing", 0.0)
-        write_picture(output, renderer.render(scene, size=pixels, samples=samples))
+        picture = renderer.render(
+            scene,
+            size=pixels,
+            samples=samples,
+            contact=Contact[contact.upper()],
+            mapping=Mapping[mapping.upper()],
+        )
+        write_picture(output, picture)

@@ -11,9 +11,12 @@ from PIL import Image
 
 import blobtree
 from blobtree import Point
+from decals.field.contact import Contact
+from decals.field.mapping import Mapping
+from decals.render import Renderer
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene, TreeObject
-from decals.scenes.scene_file import save_scene
+from decals.scenes.scene_file import load_scene, save_scene
 from implicit_decals.apps.cli import run
 from tests.apps.commands.pictures import picture, small
 
@@ -53,6 +56,21 @@ def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
     written = json.loads((folder / "s.json").read_text())
     assert [item.get("source") for item in written["objects"]] == ["ball.stl", "sample:knot", None]
     assert len(written["decals"]) == 30
+
+
+def test_contact_and_mapping_are_those_of_the_renderer(folder: Path) -> None:
+    assert run([*small("spheres"), "--save", "s.json", "-o", "paper.png"]) == 0
+    scene = load_scene(folder / "s.json")
+    with Renderer() as renderer:
+        for contact in Contact:
+            for mapping in Mapping:
+                names = ["--contact", contact.name.lower(), "--mapping", mapping.name.lower()]
+                plain = ["render", "s.json", "--size", "64x48", "--samples", "1"]
+                assert run([*plain, *names, "-o", "out.png"]) == 0
+                drawn = renderer.render(scene, size=(64, 48), samples=1, contact=contact, mapping=mapping)
+                assert np.array_equal(picture(folder / "out.png"), drawn)
+                usual = (contact, mapping) == (Contact.PAPER, Mapping.CORRECTED)
+                assert usual == np.array_equal(drawn, picture(folder / "paper.png"))
 
 
 def test_a_camera_for_a_saved_scene(folder: Path) -> None:
