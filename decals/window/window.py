@@ -30,6 +30,7 @@ from decals.window.home import (
 from decals.window.looking import camera_of, ray_through, view_of
 from decals.window.marks import Marks
 from decals.window.quality import Quality
+from decals.window.tenancy import Tenancy
 from decals.window.weak import weakly
 
 TICK = 20
@@ -68,7 +69,8 @@ class EditWindow:
         Samples a pixel along each axis, at rest.
     plotter
         Edit in the active subplot of this one, such as pyvistaqt's or one that trame serves, in place of a
-        window of our own. It stays open, and ``size`` and ``off_screen`` are its own.
+        window of our own. It stays open, and ``size`` and ``off_screen`` are its own. A subplot that showed
+        a scene through us goes on to show the edited one; one that showed none is empty again.
 
     Raises
     ------
@@ -115,10 +117,11 @@ class EditWindow:
         self._whole: tuple[int, ...] = self._shown
 
     def _open_stage(self) -> None:
+        self.stage = self.plotter.decals.stage
+        self._tenancy = Tenancy(self.stage)
         self.plotter.decals.add_scene(
             self.document.scene, camera=not (self._guest and self.plotter.renderer.camera_set)
         )
-        self.stage = self.plotter.decals.stage
         self.stage.scene = self.document
         self.stage.measure, self.stage.samples = True, self.samples
         self._began = 0.0
@@ -299,8 +302,7 @@ class EditWindow:
             self._interactor.DestroyTimer(self._timer)
         for tag in self._timing:
             self.stage.vtk_renderer.RemoveObserver(tag)
-        self.stage.scene, self.stage.measure = None, False
-        self.stage.draw_scale = 1.0
+        self._tenancy.end(self.document)
         self.plotter.render()
 
     def __enter__(self) -> "EditWindow":

@@ -48,6 +48,60 @@ def test_hands_in_a_subplot_that_is_no_longer_the_active_one(plotter: Factory) -
     assert driver.session._listeners == []
 
 
+def test_a_subplot_that_showed_a_scene_shows_the_edited_one(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(scene())
+    pl.decals.stage.samples = 1
+    first = shot(pl)
+    with EditWindow(scene(), plotter=pl) as window:
+        window.show()
+        window.stage.draw_scale = 0.5  # as while something moves
+    np.testing.assert_array_equal(pl.decals.scene.decals.packed(), scene().decals.packed())
+    np.testing.assert_array_equal(shot(pl), first)
+    window = EditWindow(pl.decals.scene, plotter=pl)
+    window.show()
+    driver = Driver(window)
+    _, at = next(driver.visible())
+    driver.click(at)
+    driver.key("Delete")
+    window.close()
+    assert pl.decals.stage.measure is False
+    edited = pl.decals.scene
+    assert len(edited.decals) == len(scene().decals) - 1
+    after = shot(pl)
+    assert (after != first).any()
+    fresh = plotter()
+    fresh.decals.add_scene(edited)
+    fresh.decals.stage.samples = 1
+    np.testing.assert_array_equal(after, shot(fresh))
+    pl.decals.add(edited.decals[:1])
+
+
+def test_what_somebody_shows_meanwhile_stays(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(scene())
+    with EditWindow(scene(), plotter=pl) as window:
+        window.show()
+        pl.decals.scene = other = scene(20)
+    assert pl.decals.scene is other
+    with EditWindow(scene(), plotter=pl) as window:
+        window.show()
+        pl.clear()
+    assert pl.decals.stage.scene is None
+
+
+def test_a_window_in_the_subplot_of_another_gives_it_back(plotter: Factory) -> None:
+    pl = plotter()
+    outer = EditWindow(scene(), plotter=pl)
+    outer.show()
+    with EditWindow(scene(20), plotter=pl) as inner:
+        inner.show()
+        assert outer.stage.scene is inner.document
+    assert outer.stage.scene is outer.document
+    outer.close()
+    assert outer.stage.scene is None
+
+
 def test_each_of_two_subplots_has_hands_of_its_own(plotter: Factory) -> None:
     pl = plotter(shape=(1, 2), window_size=(320, 120))
     drivers = []
