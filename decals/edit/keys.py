@@ -111,6 +111,28 @@ _NAMES = {
 }
 _SYMBOLS = {"plus", "minus", "comma", "period", "bracketleft", "bracketright", "equal"}
 
+_OF_BROWSERS = {
+    "+": "plus",
+    "=": "equal",
+    "-": "minus",
+    ",": "comma",
+    "<": "comma",
+    ".": "period",
+    ">": "period",
+    "[": "bracketleft",
+    "{": "bracketleft",
+    "]": "bracketright",
+    "}": "bracketright",
+    "PageUp": "Prior",
+    "PageDown": "Next",
+    "Backspace": "BackSpace",
+}
+
+
+def of_browser(key: str) -> str:
+    """Give the name of a key here from what a browser calls it (``KeyboardEvent.key``)."""
+    return _OF_BROWSERS.get(key, key)
+
 
 def gesture(name: str, *, ctrl: bool = False, shift: bool = False) -> str:
     """Give the name of a gesture, as the table has it."""

@@ -3,7 +3,8 @@
 `view` opens one and gives the edited scene.
 """
 
+from decals.window.browser import browser_keys, press_key
 from decals.window.quality import Quality
 from decals.window.window import EditWindow, view
 
-__all__ = ["EditWindow", "Quality", "view"]
+__all__ = ["EditWindow", "Quality", "browser_keys", "press_key", "view"]

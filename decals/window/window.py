@@ -31,10 +31,8 @@ from decals.window.looking import camera_of, ray_through, view_of
 from decals.window.marks import Marks
 from decals.window.quality import Quality
 from decals.window.tenancy import Tenancy
+from decals.window.ticker import TICK, Ticker, running_loop
 from decals.window.weak import weakly
-
-TICK = 20
-"""Milliseconds between looks at what goes on."""
 
 SLICE = 0.04
 """Seconds that are drawn on a whole frame at a time; in between the window listens."""
@@ -113,6 +111,7 @@ class EditWindow:
         self.grip = Grip(self.stage.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole))
         self._interactor = self.plotter.iren.interactor
         self._bindings = Bindings(self, self._interactor)
+        self._ticker = Ticker(self)
         self._timer, self._moved, self._told = 0, 0.0, 0.0
         self._whole: tuple[int, ...] = self._shown
 
@@ -134,8 +133,18 @@ class EditWindow:
 
     @property
     def ticking(self) -> bool:
-        """Whether a timer calls `tick`; where none does, such as off screen, frames are whole at once."""
+        """Whether a timer calls `tick`, or a loop of asyncio's; where none does, frames are whole at once."""
+        return self._timed or running_loop() is not None
+
+    @property
+    def _timed(self) -> bool:
+        """Whether the plotter's interactor has timers: off screen nobody waits for events."""
         return not getattr(self.plotter, "off_screen", False)
+
+    @property
+    def busy(self) -> bool:
+        """Whether something goes on in the background, or a whole frame is still to be drawn."""
+        return not self._closed and (self.background.busy or self._moved > 0.0)
 
     # -- what is seen -----------------------------------------------------------------------------------
 
@@ -144,6 +153,8 @@ class EditWindow:
         if self._closed:
             return
         self.actions_shown()
+        if self.busy:
+            self._ticker.wake()
         if not whole:
             self.moving()
             self.plotter.render()
@@ -177,6 +188,7 @@ class EditWindow:
     def moving(self) -> None:
         """Draw the next frames at the size that is done in time."""
         self._moved = time.perf_counter()
+        self._ticker.wake()
         if self.quality.expected(self.samples) > self.quality.target:
             self.stage.draw_scale, self.stage.samples = self.quality.scale, 1
 
@@ -255,15 +267,16 @@ class EditWindow:
             raise InvalidEdit("the window was closed; open another EditWindow on its session")
         self.actions_shown()
         self.plotter.iren.initialize()
-        if self.ticking:
+        if self._timed:
             self._timer = self._interactor.CreateRepeatingTimer(TICK)
+        if self.ticking:
             self.stage.draw_scale, self._moved = GLANCE, time.perf_counter() - REST
+            self._ticker.wake()
         if self._guest:
             self.plotter.render()
             return
-        interactive = self.ticking
-        self.plotter.show(auto_close=False, interactive=interactive)
-        if interactive:
+        self.plotter.show(auto_close=False, interactive=self._timed)
+        if self._timed:
             self.close()
 
     def close(self) -> None:
@@ -279,6 +292,7 @@ class EditWindow:
         if self._closed:
             return
         self._closed = True
+        self._ticker.stop()
         try:
             self.background.close()
         finally:

@@ -87,16 +87,19 @@ async def shows(page: Page, plotter: pv.Plotter) -> np.ndarray:
             await asyncio.sleep(0.1)
 
 
-async def drag(page: Page, plotter: pv.Plotter, *places: tuple[int, int]) -> None:
-    """A drag over the canvas with the left button; places count from the lower left, as VTK's do."""
+async def point(page: Page, plotter: pv.Plotter, *places: tuple[int, int]) -> None:
+    """Move the pointer over the canvas; places count from the lower left, as VTK's do."""
     box = await page.locator(PICTURE).first.bounding_box()
     assert box is not None
     height = plotter.window_size[1]
-    points = [(box["x"] + x + 0.5, box["y"] + height - 1 - y + 0.5) for x, y in places]
-    await page.mouse.move(*points[0])
-    await page.mouse.down()
-    for point in points[1:]:
-        await page.mouse.move(*point)
+    for x, y in places:
+        await page.mouse.move(box["x"] + x + 0.5, box["y"] + height - 1 - y + 0.5)
         await asyncio.sleep(0.05)
-    await asyncio.sleep(0.05)
+
+
+async def drag(page: Page, plotter: pv.Plotter, *places: tuple[int, int]) -> None:
+    """A drag over the canvas with the left button."""
+    await point(page, plotter, places[0])
+    await page.mouse.down()
+    await point(page, plotter, *places[1:])
     await page.mouse.up()

@@ -12,15 +12,16 @@ from unittest.mock import patch
 import numpy as np
 import pyvista as pv
 from PIL import Image
+from playwright.async_api import Page
 from trame.app import get_server
 from trame.ui.vuetify3 import VAppLayout
-from trame.widgets import vuetify3
 from trame_pyvista.widgets import PyVistaRCAView, PyVistaRemoteView
 from trame_server.core import Server
 
+from decals.edit.population import lying_on
 from decals.window import EditWindow
 from tests.doors import page as docs
-from tests.doors.browsing import drag, drawn, served, shows, until
+from tests.doors.browsing import LOSS, PATIENCE, drag, drawn, point, seen, served, shows, until
 from tests.edit.scenes import scene
 from tests.vtk.scenes import both
 from tests.window.driver import Driver
@@ -60,22 +61,17 @@ def covered(picture: np.ndarray) -> np.ndarray:
 
 
 async def hands() -> None:
-    """A click selects a decal, a drag moves it, a button undoes that: the first picture comes back."""
+    """A click selects a decal, a drag moves it, keys undo that: the first picture comes back.
+
+    A coat is scattered in the background; nobody asks for it, and the page shows it when it is done.
+    """
     plotter = pv.Plotter(off_screen=True)
-    window = EditWindow(scene(), plotter=plotter)
-    window.show()
-    driver = Driver(window)
     server = get_server("hands", client_type="vue3")
-
-    def undo() -> None:
-        window.tools.key("z", 0, 0, ctrl=True)
-        window.tools.key("Escape", 0, 0)
-        window.actions.message = ""
-        window.redraw(whole=True)
-
-    with VAppLayout(server, full_height=True):
-        vuetify3.VBtn("undo", click=undo, height=40)
-        PyVistaRemoteView(plotter, style="height: calc(100% - 40px)")
+    page = {"VAppLayout": VAppLayout, "PyVistaRemoteView": PyVistaRemoteView}
+    page |= {"scene": scene(), "pl": plotter, "server": server}
+    exec(compile(docs.code("hands"), "pyvista.md", "exec"), page)
+    window = page["window"]
+    driver = Driver(window)
     async with served(server) as browser:
         first, state = await shows(browser, plotter), driver.state
         number, at = next(driver.visible())
@@ -85,10 +81,32 @@ async def hands() -> None:
         await until(lambda: driver.session.labels == ("move",) and not window.tools.dragging)
         moved = await shows(browser, plotter)
         assert np.abs(moved - first).mean() > 0.5
-        await browser.get_by_role("button").click()
+        await browser.keyboard.press("Control+z")
         await until(lambda: driver.state == state)
+        await browser.keyboard.press("Escape")
+        await until(lambda: window.actions.selection == ())
         np.testing.assert_array_equal(await shows(browser, plotter), first)
+        await coat(browser, window, driver)
     window.close()
+    await asyncio.sleep(0)
+    assert not [task for task in asyncio.all_tasks() if "EditWindow" in task.get_name()]
+
+
+async def coat(browser: Page, window: EditWindow, driver: Driver) -> None:
+    """Keys act where the pointer is, also where it went without a button."""
+    on_tree = set(lying_on(window.document, [0]).tolist())
+    number, at = next((number, at) for number, at in driver.visible() if number in on_tree)
+    await point(browser, window.plotter, at)
+    await browser.keyboard.press("g")
+    await until(lambda: driver.session.labels == ("scatter",) and not window.busy)
+    assert number not in window.document.decals.numbers
+    picture = drawn(window.plotter)  # draws nothing: the last frame was a whole one
+    async with asyncio.timeout(PATIENCE):
+        while np.abs(await seen(browser) - picture).mean() > LOSS:
+            await asyncio.sleep(0.1)
+    await browser.keyboard.press("Shift+N")
+    await until(lambda: len(window.document.objects) == 3)
+    assert driver.session.labels[-1] == "add an object"
 
 
 async def streamed() -> None:
@@ -102,7 +120,12 @@ async def streamed() -> None:
         first = await shows(browser, view.plotter)
         await drag(browser, plotter, (40, 40), (80, 60), (140, 70))
         await until(lambda: np.abs(drawn(plotter) - first).mean() > 2)
-        await shows(browser, plotter)
+        turned = await shows(browser, plotter)
+        plotter.add_on_render_callback(lambda _: view.render())
+        bare = both().replace(decals=both().decals[:0])
+        plotter.decals.scene = bare
+        plotter.render()
+        assert np.abs(await shows(browser, plotter) - turned).mean() > 2
 
 
 def main() -> None:
