@@ -43,8 +43,6 @@ class Actions(ShapeActions):
         Whether the help is wanted.
     camera
         Gives the camera to save with the scene; None for the document's.
-    background
-        What takes long.
     release
         Lets go of the session, which may outlive this.
     """

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError, Node, Point, Segment
 from blobtree.formulas.kernels import RIM
+from decals.edit.background import Background
 from decals.edit.change import Change
 from decals.edit.objects import AddObject, RemoveObject
 from decals.edit.pick import Pick
@@ -59,7 +60,11 @@ class ShapeActions(ABC):
         Object and path of the primitive that is held, if any.
     view
         Gives the eye, and the point that it looks at; at first the document's camera's.
+    background
+        What takes long.
     """
+
+    background: Background
 
     def __init__(self, session: EditSession) -> None:
         self.session = session
@@ -198,14 +203,35 @@ class ShapeActions(ABC):
 
     def _grow(self, found: Pick, path: Path, node: Node, reach: float) -> None:
         tree = self._tree(found.object)
-        self._reshape(AddPrimitive(found.object, in_world(tree, path), node), reach * found.normal)
+        command = AddPrimitive(found.object, in_world(tree, path), node)
+        self._reshape(command, offset=reach * found.normal)
 
-    def _reshape(self, command: Reshaping, offset: Floats | None = None) -> None:
-        """Exchange the tree, and hold what it was about."""
-        _, path = command.made(self._tree(command.object))
-        self._do(command)
-        if path is not None:
-            self._hold(command.object, path, offset)
+    def _reshape(self, *commands: Reshaping, offset: Floats | None = None) -> None:
+        """Do the first of some commands that leaves something to see, and hold what it is about.
+
+        That makes another surface, which takes long: it goes on in the background.
+        """
+        done: list[tuple[int, Path]] = []
+
+        def step(session: EditSession) -> str:
+            failed: Exception | None = None
+            for command in commands:
+                try:
+                    _, path = command.made(command.tree(session.document))
+                    session.do(command)
+                except (DecalsError, BlobTreeError) as error:
+                    failed = failed or error
+                    continue
+                done[:] = [] if path is None else [(command.object, path)]
+                return command.text
+            assert failed is not None
+            raise failed
+
+        def hold() -> None:
+            for number, path in done:
+                self._hold(number, path, offset)
+
+        self.background.edit(commands[0].label, step, hold)
 
     def _duplicate_held(self) -> None:
         assert self.grip is not None
@@ -224,14 +250,7 @@ class ShapeActions(ABC):
         number, path = self._take_hold(cursor)
         now, ways = join_of(self._tree(number), path), list(Join)
         first = 0 if now is None else ways.index(now) + 1
-        for join in [*ways[first:], *ways[:first]]:
-            try:
-                self._reshape(JoinPrimitive(number, path, join))
-            except (DecalsError, BlobTreeError) as error:
-                self.message = str(error)
-            else:
-                self.message = f"joined by {join.value}"
-                return
+        self._reshape(*(JoinPrimitive(number, path, join) for join in ways[first:] + ways[:first]))
 
     # -- objects ----------------------------------------------------------------------------------------
 

@@ -208,6 +208,11 @@ class Reshaping(OfPrimitive):
 
     label: ClassVar[str]
 
+    @property
+    def text(self) -> str:
+        """What it did, in plain words."""
+        return self.label
+
     def made(self, tree: Node) -> tuple[Node, Path | None]:
         """The new tree, and the path in it of what the command is about, if it is still there."""
         raise NotImplementedError  # every kind has its own
@@ -276,6 +281,11 @@ class JoinPrimitive(Reshaping):
 
     join: Join
     label: ClassVar[str] = "join in another way"
+
+    @property
+    def text(self) -> str:
+        """How it is joined then."""
+        return f"joined by {Join(self.join).value}"
 
     def made(self, tree: Node) -> tuple[Node, Path]:
         """Take it out, and join it to the rest."""

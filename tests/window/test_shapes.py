@@ -25,6 +25,7 @@ def test_primitives_grow_join_and_go_and_undo_gives_the_first_picture(driver):
     pictures = [first]
     for key, spot in (("n", at), ("j", (1, 1)), ("d", (1, 1)), ("l", at), ("Delete", (1, 1))):
         driver.key(key, spot)
+        driver.finish()
         assert (driver.window.grip.widget is None) == (key == "Delete")
         pictures.append(fresh_but_held(driver))
     assert all((one != other).any() for one, other in pairwise(pictures))
@@ -43,6 +44,7 @@ def fresh_but_held(driver):
 
 def test_the_handle_of_what_is_new_drags_it(driver):
     driver.key("n", place(driver))
+    driver.finish()
     grip = driver.window.grip
     before = driver.window.actions.grip_center
     grip.begin()

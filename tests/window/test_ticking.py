@@ -41,7 +41,7 @@ def test_a_coat_is_scattered_and_put_on_by_itself_and_what_is_drawn_is_told(plot
         on_tree = set(lying_on(driver.document, [0]).tolist())
         at = next(at for number, at in driver.visible() if number in on_tree)
         driver.key("g", at)
-        assert window.worker.busy
+        assert window.background.busy
         assert len(tasks()) == 1
         count = len(drawn)
         await rested(window)
