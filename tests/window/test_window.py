@@ -165,7 +165,7 @@ def test_scattering_goes_on_in_the_background(driver):
     driver.key("g", at)
     assert driver.window.background.busy
     assert number in driver.document.decals.numbers
-    assert driver.window.marks.status.startswith(("scatter", "spreading seeds"))  # its label, or how far it is
+    assert driver.window.marks.status.startswith(("scatter", "spreading seeds"))  # or how far
     driver.finish()
     assert number not in driver.document.decals.numbers
     assert driver.session.labels == ("scatter",)
