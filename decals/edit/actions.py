@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from blobtree import BlobTreeError
 from blobtree.progress import Progress
 from decals.edit.background import Background, are_many, doing, takes_long
-from decals.edit.change import Change
-from decals.edit.commands import Add, Alter, Delete, Duplicate, Scale, Turn
+from decals.edit.change import Change, Numbers
+from decals.edit.commands import Add, Adjust, Delete, Duplicate, Scale, Turn
 from decals.edit.keys import BINDINGS, CAMERA
 from decals.edit.new_decals import decal_at
 from decals.edit.places import nearest
@@ -80,17 +80,9 @@ class Actions(ShapeActions):
             self.message = str(error)
         self._series = series
 
-    def attempt(self, command: Command) -> bool:
+    def attempt(self, command: Command) -> None:
         """Do a command, as hands ask for again and again; what cannot be done is said in `message`."""
-        try:
-            if takes_long(command):
-                self.background.follow(command.label, doing(command))
-            else:
-                self._do(command)
-        except (DecalsError, BlobTreeError) as error:
-            self.message = str(error)
-            return False
-        return True
+        self._follow(command.label, doing(command), long=takes_long(command))
 
     def settle(self) -> None:
         """End what goes on: the next action is an entry of its own."""
@@ -121,14 +113,13 @@ class Actions(ShapeActions):
         there = self.session.document.decals.has(np.array(self.selection, np.int64))
         self.selection = tuple(n for n, stays in zip(self.selection, there, strict=True) if stays)
 
-    def _chosen(self) -> tuple[Decals, np.ndarray]:
+    def _chosen(self) -> Numbers:
         if not self.selection:
             raise InvalidEdit("select a decal first: click on one")
-        numbers = np.array(self.selection, np.int64)
-        return self.session.document.decals.take(numbers), numbers
+        return np.array(self.selection, np.int64)
 
-    def _alter(self, label: str, **values: ArrayLike) -> None:
-        self._do(Alter(self._chosen()[1], values, label))
+    def _alter(self, label: str, name: str, value: Callable[[Decals], ArrayLike]) -> None:
+        self._do(Adjust(self._chosen(), name, value, label))
 
     # -- selecting --------------------------------------------------------------------------------------
 
@@ -172,13 +163,13 @@ class Actions(ShapeActions):
             end = self.session.document.decals.next_number
             self.selection = tuple(range(end - count, end))
 
-        self._do(Duplicate(self._chosen()[1]), select)
+        self._do(Duplicate(self._chosen()), select)
 
     def _delete(self, _cursor: Cursor) -> None:
         if self._means_held:
             self._delete_held()
         else:
-            self._do(Delete(self._chosen()[1]))
+            self._do(Delete(self._chosen()))
 
     @property
     def _means_held(self) -> bool:
@@ -186,45 +177,45 @@ class Actions(ShapeActions):
         return self.grip is not None and not self.selection
 
     def _larger(self, _cursor: Cursor) -> None:
-        self._do(Scale(self._chosen()[1], LARGER))
+        self._do(Scale(self._chosen(), LARGER))
 
     def _smaller(self, _cursor: Cursor) -> None:
-        self._do(Scale(self._chosen()[1], 1.0 / LARGER))
+        self._do(Scale(self._chosen(), 1.0 / LARGER))
 
     def _turn_left(self, _cursor: Cursor) -> None:
-        self._do(Turn(self._chosen()[1], TURN))
+        self._do(Turn(self._chosen(), TURN))
 
     def _turn_right(self, _cursor: Cursor) -> None:
-        self._do(Turn(self._chosen()[1], -TURN))
+        self._do(Turn(self._chosen(), -TURN))
 
     def _next_image(self, _cursor: Cursor, step: int = 1) -> None:
-        count = len(self.session.document.images)
-        images = (self._chosen()[0].images - PLAIN + step) % (count - PLAIN) + PLAIN
-        self._alter("change the image", images=images)
+        count = len(self.session.document.images) - PLAIN
+        self._alter("change the image", "images", lambda d: (d.images - PLAIN + step) % count + PLAIN)
 
     def _previous_image(self, cursor: Cursor) -> None:
         self._next_image(cursor, -1)
 
     def _next_tint(self, _cursor: Cursor) -> None:
-        now = self._chosen()[0].tints[0]
-        nearest = int(np.abs(np.array(TINTS) - now).sum(axis=1).argmin())
-        self._alter("tint", tints=TINTS[(nearest + 1) % len(TINTS)])
+        def tint(decals: Decals) -> ArrayLike:
+            nearest = int(np.abs(np.array(TINTS) - decals.tints[0]).sum(axis=1).argmin())
+            return TINTS[(nearest + 1) % len(TINTS)]
+
+        self._alter("tint", "tints", tint)
 
     def _fainter(self, _cursor: Cursor) -> None:
-        self._alter("fade", opacities=self._chosen()[0].opacities * FAINTER)
+        self._alter("fade", "opacities", lambda d: d.opacities * FAINTER)
 
     def _stronger(self, _cursor: Cursor) -> None:
-        self._alter("fade", opacities=np.minimum(self._chosen()[0].opacities / FAINTER, 1.0))
+        self._alter("fade", "opacities", lambda d: np.minimum(d.opacities / FAINTER, 1.0))
 
     def _layer_up(self, _cursor: Cursor, step: int = 1) -> None:
-        layers = np.clip(self._chosen()[0].layers + step, -LAYERS, LAYERS - 1)
-        self._alter("change the layer", layers=layers)
+        self._alter("change the layer", "layers", lambda d: np.clip(d.layers + step, -LAYERS, LAYERS - 1))
 
     def _layer_down(self, cursor: Cursor) -> None:
         self._layer_up(cursor, -1)
 
     def _next_interaction(self, _cursor: Cursor) -> None:
-        self._alter("change the interaction", interactions=(self._chosen()[0].interactions + 1) % 3)
+        self._alter("change the interaction", "interactions", lambda d: (d.interactions + 1) % 3)
 
     # -- many -------------------------------------------------------------------------------------------
 
@@ -235,7 +226,7 @@ class Actions(ShapeActions):
         document, number = self.session.document, under(cursor).object
         self._coats += 1
         seed, objects, images = self._coats, document.objects, len(document.images)
-        positions = document.decals.decals.positions
+        positions = document.decals.column("positions")
 
         def work(tell: Progress, stop: Callable[[], bool]) -> Command:
             count = int((nearest(objects, positions).objects == number).sum())

@@ -13,7 +13,9 @@ from blobtree.progress import Cancel, Progress
 from decals.edit.change import Numbers
 from decals.edit.commands import OfNumbers
 from decals.edit.jobs import Job, Outcome, Worker
-from decals.edit.population import Relax
+from decals.edit.objects import AddObject, RemoveObject
+from decals.edit.population import Coat, Relax, Scatter
+from decals.edit.primitives import OfPrimitive
 from decals.edit.session import Command, EditSession, Saving
 from decals.errors import DecalsError, InvalidEdit
 from decals.scenes.camera import Camera
@@ -21,10 +23,13 @@ from decals.scenes.camera import Camera
 MANY = 500
 """Decals that are changed at once, while the window waits."""
 
+LONG = (AddObject, Coat, OfPrimitive, Relax, RemoveObject, Scatter)
+"""Commands that ask many places of surfaces, or make surfaces."""
+
 WAIT = "wait for what goes on, or press Escape"
 
 Step = Callable[[EditSession], str]
-"""Does something to a session; what it did, in plain words."""
+"""Does something to a session; what it did, in plain words, or nothing where that was said."""
 
 
 def are_many(numbers: Numbers) -> bool:
@@ -33,8 +38,8 @@ def are_many(numbers: Numbers) -> bool:
 
 
 def takes_long(command: Command) -> bool:
-    """Whether a command is better done in the background."""
-    return isinstance(command, Relax) or (isinstance(command, OfNumbers) and are_many(command.numbers))
+    """Whether a command is better done in the background: it asks surfaces, or changes many decals."""
+    return isinstance(command, LONG) or (isinstance(command, OfNumbers) and are_many(command.numbers))
 
 
 def doing(command: Command) -> Step:
@@ -92,9 +97,14 @@ class Background:
             self._edits.start(self._on_fork(label, step, done))
             return
         text = step(self._session)
+        self._seen(text, done)
+
+    def _seen(self, text: str, done: Callable[[], None] | None) -> None:
+        """Do what goes with an edit that is seen now."""
         if done is not None:
             done()
-        self._say(text)
+        if text:
+            self._say(text)
 
     def make(self, label: str, work: Callable[[Progress, Cancel], Command]) -> None:
         """Make a command out of what stays as it is, which takes long, and do it; errors as for `edit`."""
@@ -122,11 +132,12 @@ class Background:
         """
         if not self._threaded:
             self.edit(label, step)
-        elif self._following and not self._edits.stopping:
+        elif self._following and self._edits.busy and not self._edits.stopping:
             self._wish = label, step
         else:
-            self.edit(label, step)
+            self.wait()
             self._following = True
+            self.edit(label, step)
 
     def afterwards(self, call: Callable[[], None]) -> None:
         """Call something once nothing follows any more."""
@@ -156,21 +167,19 @@ class Background:
 
         def work(_tell: Progress, _stop: Cancel) -> Outcome:
             text = step(fork)
-            fork.document.prepare()
+            fork.document.prepare(surfaces=not following)
 
             def outcome() -> Job | None:
                 if not self._session.adopt(fork):
                     if not self._following:
                         self._settle()
                     return self._on_fork(label, step, done)
-                if done is not None:
-                    done()
-                self._say(text)
+                self._seen(text, done)
                 return None
 
             return outcome
 
-        fork = self._session.fork()
+        fork, following = self._session.fork(), self._following
         return Job(label, work)
 
     # -- saves ------------------------------------------------------------------------------------------
@@ -203,6 +212,11 @@ class Background:
     def busy(self) -> bool:
         """Whether something goes on, or is done and was not looked at."""
         return self.busy_editing or self._saves.busy
+
+    @property
+    def following(self) -> bool:
+        """Whether what hands asked for again and again is not all seen yet."""
+        return self._following
 
     @property
     def busy_editing(self) -> bool:

@@ -1,6 +1,6 @@
 """What can be done to decals and images; each command is a value, and computes a change."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -77,6 +77,20 @@ class Alter(OfNumbers):
         before = document.decals.take(self.numbers)
         arrays = {name: _spread(before, name, value) for name, value in self.values.items()}
         return document.with_decals(self.numbers, before.replace(**arrays))
+
+
+@dataclass(frozen=True, eq=False)
+class Adjust(OfNumbers):
+    """Exchange one value by what a function makes of the decals as they are: a layer up, half as opaque."""
+
+    name: str
+    value: Callable[[Decals], ArrayLike]
+    label: str = "change"
+
+    def change(self, document: Document) -> Change:
+        """Ask the function."""
+        values = {self.name: self.value(document.decals.take(self.numbers))}
+        return Alter(self.numbers, values, self.label).change(document)
 
 
 @dataclass(frozen=True, eq=False)

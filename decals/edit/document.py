@@ -17,16 +17,26 @@ NOWHERE = np.zeros((1, 3), np.float32)
 """Any point: what is asked about it for the first time is made then."""
 
 
+class Lineage:
+    """What a document and its forks have in common; what is known of one may be kept for all."""
+
+
 class Document:
     """A scene whose decals keep their numbers while they are edited; renderers draw it as it is.
 
     Nothing but `put` changes it, and that takes a `Change`.
+
+    Attributes
+    ----------
+    lineage
+        The same for a document and its forks.
     """
 
     def __init__(self, scene: Scene) -> None:
         instance("what to edit", scene, Scene, InvalidScene, "decals.cover makes one")
         self._objects, self._images, self._camera = scene.objects, scene.images, scene.camera
         self._decals = DecalEditor(scene.decals)
+        self.lineage = Lineage()
 
     @property
     def objects(self) -> tuple[SceneObject, ...]:
@@ -57,13 +67,13 @@ class Document:
         """Give the same document again, to be changed on its own; objects and images are shared."""
         made = type(self).__new__(type(self))
         made._objects, made._images, made._camera = self._objects, self._images, self._camera
-        made._decals = self._decals.copy()
+        made._decals, made.lineage = self._decals.copy(), self.lineage
         return made
 
-    def prepare(self) -> None:
-        """Lay out the index and find the surfaces, for which who asks for them first would wait."""
+    def prepare(self, *, surfaces: bool = True) -> None:
+        """Lay out the index and make the surfaces, for which who asks for them first would wait."""
         self._decals.index  # noqa: B018  (it is laid out where it is asked for)
-        for item in self._objects:
+        for item in self._objects if surfaces else ():
             with suppress(InvalidMesh):  # a tree that shows nothing
                 item.surface.project(NOWHERE)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import ISO, Node
-from decals.edit.document import Document
+from decals.edit.document import Document, Lineage
 from decals.edit.places import Places, nearest
 from decals.edit.trees import Doubles, Path, alone, moved, node_at, with_node, within, world_matrix
 from decals.scenes.scene import SceneObject, TreeObject
@@ -99,14 +99,14 @@ class Start:
         return weights
 
 
-_starts: WeakKeyDictionary[Document, Start] = WeakKeyDictionary()
+_starts: WeakKeyDictionary[Lineage, Start] = WeakKeyDictionary()
 
 
 def _start_of(document: Document, asked: Asked, tree: Node, positions: Floats) -> Start:
     """Give where a drag began, the same as for its last step where nothing else happened."""
-    start = _starts.get(document)
+    start = _starts.get(document.lineage)
     if start is None or not start.same(asked, positions):
-        start = _starts[document] = Start(asked, tree, positions)
+        start = _starts[document.lineage] = Start(asked, tree, positions)
     return start
 
 

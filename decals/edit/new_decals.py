@@ -5,6 +5,7 @@ import numpy as np
 from decals.coat.orientation import tangents
 from decals.edit.document import Document
 from decals.model import PLAIN, Decals
+from decals.scenes.scene import bounds_of
 from decals.surfaces.surface import Floats
 
 SMALL = 0.05
@@ -19,8 +20,8 @@ def decal_at(document: Document, position: Floats, normal: Floats, model: int | 
         return like.replace(
             positions=places[0], normals=places[1], tangents=tangents(*places, like.tangents[0], 0)
         )
-    radii = document.decals.decals.radii
-    low, high = document.scene.bounds
+    radii = document.decals.column("radii")
+    low, high = bounds_of(document.objects)
     radius = float(np.median(radii)) if len(radii) else SMALL * float(np.linalg.norm(high - low))
     return Decals(
         *places,

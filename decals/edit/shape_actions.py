@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError, Node, Point, Segment
 from blobtree.formulas.kernels import RIM
-from decals.edit.background import Background
+from decals.edit.background import Background, Step
 from decals.edit.change import Change
 from decals.edit.objects import AddObject, RemoveObject
 from decals.edit.pick import Pick
@@ -39,6 +39,9 @@ TINTS = ((1.0, 1.0, 1.0), (0.95, 0.45, 0.35), (0.95, 0.8, 0.35), (0.5, 0.85, 0.5
 
 BALL, LIMB, LONG = 0.5, 0.4, 1.6
 """Radii of a new ball and of a new limb, and the limb's length, in radii of what they grow out of."""
+
+CARRIED = 5_000
+"""Decals among which a primitive is dragged while the window waits."""
 
 OBJECT, FIRST = 0.08, 0.2
 """Radius of a new object in diagonals of the scene; of the first one, in distances from the eye."""
@@ -76,16 +79,22 @@ class ShapeActions(ABC):
         self._colors = 0
 
     @abstractmethod
-    def attempt(self, command: Command) -> bool:
-        """Do a command; what cannot be done is said in `message`."""
-
-    @abstractmethod
     def settle(self) -> None:
         """End what goes on: the next action is an entry of its own."""
 
     @abstractmethod
     def _do(self, command: Command, done: Callable[[], None] | None = None) -> None:
         """Do a command, then what goes with it."""
+
+    def _follow(self, label: str, step: Step, *, long: bool) -> None:
+        """Do what hands ask for again and again; what cannot be done is said in `message`."""
+        try:
+            if long:
+                self.background.follow(label, step)
+            else:
+                self.message = step(self.session)
+        except (DecalsError, BlobTreeError) as error:
+            self.message = str(error)
 
     # -- holding a primitive ----------------------------------------------------------------------------
 
@@ -153,18 +162,33 @@ class ShapeActions(ABC):
 
     def move_grip(self, offset: ArrayLike) -> None:
         """Move the held primitive by an offset from where it was at first."""
-        if self.grip is not None:
-            self.session.take_back()
-            self.attempt(MovePrimitive(*self.grip, offset, quick=True))
+        if self.grip is None:
+            return
+        command = MovePrimitive(*self.grip, offset, quick=True)
+
+        def step(session: EditSession) -> str:
+            session.take_back()
+            session.do(command)
+            return command.label
+
+        self._follow(command.label, step, long=len(self.session.document.decals) > CARRIED)
 
     def end_grip(self) -> None:
         """Let go of the held primitive; where nothing is left to lay decals on, it goes back."""
-        try:
-            if self.grip is not None:
-                self.session.document.objects[self.grip[0]].surface  # noqa: B018  (asking may fail)
-        except (DecalsError, BlobTreeError) as error:
-            self.session.cancel()
-            self.message = str(error)
+        if self.grip is not None:
+            number = self.grip[0]
+
+            def step(session: EditSession) -> str:
+                try:
+                    session.document.objects[number].surface  # noqa: B018  (asking may fail)
+                except (DecalsError, BlobTreeError) as error:
+                    session.cancel()
+                    return str(error)
+                session.document.prepare()
+                return ""
+
+            long = self.background.following or not self.background.busy_editing
+            self._follow(MovePrimitive.label, step, long=long)
         self.settle()
 
     # -- primitives -------------------------------------------------------------------------------------
@@ -266,8 +290,8 @@ class ShapeActions(ABC):
         center = target if found is None else found.position + radius * up
         names = {item.name for item in objects}
         name = next(name for n in range(1, len(names) + 2) if (name := f"ball {n}") not in names)
-        self._do(AddObject(TreeObject(name, Point(_numbers(center), radius=radius))))
-        self._hold(len(objects), (), radius * up)
+        ball = TreeObject(name, Point(_numbers(center), radius=radius))
+        self._do(AddObject(ball), lambda: self._hold(len(self.session.document.objects) - 1, (), radius * up))
 
     def _remove_object(self, cursor: Cursor) -> None:
         self._do(RemoveObject(under(cursor).object))

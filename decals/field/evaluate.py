@@ -100,7 +100,7 @@ def evaluate(
         int(mapping),
         int(contact),
         decals.layered,
-        wp.array(records, dtype=wp.vec4, device=device),
+        wp.array(records, dtype=wp.vec4, device=device, copy=False),
         *placed.arguments(),
     ]
     wp.launch(sample_points, count, inputs, [owner, uv, field], device=device)
@@ -113,7 +113,7 @@ def _placed(
 ) -> tuple[NDArray[np.float32], DeviceIndex]:
     """Records and index of decals."""
     if isinstance(decals, DecalEditor):
-        return decals.arrays[RECORDS], decals.index.on(device)
+        return decals.arrays[RECORDS], decals.index.on(device, copy=False)
     if not isinstance(decals, Decals):
         raise InvalidDecals(f"expected Decals or a DecalEditor, got {shown(decals)}; a scene has .decals")
     if index is None:

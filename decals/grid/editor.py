@@ -110,6 +110,10 @@ class DecalEditor:
         """All decals, in the order of `numbers`."""
         return self._rows.take(self.numbers)
 
+    def column(self, name: str) -> NDArray[Any]:
+        """Copy one array of all decals, such as "positions", in the order of `numbers`."""
+        return self._rows.column(name)
+
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Give "decal_records", "index_levels", "index_table" and "index_ids", with spare rows at the end.

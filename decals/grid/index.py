@@ -124,14 +124,14 @@ class DecalIndex:
         np.maximum.at(longest, cells[:, 0] >> LEVEL_SHIFT, self.ids[cells[:, 3]])
         return longest
 
-    def on(self, device: Any = None) -> DeviceIndex:
-        """Copy the arrays to a Warp device."""
+    def on(self, device: Any = None, *, copy: bool = True) -> DeviceIndex:
+        """Copy the arrays to a Warp device; without ``copy``, share those that are on it already."""
         return DeviceIndex(
             self.level_count,
-            wp.array(self.levels, dtype=wp.vec4, device=device),
-            wp.array(self.table, dtype=wp.vec4i, device=device),
+            wp.array(self.levels, dtype=wp.vec4, device=device, copy=copy),
+            wp.array(self.table, dtype=wp.vec4i, device=device, copy=copy),
             self.mask,
-            wp.array(self.ids, dtype=wp.int32, device=device),
+            wp.array(self.ids, dtype=wp.int32, device=device, copy=copy),
         )
 
     def candidates(self, points: ArrayLike) -> tuple[Wide, Ints]:

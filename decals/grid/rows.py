@@ -73,6 +73,10 @@ class DecalRows:
         rows = self.check(numbers)
         return Decals.of_rows({name: column[rows] for name, column in self._columns.items()})
 
+    def column(self, name: str) -> NDArray[Any]:
+        """One of the arrays of all decals, in the order of `numbers`."""
+        return self._columns[name][self.numbers]
+
     def put(self, numbers: Numbers, decals: Decals) -> None:
         """Put decals into rows, which may be past the end."""
         self.end = max(self.end, int(numbers.max(initial=-1)) + 1)

@@ -7,6 +7,7 @@ import numpy as np
 from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 
 from decals.edit.actions import Actions
+from decals.scenes.scene import bounds_of
 from decals.surfaces.surface import Floats
 from decals.window.weak import weakly
 
@@ -58,7 +59,7 @@ class Grip:
         self._widget.SetCenter(*center.tolist())
 
     def _make(self, center: Floats) -> Any:
-        low, high = self._actions.session.document.scene.bounds
+        low, high = bounds_of(self._actions.session.document.objects)
         widget: Any = vtkSphereWidget()  # its stubs know events by number alone
         widget.SetRepresentationToSurface()
         widget.GetSphereProperty().SetColor(*COLOR)
@@ -89,7 +90,6 @@ class Grip:
         """The handle was let go."""
         self._actions.end_grip()
         self.moving = False
-        self.update()
         self._redraw(True)
 
     @property

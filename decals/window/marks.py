@@ -32,6 +32,7 @@ class Marks:
     def __init__(self, plotter: pv.BasePlotter) -> None:
         self._plotter: Any = plotter
         self._lines = pv.PolyData()
+        self._outlined: tuple[object, ...] = ()
         self._actor = plotter.add_mesh(
             pv.Line((0, 0, 0), (0, 0, 0)),
             color=COLOR,
@@ -64,8 +65,10 @@ class Marks:
 
     def outline(self, document: Document, numbers: tuple[int, ...], contact: Contact) -> None:
         """Outline decals; the last one exactly."""
-        if not numbers and not self._lines.n_points:
+        seen = document.objects, document.decals.version, numbers, contact
+        if seen == self._outlined:
             return
+        self._outlined = seen
         chosen = numbers[-MOST:]
         lines = [outline(document, chosen[-1], contact=contact)] if chosen else []
         lines += list(rims(document, np.array(chosen[:-1], np.int64)))

@@ -173,7 +173,7 @@ class EditWindow:
 
     def actions_shown(self) -> None:
         """Bring outlines, handle, help and status up to date."""
-        dragging = self.tools.dragging or self.grip.moving
+        dragging = self.tools.dragging or self.grip.moving or self.background.following
         if not dragging:
             self.grip.update()
         outlined = () if dragging else self.actions.selection  # it takes longer than the move itself

@@ -28,7 +28,7 @@ TARGET = 100.0
 COUNTS = (1_000, 20_000, 100_000)
 MODELS = ("knot", "creature")
 SIZE = (600, 400)
-RUNS = 3
+RUNS = 2
 KEYS = {"pick": "Click", "pick_also": "Shift+Click"}
 """Gestures that are no keys, where the table has no key for an action."""
 OF_SELECTED = (
@@ -86,6 +86,18 @@ class Hand:
             time.sleep(0.005)
         return max(times), 1e3 * (time.perf_counter() - begin)
 
+    def move_grip(self) -> tuple[float, float]:
+        """Move the held primitive a little by its handle; the longest of taking it, moving and letting go."""
+        widget = self.window.grip.widget
+        center = np.array(widget.GetCenter())
+        reach = 0.002 * float(np.linalg.norm(np.subtract(*self.window.document.scene.bounds)))
+        found = [self.blocks(lambda: widget.InvokeEvent("StartInteractionEvent"))]
+        for step in (1, 2, 3):
+            widget.SetCenter(*np.add(center, (reach * step, 0, 0)).tolist())
+            found.append(self.blocks(lambda: widget.InvokeEvent("InteractionEvent")))
+        found.append(self.blocks(lambda: widget.InvokeEvent("EndInteractionEvent")))
+        return max(block for block, _ in found), sum(whole for _, whole in found)
+
     def drag(self) -> tuple[float, float]:
         """Drag what is selected; the longest of press, moves and release."""
         x, y = self.at
@@ -117,6 +129,7 @@ def cases() -> Iterator[tuple[str, str, str, str]]:
                 yield f"{binding.action}_{selected}", binding.action, gesture, selected
         else:
             yield binding.action, binding.action, gesture, ""
+    yield "grip_move", "grip_move", "m", ""
     for action in ("undo", "redo"):
         yield f"{action}_all", action, "Ctrl+z" if action == "undo" else "Ctrl+y", "all"
 
@@ -124,7 +137,7 @@ def cases() -> Iterator[tuple[str, str, str, str]]:
 def measure(hand: Hand, action: str, gesture: str, selected: str) -> tuple[float, float]:
     """Median of a few runs of one case: longest block and whole time."""
     found = []
-    for run in range(RUNS + 1):
+    for run in range(1 if action == "scatter" else RUNS + 1):
         hand.blocks(lambda: hand.gesture("Escape"))
         if selected:
             hand.gesture("Click")
@@ -136,16 +149,19 @@ def measure(hand: Hand, action: str, gesture: str, selected: str) -> tuple[float
         if action in BEFORE:
             hand.blocks(lambda: hand.gesture("Ctrl+z"))
         steps = len(hand.window.session.labels)
-        times = hand.drag() if action == "move" else hand.blocks(lambda: hand.gesture(gesture))
+        if action == "grip_move":
+            hand.blocks(lambda: hand.gesture(gesture))
+        special = {"move": hand.drag, "grip_move": hand.move_grip}
+        times = special.get(action, lambda: hand.blocks(lambda: hand.gesture(gesture)))()
         found.append(times)
         hand.blocks(lambda: hand.window.actions.settle())
         while len(hand.window.session.labels) > (steps if action not in ("undo", "redo") else 0):
             hand.blocks(lambda: hand.gesture("Ctrl+z"))
-        if action == "grip" and hand.window.actions.grip:
-            hand.gesture("m")
+        if hand.window.actions.grip:
+            hand.blocks(lambda: hand.gesture("m"))
         if action == "help" and run == RUNS:
             hand.window.actions.help = False
-    block, whole = np.median(found[1:], axis=0)
+    block, whole = np.median(found[1:] or found, axis=0)
     return float(block), float(whole)
 
 
@@ -156,7 +172,7 @@ def scene_figures(model: str, count: int, only: tuple[str, ...], folder: Path) -
         window.show()
         hand = Hand(window)
         for name, action, gesture, selected in cases():
-            if only and action not in only:
+            if action not in only:
                 continue
             block, whole = measure(hand, action, gesture, selected)
             yield {f"{model}_{count}_{name}_block_ms": block, f"{model}_{count}_{name}_whole_ms": whole}
@@ -171,10 +187,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="1,000 decals alone")
     parser.add_argument("--counts", default=",".join(map(str, COUNTS)))
     parser.add_argument("--models", default=",".join(MODELS))
+    parser.add_argument("--skip", default="", help="some that are left out, such as scatter")
     parser.add_argument("--only", default="", help="some of the actions, as decals.edit.keys names them")
     arguments = parser.parse_args()
     counts = COUNTS[:1] if arguments.quick else tuple(int(count) for count in arguments.counts.split(","))
-    only = tuple(filter(None, arguments.only.split(",")))
+    skipped = arguments.skip.split(",")
+    only = (
+        tuple(arguments.only.split(",")) if arguments.only else tuple(action for _, action, _, _ in cases())
+    )
+    only = tuple(action for action in only if action not in skipped)
     print(f"python -m tests.bench.actions {' '.join(sys.argv[1:])}".rstrip(), machine(), sep="\n", flush=True)
     print(f"target: no block above {TARGET:g} ms; longest block ms, whole time ms")
     figures: Figures = {}

@@ -34,6 +34,11 @@ class Driver:
         self.event("KeyPressEvent", at, key=name, **modifiers)
         self.event("CharEvent", at, key=name, **modifiers)
 
+    def press(self, name, at=(1, 1), **modifiers):
+        """Press a key, and let what it begins come to its end."""
+        self.key(name, at, **modifiers)
+        self.finish()
+
     def wheel(self, at, *, up=True, **modifiers):
         self.event("MouseWheelForwardEvent" if up else "MouseWheelBackwardEvent", at, **modifiers)
 

@@ -24,14 +24,13 @@ def test_primitives_grow_join_and_go_and_undo_gives_the_first_picture(driver):
     first, state, at = fresh(driver), driver.state, place(driver)
     pictures = [first]
     for key, spot in (("n", at), ("j", (1, 1)), ("d", (1, 1)), ("l", at), ("Delete", (1, 1))):
-        driver.key(key, spot)
-        driver.finish()
+        driver.press(key, spot)
         assert (driver.window.grip.widget is None) == (key == "Delete")
         pictures.append(fresh_but_held(driver))
     assert all((one != other).any() for one, other in pairwise(pictures))
     assert len(driver.session.labels) == 5
     for _ in range(5):
-        driver.key("z", ctrl=True)
+        driver.press("z", ctrl=True)
     assert driver.state == state
     np.testing.assert_array_equal(fresh(driver), first)
 
@@ -43,14 +42,14 @@ def fresh_but_held(driver):
 
 
 def test_the_handle_of_what_is_new_drags_it(driver):
-    driver.key("n", place(driver))
-    driver.finish()
+    driver.press("n", place(driver))
     grip = driver.window.grip
     before = driver.window.actions.grip_center
     grip.begin()
     grip.widget.SetCenter(*np.add(before, (0.3, 0, 0)).tolist())
     grip.move()
     grip.end()
+    driver.finish()
     assert driver.session.labels == ("add a primitive", "move a primitive")
     np.testing.assert_allclose(driver.window.actions.grip_center - before, (0.3, 0, 0), atol=0.1)
 
@@ -59,12 +58,12 @@ def test_a_window_without_objects_gets_one_where_it_looks(driver):
     first, state = fresh(driver), driver.state
     while driver.document.objects:
         _, at = next(driver.visible())
-        driver.key("Delete", at, shift=True)
+        driver.press("Delete", at, shift=True)
     assert len(driver.document.decals) == 0
     empty = fresh(driver)
     driver.plotter.camera.focal_point = (0.25, 0, 0)
     driver.plotter.enable_parallel_projection()
-    driver.key("N", shift=True)
+    driver.press("N", shift=True)
     (ball,) = driver.document.objects
     np.testing.assert_allclose(ball.tree.center, (0.25, 0, 0), atol=1e-6)
     assert driver.window.grip.widget is not None
@@ -72,7 +71,7 @@ def test_a_window_without_objects_gets_one_where_it_looks(driver):
     driver.plotter.camera.focal_point = driver.document.camera.target
     assert (fresh(driver) != empty).any()
     while driver.session.labels:
-        driver.key("z", ctrl=True)
+        driver.press("z", ctrl=True)
     assert driver.state == state
     np.testing.assert_array_equal(fresh(driver), first)
 
@@ -82,9 +81,9 @@ def test_scenes_without_objects_are_saved_and_opened(opened, tmp_path):
 
     driver = opened(path=tmp_path / "scene.json")
     while driver.document.objects:
-        driver.key("Delete", next(driver.visible())[1], shift=True)
-    driver.key("s", ctrl=True)
+        driver.press("Delete", next(driver.visible())[1], shift=True)
+    driver.press("s", ctrl=True)
     again = opened(load_scene(tmp_path / "scene.json"))
     assert again.document.objects == ()
-    again.key("N", shift=True)
+    again.press("N", shift=True)
     assert len(again.document.objects) == 1

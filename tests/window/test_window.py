@@ -147,6 +147,7 @@ def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
         widget.SetCenter(*np.add(center, (step, 0, 0)).tolist())
         widget.InvokeEvent("InteractionEvent")
     widget.InvokeEvent("EndInteractionEvent")
+    driver.finish()
     moved = np.linalg.norm(driver.document.decals.decals.positions - before, axis=1)
     assert moved.max() > 0.2
     assert (moved == 0).any()
