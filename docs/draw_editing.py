@@ -28,9 +28,8 @@ def press(window: EditWindow, name: str, at: tuple[int, int], key: str | None = 
 def shot(window: EditWindow, path: Path) -> None:
     """Write the whole frame, smooth."""
     window.samples = 2
-    window.rest()
-    window.samples = 1
     picture = Image.fromarray(window.plotter.screenshot(None, return_img=True))
+    window.samples = 1
     picture.save(path, quality=88)
     print(path)
 

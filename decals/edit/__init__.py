@@ -22,7 +22,8 @@ from decals.edit.commands import (
 from decals.edit.document import Document
 from decals.edit.jobs import Job, Worker
 from decals.edit.objects import AddObject, RemoveObject
-from decals.edit.pick import Pick, outline, pick
+from decals.edit.outlines import outline
+from decals.edit.pick import Pick, pick
 from decals.edit.places import Places, first_hit, nearest
 from decals.edit.population import Coat, Relax, Scatter
 from decals.edit.primitives import MovePrimitive, PaintPrimitive, ResizePrimitive

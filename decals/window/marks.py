@@ -7,8 +7,9 @@ import pyvista as pv
 
 from decals.edit.document import Document
 from decals.edit.keys import help_lines
-from decals.edit.pick import outline, rims
+from decals.edit.outlines import outline, rims
 from decals.field.contact import Contact
+from decals.field.mapping import Mapping
 from decals.surfaces.surface import Floats
 
 MOST = 64
@@ -63,15 +64,17 @@ class Marks:
             text.prop.SetBackgroundOpacity(PAPER)
         self._help.SetVisibility(False)
 
-    def outline(self, document: Document, numbers: tuple[int, ...], contact: Contact) -> None:
+    def outline(
+        self, document: Document, numbers: tuple[int, ...], contact: Contact, mapping: Mapping
+    ) -> None:
         """Outline decals; the last one exactly."""
         seen = document.objects, document.decals.version, numbers, contact
         if seen == self._outlined:
             return
         self._outlined = seen
         chosen = numbers[-MOST:]
-        lines = [outline(document, chosen[-1], contact=contact)] if chosen else []
-        lines += list(rims(document, np.array(chosen[:-1], np.int64)))
+        lines = [outline(document, chosen[-1], contact=contact, mapping=mapping)] if chosen else []
+        lines += list(rims(document, np.array(chosen[:-1], np.int64), mapping=mapping))
         self._lines.copy_from(_polylines(lines))
         self._actor.SetVisibility(bool(lines))
 

@@ -177,7 +177,7 @@ class EditWindow:
         if not dragging:
             self.grip.update()
         outlined = () if dragging else self.actions.selection  # it takes longer than the move itself
-        self.marks.outline(self.document, outlined, self.stage.contact)
+        self.marks.outline(self.document, outlined, self.stage.contact, self.stage.mapping)
         self.marks.show_help(self.actions.help)
         self.marks.say(self._status())
 

@@ -6,7 +6,8 @@ import pytest
 from blobtree import Point
 from decals.edit import EditSession
 from decals.edit.document import Document
-from decals.edit.pick import LIFT, outline, pick, rims
+from decals.edit.outlines import LIFT, outline, rims
+from decals.edit.pick import pick
 from decals.field.evaluate import evaluate
 from decals.model import Interaction
 from decals.render.renderer import Renderer
