@@ -1,7 +1,7 @@
 // The same pass as pixels.frag as a compute shader, for GLSL 4.30 on: an invocation a pixel.
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
-uniform ivec2 target_size;  // rows below the first one are left as they are
-uniform int first_row;
+uniform ivec2 first_texel;  // the lower left one of a rectangle
+uniform ivec2 end_texel;    // past its upper right one
 
 //@ slot body
 
@@ -11,8 +11,8 @@ layout(binding = 1) writeonly uniform image2D out_buffers;
 #endif
 
 void main() {
-    ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
-    if (any(greaterThanEqual(texel, target_size))) {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + first_texel;
+    if (any(greaterThanEqual(texel, end_texel))) {
         return;
     }
     Pixel pixel = pixel_at(texel);

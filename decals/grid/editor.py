@@ -24,7 +24,8 @@ from decals.grid import edit_kernels as kernels
 from decals.grid.cells import ALONE, FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
 from decals.grid.index import DecalIndex
 from decals.grid.journal import Journal, Range
-from decals.grid.rows import DecalRows, as_numbers, with_spare
+from decals.grid.rows import DecalRows, as_numbers, records_with_spare, runs_of, with_spare
+from decals.grid.trail import Balls, Trail, same_order
 from decals.model import RECORD, Decals
 
 MOST_LEVELS = 128
@@ -49,12 +50,13 @@ class DecalEditor:
 
     def __init__(self, decals: Decals) -> None:
         _check(decals)
-        self._begin(DecalRows(decals), _records(decals.packed(), len(decals)))
+        self._begin(DecalRows(decals), records_with_spare(decals.packed(), len(decals)))
 
     def _begin(self, rows: DecalRows, records: NDArray[np.float32]) -> None:
         self._rows = rows
         self._arrays: dict[str, NDArray[Any]] = {}
-        self._journal = Journal()
+        self._journal, self._trail = Journal(), Trail()
+        self._parity, self._level_of = ALONE, dict[int, int]()
         self._shared: dict[str, Any] = {}
         self._state, self._wp_state = _shared(np.zeros(4, np.int32), wp.int32)
         self._ranges, self._wp_ranges = _shared(np.zeros((NEIGHBOURHOOD, 2), np.int32), wp.vec2i)
@@ -72,11 +74,12 @@ class DecalEditor:
 
     def adopt(self, other: "DecalEditor") -> None:
         """Become another editor, which nobody may use any more; who follows this one copies everything."""
-        journal, arrays = self._journal, other.arrays
+        journal, trail, arrays = self._journal, self._trail, other.arrays
         vars(self).update(vars(other))
-        self._journal = journal
+        self._journal, self._trail = journal, trail
         for name, array in arrays.items():
             journal.add(name, (0, len(array)), new=True)
+        trail.everywhere(journal.version)
 
     # -- what there is ----------------------------------------------------------------------------------
 
@@ -174,6 +177,7 @@ class DecalEditor:
         """
         rows = self._rows.check(numbers)
         self._note_many(rows)
+        self._trail.add(self._journal.version + 1, self._balls(rows))
         if not self._behind:
             for number in rows.tolist():
                 self._take_out(number)
@@ -190,11 +194,14 @@ class DecalEditor:
         """
         rows = self._checked(numbers, decals)
         self._note_many(rows)
+        version, known = self._journal.version + 1, rows[self._rows.there(rows)]
+        left = self._balls(known)
         if not self._behind:
-            for number in rows[self._rows.there(rows)].tolist():
+            for number in known.tolist():
                 self._take_out(number)
         self._write_records(rows, decals)
         self._rows.put(rows, decals)
+        self._trail.add(version, np.concatenate([left, self._balls(rows)]))
         if not self._behind:
             self._behind = not all(map(self._put_in, rows.tolist(), decals.ranks.tolist()))
 
@@ -210,7 +217,24 @@ class DecalEditor:
         known = self._journal.since(since)
         return {name: [(0, len(array))] for name, array in self.arrays.items()} if known is None else known
 
+    def touched(self, since: int) -> Balls | None:
+        """Balls of influence, ``float32[n, 4]``, of all decals that changed since a version, then and now.
+
+        None where anything may show otherwise: too much changed, or sums over neighbours round otherwise.
+        """
+        self._catch_up()
+        return self._trail.since(since)
+
+    @property
+    def largest_influence(self) -> float:
+        """At least the largest radius of influence of the decals that there are."""
+        return float(self._arrays[RECORDS][::RECORD, 3].max(initial=0.0))
+
     # -- how --------------------------------------------------------------------------------------------
+
+    def _balls(self, rows: NDArray[np.int64]) -> Balls:
+        """Centres and influence of decals."""
+        return self._arrays[RECORDS][RECORD * rows]
 
     def _checked(self, numbers: ArrayLike, decals: Decals) -> NDArray[np.int64]:
         _check(decals)
@@ -239,9 +263,9 @@ class DecalEditor:
     def _write_records(self, rows: NDArray[np.int64], decals: Decals) -> None:
         count = int(rows.max(initial=-1)) + 1
         if RECORD * count > len(self._arrays[RECORDS]):
-            self._put(RECORDS, _records(self._arrays[RECORDS], count))
+            self._put(RECORDS, records_with_spare(self._arrays[RECORDS], count))
         self._arrays[RECORDS].reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
-        for first, last in _runs(rows):
+        for first, last in runs_of(rows):
             self._journal.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
 
     def _put_in(self, number: int, rank: int) -> bool:
@@ -292,8 +316,9 @@ class DecalEditor:
         index = DecalIndex.build(records[:, 0, :3], records[:, 0, 3], ranks)
         levels = np.zeros((MOST_LEVELS, 4), np.float32)
         levels[: index.level_count] = index.levels
-        self._parity = index.parity
-        self._level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
+        level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
+        reordered = index.parity != self._parity or not same_order(self._level_of, level_of)
+        self._parity, self._level_of = index.parity, level_of
         table, ids = index.table.copy(), index.ids.copy()
         full = np.flatnonzero(table[:, 0] >= 0)
         heads = table[full, 3]
@@ -307,6 +332,8 @@ class DecalEditor:
         self._put(TABLE, table)
         self._put(IDS, with_spare(ids))
         _, self._shared[ROOMS] = _shared(rooms, wp.int32)
+        if reordered:
+            self._trail.everywhere(self._journal.version)
 
     def _put(self, name: str, array: NDArray[Any]) -> None:
         self._arrays[name], self._shared[name] = _shared(array, _TYPES[name])
@@ -321,20 +348,6 @@ def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:
     """Give an array, and the same memory as Warp has it."""
     held = np.ascontiguousarray(array)
     return held, wp.array(held, dtype=dtype, device="cpu", copy=False)
-
-
-def _records(array: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-    """Copy records to more of them, at least so many."""
-    return with_spare(array.reshape(-1, RECORD, 4), count).reshape(-1, 4)
-
-
-def _runs(rows: NDArray[np.int64]) -> list[Range]:
-    """First and last number of each run of numbers that follow each other."""
-    ordered = np.sort(rows)
-    breaks = np.flatnonzero(np.diff(ordered) > 1)
-    firsts = ordered[np.concatenate([[0], breaks + 1])] if len(ordered) else ordered
-    lasts = ordered[np.concatenate([breaks, [-1]])] if len(ordered) else ordered
-    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
 def _check(decals: Decals) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.errors import InvalidDecals
-from decals.model import Decals, Interaction
+from decals.model import RECORD, Decals, Interaction
 
 Numbers = NDArray[np.int64]
 
@@ -120,3 +120,17 @@ def with_spare(array: NDArray[Any], least: int = 0) -> NDArray[Any]:
     grown = np.zeros((size, *array.shape[1:]), array.dtype)
     grown[: len(array)] = array
     return grown
+
+
+def records_with_spare(array: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """Copy records to more of them, at least so many."""
+    return with_spare(array.reshape(-1, RECORD, 4), count).reshape(-1, 4)
+
+
+def runs_of(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """First and last number of each run of numbers that follow each other."""
+    ordered = np.sort(rows)
+    breaks = np.flatnonzero(np.diff(ordered) > 1)
+    firsts = ordered[np.concatenate([[0], breaks + 1])] if len(ordered) else ordered
+    lasts = ordered[np.concatenate([breaks, [-1]])] if len(ordered) else ordered
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))

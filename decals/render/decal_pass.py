@@ -12,7 +12,7 @@ from decals.render.context import Context
 from decals.render.decal_data import DecalData, library
 from decals.render.entry import PixelPass, Program, pixel_pass
 from decals.render.gbuffer import GBuffer
-from decals.render.parts import WHOLE, Part
+from decals.render.parts import WHOLE, Part, Rectangle
 from decals.render.textures import ImageArray
 from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
 
@@ -44,15 +44,15 @@ class DecalPass:
 
     def draw(
         self,
+        where: Rectangle,
         gbuffer: GBuffer,
-        tile: Tile,
         decals: DecalData | None,
         images: ImageArray | None,
         mapping: Mapping,
         contact: Contact,
         part: Part = WHOLE,
     ) -> None:
-        """Paint rows of a tile; without decals (or images for them) only the objects' own colours are seen.
+        """Paint rows of a rectangle; without decals (or images for them) the objects' own colours show.
 
         ``mapping`` is how images are laid onto curved surface, ``contact`` how decals push each other.
         """
@@ -65,7 +65,7 @@ class DecalPass:
             set_uniform(program, "decal_images", FIRST_UNIT)
             set_uniform(program, "decal_mapping", int(mapping))
             decals.use(program, FIRST_UNIT + 1)
-        painting.run(tile.width, tile.height, part)
+        painting.run(where.rows(part))
 
     def read_decal(self, tile: Tile) -> NDArray[np.float32]:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""

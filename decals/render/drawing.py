@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 from decals.render.parts import Part, Step
+from decals.render.shown import Shown
+from decals.render.steps import Plan
 from decals.render.targets import Targets
 
 UNITS = 1024
@@ -18,12 +20,16 @@ SHARE = 0.25
 class Drawing:
     """A picture in the making: the same as `Renderer.draw` gives at once, bit for bit.
 
+    Of what the targets hold when it begins, whatever is the same stays. Where somebody else draws into them
+    before it is done, it begins anew.
+
     Parameters
     ----------
     targets
         Ends with what is drawn into; before that come Nones, while it is being made.
-    steps
-        Gives what is to be drawn into the targets, always the same; asked whenever somebody goes on.
+    plan
+        Gives what is to be drawn into targets that hold something, always the same; asked whenever somebody
+        goes on.
     finish
         Waits until the card has done what it was told.
     clock
@@ -35,20 +41,24 @@ class Drawing:
         Whether the picture is in the targets.
     seconds
         What drawing it has taken until now.
+    share
+        Part of the work of a whole picture, 0 to 1, that there was when it was ordered.
     """
 
     def __init__(
         self,
         targets: Iterator[Targets | None],
-        steps: Callable[[Targets], Sequence[Step]],
+        plan: Callable[[Targets, Shown | None], Plan],
         finish: Callable[[], None],
         *,
+        share: float = 1.0,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._making = targets
         self._targets: Targets | None = None
-        self.done, self.seconds = False, 0.0
-        self._steps, self._finish, self._clock = steps, finish, clock
+        self.done, self.seconds, self.share = False, 0.0, share
+        self._plan, self._finish, self._clock = plan, finish, clock
+        self._held: Shown | None = None
         self._number, self._at, self._step = 0, 0, FIRST
 
     @property
@@ -64,14 +74,15 @@ class Drawing:
         The context must be current, and what is shown as it was when the drawing began.
         """
         begin = before = self._clock()
-        steps: Sequence[Step] = ()
+        plan: Plan | None = None
         while not self.done and before - begin <= (1.0 - SHARE) * seconds:
             if self._targets is None:
                 self._targets = next(self._making)
                 before = self._clock()
                 continue
-            steps = steps or self._begin(self._targets)
-            self._draw(steps)
+            plan = plan or self._begin(self._targets)
+            self._draw(plan.steps)
+            self._end(plan)
             now = self._clock()
             self._pace(now - before, SHARE * seconds)
             before = now
@@ -80,24 +91,35 @@ class Drawing:
 
     def complete(self) -> None:
         """Draw all that is missing at once."""
-        for number, step in enumerate(self._begin(self.targets)):
-            if number >= self._number:
-                step(Part(self._at / UNITS if number == self._number else 0.0))
-        self.done = True
+        plan = self._begin(self.targets)
+        for step in plan.steps[self._number :]:
+            step(Part(self._at / UNITS))
+            self._number, self._at = self._number + 1, 0
+        self._end(plan)
 
-    def _begin(self, targets: Targets) -> Sequence[Step]:
-        targets.picture = None
-        return self._steps(targets)
+    def _begin(self, targets: Targets) -> Plan:
+        """Begin, anew if somebody else has drawn into the targets since, or go on."""
+        if targets.drawing is not self:
+            self._held, targets.drawing, targets.shown = targets.shown, self, None
+            self._number, self._at, self._step = 0, 0, FIRST
+        return self._plan(targets, self._held)
 
     def _draw(self, steps: Sequence[Step]) -> None:
-        """Draw the next part."""
+        """Draw the next part, if there is any."""
+        if self._number == len(steps):
+            return
         end = min(self._at + self._step, UNITS)
         steps[self._number](Part(self._at / UNITS, end / UNITS))
         self._finish()
         self._at = end
         if end == UNITS:
             self._number, self._at = self._number + 1, 0
-            self.done = self._number == len(steps)
+
+    def _end(self, plan: Plan) -> None:
+        """Note what the targets show, if all of it is there."""
+        self.done = self._number == len(plan.steps)
+        if self.done:
+            self.targets.shown = plan.shown
 
     def _pace(self, took: float, wished: float) -> None:
         """Choose the size of the next part: steps differ, so each begins small."""

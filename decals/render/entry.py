@@ -15,7 +15,7 @@ import moderngl
 import numpy as np
 
 from decals.errors import NoGraphics
-from decals.render.parts import WHOLE, Part
+from decals.render.parts import Rectangle
 from implicit_decals.shaders import Source, compose
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class PixelPass(Protocol):
         """What takes the uniforms."""
         ...
 
-    def run(self, width: int, height: int, part: Part = WHOLE) -> None:
-        """Fill these rows of the lower left part of this size of all targets."""
+    def run(self, where: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
         ...
 
     def release(self) -> None:
@@ -121,9 +121,10 @@ class FragmentPass:
         self._framebuffer = context.gl.framebuffer(list(targets))
         self._gl = context.gl
 
-    def run(self, width: int, height: int, part: Part = WHOLE) -> None:
-        """Fill these rows of the lower left part of this size of all targets."""
-        limit(self._framebuffer, width, height, part)
+    def run(self, where: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
+        self._framebuffer.viewport = (0, 0, where.x + where.width, where.y + where.height)
+        self._framebuffer.scissor = scissor_of(where)
         self._framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
         self._array.render(vertices=3)
@@ -145,32 +146,29 @@ class ComputePass:
         self._targets = tuple(targets)
         self._gl = context.gl
 
-    def run(self, width: int, height: int, part: Part = WHOLE) -> None:
-        """Fill these rows of the lower left part of this size of all targets."""
+    def run(self, where: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
         for unit, target in enumerate(self._targets):
             target.bind_to_image(unit, read=False, write=True)
         program = self.program
         assert isinstance(program, moderngl.ComputeShader)
-        run_rows(program, width, part.of(height))
+        run_pixels(program, where)
         self._gl.memory_barrier()
 
     def release(self) -> None:
         """Nothing but targets and program was made."""
 
 
-def limit(framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
-    """Let what is drawn into a framebuffer fall into rows of the lower left part of this size."""
-    first, last = part.of(height)
-    framebuffer.viewport = (0, 0, width, height)
-    framebuffer.scissor = (0, first, width, last - first)
+def scissor_of(where: Rectangle) -> tuple[int, int, int, int]:
+    """Give a rectangle as OpenGL's scissors."""
+    return where.x, where.y, where.width, where.height
 
 
-def run_rows(program: moderngl.ComputeShader, width: int, rows: tuple[int, int]) -> None:
-    """Invoke a compute shader for every pixel of rows, from the first to before the last."""
-    first, last = rows
-    program["first_row"] = first
-    program["target_size"] = width, last
-    program.run(-(-width // GROUP), -(-(last - first) // GROUP))
+def run_pixels(program: moderngl.ComputeShader, where: Rectangle) -> None:
+    """Invoke a compute shader for every pixel of a rectangle."""
+    program["first_texel"] = where.x, where.y
+    program["end_texel"] = where.x + where.width, where.y + where.height
+    program.run(-(-where.width // GROUP), -(-where.height // GROUP))
 
 
 _chosen: dict[str, Entry] = {}
@@ -248,6 +246,6 @@ def measure(context: "Context", entry: Entry) -> float:
 def _seconds(context: "Context", probe: PixelPass) -> float:
     context.gl.finish()
     begin = time.perf_counter()
-    probe.run(*_PROBE_SIZE)
+    probe.run(Rectangle(0, 0, *_PROBE_SIZE))
     context.gl.finish()
     return time.perf_counter() - begin

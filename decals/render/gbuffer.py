@@ -5,9 +5,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.render.context import DEPTH, Context
-from decals.render.entry import GROUP, Entry, limit, run_rows
-from decals.render.parts import WHOLE, Part
-from decals.render.tile import Rectangle, Tile, attach_camera, read_floats, set_uniform
+from decals.render.entry import GROUP, Entry, run_pixels, scissor_of
+from decals.render.parts import WHOLE, Part, Rectangle
+from decals.render.tile import Tile, attach_camera, read_floats, set_uniform
 from implicit_decals.shaders import compose
 
 
@@ -42,7 +42,8 @@ class GBuffer:
         self._bind(self._framebuffer, width, height, part)
 
     def _bind(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
-        limit(framebuffer, width, height, part)
+        framebuffer.viewport = (0, 0, width, height)
+        framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
         framebuffer.use()
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
@@ -53,14 +54,14 @@ class GBuffer:
             self.use(width, height, part)  # before anything is cleared: it ends scissors that others left on
             self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         else:
-            self._clear_by_compute(self._clearing, width, height, part)
+            self._clear_by_compute(self._clearing, Rectangle(0, 0, width, height).rows(part))
             self._bind(self._depth_alone, width, height, part)
             self._depth_alone.clear(depth=1.0)
 
-    def _clear_by_compute(self, program: moderngl.ComputeShader, width: int, height: int, part: Part) -> None:
+    def _clear_by_compute(self, program: moderngl.ComputeShader, where: Rectangle) -> None:
         for unit, texture in enumerate((self.position, self.normal, self.color)):
             texture.bind_to_image(unit, read=False, write=True)
-        run_rows(program, width, part.of(height))
+        run_pixels(program, where)
         self._gl.memory_barrier()
 
     def complete_depth(self, width: int, height: int, part: Part = WHOLE) -> None:

@@ -8,7 +8,7 @@ from decals.render.decal_pass import use_textures
 from decals.render.entry import PixelPass, Program, pixel_pass
 from decals.render.gbuffer import GBuffer
 from decals.render.lamps import Lamps
-from decals.render.parts import WHOLE, Part
+from decals.render.parts import WHOLE, Part, Rectangle
 from decals.render.tile import MARGIN, Tile, attach_camera, set_uniform
 
 STUDIO, LAMPS = "lit.glsl", "lamplit.glsl"
@@ -34,6 +34,7 @@ class LightPass:
 
     def draw(
         self,
+        where: Rectangle,
         gbuffer: GBuffer,
         paint: moderngl.Texture,
         tile: Tile,
@@ -41,7 +42,7 @@ class LightPass:
         lamps: Lamps | None = None,
         part: Part = WHOLE,
     ) -> None:
-        """Light rows of a tile, all of which must be in the G-buffer, by the studio or by lamps.
+        """Light rows of a rectangle of a tile, all of which must be in the G-buffer, by studio or lamps.
 
         ``ambient_radius`` is how far away surroundings may be to keep the studio's light out, in the
         scene's units.
@@ -56,7 +57,7 @@ class LightPass:
             set_uniform(program, "ambient_limit", MARGIN)
         else:
             _use_lamps(program, lamps)
-        lighting.run(tile.width, tile.height, part)
+        lighting.run(where.rows(part))
 
     def _pass(self, body: str) -> PixelPass:
         if body not in self._passes:

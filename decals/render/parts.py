@@ -20,3 +20,26 @@ WHOLE = Part()
 
 Step = Callable[[Part], None]
 """Something that a picture takes. Its parts, one after the other, are the same as the whole at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """Lower left corner and size, in samples."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def area(self) -> int:
+        """Number of samples."""
+        return self.width * self.height
+
+    def rows(self, part: Part) -> "Rectangle":
+        """Give a part of its rows."""
+        first, last = part.of(self.height)
+        return Rectangle(self.x, self.y + first, self.width, last - first)
+
+
+NOTHING = Rectangle(0, 0, 0, 0)

@@ -23,24 +23,25 @@ from decals.render.drawing import Drawing
 from decals.render.entry import Entry
 from decals.render.kept import Kept
 from decals.render.lamps import Lamps
-from decals.render.parts import WHOLE, Step
+from decals.render.modes import Modes
+from decals.render.parts import Rectangle
 from decals.render.resolve import STUDIO, Background
 from decals.render.scene_like import SceneLike
-from decals.render.steps import Modes, Uploaded, steps_of
-from decals.render.targets import KINDS, Size, Targets, check_size
+from decals.render.shown import Shown
+from decals.render.slots import BUFFERS_SLOT, WHOLE_SLOT, Slots
+from decals.render.steps import Order, Plan, Uploaded, plan_of
+from decals.render.targets import Size, Targets, check_size
 from decals.render.textures import ImageArray
-from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Rectangle, Tile, largest_tile, tiles
+from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Tile, largest_tile, tiles
 from decals.scenes.viewpoint import Viewpoint
-
-WHOLE_SLOT, BUFFERS_SLOT = "whole", "buffers"
-"""Which targets pictures at once are drawn into, and pictures with what lies behind their pixels."""
 
 
 class Renderer:
     """Draws scenes; owns everything that it puts on the graphics card.
 
     What it uploads for an object, for the decals or for the images stays for the next picture of the same
-    ones. Use it as a context manager, or call `release`.
+    ones, and what of a picture is as in the one before is not drawn again. Use it as a context manager, or
+    call `release`.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class Renderer:
         self._drawables: Kept[Drawable] = Kept()
         self._decals: Kept[DecalData] = Kept()
         self._images: Kept[ImageArray] = Kept()
-        self._targets: dict[str, Targets] = {}
+        self._targets = Slots(self.context)
         with self.context.current():
             self._camera = CameraBuffer(self.context)
 
@@ -153,8 +154,8 @@ class Renderer:
             uploaded = self._upload(scene)
             picture = Picture.of(viewpoint or scene.camera, size, uploaded.bounds)
             tile = picture.part(Rectangle(x, y, 1, 1))
-            targets = self._targets_for(BUFFERS_SLOT, (1, 1))
-            self._draw_tile(uploaded, tile, targets, Modes(mapping, contact))
+            targets = self._targets.of(BUFFERS_SLOT, (1, 1))
+            self._draw_tile(scene, uploaded, tile, targets, Modes(mapping, contact))
             canvas = BufferCanvas((1, 1))
             canvas.place(targets, Tile(picture, 0, 0, 1, 1, Rectangle(0, 0, 1, 1)))
             return canvas.buffers
@@ -213,16 +214,16 @@ class Renderer:
                 f"{full[1]}; take fewer a pixel, or `render` draws in parts"
             )
 
-        def steps(targets: Targets) -> list[Step]:
-            uploaded = self._upload(scene)  # again each time: others may draw in between
-            tile = Picture.of(viewpoint or scene.camera, full, uploaded.bounds).whole()
-            self._camera.use(tile)
-            done = steps_of(uploaded, tile, targets, Modes(mapping, contact, lamps))
-            if not all(drawable.rasterised for drawable in uploaded.drawables):
-                done.append(partial(targets.gbuffer.complete_depth, *full))
-            return done
+        order = Order(scene, viewpoint, full, Modes(mapping, contact, lamps))
 
-        return Drawing(self._making(slot, full), steps, self.context.gl.finish)
+        def plan(targets: Targets, held: Shown | None) -> Plan:
+            uploaded = self._upload(scene)  # again each time: others may draw in between
+            tile = order.tile(uploaded.bounds)
+            self._camera.use(tile)
+            return plan_of(scene, uploaded, tile, order.modes, targets, held, depth=True)
+
+        share = order.share(self._targets.get(slot))
+        return Drawing(self._targets.making(slot, full), plan, self.context.gl.finish, share=share)
 
     def time_frame(
         self,
@@ -239,6 +240,7 @@ class Renderer:
         """
         check_size(size, 1)
         with self.context.current():
+            self._targets.forget()
             self.context.gl.finish()
             begin = time.perf_counter()
             for _ in self._tiles(scene, None, size, 1, Modes(mapping, contact)):
@@ -268,17 +270,18 @@ class Renderer:
             full = size[0] * samples, size[1] * samples
             picture = Picture.of(viewpoint or scene.camera, full, uploaded.bounds)
             slot = BUFFERS_SLOT if buffers else WHOLE_SLOT
-            targets = self._targets_for(slot, largest_tile(size, samples, limit=self._max_tile))
+            targets = self._targets.of(slot, largest_tile(size, samples, limit=self._max_tile))
             for tile in tiles(picture, samples, limit=self._max_tile):
-                self._draw_tile(uploaded, tile, targets, modes)
+                self._draw_tile(scene, uploaded, tile, targets, modes)
                 yield tile, targets
             self.sweep()
 
-    def _draw_tile(self, uploaded: Uploaded, tile: Tile, targets: Targets, modes: Modes) -> None:
+    def _draw_tile(
+        self, scene: SceneLike, uploaded: Uploaded, tile: Tile, targets: Targets, modes: Modes
+    ) -> None:
         self._camera.use(tile)
-        targets.picture = None
-        for step in steps_of(uploaded, tile, targets, modes):
-            step(WHOLE)
+        plan = partial(plan_of, scene, uploaded, tile, modes, depth=False)
+        Drawing(iter([targets]), plan, self.context.gl.finish).complete()
 
     def _upload(self, scene: SceneLike) -> Uploaded:
         drawables = [self._drawable(thing) for thing in scene.objects]
@@ -307,33 +310,10 @@ class Renderer:
             data.update(decals)
         return data, images
 
-    def _targets_for(self, slot: str, size: Size) -> Targets:
-        """Give targets of a size; those of the slot's last picture if they fit exactly."""
-        targets = self._targets.get(slot)
-        if targets is None or targets.gbuffer.size != size:
-            if targets is not None:
-                targets.release()
-            targets = self._targets[slot] = Targets(self.context, size, buffers=slot == BUFFERS_SLOT)
-        return targets
-
-    def _making(self, slot: str, size: Size) -> Iterator[Targets | None]:
-        """Give targets of a size; before that, None after each piece of them: memory may come slowly."""
-        held = self._targets.get(slot)
-        if held is None or held.gbuffer.size != size:
-            if held is not None:
-                self._targets.pop(slot).release()
-            self.context.clear_stock()
-            for kind in KINDS:
-                self.context.stock(size, kind)
-                yield None
-        yield self._targets_for(slot, size)
-
     def release(self) -> None:
         """Give everything back. Calling twice is harmless."""
         with self.context.current():
-            for targets in self._targets.values():
-                targets.release()
-            self._targets.clear()
+            self._targets.release()
             for kept in (self._drawables, self._decals, self._images):
                 kept.release()
             self._camera.release()

@@ -5,18 +5,16 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from decals.checks import member
-from decals.errors import InvalidScene
-from decals.field.contact import Contact
-from decals.field.mapping import Mapping
 from decals.render.decal_data import DecalData
 from decals.render.drawables import Drawable
-from decals.render.lamps import Lamps
+from decals.render.modes import Modes
 from decals.render.parts import Step
-from decals.render.targets import Targets
+from decals.render.scene_like import SceneLike
+from decals.render.shown import Shown, same
+from decals.render.targets import Size, Targets
 from decals.render.textures import ImageArray
-from decals.render.tile import Tile
-from decals.scenes.viewpoint import Bounds
+from decals.render.tile import Picture, Tile
+from decals.scenes.viewpoint import Bounds, Viewpoint
 
 AMBIENT_RADIUS = 0.1
 """How far away surroundings may be to keep light out, relative to the scene's diagonal."""
@@ -39,28 +37,82 @@ class Uploaded:
         return np.min(lower, axis=0), np.max(upper, axis=0)
 
 
-@dataclass(frozen=True)
-class Modes:
-    """How images lie on curved surface, how decals push each other, and lamps, if not the studio's."""
+@dataclass(frozen=True, eq=False)
+class Order:
+    """A picture that somebody wants: its size in samples, in one tile, with the depth of all objects."""
 
-    mapping: Mapping
-    contact: Contact
-    lamps: Lamps | None = None
+    scene: SceneLike
+    viewpoint: Viewpoint | None
+    size: Size
+    modes: Modes
 
-    def __post_init__(self) -> None:
-        member("mapping", self.mapping, Mapping, InvalidScene)
-        member("contact", self.contact, Contact, InvalidScene)
+    def tile(self, bounds: Bounds) -> Tile:
+        """Give the tile, if there is such a box around the objects."""
+        return Picture.of(self.viewpoint or self.scene.camera, self.size, bounds).whole()
+
+    def share(self, targets: Targets | None) -> float:
+        """Part of the work, 0 to 1, that is left in targets that hold something."""
+        held = None if targets is None else targets.shown
+        fits = targets is not None and targets.gbuffer.size == self.size
+        if held is None or not fits or not same(tuple(self.scene.objects), held.objects):
+            return 1.0
+        tile = self.tile(held.bounds)
+        shown = Shown.of(self.scene, held.bounds, tile, self.modes, depth=True)
+        return shown.stale(held, tile).share(tile)
 
 
-def steps_of(uploaded: Uploaded, tile: Tile, targets: Targets, modes: Modes) -> list[Step]:
-    """What a tile of a scene takes, in this order; the tile's camera must be bound."""
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is to be drawn so that targets show something.
+
+    Attributes
+    ----------
+    shown
+        What they show then.
+    steps
+        In this order; none where they show it already.
+    """
+
+    shown: Shown
+    steps: list[Step]
+
+
+def plan_of(
+    scene: SceneLike,
+    uploaded: Uploaded,
+    tile: Tile,
+    modes: Modes,
+    targets: Targets,
+    held: Shown | None,
+    *,
+    depth: bool,
+) -> Plan:
+    """What must be drawn of a tile in targets that hold something; the tile's camera must be bound.
+
+    ``depth``: objects that were not rasterised get their depth too.
+    """
+    shown = Shown.of(scene, uploaded.bounds, tile, modes, depth=depth)
+    stale = shown.stale(held, tile)
+    steps = _surface(uploaded, tile, targets, depth=depth) if stale.surface.area else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
+    if stale.paint.area:
+        painted = stale.paint, gbuffer, uploaded.decals, uploaded.images, modes.mapping, modes.contact
+        steps.append(partial(targets.decal_pass.draw, *painted))
+    if stale.light.area:
+        radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
+        lit = stale.light, gbuffer, paint, tile, radius, modes.lamps
+        steps.append(partial(targets.light_pass.draw, *lit))
+    return Plan(shown, steps)
+
+
+def _surface(uploaded: Uploaded, tile: Tile, targets: Targets, *, depth: bool) -> list[Step]:
+    """All objects into the G-buffer."""
+    gbuffer = targets.gbuffer
     objects = sorted(enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised)
-    radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
-    painted = gbuffer, tile, uploaded.decals, uploaded.images, modes.mapping, modes.contact
-    return [
+    steps: list[Step] = [
         partial(gbuffer.clear, tile.width, tile.height),
         *(partial(drawable.draw, number, tile, gbuffer) for number, drawable in objects),
-        partial(targets.decal_pass.draw, *painted),
-        partial(targets.light_pass.draw, gbuffer, paint, tile, radius, modes.lamps),
     ]
+    if depth and not all(drawable.rasterised for drawable in uploaded.drawables):
+        steps.append(partial(gbuffer.complete_depth, tile.width, tile.height))
+    return steps

@@ -6,6 +6,7 @@ from decals.render.decal_pass import DecalPass
 from decals.render.gbuffer import GBuffer
 from decals.render.light_pass import LightPass
 from decals.render.resolve import ResolvePass
+from decals.render.shown import Shown
 
 Size = tuple[int, int]
 
@@ -26,8 +27,10 @@ class Targets:
 
     def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
         self.buffers = buffers
-        self.picture: object = None
-        """Whose picture is in here, as its owner notes; whatever is drawn next takes it away."""
+        self.shown: Shown | None = None
+        """What the picture in here is of; None while it is being made."""
+        self.drawing: object = None
+        """Who made it, or does so now."""
         self.gbuffer = GBuffer(context, size)
         self.decal_pass = DecalPass(context, size, buffers=buffers)
         self.light_pass = LightPass(context, size)
@@ -35,7 +38,7 @@ class Targets:
 
     def release(self) -> None:
         """Give the memory back."""
-        self.picture = None
+        self.shown = self.drawing = None
         self.gbuffer.release()
         self.decal_pass.release()
         self.light_pass.release()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from decals.render.context import Context
 from decals.render.entry import Program
+from decals.render.parts import Rectangle
 from decals.scenes.viewpoint import Bounds, Floats, Rays, Viewpoint
 
 Compiled = TypeVar("Compiled", bound=Program)
@@ -20,16 +21,6 @@ MAX_TILE = 2560
 """Tiles, without their margins, are at most this many samples wide and high; it bounds the memory."""
 MARGIN = 320
 """Samples around a tile that are drawn too, so that what looks at its neighbours never meets a seam."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rectangle:
-    """Lower left corner and size, in samples of the picture."""
-
-    x: int
-    y: int
-    width: int
-    height: int
 
 
 @dataclass(frozen=True, slots=True)

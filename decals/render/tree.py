@@ -12,9 +12,9 @@ from decals.render.buffers import DataTexture
 from decals.render.context import Context
 from decals.render.entry import GROUP, Entry, Program
 from decals.render.gbuffer import GBuffer
-from decals.render.parts import WHOLE, Part
+from decals.render.parts import WHOLE, Part, Rectangle
 from decals.render.tape_shader import Kinds, tracing_shader
-from decals.render.tile import Rectangle, Tile, attach_camera, set_uniform
+from decals.render.tile import Tile, attach_camera, set_uniform
 from decals.scenes.viewpoint import Bounds
 from implicit_decals.shaders import compose
 
@@ -118,16 +118,15 @@ class _ComputeTracer:
         self._gl = context.gl
 
     def run(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
-        box = covered(self._bounds, tile)
-        first, last = part.of(box.height)
-        if box.width == 0 or first == last:
+        rows = covered(self._bounds, tile).rows(part)
+        if rows.area == 0:
             return
-        set_uniform(self.program, "rectangle", (box.x, box.y + first, box.width, last - first))
+        set_uniform(self.program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
         gbuffer.position.bind_to_image(POSITION, read=True, write=True)
         gbuffer.normal.bind_to_image(NORMAL, read=False, write=True)
         gbuffer.color.bind_to_image(COLOR, read=False, write=True)
         self._gl.memory_barrier()
-        self.program.run(-(-box.width // GROUP), -(-(last - first) // GROUP))
+        self.program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
         self._gl.memory_barrier()
 
     def release(self) -> None:

@@ -7,11 +7,10 @@ from typing import Any, Self
 
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
-from decals.grid.editor import DecalEditor
 from decals.render import Renderer, SceneLike, Size
 from decals.render.drawing import Drawing
 from decals.render.lamps import Lamps
-from decals.render.renderer import WHOLE_SLOT
+from decals.render.shown import Shown, same, version_of
 from decals.render.targets import Targets
 from decals.render.tile import CameraBuffer
 from decals.scenes.viewpoint import Projection
@@ -22,13 +21,19 @@ from decals.vtk.picking import texels_of
 
 @dataclass(frozen=True)
 class Look:
-    """How a frame is drawn: size in pixels, samples a pixel along each axis, modes, lamps of VTK's."""
+    """How a frame is drawn: size, samples a pixel along each axis, modes, VTK's lamps, whether magnified."""
 
     size: Size
     samples: int
     mapping: Mapping
     contact: Contact
     lamps: Lamps | None
+    magnified: bool = False
+
+    @property
+    def slot(self) -> str:
+        """Which targets it is drawn into: those of each number of samples keep their picture."""
+        return "small" if self.magnified else f"samples {self.samples}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,30 +47,20 @@ class Seen:
     def of(cls, scene: SceneLike, look: Look, viewpoint: Projection) -> Self:
         """What a picture of a scene depends on; of that an editor alone changes, and counts its versions."""
         things = (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
-        return cls(things, (look, viewpoint.matrix.tobytes(), _version(scene)))
+        return cls(things, (look, viewpoint.matrix.tobytes(), version_of(scene)))
 
     @classmethod
     def tried(cls, scene: SceneLike, *how: object) -> Self:
         """What it depends on whether a scene can be drawn at all, not how it is seen and lit."""
-        return cls((scene, scene.objects, scene.images, scene.decals), (*how, _version(scene)))
+        return cls((scene, scene.objects, scene.images, scene.decals), (*how, version_of(scene)))
 
     def same(self, other: Seen | None) -> bool:
         """Whether two pictures are the same."""
-        return (
-            other is not None
-            and self.values == other.values
-            and len(self.things) == len(other.things)
-            and all(a is b for a, b in zip(self.things, other.things, strict=True))
-        )
-
-
-def _version(scene: SceneLike) -> int:
-    """Which of a scene's decals: an editor counts; others stay as they are."""
-    return scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
+        return other is not None and self.values == other.values and same(self.things, other.things)
 
 
 class Frame:
-    """Draws frames; one in which nothing changed since the last is not drawn again.
+    """Draws frames; what did not change since the last one of the same look is not drawn again.
 
     Parameters
     ----------
@@ -74,18 +69,17 @@ class Frame:
 
     Attributes
     ----------
-    drawn
-        Whether the last call of `draw` drew.
+    share
+        Part of a whole frame's work, 0 to 1, that the last call of `draw` had to do.
     camera
         The block from which VTK's shaders read the camera, where they show our decals.
     """
 
     def __init__(self, context: WindowContext) -> None:
         self.context = context
-        self.drawn = False
-        self._shown: Seen | None = None
-        self._targets: Targets | None = None
+        self.share = 0.0
         self._given: Targets | None = None
+        self._given_shown: Shown | None = None
         self._magnified = False
         self._coming: tuple[Seen, Drawing] | None = None
         with context.current():
@@ -95,43 +89,38 @@ class Frame:
 
     def draw(self, scene: SceneLike, look: Look, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's own targets; ``wait`` until the card has finished."""
-        seen = Seen.of(scene, look, viewpoint)
-        if self._targets is not None and self._shows(seen):
-            self.drawn = False
-            return self._targets
-        with self.context.current():
-            drawing = self._drawing(scene, look, viewpoint, WHOLE_SLOT)
-            drawing.complete()
-            self.renderer.sweep()
-            if wait:
-                self.context.gl.finish()
-        self._show(seen, drawing)
-        self.drawn = True
+        drawing = self._drawing(scene, look, viewpoint)
+        self.share = drawing.share
+        if self.share:
+            with self.context.current():
+                drawing.complete()
+                self.renderer.sweep()
+                if wait:
+                    self.context.gl.finish()
         return drawing.targets
 
     def prepare(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> float | None:
         """Draw for about so long on a frame that is to come; once it is done, `draw` has nothing to do.
 
-        Whatever changes meanwhile, it begins anew. What is shown stays. Gives the seconds that the frame has
-        taken, none where it is shown already; None while it is not done.
+        Whatever changes meanwhile, it begins anew. What is shown stays. Gives the seconds that a whole frame
+        has taken, none where some of it was there already; None while it is not done.
         """
         seen = Seen.of(scene, look, viewpoint)
-        if self._shows(seen):
-            return 0.0
-        with self.context.current():
-            if self._coming is None or not seen.same(self._coming[0]):
-                self._coming = seen, self._drawing(scene, look, viewpoint, f"samples {look.samples}")
-            drawing = self._coming[1]
-            if not drawing.advance(seconds):
-                return None
+        if self._coming is None or not seen.same(self._coming[0]):
+            self._coming = seen, self._drawing(scene, look, viewpoint)
+        drawing = self._coming[1]
+        if drawing.share:
+            with self.context.current():
+                if not drawing.advance(seconds):
+                    return None
         self._coming = None
-        self._show(seen, drawing)
-        return drawing.seconds
+        return drawing.seconds if drawing.share == 1.0 else 0.0
 
-    def _shows(self, seen: Seen) -> bool:
-        return seen.same(self._shown) and self._targets is not None and self._targets.picture is self
+    def share_of(self, scene: SceneLike, look: Look, viewpoint: Projection) -> float:
+        """Part of a whole frame's work, 0 to 1, that a frame would take now."""
+        return self._drawing(scene, look, viewpoint).share
 
-    def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection, slot: str) -> Drawing:
+    def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection) -> Drawing:
         return self.renderer.drawing(
             scene,
             size=look.size,
@@ -140,16 +129,12 @@ class Frame:
             contact=look.contact,
             viewpoint=viewpoint,
             lamps=look.lamps,
-            slot=slot,
+            slot=look.slot,
         )
-
-    def _show(self, seen: Seen, drawing: Drawing) -> None:
-        self._shown, self._targets = seen, drawing.targets
-        drawing.targets.picture = self
 
     def nearest(self, x: int, y: int, size: Size) -> float:
         """Least depth put into VTK's frame, of this size, at a pixel: 1 for nothing, 0 for not known."""
-        if self._given is None or self._given.picture is not self:
+        if self._given is None or self._given_shown is None or self._given.shown is not self._given_shown:
             return 0.0
         with self.context.current():
             gbuffer = self._given.gbuffer
@@ -159,12 +144,12 @@ class Frame:
         self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int
     ) -> None:
         """Put what was drawn into VTK's frame; see `Composite.draw`."""
-        self._given, self._magnified = targets, samples == 0
+        self._given, self._given_shown, self._magnified = targets, targets.shown, samples == 0
         self._composite.draw(window, viewport, targets, samples)
 
     def release(self) -> None:
         """Give everything back."""
-        self._shown = self._targets = self._given = self._coming = None
+        self._given = self._given_shown = self._coming = None
         with self.context.current():
             self.renderer.release()
             self._composite.release()

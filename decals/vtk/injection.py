@@ -13,8 +13,9 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from decals.field.contact import Contact
 from decals.render.decal_data import DecalData, library
+from decals.render.parts import Rectangle
 from decals.render.textures import ImageArray
-from decals.render.tile import Picture, Rectangle
+from decals.render.tile import Picture
 from decals.scenes.viewpoint import Floats
 from decals.vtk.camera import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, SmoothNormals, polygon_mapper

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from decals.checks import finite
 from decals.errors import InvalidPoints
 from decals.render import Size
-from decals.render.tile import Rectangle
+from decals.render.parts import Rectangle
 from decals.scenes.viewpoint import Floats
 
 if TYPE_CHECKING:

@@ -177,9 +177,20 @@ class Stage(Settings):
         return vtk_projection(self.vtk_renderer, self.frame())
 
     @property
-    def drawn(self) -> bool:
-        """Whether the last frame was drawn; where nothing had changed, the one before was shown again."""
-        return self._frame is not None and self._frame.drawn
+    def drawn(self) -> float:
+        """Part of a whole frame's work, 0 to 1, that the last one took: 0 where nothing had changed."""
+        return 0.0 if self._frame is None else self._frame.share
+
+    def to_draw(self, samples: int) -> float:
+        """Part of its work, 0 to 1, that a frame of the window's size with so many samples would take now.
+
+        It is little where edits reach little of the last such frame.
+        """
+        scene = self.scene
+        if scene is None or self._drawn_size is None:
+            return 1.0
+        look = self._look(self._drawn_size, 1.0, samples)
+        return self._use_frame().share_of(scene, look, self.viewpoint())
 
     def frame(self) -> Floats:
         """The scene's coordinates to the world's: identity, unless somebody moved or scaled the whole."""
@@ -242,14 +253,15 @@ class Stage(Settings):
         """How the part of a window is drawn that has this size."""
         if scale < 1.0:
             width, height = (max(1, round(scale * side)) for side in size)
-            return Look((width, height), 1, self.mapping, self.contact, self.lamps())
+            return Look((width, height), 1, self.mapping, self.contact, self.lamps(), magnified=True)
         supersampled = size[0] > self.vtk_renderer.GetSize()[0]
         return Look(size, 1 if supersampled else samples, self.mapping, self.contact, self.lamps())
 
     def prepare(self, samples: int, seconds: float) -> float | None:
         """Draw for about so long on a whole frame with so many samples, and show nothing of it yet.
 
-        Gives the seconds that it has taken in all, None while it is not done. From then on frames with a
+        Gives the seconds that it has taken in all, none where some of it was there already, None while it is
+        not done. From then on frames with a
         `draw_scale` of 1 and these `samples` show it. What changes meanwhile makes it begin anew.
         """
         scene = self.scene

@@ -17,7 +17,7 @@ class Quality:
     """Chooses the size of frames while things move; at rest frames are whole.
 
     A frame takes some time whatever its size, and some for each pixel. Both are estimated from the last
-    frames of two sizes.
+    whole frames of two sizes. Frames of which a part alone is drawn tell how long the rest of a frame takes.
 
     Parameters
     ----------
@@ -28,10 +28,16 @@ class Quality:
     def __init__(self, target: float = TARGET) -> None:
         self.target = target
         self._seconds: dict[float, float] = {}
+        self._besides: dict[float, float] = {}
         self._scale: float | None = None
 
-    def saw(self, scale: float, seconds: float) -> None:
-        """Take note of a frame, of so many times the window's size along each axis."""
+    def saw(self, scale: float, seconds: float, share: float = 1.0) -> None:
+        """Take note of a frame so many times the window's size along each axis, or of a share of one."""
+        if share < 1.0:
+            self._besides[scale] = max(seconds - share * self._pixels(scale), 0.0)
+            return
+        if scale >= 1.0:
+            self._besides.clear()  # what was slow once is tried again
         self._seconds.pop(scale, None)
         self._seconds[scale] = seconds
         self._scale = self._choose()
@@ -41,13 +47,22 @@ class Quality:
         """Size for the next frame of something that moves."""
         return 1.0 if self._scale is None else self._scale
 
-    def expected(self, scale: float) -> float:
-        """Seconds that a frame of some size should take: at most the last frame's for each of its pixels."""
+    def expected(self, scale: float, share: float = 1.0) -> float:
+        """Seconds that a frame of some size, or a share of its work, should take.
+
+        They are at most the last frame's for each of its pixels.
+        """
         if not self._seconds:
             return 0.0
+        if share < 1.0:
+            return self._besides.get(scale, 0.0) + share * self._pixels(scale)  # until it was tried: nothing
         fixed, each = self._model()
         last, seconds = next(reversed(self._seconds.items()))
         return min(fixed + each * scale**2, seconds * max(scale / last, 1.0) ** 2)
+
+    def _pixels(self, scale: float) -> float:
+        """Seconds for all pixels of a frame of some size."""
+        return self._model()[1] * scale**2 if self._seconds else 0.0
 
     def _model(self) -> tuple[float, float]:
         """Seconds for any frame, and for one of the window's size besides."""

@@ -156,13 +156,13 @@ class EditWindow:
         if self.busy:
             self._ticker.wake()
         if not whole:
-            self.moving()
+            self._edited()
             self.plotter.render()
         elif not self.ticking:
             self.rest()
         else:
             if self._whole != self._shown:
-                self.moving()  # `tick` draws the whole frame a little later
+                self._edited()  # `tick` draws the whole frame a little later
             self.plotter.render()
 
     @property
@@ -185,8 +185,18 @@ class EditWindow:
         told = (self.background.progress, self.actions.message)
         return "   ".join(filter(None, told)) or "h: help"
 
+    def _edited(self) -> None:
+        """Draw the next frame as at rest, or with fewer samples, where little of it changed; or coarsely."""
+        for samples in (self.samples, 1):
+            share = self.stage.to_draw(samples)
+            if share < 1.0 and self.quality.expected(samples, share) <= self.quality.target:
+                self._moved = time.perf_counter()
+                self.stage.draw_scale, self.stage.samples = 1.0, samples
+                return
+        self.moving()
+
     def moving(self) -> None:
-        """Draw the next frames at the size that is done in time."""
+        """Draw the next frames at the size that is done in time, all of each."""
         self._moved = time.perf_counter()
         self._ticker.wake()
         if self.quality.expected(self.samples) > self.quality.target:
@@ -224,7 +234,7 @@ class EditWindow:
     def _frame_ends(self) -> None:
         if self.stage.drawn:
             size = self.stage.draw_scale * self.stage.samples
-            self.quality.saw(size, time.perf_counter() - self._began)
+            self.quality.saw(size, time.perf_counter() - self._began, self.stage.drawn)
 
     # -- what goes on -----------------------------------------------------------------------------------
 
@@ -237,7 +247,7 @@ class EditWindow:
             self._told = now
             self.marks.say(self._status())
             self.plotter.render()
-        elif self._moved and now - self._moved > REST and not self.tools.dragging:
+        elif self._moved and now - self._moved > REST:
             self._refine()
 
     def elsewhere(self, x: int, y: int) -> bool:

@@ -81,7 +81,7 @@ def _noting_use(original: Any, units: dict[int, Any]) -> Any:
 
 
 def _noting_run(original: Any, units: dict[int, Any], arrays: Arrays, passes: dict[str, Any]) -> Any:
-    def run(self: Any, *size_and_part: Any) -> None:
+    def run(self: Any, where: Any) -> None:
         uniforms, textures = {}, {}
         for name in self.program:
             member = self.program[name]
@@ -93,7 +93,7 @@ def _noting_run(original: Any, units: dict[int, Any], arrays: Arrays, passes: di
             elif "image" not in kind:
                 uniforms[name] = member.value
         passes[self.body] = {"text": self.source.text, "uniforms": uniforms, "textures": textures}
-        original(self, *size_and_part)
+        original(self, where)
 
     return run
 

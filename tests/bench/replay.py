@@ -75,7 +75,7 @@ class Replay:
             if name in program:
                 program[name] = unit
         if entry == "compute":
-            program["target_size"] = self.size
+            program["end_texel"] = self.size
             return lambda: self._compute(program, textures, target)
         array = self.gl.vertex_array(program, [])
         framebuffer = self.gl.framebuffer([self.targets[target]])

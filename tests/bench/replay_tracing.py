@@ -44,7 +44,7 @@ class Replay:
         self.depth_alone = gl.framebuffer([], depth)
         if gl.version_code >= COMPUTE:
             self.clearing = gl.compute_shader(self.settings["clear"])
-            self.clearing["target_size"] = self.size
+            self.clearing["end_texel"] = self.size
 
     def entry(self, entry: str, count: str) -> Callable[[], None]:
         """Compile a scene's tracer; what is returned clears the G-buffer and runs it."""

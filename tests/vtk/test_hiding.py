@@ -8,7 +8,7 @@ import pyvista as pv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.render.tile import Rectangle
+from decals.render.parts import Rectangle
 from decals.vtk.picking import texels_of
 from tests.oracles.raster import edges
 from tests.vtk.conftest import Factory
@@ -122,6 +122,9 @@ def test_nothing_is_hidden_where_what_was_drawn_is_forgotten(plotter: Factory) -
     stage = pl.decals.stage
     with stage.current():
         stage.renderer.render(stage.scene, size=(160, 120), viewpoint=stage.viewpoint())
+        assert stage.at(80, 60) is None
+        slot = f"samples {stage.samples}"
+        stage.renderer.drawing(stage.scene, size=(50, 40), viewpoint=stage.viewpoint(), slot=slot).complete()
     assert stage.at(80, 60) is not None
     pl.camera.zoom(1.1)
     shot(pl)

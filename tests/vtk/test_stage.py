@@ -131,12 +131,13 @@ def prepared(stage: Stage, samples: int) -> int:
 
 @pytest.mark.parametrize("samples", [1, 2])
 def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory, samples: int) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both())
+    other, pl = plotter(), plotter()
+    for one in (other, pl):
+        one.decals.add_scene(both())
+    other.decals.stage.samples = samples
+    whole = shot(other)
     stage = pl.decals.stage
-    stage.samples = samples
-    whole = shot(pl)
-    stage.draw_scale = 0.5
+    stage.samples, stage.draw_scale = samples, 0.5
     small = shot(pl)
     assert stage.prepare(samples, 0.0) is None
     np.testing.assert_array_equal(shot(pl), small)
@@ -167,7 +168,7 @@ def test_what_changes_while_a_frame_is_prepared_is_in_it(plotter: Factory) -> No
     shot(pl)
     stage.draw_scale = 1.0
     np.testing.assert_array_equal(shot(pl), seen)
-    assert stage.drawn
+    assert not stage.drawn
 
 
 def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
@@ -184,7 +185,9 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
     pl.decals.scene = document
     np.testing.assert_array_equal(shot(pl), first)
     document.decals.delete(int(pl.decals.stage.at(80, 60).owner))
+    share = pl.decals.stage.to_draw(pl.decals.stage.samples)
     without = shot(pl)
+    assert 0.0 < pl.decals.stage.drawn == share < 0.5
     assert (without != first).any()
     np.testing.assert_array_equal(shot(pl), without)
     document.objects = (*both().objects, MeshObject("ball", *triangles(pv.Sphere(center=(0, 0, 4)))))

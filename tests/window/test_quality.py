@@ -54,3 +54,34 @@ def test_a_choice_stays_while_times_waver():
 def test_before_the_first_frame_everything_is_whole():
     assert Quality().scale == 1.0
     assert Quality().expected(2.0) == 0.0
+
+
+@given(st.floats(0.001, 0.06), st.floats(0.1, 10), st.floats(0.001, 0.3))
+def test_frames_of_which_a_part_is_drawn_do_not_pass_for_whole_ones(
+    fixed: float, each: float, share: float
+) -> None:
+    quality = settled(fixed, each)
+    scale, whole = quality.scale, quality.expected(2.0)
+    for _ in range(10):
+        quality.saw(2.0, fixed + 4 * each * share, share)
+    assert (quality.scale, quality.expected(2.0)) == (scale, whole)
+    assert quality.expected(2.0, share) == pytest.approx(fixed + 4 * each * share, rel=0.2)
+    assert quality.expected(2.0, share / 2) < quality.expected(2.0, share)
+
+
+def test_a_part_that_was_slow_once_is_tried_again_after_a_whole_frame() -> None:
+    quality = settled(0.01, 0.5)
+    assert quality.expected(2.0, 0.01) < TARGET
+    quality.saw(2.0, 3.0, 0.01)
+    assert quality.expected(2.0, 0.01) > TARGET
+    assert quality.expected(1.0, 0.01) < TARGET
+    quality.saw(1.0, 0.51)
+    assert quality.expected(2.0, 0.01) < TARGET
+
+
+def test_before_the_first_frame_parts_take_no_time_either() -> None:
+    quality = Quality()
+    assert quality.expected(2.0, 0.5) == 0.0
+    quality.saw(2.0, 0.1, 0.5)
+    assert quality.expected(2.0, 0.5) == 0.0
+    assert quality.scale == 1.0

@@ -113,7 +113,8 @@ class Machine:
 
     def drawing(self) -> Drawing:
         steps = [lambda part, number=number: self.step(number, part) for number in range(len(self.costs))]
-        return Drawing(iter([SimpleNamespace()]), lambda _: steps, lambda: None, clock=lambda: self.now)  # type: ignore[arg-type]
+        plan, targets = SimpleNamespace(steps=steps, shown=None), SimpleNamespace(drawing=None, shown=None)
+        return Drawing(iter([targets]), lambda *_: plan, lambda: None, clock=lambda: self.now)  # type: ignore[arg-type,return-value]
 
 
 @pytest.mark.parametrize("total", [0.02, 0.5, 4.0])

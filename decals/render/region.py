@@ -1,0 +1,78 @@
+"""Which samples of a tile can show anything of what lies within some balls."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from decals.render.entry import GROUP
+from decals.render.parts import NOTHING, Rectangle
+from decals.render.tile import Tile
+
+Doubles = NDArray[np.float64]
+
+ROUNDING = 2.0**-20
+"""How far positions in the G-buffer may be off, relative to the largest number in their making."""
+MARGIN = 1.0
+"""Samples around a ball: edges of triangles are put onto a grid finer than this."""
+
+
+def ball_extents(matrix: Doubles, balls: ArrayLike) -> tuple[Doubles, Doubles] | None:
+    """Give the boxes around the images of balls: least and largest x and y in clip space, ``float64[n, 2]``.
+
+    With rows a, b of ``matrix`` for x and w, a ball lies where x/w ≤ c if its centre lies R |a − c b| before
+    the plane a = c b; so the c where it touches solve a quadratic equation, in perspective and without
+    (Mara and McGuire, 2D Polyhedral Bounds of a Clipped, Perspective-Projected 3D Sphere, JCGT 2013).
+
+    Parameters
+    ----------
+    matrix
+        World to clip space, ``float64[4, 4]``, acting on columns.
+    balls
+        Centres and radii, ``float[n, 4]``.
+
+    Returns
+    -------
+    None where a ball reaches behind the eye: it may be seen anywhere.
+    """
+    rows = np.asarray(balls, np.float64).reshape(-1, 4)
+    squared = rows[:, 3:] ** 2
+    places = rows[:, :3] @ matrix[:, :3].T + matrix[:, 3]
+    across, depth = places[:, :2], places[:, 3:]
+    slopes, away = matrix[:2, :3], matrix[3, :3]
+    a = depth**2 - squared * (away @ away)
+    if (depth <= 0.0).any() or (a <= 0.0).any():
+        return None
+    b = across * depth - squared * (slopes @ away)
+    c = across**2 - squared * (slopes**2).sum(axis=1)
+    half = np.sqrt(np.maximum(b**2 - a * c, 0.0))
+    return (b - half) / a, (b + half) / a
+
+
+def region_of(tile: Tile, balls: Doubles, span: float) -> Rectangle:
+    """Give a rectangle of a tile, counted from its own corner, outside of which no ball is seen.
+
+    It is cut into whole groups of samples: some rasterisers filter images for several samples together, and
+    take the derivatives of one of them.
+
+    Parameters
+    ----------
+    tile
+        What is drawn.
+    balls
+        Centres and radii, ``float64[n, 4]``.
+    span
+        The largest coordinate of what the tile shows.
+    """
+    if not len(balls):
+        return NOTHING
+    span = max(span, float(np.abs(tile.picture.rays.origin).max()))
+    grown = balls + np.array([0.0, 0.0, 0.0, ROUNDING * span])
+    extents = ball_extents(tile.matrix(), grown)
+    size = np.array([tile.width, tile.height])
+    if extents is None:
+        return Rectangle(0, 0, tile.width, tile.height)
+    low = (0.5 * extents[0].min(axis=0) + 0.5) * size - MARGIN
+    high = (0.5 * extents[1].max(axis=0) + 0.5) * size + MARGIN
+    first = np.clip(np.floor(low / GROUP) * GROUP, 0, size)
+    last = np.clip(np.ceil(high / GROUP) * GROUP, first, size)
+    (x, y), (right, top) = first.astype(int).tolist(), last.astype(int).tolist()
+    return Rectangle(x, y, right - x, top - y) if right > x and top > y else NOTHING

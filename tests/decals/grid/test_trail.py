@@ -1,0 +1,107 @@
+"""Beyond the reach of what an editor changed everything is what it was, bit for bit."""
+
+import numpy as np
+import pytest
+
+from decals.field.contact import Contact
+from decals.field.evaluate import evaluate
+from decals.grid.editor import DecalEditor
+from decals.grid.trail import MOST, UNEVEN, Trail, reach_of
+from decals.model import Decals
+from tests.decals.render.pictures import in_layers
+
+
+def coat(rng: np.random.Generator, count: int = 300) -> Decals:
+    """Decals of sizes up to eight times each other on a ball, crowded enough to push."""
+    normals = rng.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    radii = np.exp(rng.uniform(np.log(0.04), np.log(0.32), count))
+    return Decals(normals, normals, rng.normal(size=(count, 3)), radii, spill=rng.random(count) < 0.2)
+
+
+def field(editor: DecalEditor, points: np.ndarray, contact: Contact) -> np.ndarray:
+    found = evaluate(editor, points, points, contact=contact)
+    return np.column_stack([found.owner, found.field, found.uv])
+
+
+@pytest.mark.parametrize("layered", [False, True])
+@pytest.mark.parametrize("contact", list(Contact))
+def test_what_a_change_cannot_reach_stays_and_not_much_more(contact: Contact, layered: bool) -> None:
+    rng = np.random.default_rng(5)
+    decals = coat(rng)
+    editor = DecalEditor(in_layers(decals, 1) if layered else decals)
+    points = rng.normal(size=(40_000, 3)).astype(np.float32)
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    before, changed, reached = field(editor, points, contact), 0, 0
+    for step in range(40):
+        version, number = editor.version, int(rng.choice(editor.numbers))
+        if step % 4 == 3:
+            editor.change(number, radii=editor[number].radii * np.float32(rng.uniform(0.6, 1.5)))
+        elif step % 8 == 2:
+            editor.delete(number)
+        else:
+            moved = editor[number].positions + rng.normal(0, 0.1, (1, 3)).astype(np.float32)
+            editor.change(number, positions=moved / np.linalg.norm(moved))
+        touched = editor.touched(version)
+        assert touched is not None
+        balls = reach_of(touched, contact, editor.largest_influence)
+        assert balls is not None
+        gaps = np.linalg.norm(points[:, None].astype(np.float64) - balls[:, :3], axis=2)
+        inside = (gaps < balls[:, 3]).any(axis=1)
+        after = field(editor, points, contact)
+        different = (after != before).any(axis=1)
+        assert not (different & ~inside).any()
+        changed, reached, before = changed + different.sum(), reached + inside.sum(), after
+    assert changed > (0.02 if contact is Contact.RADIAL else 0.2) * reached
+
+
+def test_an_index_whose_levels_are_read_in_another_order_is_said_to_change_everything() -> None:
+    rng = np.random.default_rng(6)
+    editor = DecalEditor(coat(rng).replace(radii=np.full(300, 0.1)))
+    version = editor.version
+    editor.change(7, radii=[0.9])
+    editor.change(8, radii=[0.01])
+    assert len(editor._level_of) == 3
+    assert editor.touched(version) is not None
+    editor.put(editor.numbers[:200], editor.take(editor.numbers[:200][::-1]))
+    assert editor.touched(version) is None
+    version = editor.version
+    editor.put(editor.numbers[:200], editor.take(editor.numbers[:200][::-1]))
+    touched = editor.touched(version)
+    assert touched is not None
+    assert len(touched) == 400
+
+
+def test_old_entries_are_forgotten_and_said_to_be_anywhere() -> None:
+    trail, ball = Trail(), np.ones((1, 4), np.float32)
+    for version in range(1, MOST + 11):
+        trail.add(version, version * ball)
+    assert trail.since(9) is None
+    found = trail.since(10)
+    assert found is not None
+    assert found[:, 0].tolist() == list(range(11, MOST + 11))
+    assert trail.since(MOST + 10) is not None
+    trail.add(MOST + 11, np.ones((2 * MOST, 4), np.float32))
+    assert trail.since(MOST + 10) is None
+    assert trail.since(MOST + 11) is not None
+
+
+def test_radial_contact_reaches_as_far_as_neighbours_do_and_anywhere_among_very_uneven_ones() -> None:
+    ball = np.array([[1.0, 2.0, 3.0, 0.5]], np.float32)
+    assert reach_of(ball, Contact.PAPER, 9.0)[0, 3] == pytest.approx(0.575 * 0.5, rel=1e-4)
+    assert reach_of(ball, Contact.RADIAL, 2.0)[0, 3] == pytest.approx(0.575 * 0.5 + 0.4542 * 2.0, rel=1e-4)
+    assert reach_of(ball, Contact.RADIAL, 0.51 * UNEVEN) is None
+    assert reach_of(ball[:0], Contact.RADIAL, 1e9).shape == (0, 4)
+
+
+def test_an_editor_that_becomes_another_has_changed_everywhere() -> None:
+    editor = DecalEditor(coat(np.random.default_rng(7)))
+    version, other = editor.version, editor.copy()
+    other.change(3, radii=[0.2])
+    editor.adopt(other)
+    assert editor.touched(version) is None
+    version = editor.version
+    editor.change(3, radii=[0.1])
+    touched = editor.touched(version)
+    assert touched is not None
+    assert len(touched) == 2

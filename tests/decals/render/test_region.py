@@ -1,0 +1,110 @@
+"""The rectangle of what lies within balls holds all of it, and little more."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from decals.render.entry import GROUP
+from decals.render.parts import NOTHING
+from decals.render.region import ball_extents, region_of
+from decals.render.tile import Picture, Rectangle
+from decals.scenes.camera import Camera
+from decals.scenes.viewpoint import Floats, Projection
+
+SIZE = (300, 200)
+
+numbers = st.floats(-3.0, 3.0)
+points = st.tuples(numbers, numbers, numbers)
+
+
+def perspective(eye: Floats, target: Floats, fov: float) -> Floats:
+    camera = Camera(tuple(eye.tolist()), tuple(target.tolist()), (0.1, 0.2, 1.0), fov)
+    return camera.clip_matrix(SIZE, ([-3, -3, -3], [3, 3, 3]))
+
+
+def parallel(scale: float, shear: float) -> Floats:
+    return np.array([[scale, shear, 0, 0.1], [0, scale, shear, -0.2], [0.1, 0, -0.1, 0], [0, 0, 0, 1.0]])
+
+
+def on_ball(center: Floats, radius: float) -> Floats:
+    """Points all over a ball, ``float64[n, 3]``."""
+    count = 4000
+    z = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
+    turn = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))
+    flat = np.sqrt(1.0 - z**2)
+    return center + radius * np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
+
+
+def projected(matrix: Floats, places: Floats) -> Floats:
+    clip = np.column_stack([places, np.ones(len(places))]) @ matrix.T
+    return clip[:, :2] / clip[:, 3:]
+
+
+@given(points, points, st.floats(1e-3, 2.0), st.floats(5.0, 120.0))
+def test_in_perspective_boxes_hold_balls_tightly(
+    eye: tuple[float, ...], center: tuple[float, ...], radius: float, fov: float
+) -> None:
+    place, ball = np.array(eye) + 5.0, np.array(center)
+    matrix = perspective(place, np.zeros(3), fov)
+    check(matrix, ball, radius, behind=matrix[3] @ [*ball, 1.0] <= radius * np.linalg.norm(matrix[3, :3]))
+
+
+@given(points, st.floats(1e-3, 2.0), st.floats(0.05, 3.0), st.floats(-1.0, 1.0))
+def test_in_parallel_projections_too_sheared_ones_as_well(
+    center: tuple[float, ...], radius: float, scale: float, shear: float
+) -> None:
+    check(parallel(scale, shear), np.array(center), radius, behind=False)
+
+
+def check(matrix: Floats, center: Floats, radius: float, *, behind: bool) -> None:
+    found = ball_extents(matrix, [[*center, radius]])
+    if behind or found is None:
+        assert behind
+        assert found is None
+        return
+    (low,), (high,) = found
+    seen = projected(matrix, on_ball(center, radius))
+    slack = 1e-9 * (1.0 + np.abs(seen).max())
+    assert (seen >= low - slack).all()
+    assert (seen <= high + slack).all()
+    wide = high - low
+    assert (seen.min(axis=0) - low < 0.05 * wide + slack).all()
+    assert (high - seen.max(axis=0) < 0.05 * wide + slack).all()
+
+
+@pytest.mark.parametrize("inner", [Rectangle(0, 0, *SIZE), Rectangle(40, 30, 101, 77)])
+def test_regions_of_a_tile_hold_the_samples_of_all_balls_and_whole_groups(inner: Rectangle) -> None:
+    rng = np.random.default_rng(0)
+    matrix = perspective(np.array([4.0, 5.0, 6.0]), np.zeros(3), 40.0)
+    picture = Picture.of(Projection(matrix), SIZE, ([-1, -1, -1], [1, 1, 1]))
+    tile = picture.part(inner)
+    shares = []
+    for _ in range(100):
+        balls = np.column_stack([rng.uniform(-2, 2, (3, 3)), rng.uniform(0.01, 0.3, 3)])
+        found = region_of(tile, balls, 3.0)
+        places = np.concatenate([on_ball(ball[:3], ball[3]) for ball in balls])
+        samples = (0.5 * projected(matrix, places) + 0.5) * SIZE - (inner.x, inner.y)
+        inside = (samples >= 0).all(axis=1) & (samples < (tile.width, tile.height)).all(axis=1)
+        low, high = (found.x, found.y), (found.x + found.width, found.y + found.height)
+        assert (samples[inside] >= low).all()
+        assert (samples[inside] < high).all()
+        shares.append(found.area / (tile.width * tile.height))
+        if found == NOTHING:
+            assert not inside.any()
+            continue
+        assert found.x % GROUP == found.y % GROUP == 0
+        assert high[0] % GROUP == 0 or high[0] == tile.width
+        assert high[1] % GROUP == 0 or high[1] == tile.height
+        assert found.width <= tile.width
+        assert found.height <= tile.height
+    assert np.median(shares) < 0.8
+
+
+def test_no_balls_are_nowhere_and_those_behind_the_eye_anywhere() -> None:
+    matrix = perspective(np.array([0.0, 0.0, 5.0]), np.zeros(3), 40.0)
+    tile = Picture.of(Projection(matrix), SIZE, ([-1, -1, -1], [1, 1, 1])).whole()
+    assert region_of(tile, np.zeros((0, 4)), 1.0) == NOTHING
+    assert region_of(tile, np.array([[0.0, 0.0, 4.5, 0.6]]), 1.0) == Rectangle(0, 0, *SIZE)
+    assert region_of(tile, np.array([[0.0, 0.0, 9.0, 0.1]]), 1.0) == Rectangle(0, 0, *SIZE)
+    assert region_of(tile, np.array([[50.0, 0.0, 0.0, 0.1]]), 1.0) == NOTHING
