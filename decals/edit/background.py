@@ -26,6 +26,9 @@ MANY = 500
 LONG = (AddObject, Coat, OfPrimitive, Relax, RemoveObject, Scatter)
 """Commands that ask many places of surfaces, or make surfaces."""
 
+PATIENCE = 5.0
+"""Seconds that closing waits for the thread of an edit: Python may end next, under what is being computed."""
+
 WAIT = "wait for what goes on, or press Escape"
 
 Step = Callable[[EditSession], str]
@@ -287,6 +290,7 @@ class Background:
             It could not be.
         """
         self.cancel()
+        self._edits.take(PATIENCE)
         failed: DecalsError | None = None
         while self._saves.busy:
             try:

@@ -13,8 +13,8 @@ from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene, SceneObject
 
-NOWHERE = np.zeros((1, 3), np.float32)
-"""Any point: what is asked about it for the first time is made then."""
+NOWHERE, ANYWHERE = np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32)
+"""Any point, and any direction: what is asked about them for the first time is made then."""
 
 
 class Lineage:
@@ -76,6 +76,7 @@ class Document:
         for item in self._objects if surfaces else ():
             with suppress(InvalidMesh):  # a tree that shows nothing
                 item.surface.project(NOWHERE)
+                item.surface.raycast(NOWHERE, ANYWHERE)
 
     def adopt(self, other: "Document") -> None:
         """Become another document, which nobody may use any more; renderers go on with this one."""

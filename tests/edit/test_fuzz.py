@@ -1,10 +1,13 @@
 """Random commands: none breaks anything, undoing all gives back the first state, redoing all the last."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
 from blobtree import BlobTreeError
-from decals.edit import EditSession
+from decals.edit import Background, EditSession
+from decals.edit.background import doing
 from decals.errors import DecalsError
 from tests.edit.fuzz import Monkey
 from tests.edit.scenes import digest, scene
@@ -76,3 +79,47 @@ def test_the_index_is_that_of_a_fresh_build_after_random_commands():
     assert (fresh.owner >= 0).any()
     np.testing.assert_array_equal(edited.owner, np.where(fresh.owner < 0, -1, editor.numbers[fresh.owner]))
     np.testing.assert_allclose(edited.uv, fresh.uv, atol=1e-6)
+
+
+def tried(session, command):
+    """Do a command that may make no sense."""
+    with suppress(DecalsError, BlobTreeError):
+        session.do(command)
+
+
+@pytest.mark.parametrize(("seed", "count"), [(3, 60), pytest.param(4, 1_000, marks=pytest.mark.slow)])
+def test_random_commands_in_the_background_while_hands_go_on(seed, count):
+    """Each comes after what hands do until it is seen, whatever either of them is."""
+    session, shadow = EditSession(scene()), EditSession(scene())
+    background = Background(session, lambda _text: None, session.end, threaded=True)
+    monkey = Monkey(seed, session.document, scene(200).decals)
+    for _ in range(count):
+        slow = monkey.command()
+        background.edit("slow", doing(slow))
+        for _ in range(monkey.rng.integers(3)):
+            quick = monkey.command()
+            tried(session, quick)
+            tried(shadow, quick)
+        undone = monkey.rng.random() < 0.2
+        if undone:
+            assert session.undo() == shadow.undo()
+        while background.busy:
+            background.look(timeout=30.0)
+        tried(shadow, slow)
+        assert session.labels == shadow.labels
+        assert content(session) == content(shadow)
+        check_whole(session.document)
+    entries, last = len(session.labels), digest(session.document)
+    for _ in range(entries):
+        session.undo()
+    assert digest(session.document) == digest(EditSession(scene()).document)
+    for _ in range(entries):
+        session.redo()
+    assert digest(session.document) == last
+
+
+def content(session):
+    """Decals and their numbers; objects of two sessions are not the same ones."""
+    decals = session.document.decals
+    names = [item.name for item in session.document.objects]
+    return decals.numbers.tolist(), decals.decals.packed().tobytes(), names, len(session.document.images)
