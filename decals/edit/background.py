@@ -170,7 +170,7 @@ class Background:
 
         def work(_tell: Progress, _stop: Cancel) -> Outcome:
             text = step(fork)
-            fork.document.prepare(surfaces=not following)
+            fork.prepare(surfaces=not following)
 
             def outcome() -> Job | None:
                 if not self._session.adopt(fork):

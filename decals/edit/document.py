@@ -70,10 +70,9 @@ class Document:
         made._decals, made.lineage = self._decals.copy(), self.lineage
         return made
 
-    def prepare(self, *, surfaces: bool = True) -> None:
-        """Lay out the index and make the surfaces, for which who asks for them first would wait."""
-        self._decals.index  # noqa: B018  (it is laid out where it is asked for)
-        for item in self._objects if surfaces else ():
+    def make_surfaces(self) -> None:
+        """Make what is made when surfaces are asked for the first time, such as trees of boxes."""
+        for item in self._objects:
             with suppress(InvalidMesh):  # a tree that shows nothing
                 item.surface.project(NOWHERE)
                 item.surface.raycast(NOWHERE, ANYWHERE)

@@ -8,12 +8,15 @@ from typing import Protocol
 
 from blobtree.progress import Progress
 from decals.checks import shown
-from decals.edit.change import Change
+from decals.edit.change import Change, Parts, Rows
 from decals.edit.document import Document
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.scenes.scene_file import save_scene
+
+FEW = 500
+"""Decals that change their places in an index one by one sooner than another index is brought over."""
 
 
 class Command(Protocol):
@@ -69,8 +72,7 @@ class EditSession:
     def _carry_out(self, label: str, change: Change) -> Change:
         if change.empty:
             return change
-        self._age += 1
-        self.document.put(change.after, change.parts_after)
+        self._put(change.after, change.parts_after)
         self._undone.clear()
         if self._stroke is None:
             self._done.append(Done(label, change))
@@ -94,17 +96,19 @@ class EditSession:
         self.end()
         if not self._undone:
             return None
-        self._age += 1
         entry = self._undone.pop()
         self._done.append(entry)
-        self.document.put(entry.change.after, entry.change.parts_after)
+        self._put(entry.change.after, entry.change.parts_after)
         self._tell(entry.change)
         return entry.label
 
     def _revert(self, change: Change) -> None:
-        self._age += 1
-        self.document.put(change.before, change.parts_before)
+        self._put(change.before, change.parts_before)
         self._tell(change)
+
+    def _put(self, rows: Rows, parts: Parts) -> None:
+        self._age += 1
+        self.document.put(rows, parts)
 
     @property
     def next_undo(self) -> Done | None:
@@ -176,7 +180,11 @@ class EditSession:
         """
         if (fork.origin, fork.origin_age) != (self, self._age):
             return False
-        self.document.adopt(fork.document)
+        if fork.small:
+            for rows, parts in fork.puts:
+                self.document.put(rows, parts)
+        else:
+            self.document.adopt(fork.document)
         self._done, self._undone, self._stroke = fork._done, fork._undone, fork._stroke
         self._age += 1
         for change in fork.heard:
@@ -227,17 +235,34 @@ class Fork(EditSession):
     ----------
     origin, origin_age
         The other one, and how often it had changed.
-    heard
-        The changes since then.
+    heard, puts
+        The changes since then, and what they put on.
     """
 
     def __init__(self, origin: EditSession) -> None:
         self.origin, self.origin_age = origin, origin._age
         self.heard: list[Change] = []
+        self.puts: list[tuple[Rows, Parts]] = []
         self.document = origin.document.fork()
         self._done, self._undone, self._stroke = [*origin._done], [*origin._undone], origin._stroke
         self._saved, self._age = origin._saved, origin._age
         self._listeners = [self.heard.append]
+
+    def _put(self, rows: Rows, parts: Parts) -> None:
+        super()._put(rows, parts)
+        self.puts.append((rows, parts))
+
+    @property
+    def small(self) -> bool:
+        """Whether so few decals changed that it is no work to change them in the other session too."""
+        return sum(len(rows.numbers) for rows, _ in self.puts) <= FEW
+
+    def prepare(self, *, surfaces: bool) -> None:
+        """Do what whoever adopts this would wait for: lay out the index, and make surfaces if wished."""
+        if not self.small:
+            self.document.decals.index  # noqa: B018  (it is laid out where it is asked for)
+        if surfaces:
+            self.document.make_surfaces()
 
 
 class Saving:

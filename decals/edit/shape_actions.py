@@ -184,7 +184,7 @@ class ShapeActions(ABC):
                 except (DecalsError, BlobTreeError) as error:
                     session.cancel()
                     return str(error)
-                session.document.prepare()
+                session.document.make_surfaces()
                 return ""
 
             long = self.background.following or not self.background.busy_editing

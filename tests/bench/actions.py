@@ -18,6 +18,7 @@ import numpy as np
 
 from decals.edit import EditSession
 from decals.edit.keys import BINDINGS, CAMERA
+from decals.scenes.scene import MeshObject
 from decals.window import EditWindow
 from tests.bench.scenes import bench_scene
 from tests.bench.window import Figures, machine
@@ -35,10 +36,11 @@ OF_SELECTED = (
     "duplicate", "delete", "larger", "smaller", "turn_left", "turn_right", "next_image", "previous_image",
     "next_tint", "fainter", "stronger", "layer_up", "layer_down", "next_interaction",
 )  # fmt: skip
+OF_TREES = (
+    "grip", "grip_move", "thicker", "thinner", "next_color", "next_join", "new_ball", "new_limb",
+)  # fmt: skip
 BEFORE = {"redo": "undo"}
 """What is done first, untimed."""
-UNTOUCHED = ("undo", "redo", "save", "help", "pick", "pick_also", "pick_all", "let_go", "grip", "move")
-"""Actions that are not taken back afterwards."""
 
 
 class Hand:
@@ -172,7 +174,8 @@ def scene_figures(model: str, count: int, only: tuple[str, ...], folder: Path) -
         window.show()
         hand = Hand(window)
         for name, action, gesture, selected in cases():
-            if action not in only:
+            on_mesh = isinstance(session.document.objects[0], MeshObject)
+            if action not in only or (on_mesh and action in OF_TREES):
                 continue
             block, whole = measure(hand, action, gesture, selected)
             yield {f"{model}_{count}_{name}_block_ms": block, f"{model}_{count}_{name}_whole_ms": whole}

@@ -3,6 +3,7 @@
 import threading
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ LONG = 30.0
 @pytest.fixture(autouse=True)
 def few_are_many(monkeypatch):
     monkeypatch.setattr("decals.edit.background.MANY", 5)
+    monkeypatch.setattr("decals.edit.session.FEW", 5)
 
 
 def threaded(**options):
@@ -384,6 +386,19 @@ def test_closing_drops_an_edit():
     assert digest(actions.session.document) == first
 
 
+def test_what_few_decals_come_to_is_a_change_of_these_alone(monkeypatch):
+    monkeypatch.setattr("decals.edit.session.FEW", 500)
+    session = EditSession(scene())
+    editor = session.document.decals
+    version = editor.version
+    fork = session.fork()
+    fork.do(Scale([1, 4], 2.0))
+    assert session.adopt(fork)
+    records = editor.changes(version)["decal_records"]
+    assert sum(end - first for first, end in records) == 8
+    assert editor.touched(version) is not None
+
+
 def test_a_fork_goes_its_own_way_and_is_adopted_once():
     session = EditSession(scene())
     session.do(Scale([1], 2.0))
@@ -465,8 +480,13 @@ class Twins:
 
 
 @settings(max_examples=40, deadline=None)
-@given(operations=st.lists(OPERATIONS, max_size=14))
-def test_whatever_comes_between_nothing_is_lost(tmp_path_factory, operations):
+@given(operations=st.lists(OPERATIONS, max_size=14), few=st.sampled_from([0, 5, 500]))
+def test_whatever_comes_between_nothing_is_lost(tmp_path_factory, operations, few):
+    with patch("decals.edit.session.FEW", few):
+        go_through(operations, tmp_path_factory)
+
+
+def go_through(operations, tmp_path_factory):
     twins = Twins(tmp_path_factory.mktemp("saves") / "scene.json")
     for name, *arguments in operations:
         getattr(twins, name)(*arguments)

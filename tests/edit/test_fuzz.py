@@ -87,9 +87,13 @@ def tried(session, command):
         session.do(command)
 
 
-@pytest.mark.parametrize(("seed", "count"), [(3, 60), pytest.param(4, 1_000, marks=pytest.mark.slow)])
-def test_random_commands_in_the_background_while_hands_go_on(seed, count):
+@pytest.mark.parametrize(
+    ("seed", "count", "few"),
+    [(3, 40, 0), (5, 40, 500), *(pytest.param(4, 1_000, few, marks=pytest.mark.slow) for few in (0, 500))],
+)
+def test_random_commands_in_the_background_while_hands_go_on(seed, count, few, monkeypatch):
     """Each comes after what hands do until it is seen, whatever either of them is."""
+    monkeypatch.setattr("decals.edit.session.FEW", few)
     session, shadow = EditSession(scene()), EditSession(scene())
     background = Background(session, lambda _text: None, session.end, threaded=True)
     monkey = Monkey(seed, session.document, scene(200).decals)

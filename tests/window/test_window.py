@@ -185,6 +185,7 @@ def test_escape_stops_what_goes_on_in_the_background(driver):
 
 def test_everything_is_scaled_in_the_background_and_seen_with_the_next_tick(driver, monkeypatch):
     monkeypatch.setattr("decals.edit.background.MANY", 5)
+    monkeypatch.setattr("decals.edit.session.FEW", 5)
     first, state = driver.shot(), driver.state
     driver.key("a", ctrl=True)
     driver.key("plus")
@@ -204,6 +205,7 @@ def test_everything_is_scaled_in_the_background_and_seen_with_the_next_tick(driv
 
 def test_a_drag_of_many_follows_the_pointer_in_the_background(driver, monkeypatch):
     monkeypatch.setattr("decals.edit.background.MANY", 5)
+    monkeypatch.setattr("decals.edit.session.FEW", 5)
     number, at = next(driver.visible())
     driver.click(at)
     driver.key("a", ctrl=True)
