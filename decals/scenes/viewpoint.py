@@ -4,6 +4,7 @@ Matrices act on columns, ``M @ (x, y, z, 1)``, as in OpenGL, and are float64.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -95,8 +96,7 @@ class Projection:
 
     def rays(self, width: int, height: int) -> Rays:
         """Give the rays through the pixels of a picture of this size."""
-        pixels = np.array([[2.0 / width, 0.0, -1.0], [0.0, 2.0 / height, -1.0]])
-        return self._parallel_rays(pixels) if self.parallel else self._perspective_rays(pixels)
+        return _rays_of(self, width, height)
 
     def _perspective_rays(self, pixels: Floats) -> Rays:
         """Solve for the point that is projected nowhere, and for directions of clip coordinate w = 1."""
@@ -113,6 +113,13 @@ class Projection:
         away = _solve(rows, np.array([0.0, 0.0, 1.0]))
         direction = away / float(np.linalg.norm(away))
         return Rays(corner - _solve(rows, shift), direction, right, up, parallel=True)
+
+
+@lru_cache(maxsize=16)
+def _rays_of(projection: Projection, width: int, height: int) -> Rays:
+    """Solve for rays; one step of a hand asks several times."""
+    pixels = np.array([[2.0 / width, 0.0, -1.0], [0.0, 2.0 / height, -1.0]])
+    return projection._parallel_rays(pixels) if projection.parallel else projection._perspective_rays(pixels)
 
 
 def _solve(matrix: Floats, values: Floats) -> Floats:

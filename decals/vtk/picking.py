@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,12 +95,31 @@ def hidden(stage: Stage, x: int, y: int, position: ArrayLike) -> bool:
     VTK's depth there is compared with what we put into it ourselves: at a grazing angle, or in a coarse
     frame, that may lie far before the point. Text over the picture stands at depth zero and hides nothing.
     """
+    if not _in_company(stage, x, y):
+        return False
     left, low = stage.vtk_renderer.GetOrigin()
     own = stage.depth_at(x - left, y - low)
     if own == 0.0:
         return False
     seen = float(stage.vtk_renderer.GetZ(x, y))
     return 0.0 < seen < min(own, depth_of(stage.viewpoint().matrix, position)) - ROUNDING
+
+
+def _in_company(stage: Stage, x: int, y: int) -> bool:
+    """Whether anything but us may have left depth at a pixel; to read it, one waits for the card."""
+    ours = stage.vtk_renderer
+    return any(
+        other.GetDraw() and other.IsInViewport(x, y)
+        for other in ours.GetRenderWindow().GetRenderers()
+        if other is not ours
+    ) or any(prop is not stage.actor and _leaves_depth(prop) for prop in ours.GetViewProps())
+
+
+def _leaves_depth(prop: Any) -> bool:
+    """Whether a prop may; text does not, nor do translucent actors."""
+    if not prop.GetVisibility() or prop.IsA("vtkActor2D"):
+        return False
+    return not (prop.IsA("vtkActor") and prop.HasTranslucentPolygonalGeometry())
 
 
 def texels_of(x: int, y: int, pixels: Size, texels: Size, *, magnified: bool) -> Rectangle:

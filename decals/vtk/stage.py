@@ -11,6 +11,7 @@ from typing import Any, cast
 import pyvista as pv
 from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonCore import vtkCommand
+from vtkmodules.vtkRenderingCore import vtkActor
 
 from decals.checks import shown
 from decals.errors import InvalidScene
@@ -195,6 +196,11 @@ class Stage(Settings):
     def frame(self) -> Floats:
         """The scene's coordinates to the world's: identity, unless somebody moved or scaled the whole."""
         return self._anchor.matrix()
+
+    @property
+    def actor(self) -> vtkActor:
+        """What stands for our objects among the renderer's actors."""
+        return self._anchor.actor
 
     def viewport(self) -> tuple[int, int, int, int]:
         """Lower left corner and size of the part of the frame that VTK draws to now, in pixels."""

@@ -68,7 +68,7 @@ class Marks:
         self, document: Document, numbers: tuple[int, ...], contact: Contact, mapping: Mapping
     ) -> None:
         """Outline decals; the last one exactly."""
-        seen = document.objects, document.decals.version, numbers, contact
+        seen = (document.objects, document.decals.version, numbers, contact, mapping) if numbers else ()
         if seen == self._outlined:
             return
         self._outlined = seen

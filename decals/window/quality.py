@@ -28,13 +28,14 @@ class Quality:
     def __init__(self, target: float = TARGET) -> None:
         self.target = target
         self._seconds: dict[float, float] = {}
-        self._besides: dict[float, float] = {}
+        self._besides: dict[float, tuple[float, ...]] = {}
         self._scale: float | None = None
 
     def saw(self, scale: float, seconds: float, share: float = 1.0) -> None:
         """Take note of a frame so many times the window's size along each axis, or of a share of one."""
         if share < 1.0:
-            self._besides[scale] = max(seconds - share * self._pixels(scale), 0.0)
+            rest = max(seconds - share * self._pixels(scale), 0.0)
+            self._besides[scale] = (*self._besides.get(scale, ())[-1:], rest)
             return
         if scale >= 1.0:
             self._besides.clear()  # what was slow once is tried again
@@ -47,6 +48,11 @@ class Quality:
         """Size for the next frame of something that moves."""
         return 1.0 if self._scale is None else self._scale
 
+    def in_time(self, scale: float, share: float) -> bool:
+        """Whether a share of a frame should be done in time, or no later than the last small one was."""
+        limit = max(self.target, self._seconds.get(self.scale, 0.0))
+        return share < 1.0 and self.expected(scale, share) <= limit
+
     def expected(self, scale: float, share: float = 1.0) -> float:
         """Seconds that a frame of some size, or a share of its work, should take.
 
@@ -55,7 +61,8 @@ class Quality:
         if not self._seconds:
             return 0.0
         if share < 1.0:
-            return self._besides.get(scale, 0.0) + share * self._pixels(scale)  # until it was tried: nothing
+            besides = min(self._besides.get(scale, (0.0,)))  # one frame may be late; none was tried: no time
+            return besides + share * self._pixels(scale)
         fixed, each = self._model()
         last, seconds = next(reversed(self._seconds.items()))
         return min(fixed + each * scale**2, seconds * max(scale / last, 1.0) ** 2)

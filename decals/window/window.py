@@ -188,8 +188,7 @@ class EditWindow:
     def _edited(self) -> None:
         """Draw the next frame as at rest, or with fewer samples, where little of it changed; or coarsely."""
         for samples in (self.samples, 1):
-            share = self.stage.to_draw(samples)
-            if share < 1.0 and self.quality.expected(samples, share) <= self.quality.target:
+            if self.quality.in_time(samples, self.stage.to_draw(samples)):
                 self._moved = time.perf_counter()
                 self.stage.draw_scale, self.stage.samples = 1.0, samples
                 return

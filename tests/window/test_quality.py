@@ -72,11 +72,23 @@ def test_frames_of_which_a_part_is_drawn_do_not_pass_for_whole_ones(
 def test_a_part_that_was_slow_once_is_tried_again_after_a_whole_frame() -> None:
     quality = settled(0.01, 0.5)
     assert quality.expected(2.0, 0.01) < TARGET
+    quality.saw(2.0, 0.05, 0.01)
     quality.saw(2.0, 3.0, 0.01)
-    assert quality.expected(2.0, 0.01) > TARGET
+    assert quality.in_time(2.0, 0.01)
+    quality.saw(2.0, 3.0, 0.01)
+    assert not quality.in_time(2.0, 0.01)
     assert quality.expected(1.0, 0.01) < TARGET
     quality.saw(1.0, 0.51)
-    assert quality.expected(2.0, 0.01) < TARGET
+    assert quality.in_time(2.0, 0.01)
+    assert not quality.in_time(2.0, 1.0)
+
+
+def test_a_part_is_drawn_where_nothing_is_faster() -> None:
+    """Whatever size, what comes besides takes longer than a frame may: then at least the picture is whole."""
+    quality = settled(0.2, 0.5)
+    assert quality.scale == SCALES[-1]
+    quality.saw(2.0, 0.201, 0.001)
+    assert quality.in_time(2.0, 0.001)
 
 
 def test_before_the_first_frame_parts_take_no_time_either() -> None:

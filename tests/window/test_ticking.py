@@ -62,7 +62,8 @@ def test_frames_become_whole_by_themselves_once_nothing_moves(plotter: Factory) 
         await rested(window)
         first = np.asarray(pl.screenshot(None, return_img=True))
         window.quality.saw(1.0, 10.0)  # as on a slow machine
-        window.redraw(whole=False)
+        window.moving()  # as the camera does
+        pl.render()
         assert window.stage.draw_scale < 1.0
         await rested(window)
         assert (window.stage.draw_scale, window.stage.samples) == (1.0, window.samples)
