@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError
 from blobtree.progress import Progress
+from decals.checks import shown
 from decals.edit.background import Background, are_many, doing, takes_long
 from decals.edit.change import Change, Numbers
 from decals.edit.commands import Add, Adjust, Delete, Duplicate, Scale, Turn
@@ -68,6 +69,8 @@ class Actions(ShapeActions):
 
     def perform(self, action: str, cursor: Cursor) -> None:
         """Carry out an action; what cannot be done is said in `message`, and nothing changes."""
+        if not isinstance(action, str) or action not in _TEXTS or not hasattr(self, f"_{action}"):
+            raise InvalidEdit(f"action: expected one of the table of keys, got {shown(action)}")
         series = (action, self.selection) if action in _SERIES else None
         if series != self._series:
             self._stroke = object()

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from decals.checks import whole
+from decals.checks import instance, whole
 from decals.edit.document import Document
 from decals.edit.places import Doubles, nearest
 from decals.errors import InvalidEdit
@@ -42,6 +42,7 @@ def outline(
     outline lies where somebody else begins to show. A decal that does not show at its own centre gets its
     undisturbed rim.
     """
+    instance("document", document, Document, InvalidEdit, "a session has one")
     decal = document.decals[whole("decal", number, 0, document.decals.next_number - 1, InvalidEdit)]
     center = decal.positions[0].astype(np.float64)
     ways = _ends(document, decal, ANGLES, mapping)[0] - center

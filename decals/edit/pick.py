@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from decals.checks import instance
 from decals.edit.document import Document
 from decals.edit.places import first_hit
+from decals.errors import InvalidEdit
 from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
 from decals.surfaces.surface import Floats
@@ -25,6 +27,7 @@ def pick(
     document: Document, origin: ArrayLike, direction: ArrayLike, *, contact: Contact = Contact.PAPER
 ) -> Pick | None:
     """Follow a ray to the first surface, and ask who shows there."""
+    instance("document", document, Document, InvalidEdit, "a session has one")
     hit = first_hit(document.objects, origin, direction)
     if not len(hit.objects):
         return None

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from decals.checks import triple
-from decals.errors import InvalidPoints
+from decals.checks import shown, triple
+from decals.errors import InvalidPoints, InvalidScene
 from decals.model import Decals
 from decals.scenes.scene import SceneObject
 from decals.surfaces.surface import Floats, as_points, unit_rows
@@ -31,6 +31,7 @@ class Places:
 def nearest(objects: Sequence[SceneObject], points: ArrayLike) -> Places:
     """Closest place to each point on any object; the first object where two are equally close."""
     wished = as_points(points)
+    _check(objects)
     best = Places(wished.copy(), np.zeros_like(wished), np.full(len(wished), -1, np.int32))
     if len(wished) == 0:
         return best
@@ -49,12 +50,19 @@ def first_hit(objects: Sequence[SceneObject], origin: ArrayLike, direction: Arra
     """Where a ray first meets an object: one place, or none for a miss."""
     start = as_points(triple("origin", origin, InvalidPoints)[None])
     way = unit_rows(triple("direction", direction, InvalidPoints)[None])
+    _check(objects)
     distances = [float(item.surface.raycast(start, way)[0]) for item in objects]
     if not distances or not np.isfinite(min(distances)):
         return Places(start[:0], start[:0], np.zeros(0, np.int32))
     number = int(np.argmin(distances))
     positions, normals = objects[number].surface.project(start + np.float32(distances[number]) * way)
     return Places(positions, normals, np.array([number], np.int32))
+
+
+def _check(objects: Sequence[SceneObject]) -> None:
+    """Refuse what are no objects of a scene."""
+    if not isinstance(objects, Sequence) or not all(hasattr(item, "surface") for item in objects):
+        raise InvalidScene(f"objects: expected those of a scene, got {shown(objects)}")
 
 
 def turns(before: ArrayLike, after: ArrayLike) -> Doubles:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from blobtree.progress import Progress
-from decals.checks import shown
+from decals.checks import instance, shown
 from decals.edit.change import Change, Parts, Rows
 from decals.edit.document import Document
 from decals.errors import InvalidEdit
@@ -178,6 +178,7 @@ class EditSession:
         False where something was done here since it was made: nothing happens then, and what was done to that
         fork can be done to another.
         """
+        instance("fork", fork, Fork, InvalidEdit, "session.fork() makes one")
         if (fork.origin, fork.origin_age) != (self, self._age):
             return False
         if fork.small:
@@ -198,6 +199,8 @@ class EditSession:
 
         What comes back ends it; calling that twice is harmless.
         """
+        if not callable(listener):
+            raise InvalidEdit(f"listener: expected a function of a change, got {shown(listener)}")
         self._listeners.append(listener)
 
         def stop() -> None:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import BlobTreeError, Node, Point, Segment
 from blobtree.formulas.kernels import RIM
+from decals.checks import instance
 from decals.edit.background import Background, Step
 from decals.edit.change import Change
 from decals.edit.objects import AddObject, RemoveObject
@@ -70,7 +71,7 @@ class ShapeActions(ABC):
     background: Background
 
     def __init__(self, session: EditSession) -> None:
-        self.session = session
+        self.session = instance("session", session, EditSession, InvalidEdit, "EditSession(scene) makes one")
         self.selection: tuple[int, ...] = ()
         self.message = ""
         self.grip: tuple[int, Path] | None = None

@@ -5,11 +5,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from decals.checks import finite, instance, shown
 from decals.edit.actions import Actions
 from decals.edit.commands import Carry
 from decals.edit.keys import action_of
 from decals.edit.pick import Pick, pick
 from decals.edit.places import first_hit, nearest, turns
+from decals.errors import InvalidEdit
 from decals.surfaces.surface import Floats
 
 Ray = tuple[ArrayLike, ArrayLike]
@@ -43,7 +45,7 @@ class Tools:
         ray: Callable[[float, float], Ray | None],
         hidden: Hidden = lambda _x, _y, _point: False,
     ) -> None:
-        self.actions = actions
+        self.actions = instance("actions", actions, Actions, InvalidEdit, "Actions(session) makes some")
         self._ray, self._hidden = ray, hidden
         self._pressed: tuple[float, float] | None = None
         self._held: _Held | None = None
@@ -56,6 +58,7 @@ class Tools:
 
     def at(self, x: float, y: float) -> Pick | None:
         """Say what is under a place."""
+        x, y = _place(x, y)
         ray = self._ray(x, y)
         found = None if ray is None else pick(self.actions.session.document, *ray)
         return None if found is None or self._hidden(x, y, found.position) else found
@@ -70,7 +73,7 @@ class Tools:
 
     def press(self, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
         """Take the left button going down."""
-        self._pressed, self._strayed, self._held = (x, y), False, None
+        self._pressed, self._strayed, self._held = _place(x, y), False, None
         if ctrl:
             return True
         found = None if shift or not self.actions.selection else self.at(x, y)
@@ -81,6 +84,7 @@ class Tools:
 
     def move(self, x: float, y: float) -> bool:
         """Take the pointer being somewhere else."""
+        x, y = _place(x, y)
         if self._pressed is None:
             return False
         if not self._strayed and np.hypot(x - self._pressed[0], y - self._pressed[1]) > CLICK:
@@ -109,6 +113,9 @@ class Tools:
         return held is not None or ctrl
 
     def _ask(self, name: str, x: float, y: float, *, ctrl: bool, shift: bool) -> bool:
+        if not isinstance(name, str):
+            raise InvalidEdit(f"key: expected its name, such as 'z', got {shown(name)}")
+        x, y = _place(x, y)
         action = action_of(name, ctrl=ctrl, shift=shift)
         if action is None:
             return False
@@ -126,6 +133,11 @@ class Tools:
             self._held = None
         if self._held is not None and self._strayed:
             self._held.begin()
+
+
+def _place(x: float, y: float) -> tuple[float, float]:
+    """A place in pixels."""
+    return finite("x", x, InvalidEdit), finite("y", y, InvalidEdit)
 
 
 class _Held:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from decals.checks import finite, shown, triple
+from decals.errors import InvalidScene
 from decals.scenes.viewpoint import Floats
 
 MOST_LAMPS = 32
@@ -42,6 +44,14 @@ class Lamp:
     cone: float = 180.0
     exponent: float = 1.0
 
+    def __post_init__(self) -> None:
+        places = () if self.position is None else ("position",)
+        for name in ("color", "direction", "attenuation", *places):
+            numbers = triple(f"a lamp's {name}", getattr(self, name), InvalidScene)
+            object.__setattr__(self, name, tuple(numbers.tolist()))
+        for name in ("cone", "exponent"):
+            finite(f"a lamp's {name}", getattr(self, name), InvalidScene)
+
     def rows(self) -> list[tuple[float, ...]]:
         """Give the four rows that the shader reads."""
         place = (0.0, 0.0, 0.0, 0.0) if self.position is None else (*self.position, 1.0)
@@ -63,6 +73,13 @@ class Lamps:
 
     lamps: tuple[Lamp, ...]
     place: tuple[float, ...] = tuple(np.eye(4).ravel().tolist())
+
+    def __post_init__(self) -> None:
+        known = isinstance(self.lamps, tuple) and all(isinstance(lamp, Lamp) for lamp in self.lamps)
+        if not known or len(self.lamps) > MOST_LAMPS:
+            raise InvalidScene(
+                f"lamps: expected at most {MOST_LAMPS} Lamps in a tuple, got {shown(self.lamps)}"
+            )
 
     def data(self) -> bytes:
         """Give the rows of all lamps, ``float32[MOST_LAMPS * 4, 4]``."""

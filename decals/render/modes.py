@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from decals.checks import member
+from decals.checks import instance, member
 from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
@@ -20,3 +20,5 @@ class Modes:
     def __post_init__(self) -> None:
         member("mapping", self.mapping, Mapping, InvalidScene)
         member("contact", self.contact, Contact, InvalidScene)
+        if self.lamps is not None:
+            instance("lamps", self.lamps, Lamps, InvalidScene, "leave them out for the studio's light")

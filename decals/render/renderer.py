@@ -11,7 +11,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.errors import InvalidScene
+from decals.checks import instance, whole
+from decals.errors import InvalidPoints, InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
@@ -30,9 +31,10 @@ from decals.render.scene_like import SceneLike
 from decals.render.shown import Shown
 from decals.render.slots import BUFFERS_SLOT, WHOLE_SLOT, Slots
 from decals.render.steps import Order, Plan, Uploaded, plan_of
-from decals.render.targets import Size, Targets, check_size
+from decals.render.targets import Size, Targets
 from decals.render.textures import ImageArray
 from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Tile, largest_tile, tiles
+from decals.render.wishes import check_scene, check_size, viewpoint_of
 from decals.scenes.viewpoint import Viewpoint
 
 
@@ -57,6 +59,9 @@ class Renderer:
     """
 
     def __init__(self, context: Context | None = None, *, max_tile: int = MAX_TILE) -> None:
+        if context is not None:
+            instance("context", context, Context, InvalidScene, "Context.standalone makes one")
+        whole("max_tile", max_tile, 1, MAX_TILE, InvalidScene)
         self._owned = context is None
         self.context = context or Context.standalone()
         self._max_tile = min(max_tile, self.context.max_texture_size - 2 * MARGIN)
@@ -108,9 +113,10 @@ class Renderer:
         Raises
         ------
         InvalidScene
-            The scene holds an object of unknown kind, or size, samples, mapping or contact are none.
+            The scene is none, holds an object of unknown kind, or another argument is not of its kind.
         """
         check_size(size, samples)
+        instance("background", background, Background, InvalidScene, "such as decals.render.STUDIO")
         canvas = Canvas(size, 4, np.uint8)
         for tile, targets in self._tiles(scene, viewpoint, size, samples, Modes(mapping, contact, lamps)):
             light = targets.light_pass.light
@@ -150,9 +156,11 @@ class Renderer:
         (Its colour knows no surroundings that keep light out.)
         """
         check_size(size, 1)
+        for name, place, side in (("x", x, size[0]), ("y", y, size[1])):
+            whole(name, place, 0, side - 1, InvalidPoints)
         with self.context.current():
             uploaded = self._upload(scene)
-            picture = Picture.of(viewpoint or scene.camera, size, uploaded.bounds)
+            picture = Picture.of(viewpoint_of(scene, viewpoint), size, uploaded.bounds)
             tile = picture.part(Rectangle(x, y, 1, 1))
             targets = self._targets.of(BUFFERS_SLOT, (1, 1))
             self._draw_tile(scene, uploaded, tile, targets, Modes(mapping, contact))
@@ -214,7 +222,8 @@ class Renderer:
                 f"{full[1]}; take fewer a pixel, or `render` draws in parts"
             )
 
-        order = Order(scene, viewpoint, full, Modes(mapping, contact, lamps))
+        check_scene(scene)
+        order = Order(scene, viewpoint_of(scene, viewpoint), full, Modes(mapping, contact, lamps))
 
         def plan(targets: Targets, held: Shown | None) -> Plan:
             uploaded = self._upload(scene)  # again each time: others may draw in between
@@ -268,7 +277,7 @@ class Renderer:
         with self.context.current():
             uploaded = self._upload(scene)
             full = size[0] * samples, size[1] * samples
-            picture = Picture.of(viewpoint or scene.camera, full, uploaded.bounds)
+            picture = Picture.of(viewpoint_of(scene, viewpoint), full, uploaded.bounds)
             slot = BUFFERS_SLOT if buffers else WHOLE_SLOT
             targets = self._targets.of(slot, largest_tile(size, samples, limit=self._max_tile))
             for tile in tiles(picture, samples, limit=self._max_tile):
@@ -284,6 +293,7 @@ class Renderer:
         Drawing(iter([targets]), plan, self.context.gl.finish).complete()
 
     def _upload(self, scene: SceneLike) -> Uploaded:
+        check_scene(scene)
         drawables = [self._drawable(thing) for thing in scene.objects]
         return Uploaded(drawables, *self.uploads(scene))
 

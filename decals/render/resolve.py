@@ -6,6 +6,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.checks import shown
+from decals.errors import InvalidScene
 from decals.render.context import Context
 from decals.render.tile import Tile, set_uniform
 from implicit_decals.shaders import compose
@@ -19,6 +21,17 @@ class Background:
 
     top: Rgba
     bottom: Rgba
+
+    def __post_init__(self) -> None:
+        for name, color in (("top", self.top), ("bottom", self.bottom)):
+            try:
+                given = np.array(color, np.float64)
+            except (TypeError, ValueError, OverflowError):
+                given = np.zeros(0)
+            if given.shape != (4,) or not ((given >= 0.0) & (given <= 1.0)).all():
+                raise InvalidScene(
+                    f"a background's {name}: expected sRGB and alpha in [0, 1], got {shown(color)}"
+                )
 
 
 STUDIO = Background((0.80, 0.82, 0.85, 1.0), (0.96, 0.96, 0.95, 1.0))

@@ -42,13 +42,13 @@ class Order:
     """A picture that somebody wants: its size in samples, in one tile, with the depth of all objects."""
 
     scene: SceneLike
-    viewpoint: Viewpoint | None
+    viewpoint: Viewpoint
     size: Size
     modes: Modes
 
     def tile(self, bounds: Bounds) -> Tile:
         """Give the tile, if there is such a box around the objects."""
-        return Picture.of(self.viewpoint or self.scene.camera, self.size, bounds).whole()
+        return Picture.of(self.viewpoint, self.size, bounds).whole()
 
     def share(self, targets: Targets | None) -> float:
         """Part of the work, 0 to 1, that is left in targets that hold something."""

@@ -1,6 +1,5 @@
 """What one tile is drawn into."""
 
-from decals.errors import InvalidScene
 from decals.render.context import DEPTH, Context
 from decals.render.decal_pass import DecalPass
 from decals.render.gbuffer import GBuffer
@@ -12,14 +11,6 @@ Size = tuple[int, int]
 
 KINDS = ("f4", "f4", "f2", DEPTH, "f2", "f2", "f1")
 """Of the textures that targets without buffers are made of."""
-
-
-def check_size(size: Size, samples: int) -> None:
-    """Refuse pictures without pixels."""
-    if len(size) != 2 or min(size) < 1 or samples < 1:
-        raise InvalidScene(
-            f"a picture needs a width, a height and samples of at least 1, got {size}, {samples}"
-        )
 
 
 class Targets:

@@ -171,6 +171,7 @@ class Component:
     def add_scene(self, scene: Scene, *, camera: bool = True) -> Scene:
         """Show a scene in place of what there was; with ``camera``, from where its own camera stands."""
         instance("scene", scene, Scene, InvalidScene, "decals.cover makes one; for others set `scene`")
+        instance("camera", camera, bool, InvalidScene, "whether to look from the scene's own; it has one")
         self.scene = scene
         if camera:
             view = self._plotter.camera
@@ -265,7 +266,11 @@ def _image(image: Any, number: int) -> DecalImage:
         return image
     if isinstance(image, str | os.PathLike):
         return DecalImage.load(os.fspath(image))
-    return DecalImage(f"image {number}", np.asarray(image))
+    try:
+        pixels = np.asarray(image)
+    except ValueError:
+        raise InvalidScene(f"image {number}: expected uint8[h, w, 4], got {shown(image)}") from None
+    return DecalImage(f"image {number}", pixels)
 
 
 def _color(color: Color | str) -> Color:

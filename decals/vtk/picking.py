@@ -95,6 +95,7 @@ def hidden(stage: Stage, x: int, y: int, position: ArrayLike) -> bool:
     VTK's depth there is compared with what we put into it ourselves: at a grazing angle, or in a coarse
     frame, that may lie far before the point. Text over the picture stands at depth zero and hides nothing.
     """
+    x, y = (math.floor(finite(name, place, InvalidPoints)) for name, place in (("x", x), ("y", y)))
     if not _in_company(stage, x, y):
         return False
     left, low = stage.vtk_renderer.GetOrigin()

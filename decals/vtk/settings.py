@@ -1,6 +1,6 @@
 """How a stage draws: samples, size, modes and lights, checked when they are set."""
 
-from decals.checks import finite, member, whole
+from decals.checks import finite, member, shown, whole
 from decals.errors import InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
@@ -70,4 +70,4 @@ class Settings:
         try:
             self._lights = Lights(lights)
         except ValueError as error:
-            raise InvalidScene(f"lights must be 'scene' or 'vtk'; got {lights!r}") from error
+            raise InvalidScene(f"lights must be 'scene' or 'vtk'; got {shown(lights)}") from error

@@ -8,16 +8,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, cast
 
+import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkActor
 
-from decals.checks import shown
-from decals.errors import InvalidScene
+from decals.checks import finite
+from decals.errors import InvalidPoints
 from decals.render import Renderer, SceneLike, Size
 from decals.render.lamps import Lamps
 from decals.render.tile import CameraBuffer
+from decals.render.wishes import check_scene
 from decals.scenes.scene import Box, SceneObject, bounds_of
 from decals.scenes.viewpoint import Floats, Projection
 from decals.vtk.anchor import Anchor
@@ -30,6 +32,9 @@ from decals.vtk.lights import TOO_MANY, Lights, too_many_lights, vtk_lamps
 from decals.vtk.modes import complaints
 from decals.vtk.picking import Hit, hidden, hit_at
 from decals.vtk.settings import Settings
+
+FARTHEST = 2.0**30
+"""Pixels that VTK can count."""
 
 
 class Stage(Settings):
@@ -223,7 +228,9 @@ class Stage(Settings):
 
     def covers(self, x: int, y: int) -> bool:
         """Whether a place in the window is in this subplot."""
-        return bool(self.vtk_renderer.IsInViewport(x, y))
+        places = (finite(name, place, InvalidPoints) for name, place in (("x", x), ("y", y)))
+        column, row = (int(np.clip(place, -1.0, FARTHEST)) for place in places)
+        return bool(self.vtk_renderer.IsInViewport(column, row))
 
     def hidden(self, x: int, y: int, position: ArrayLike) -> bool:
         """Whether an actor of VTK's hid a point of ours at a pixel of the last frame; see `at`."""
@@ -310,8 +317,8 @@ class Stage(Settings):
 
 def _check_scene(scene: object) -> None:
     """Refuse what has no objects, decals and images to draw."""
-    if scene is not None and not all(hasattr(scene, name) for name in ("objects", "decals", "images")):
-        raise InvalidScene(f"scene: expected a Scene, or None, got {shown(scene)}; decals.cover makes one")
+    if scene is not None:
+        check_scene(scene)
 
 
 def _prepare(stage: weakref.ref[Stage]) -> None:

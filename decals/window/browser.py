@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from decals.checks import instance, shown
+from decals.checks import finite, instance, shown
 from decals.edit.keys import of_browser
 from decals.errors import InvalidEdit
 from decals.window.window import EditWindow
@@ -75,17 +75,28 @@ def press_key(
     bool
         Whether the key means something.
     """
+    instance("window", window, EditWindow, InvalidEdit, "open one with plotter=...")
     if not isinstance(key, str):
         raise InvalidEdit(f"key: expected its name, such as 'z', got {shown(key)}")
     interactor = window.plotter.iren.interactor
     if place is not None:
+        right, down = _parts(place)
         width, height = window.plotter.window_size
-        interactor.SetEventPosition(int(place[0] * width), int((1.0 - place[1]) * height))
+        interactor.SetEventPosition(int(right * width), int((1.0 - down) * height))
     x, y = interactor.GetEventPosition()
     used = not window.elsewhere(x, y) and window.tools.key(of_browser(key), x, y, ctrl=ctrl, shift=shift)
     if used:
         window.redraw(whole=not window.tools.dragging)
     return used
+
+
+def _parts(place: object) -> tuple[float, float]:
+    """Two numbers, held within the window."""
+    try:
+        x, y = (finite("place", part, InvalidEdit) for part in place)  # type: ignore[attr-defined]
+    except (TypeError, ValueError, KeyError) as error:
+        raise InvalidEdit(f"place: expected parts of width and height, got {shown(place)}") from error
+    return min(max(x, 0.0), 1.0), min(max(y, 0.0), 1.0)
 
 
 def _fractions(place: str) -> tuple[float, float] | None:

@@ -1,5 +1,8 @@
 """How large to draw while things move, chosen from how long frames took."""
 
+from decals.checks import finite
+from decals.errors import InvalidScene
+
 TARGET = 0.08
 """Seconds that a frame may take while things move."""
 
@@ -11,6 +14,9 @@ ROOM = 0.7
 
 PIXELS_PART = 0.8
 """Part of a frame's time that is taken to grow with the number of its pixels, until two sizes were seen."""
+
+LARGEST = 1e6
+"""Seconds that are waited for, and times the window's size."""
 
 
 class Quality:
@@ -26,13 +32,17 @@ class Quality:
     """
 
     def __init__(self, target: float = TARGET) -> None:
-        self.target = target
+        self.target = _positive("target", target)
         self._seconds: dict[float, float] = {}
         self._besides: dict[float, tuple[float, ...]] = {}
         self._scale: float | None = None
 
     def saw(self, scale: float, seconds: float, share: float = 1.0) -> None:
         """Take note of a frame so many times the window's size along each axis, or of a share of one."""
+        scale, seconds = _positive("scale", scale), finite("seconds", seconds, InvalidScene)
+        if seconds < 0.0:
+            raise InvalidScene(f"seconds: expected 0 or more, got {seconds}")
+        share = _share(share)
         if share < 1.0:
             rest = max(seconds - share * self._pixels(scale), 0.0)
             self._besides[scale] = (*self._besides.get(scale, ())[-1:], rest)
@@ -58,6 +68,7 @@ class Quality:
 
         They are at most the last frame's for each of its pixels.
         """
+        scale, share = _positive("scale", scale), _share(share)
         if not self._seconds:
             return 0.0
         if share < 1.0:
@@ -89,3 +100,19 @@ class Quality:
             if self.expected(scale) <= limit:
                 return scale
         return SCALES[-1]
+
+
+def _positive(name: str, value: float) -> float:
+    """Give a number that must be above 0, and no larger than a window's size may be."""
+    number = finite(name, value, InvalidScene)
+    if not 0.0 < number <= LARGEST:
+        raise InvalidScene(f"{name}: expected a number above 0 and at most {LARGEST:g}, got {number}")
+    return number
+
+
+def _share(share: float) -> float:
+    """Give a part of the whole."""
+    number = finite("share", share, InvalidScene)
+    if not 0.0 <= number <= 1.0:
+        raise InvalidScene(f"share: expected a number from 0 to 1, got {number}")
+    return number
