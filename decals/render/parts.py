@@ -41,5 +41,9 @@ class Rectangle:
         first, last = part.of(self.height)
         return Rectangle(self.x, self.y + first, self.width, last - first)
 
-
-NOTHING = Rectangle(0, 0, 0, 0)
+    def around(self, other: "Rectangle") -> "Rectangle":
+        """Give the smallest rectangle that holds both."""
+        x, y = min(self.x, other.x), min(self.y, other.y)
+        right = max(self.x + self.width, other.x + other.width)
+        top = max(self.y + self.height, other.y + other.height)
+        return Rectangle(x, y, right - x, top - y)

@@ -1,16 +1,21 @@
 """Which samples of a tile can show anything of what lies within some balls."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.render.entry import GROUP
-from decals.render.parts import NOTHING, Rectangle
+from decals.render.parts import Rectangle
 from decals.render.tile import Tile
 
 Doubles = NDArray[np.float64]
+Regions = tuple[Rectangle, ...]
 
 ROUNDING = 2.0**-20
 """How far positions in the G-buffer may be off, relative to the largest number in their making."""
+MANY = 32
+"""Rectangles of which each is drawn on its own; more become one."""
 MARGIN = 1.0
 """Samples around a ball: edges of triangles are put onto a grid finer than this."""
 
@@ -47,11 +52,11 @@ def ball_extents(matrix: Doubles, balls: ArrayLike) -> tuple[Doubles, Doubles] |
     return (b - half) / a, (b + half) / a
 
 
-def region_of(tile: Tile, balls: Doubles, span: float) -> Rectangle:
-    """Give a rectangle of a tile, counted from its own corner, outside of which no ball is seen.
+def regions_of(tile: Tile, balls: Doubles, span: float) -> Regions:
+    """Give rectangles of a tile, counted from its own corner, outside of which no ball is seen.
 
-    It is cut into whole groups of samples: some rasterisers filter images for several samples together, and
-    take the derivatives of one of them.
+    They are cut into whole groups of samples: some rasterisers filter images for several samples together,
+    and take the derivatives of one of them.
 
     Parameters
     ----------
@@ -62,17 +67,30 @@ def region_of(tile: Tile, balls: Doubles, span: float) -> Rectangle:
     span
         The largest coordinate of what the tile shows.
     """
-    if not len(balls):
-        return NOTHING
     span = max(span, float(np.abs(tile.picture.rays.origin).max()))
-    grown = balls + np.array([0.0, 0.0, 0.0, ROUNDING * span])
-    extents = ball_extents(tile.matrix(), grown)
-    size = np.array([tile.width, tile.height])
+    extents = ball_extents(tile.matrix(), balls + np.array([0.0, 0.0, 0.0, ROUNDING * span]))
     if extents is None:
-        return Rectangle(0, 0, tile.width, tile.height)
-    low = (0.5 * extents[0].min(axis=0) + 0.5) * size - MARGIN
-    high = (0.5 * extents[1].max(axis=0) + 0.5) * size + MARGIN
-    first = np.clip(np.floor(low / GROUP) * GROUP, 0, size)
-    last = np.clip(np.ceil(high / GROUP) * GROUP, first, size)
-    (x, y), (right, top) = first.astype(int).tolist(), last.astype(int).tolist()
-    return Rectangle(x, y, right - x, top - y) if right > x and top > y else NOTHING
+        return (Rectangle(0, 0, tile.width, tile.height),)
+    size = np.array([tile.width, tile.height])
+    low = np.floor(((0.5 * extents[0] + 0.5) * size - MARGIN) / GROUP) * GROUP
+    high = np.ceil(((0.5 * extents[1] + 0.5) * size + MARGIN) / GROUP) * GROUP
+    corners = np.clip(np.column_stack([low, high]), 0, np.tile(size, 2))
+    corners = corners[(corners[:, 2:] > corners[:, :2]).all(axis=1)]
+    if len(corners) > MANY:
+        corners = np.concatenate([corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)])[None]
+    rows = corners.astype(int).tolist()
+    return joined([Rectangle(x, y, right - x, top - y) for x, y, right, top in rows])
+
+
+def joined(rectangles: Sequence[Rectangle]) -> Regions:
+    """Give fewer rectangles that hold the same samples: two become one where that takes no more samples."""
+    result: list[Rectangle] = []
+    for rectangle in rectangles:
+        whole = rectangle
+        for other in [*result]:
+            both = whole.around(other)
+            if both.area <= whole.area + other.area:
+                result.remove(other)
+                whole = both
+        result.append(whole)
+    return tuple(result)

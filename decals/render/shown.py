@@ -11,8 +11,8 @@ from decals.grid.editor import DecalEditor
 from decals.grid.trail import reach_of
 from decals.model import Decals
 from decals.render.modes import Modes
-from decals.render.parts import NOTHING, Rectangle
-from decals.render.region import region_of
+from decals.render.parts import Rectangle
+from decals.render.region import Regions, regions_of
 from decals.render.scene_like import SceneLike
 from decals.render.tile import Tile
 from decals.scenes.viewpoint import Bounds
@@ -24,13 +24,13 @@ Things = tuple[object, ...]
 class Stale(NamedTuple):
     """What of a tile must be drawn: the rectangles where surface, paint and light are to change."""
 
-    surface: Rectangle
-    paint: Rectangle
-    light: Rectangle
+    surface: Regions
+    paint: Regions
+    light: Regions
 
     def share(self, tile: Tile) -> float:
         """Part of the work of the whole tile, 0 to 1, if each of the three takes as long as the others."""
-        return sum(rectangle.area for rectangle in self) / (3 * tile.width * tile.height)
+        return sum(part.area for regions in self for part in regions) / (3 * tile.width * tile.height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,26 +77,26 @@ class Shown:
 
     def stale(self, held: Shown | None, tile: Tile) -> Stale:
         """What must be drawn of it where targets hold something."""
-        whole = Rectangle(0, 0, tile.width, tile.height)
+        whole: Regions = (Rectangle(0, 0, tile.width, tile.height),)
         if held is None or self.view != held.view or not same(self.objects, held.objects):
             return Stale(whole, whole, whole)
         paint = whole
         if self.painting == held.painting and same(self.decals, held.decals):
             paint = self._edited(held.version, tile)
-        return Stale(NOTHING, paint, paint if self.modes.lamps == held.modes.lamps else whole)
+        return Stale((), paint, paint if self.modes.lamps == held.modes.lamps else whole)
 
-    def _edited(self, since: int, tile: Tile) -> Rectangle:
+    def _edited(self, since: int, tile: Tile) -> Regions:
         """Where edits after a version may show."""
         editor = self.decals[0]
         if not isinstance(editor, DecalEditor) or since == self.version:
-            return NOTHING
+            return ()
         touched = editor.touched(since)
         balls = None
         if touched is not None:
             balls = reach_of(touched, self.modes.contact, editor.largest_influence)
         if balls is None:
-            return Rectangle(0, 0, tile.width, tile.height)
-        return region_of(tile, balls, float(np.abs(np.asarray(self.bounds)).max()))
+            return (Rectangle(0, 0, tile.width, tile.height),)
+        return regions_of(tile, balls, float(np.abs(np.asarray(self.bounds)).max()))
 
 
 def _kind(decals: Decals | DecalEditor) -> tuple[object, ...]:

@@ -93,15 +93,13 @@ def plan_of(
     """
     shown = Shown.of(scene, uploaded.bounds, tile, modes, depth=depth)
     stale = shown.stale(held, tile)
-    steps = _surface(uploaded, tile, targets, depth=depth) if stale.surface.area else []
+    steps = _surface(uploaded, tile, targets, depth=depth) if stale.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
-    if stale.paint.area:
-        painted = stale.paint, gbuffer, uploaded.decals, uploaded.images, modes.mapping, modes.contact
-        steps.append(partial(targets.decal_pass.draw, *painted))
-    if stale.light.area:
-        radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
-        lit = stale.light, gbuffer, paint, tile, radius, modes.lamps
-        steps.append(partial(targets.light_pass.draw, *lit))
+    painted = gbuffer, uploaded.decals, uploaded.images, modes.mapping, modes.contact
+    steps += [partial(targets.decal_pass.draw, part, *painted) for part in stale.paint]
+    radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
+    lit = gbuffer, paint, tile, radius, modes.lamps
+    steps += [partial(targets.light_pass.draw, part, *lit) for part in stale.light]
     return Plan(shown, steps)
 
 
