@@ -32,8 +32,8 @@ class Look:
 
     @property
     def slot(self) -> str:
-        """Which targets it is drawn into: those of each number of samples keep their picture."""
-        return "small" if self.magnified else f"samples {self.samples}"
+        """Which targets it is drawn into: small frames, and first ones of one sample, leave fine ones be."""
+        return "small" if self.magnified else "one sample" if self.samples == 1 else "several"
 
 
 @dataclass(frozen=True, eq=False)
