@@ -1,8 +1,10 @@
 """Launching kernels on every core: Warp runs a CPU launch on one thread, but lets several run at once."""
 
 import os
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -32,9 +34,43 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-@cache
+class _Manners(threading.local):
+    """How the launches of a thread behave toward those of others."""
+
+    leaves_room = False
+
+
+_manners = _Manners()
+
+
+@contextmanager
+def leaving_room() -> Iterator[None]:
+    """Within a ``with`` block, let launches of this thread leave a core to others, and not be in their way.
+
+    Threads that nobody waits for should: a window then still has its core, and its own launches do not queue
+    behind theirs.
+    """
+    before, _manners.leaves_room = _manners.leaves_room, True
+    try:
+        yield
+    finally:
+        _manners.leaves_room = before
+
+
+def _workers() -> int:
+    """Threads for a launch of this thread."""
+    return max(1, _cores() - _manners.leaves_room)
+
+
 def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max_workers=_cores(), thread_name_prefix="blobtree")
+    return _pool(_workers(), _manners.leaves_room)
+
+
+@cache
+def _pool(workers: int, leaves_room: bool) -> ThreadPoolExecutor:
+    """Threads that are there for all launches of one kind."""
+    name = "blobtree, leaving room" if leaves_room else "blobtree"
+    return ThreadPoolExecutor(max_workers=workers, thread_name_prefix=name)
 
 
 def known_device(device: Any = None) -> str:
@@ -65,7 +101,7 @@ def launch(
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
     per_thread = SLICES_PER_THREAD if step is None else WATCHED_SLICES_PER_THREAD
-    slices = min(_cores() * per_thread, -(-count // SMALLEST_SLICE))
+    slices = min(_workers() * per_thread, -(-count // SMALLEST_SLICE))
     bounds = [count * i // slices for i in range(slices + 1)]
     wp.load_module(kernel.module, device=device)
 
@@ -89,5 +125,5 @@ def fresh_memory(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     array = np.empty(shape, dtype)
     pages = array.reshape(-1).view(np.uint8)[::PAGE]
     if len(pages) > PAGES_WORTH_SHARING:
-        list(_threads().map(lambda part: part.fill(0), np.array_split(pages, _cores())))
+        list(_threads().map(lambda part: part.fill(0), np.array_split(pages, _workers())))
     return array

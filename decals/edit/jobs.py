@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from blobtree.launch import leaving_room
 from blobtree.progress import Cancel, Progress
 
 Outcome = Callable[[], "Job | None"]
@@ -70,7 +71,8 @@ class Worker:
 
     def _run(self, job: Job) -> None:
         try:
-            self._outcome = job.work(self._tell, self._cancelled.is_set)
+            with leaving_room():
+                self._outcome = job.work(self._tell, self._cancelled.is_set)
         except Exception as error:  # it is raised where the outcome is asked for
             self._error = error
 

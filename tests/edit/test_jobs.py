@@ -4,6 +4,7 @@ import threading
 
 import pytest
 
+from blobtree import launch
 from decals.edit.jobs import Job, Worker
 
 
@@ -61,3 +62,17 @@ def test_what_a_job_raises_is_raised_where_it_is_asked_for():
     with pytest.raises(ValueError, match="no"):
         worker.take(timeout=5)
     assert not worker.busy
+
+
+def test_a_job_leaves_a_core_to_the_window(monkeypatch):
+    monkeypatch.setattr(launch, "_cores", lambda: 4)
+    worker, seen = Worker(), []
+
+    def work(tell, stop):
+        seen.append(launch._workers())
+        return nothing
+
+    worker.start(Job("count", work))
+    assert worker.take(timeout=5) is nothing
+    assert seen == [3]
+    assert launch._workers() == 4
