@@ -17,8 +17,8 @@ from decals.render.targets import Size
 from decals.render.tree import TreeDrawable
 from decals.scenes.scene import MeshObject, TreeObject
 
-register(MeshObject, MeshDrawable)
-register(TreeObject, TreeDrawable)
+register(MeshObject, MeshDrawable, MeshDrawable.ahead)
+register(TreeObject, TreeDrawable, TreeDrawable.ahead)
 
 __all__ = [
     "STUDIO",

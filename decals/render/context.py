@@ -92,11 +92,12 @@ class Context:
         self._owned = owned
         self._programs: dict[tuple[str, str], moderngl.Program] = {}
         self._compute_programs: dict[str, moderngl.ComputeShader] = {}
-        self._wished_entry = checked_entry(self, entry) if entry else None
+        self.wished_entry = checked_entry(self, entry) if entry else None
         self._stock: dict[tuple[tuple[int, int], str], list[moderngl.Texture]] = {}
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         self.anisotropy = _anisotropy(gl)
-        self.most_turns = SOFTWARE_TURNS if _is_software(gl) else None
+        self.software = _is_software(gl)
+        self.most_turns = SOFTWARE_TURNS if self.software else None
 
     @classmethod
     def standalone(cls, *, entry: str | None = None) -> "Context":
@@ -123,7 +124,7 @@ class Context:
     @cached_property
     def entry(self) -> Entry:
         """How passes over all pixels are run here. Ask while the context is current."""
-        return self._wished_entry or choose_entry(self)
+        return self.wished_entry or choose_entry(self)
 
     @contextmanager
     def current(self) -> Iterator[Self]:

@@ -113,4 +113,9 @@ def library(contact: Contact, *, layered: bool) -> str:
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_sheet = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )
-    return constants + translate_library(FUNCTIONS)
+    return constants + _formulas()
+
+
+@cache
+def _formulas() -> str:
+    return translate_library(FUNCTIONS)

@@ -10,7 +10,7 @@ from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.render.context import Context
 from decals.render.decal_data import DecalData, library
-from decals.render.entry import PixelPass, Program, pixel_pass
+from decals.render.entry import PixelPass, Program, pixel_pass, pixel_program
 from decals.render.gbuffer import GBuffer
 from decals.render.parts import WHOLE, Part, Rectangle
 from decals.render.textures import ImageArray
@@ -74,11 +74,8 @@ class DecalPass:
     def _pass(self, functions: str) -> PixelPass:
         """Give the pass with these decal functions, or without decals where there are none."""
         if functions not in self._passes:
-            slots = {"decals": "//@ include decals.glsl", "functions": functions} if functions else {}
-            defines = {"DECALS": bool(functions)}
-            made = pixel_pass(self._context, BODY, self._targets, slots=slots, defines=defines)
-            attach_camera(made.program)
-            self._passes[functions] = made
+            program = painting_program(self._context, functions, len(self._targets))
+            self._passes[functions] = pixel_pass(self._context, program, self._targets)
         return self._passes[functions]
 
     def release(self) -> None:
@@ -88,6 +85,13 @@ class DecalPass:
         self._reading.release()
         for target in self._targets:
             target.release()
+
+
+def painting_program(context: Context, functions: str, targets: int = 1) -> Program:
+    """Give the program that paints with these decal functions, or without decals where there are none."""
+    slots = {"decals": "//@ include decals.glsl", "functions": functions} if functions else {}
+    defines = {"DECALS": bool(functions)}
+    return attach_camera(pixel_program(context, BODY, targets, slots=slots, defines=defines))
 
 
 def use_textures(program: Program, textures: Table[str, moderngl.Texture]) -> None:

@@ -7,6 +7,7 @@ from decals.errors import InvalidScene
 from decals.render.context import Context
 from decals.render.gbuffer import GBuffer
 from decals.render.parts import WHOLE, Part
+from decals.render.pieces import Ahead
 from decals.render.tile import Tile
 from decals.scenes.viewpoint import Bounds
 
@@ -40,13 +41,21 @@ class Drawable(Protocol):
 
 
 Factory = Callable[[Context, Any], Drawable]
+Foresight = Callable[[Context, Any], Ahead]
 
-_FACTORIES: dict[type, Factory] = {}
+_KINDS: dict[type, tuple[Factory, Foresight]] = {}
 
 
-def register(kind: type, factory: Factory) -> None:
-    """Let objects of a type (and of its subtypes) be drawn by what ``factory(context, object)`` makes."""
-    _FACTORIES[kind] = factory
+def _nothing_ahead(_context: Context, thing: object) -> Ahead:
+    return Ahead(repr(type(thing)), ())
+
+
+def register(kind: type, factory: Factory, ahead: Foresight = _nothing_ahead) -> None:
+    """Let objects of a type (and of its subtypes) be drawn by what ``factory(context, object)`` makes.
+
+    ``ahead(context, object)`` says what the factory will ask for that takes long, such as programs.
+    """
+    _KINDS[kind] = factory, ahead
 
 
 def drawable_for(context: Context, thing: object) -> Drawable:
@@ -57,8 +66,17 @@ def drawable_for(context: Context, thing: object) -> Drawable:
     InvalidScene
         No factory was registered for its type.
     """
+    return _kind_of(thing)[0](context, thing)
+
+
+def ahead_of(context: Context, thing: object) -> Ahead:
+    """Say what the drawable of a scene's object needs; errors as for `drawable_for`."""
+    return _kind_of(thing)[1](context, thing)
+
+
+def _kind_of(thing: object) -> tuple[Factory, Foresight]:
     for kind in type(thing).__mro__:
-        if kind in _FACTORIES:
-            return _FACTORIES[kind](context, thing)
-    known = ", ".join(sorted(kind.__name__ for kind in _FACTORIES))
+        if kind in _KINDS:
+            return _KINDS[kind]
+    known = ", ".join(sorted(kind.__name__ for kind in _KINDS))
     raise InvalidScene(f"cannot draw a {type(thing).__name__}; expected one of: {known}")

@@ -16,6 +16,9 @@ much may follow rows that show nothing."""
 SHARE = 0.25
 """Of the time that is given, so much should go by between two looks at the clock."""
 
+PICTURE = "picture"
+"""What is being made once all that it needs is there."""
+
 
 class Drawing:
     """A picture in the making: the same as `Renderer.draw` gives at once, bit for bit.
@@ -26,7 +29,8 @@ class Drawing:
     Parameters
     ----------
     targets
-        Ends with what is drawn into; before that come Nones, while it is being made.
+        Ends with what is drawn into; before that come Nones, or texts that say how far it is, while that and
+        all else that the picture needs is being made.
     plan
         Gives what is to be drawn into targets that hold something, always the same; asked whenever somebody
         goes on.
@@ -47,7 +51,7 @@ class Drawing:
 
     def __init__(
         self,
-        targets: Iterator[Targets | None],
+        targets: Iterator[Targets | str | None],
         plan: Callable[[Targets, Shown | None], Plan],
         finish: Callable[[], None],
         *,
@@ -56,7 +60,7 @@ class Drawing:
     ) -> None:
         self._making = targets
         self._targets: Targets | None = None
-        self.done, self.seconds, self.share = False, 0.0, share
+        self.done, self.seconds, self.share, self.news = False, 0.0, share, ""
         self._plan, self._finish, self._clock = plan, finish, clock
         self._held: Shown | None = None
         self._number, self._at, self._step = 0, 0, FIRST
@@ -65,7 +69,7 @@ class Drawing:
     def targets(self) -> Targets:
         """What is drawn into; the picture is there once `done`."""
         while self._targets is None:
-            self._targets = next(self._making)
+            self._make()
         return self._targets
 
     def advance(self, seconds: float) -> bool:
@@ -77,7 +81,8 @@ class Drawing:
         plan: Plan | None = None
         while not self.done and before - begin <= (1.0 - SHARE) * seconds:
             if self._targets is None:
-                self._targets = next(self._making)
+                self._make()
+                self._finish()
                 before = self._clock()
                 continue
             plan = plan or self._begin(self._targets)
@@ -96,6 +101,14 @@ class Drawing:
             step(Part(self._at / UNITS))
             self._number, self._at = self._number + 1, 0
         self._end(plan)
+
+    def _make(self) -> None:
+        """Make the next piece of what the picture needs."""
+        made = next(self._making)
+        if made is None or isinstance(made, str):
+            self.news = made or self.news
+        else:
+            self._targets, self.news = made, PICTURE
 
     def _begin(self, targets: Targets) -> Plan:
         """Begin, anew if somebody else has drawn into the targets since, or go on."""

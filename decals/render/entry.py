@@ -70,16 +70,16 @@ class PixelPass(Protocol):
         ...
 
 
-def pixel_pass(
+def pixel_program(
     context: "Context",
     body: str,
-    targets: Sequence[moderngl.Texture],
+    targets: int,
     *,
     slots: Slots | None = None,
     defines: Defines | None = None,
     entry: Entry | None = None,
-) -> PixelPass:
-    """Compile a pass.
+) -> Program:
+    """Compile the program of a pass, or give what it already is.
 
     Parameters
     ----------
@@ -88,17 +88,24 @@ def pixel_pass(
     body
         Shader file that defines ``Pixel pixel_at(ivec2 texel)``.
     targets
-        One or two textures of floats that it fills.
+        How many textures it fills, one or two.
     slots, defines
         For the body, as in `implicit_decals.shaders.compose`.
     entry
         How it is run; the context's choice if not given.
     """
     entry = entry or context.entry
-    source = _source(entry, body, len(targets), slots or {}, defines or {})
+    source = _source(entry, body, targets, slots or {}, defines or {})
     if entry is Entry.COMPUTE:
-        return ComputePass(context, body, source, targets)
-    return FragmentPass(context, body, source, targets)
+        return context.compute_program(source)
+    return context.program(compose("screen.vert"), source)
+
+
+def pixel_pass(context: "Context", program: Program, targets: Sequence[moderngl.Texture]) -> PixelPass:
+    """Let a program of `pixel_program` fill textures of floats."""
+    if isinstance(program, moderngl.ComputeShader):
+        return ComputePass(context, program, targets)
+    return FragmentPass(context, program, targets)
 
 
 def _source(entry: Entry, body: str, targets: int, slots: Slots, defines: Defines) -> Source:
@@ -113,11 +120,10 @@ class FragmentPass:
     """One triangle over all pixels."""
 
     def __init__(
-        self, context: "Context", body: str, source: Source, targets: Sequence[moderngl.Texture]
+        self, context: "Context", program: moderngl.Program, targets: Sequence[moderngl.Texture]
     ) -> None:
-        self.body, self.source = body, source
-        self.program: Program = context.program(compose("screen.vert"), source)
-        self._array = context.gl.vertex_array(self.program, [])
+        self.program: Program = program
+        self._array = context.gl.vertex_array(program, [])
         self._framebuffer = context.gl.framebuffer(list(targets))
         self._gl = context.gl
 
@@ -139,10 +145,9 @@ class ComputePass:
     """A group of invocations for every square of pixels."""
 
     def __init__(
-        self, context: "Context", body: str, source: Source, targets: Sequence[moderngl.Texture]
+        self, context: "Context", program: moderngl.ComputeShader, targets: Sequence[moderngl.Texture]
     ) -> None:
-        self.body, self.source = body, source
-        self.program: Program = context.compute_program(source)
+        self.program: Program = program
         self._targets = tuple(targets)
         self._gl = context.gl
 
@@ -171,13 +176,15 @@ def run_pixels(program: moderngl.ComputeShader, where: Rectangle) -> None:
     program.run(-(-where.width // GROUP), -(-where.height // GROUP))
 
 
-_chosen: dict[str, Entry] = {}
+_times: dict[tuple[str, Entry], float] = {}
+"""Seconds that a short piece of work takes, by driver and entry point."""
 
 
 def choose_entry(context: "Context") -> Entry:
     """Give the faster entry point of a context; it must be current.
 
-    Measured once for each driver (a few milliseconds, and two compilations), never where there is no choice.
+    Measured once for each driver (a few milliseconds, and two compilations), never where there is no choice
+    or it is known: processors are several times slower through compute shaders.
 
     Raises
     ------
@@ -187,12 +194,25 @@ def choose_entry(context: "Context") -> Entry:
     wish = os.environ.get(OVERRIDE, "")
     if wish:
         return checked_entry(context, wish)
-    if not supports_compute(context):
+    if context.software or not supports_compute(context):
         return Entry.FRAGMENT
-    if context.name not in _chosen:
-        gain = measure(context, Entry.FRAGMENT) / measure(context, Entry.COMPUTE)
-        _chosen[context.name] = Entry.COMPUTE if gain > CLEARLY else Entry.FRAGMENT
-    return _chosen[context.name]
+    gain = measured(context, Entry.FRAGMENT) / measured(context, Entry.COMPUTE)
+    return Entry.COMPUTE if gain > CLEARLY else Entry.FRAGMENT
+
+
+def measured(context: "Context", entry: Entry) -> float:
+    """Give what `measure` found once for the context's driver."""
+    key = context.name, entry
+    if key not in _times:
+        _times[key] = measure(context, entry)
+    return _times[key]
+
+
+def probe(context: "Context", entry: Entry) -> None:
+    """Measure an entry point now, if it is going to be measured."""
+    settled = context.wished_entry or context.software or os.environ.get(OVERRIDE)
+    if not settled and supports_compute(context):
+        measured(context, entry)
 
 
 def checked_entry(context: "Context", wish: str) -> Entry:
@@ -234,18 +254,18 @@ def measure(context: "Context", entry: Entry) -> float:
     noise = np.random.default_rng(0).random((_NOISE_SIZE, _NOISE_SIZE, 4), np.float32)
     source = context.gl.texture((_NOISE_SIZE, _NOISE_SIZE), 4, noise.tobytes(), dtype="f4")
     target = context.gl.texture(_PROBE_SIZE, 4, dtype="f2")
-    probe = pixel_pass(context, "probe.glsl", [target], entry=entry)
+    trial = pixel_pass(context, pixel_program(context, "probe.glsl", 1, entry=entry), [target])
     source.use(0)
-    probe.program["noise"] = 0
-    times = [_seconds(context, probe) for _ in range(_PROBE_RUNS + 1)]
-    for resource in (probe, target, source):
+    trial.program["noise"] = 0
+    times = [_seconds(context, trial) for _ in range(_PROBE_RUNS + 1)]
+    for resource in (trial, target, source):
         resource.release()
     return min(times[1:])
 
 
-def _seconds(context: "Context", probe: PixelPass) -> float:
+def _seconds(context: "Context", trial: PixelPass) -> float:
     context.gl.finish()
     begin = time.perf_counter()
-    probe.run(Rectangle(0, 0, *_PROBE_SIZE))
+    trial.run(Rectangle(0, 0, *_PROBE_SIZE))
     context.gl.finish()
     return time.perf_counter() - begin

@@ -32,7 +32,7 @@ class GBuffer:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._framebuffer = context.gl.framebuffer([self.position, self.normal, self.color], self.depth)
         self._depth_alone = context.gl.framebuffer([], self.depth)
-        self._depth_program = attach_camera(context.program(compose("screen.vert"), compose("depth.frag")))
+        self._depth_program = depth_program(context)
         self._screen = context.gl.vertex_array(self._depth_program, [])
         self._clearing = _clearing(context) if context.entry is Entry.COMPUTE else None
         self._gl = context.gl
@@ -96,6 +96,11 @@ class GBuffer:
         framebuffers = self._framebuffer, self._depth_alone
         for resource in (self._screen, *framebuffers, self.position, self.normal, self.color, self.depth):
             resource.release()
+
+
+def depth_program(context: Context) -> moderngl.Program:
+    """Give the program that adds the depth of what wrote none."""
+    return attach_camera(context.program(compose("screen.vert"), compose("depth.frag")))
 
 
 def _clearing(context: Context) -> moderngl.ComputeShader:

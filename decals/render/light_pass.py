@@ -5,7 +5,7 @@ import numpy as np
 
 from decals.render.context import Context
 from decals.render.decal_pass import use_textures
-from decals.render.entry import PixelPass, Program, pixel_pass
+from decals.render.entry import PixelPass, Program, pixel_pass, pixel_program
 from decals.render.gbuffer import GBuffer
 from decals.render.lamps import Lamps
 from decals.render.parts import WHOLE, Part, Rectangle
@@ -61,8 +61,9 @@ class LightPass:
 
     def _pass(self, body: str) -> PixelPass:
         if body not in self._passes:
-            self._passes[body] = pixel_pass(self._context, body, [self.light])
-            attach_camera(self._passes[body].program)
+            self._passes[body] = pixel_pass(
+                self._context, lighting_program(self._context, body), [self.light]
+            )
         return self._passes[body]
 
     def release(self) -> None:
@@ -70,6 +71,11 @@ class LightPass:
         for lighting in self._passes.values():
             lighting.release()
         self.light.release()
+
+
+def lighting_program(context: Context, body: str) -> Program:
+    """Give the program that lights with STUDIO or with LAMPS."""
+    return attach_camera(pixel_program(context, body, 1))
 
 
 def _use_lamps(program: Program, lamps: Lamps) -> None:

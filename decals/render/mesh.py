@@ -2,12 +2,14 @@
 
 from typing import Protocol
 
+import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals.render.context import Context
 from decals.render.gbuffer import GBuffer
 from decals.render.parts import WHOLE, Part
+from decals.render.pieces import SHADERS, Ahead, Piece
 from decals.render.tile import Tile, attach_camera, set_uniform
 from decals.scenes.viewpoint import Bounds
 from implicit_decals.shaders import compose
@@ -32,11 +34,16 @@ class MeshDrawable:
         faces = np.ascontiguousarray(mesh.faces, np.int32)
         self._faces = len(faces)
         self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
-        self._program = attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
+        self._program = _program(context)
         self._vertices = context.gl.buffer(rows.tobytes())
         self._indices = context.gl.buffer(faces.tobytes())
         layout = [(self._vertices, "3f 3f 3f", "vertex_position", "vertex_normal", "vertex_color")]
         self._array = context.gl.vertex_array(self._program, layout, self._indices)
+
+    @staticmethod
+    def ahead(context: Context, _mesh: MeshLike) -> Ahead:
+        """Say what one needs that takes long for the first time."""
+        return Ahead("mesh", (Piece(SHADERS, lambda: _program(context)),))
 
     @property
     def bounds(self) -> Bounds:
@@ -60,6 +67,10 @@ class MeshDrawable:
         """Give the memory back."""
         for resource in (self._array, self._vertices, self._indices):
             resource.release()
+
+
+def _program(context: Context) -> moderngl.Program:
+    return attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
 
 
 def mesh_rows(mesh: MeshLike) -> NDArray[np.float32]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from functools import partial
+from itertools import chain
 from types import TracebackType
 from typing import Self
 
@@ -15,17 +16,16 @@ from decals.checks import instance, whole
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
-from decals.grid.editor import DecalEditor
 from decals.render.canvas import BufferCanvas, Buffers, Canvas
 from decals.render.context import Context
 from decals.render.decal_data import DecalData
-from decals.render.drawables import Drawable, drawable_for
 from decals.render.drawing import Drawing
 from decals.render.entry import Entry
-from decals.render.kept import Kept
 from decals.render.lamps import Lamps
 from decals.render.modes import Modes
 from decals.render.parts import Rectangle
+from decals.render.pieces import Ahead, told
+from decals.render.preparing import ahead_of_scene
 from decals.render.resolve import STUDIO, Background
 from decals.render.scene_like import SceneLike
 from decals.render.shown import Shown
@@ -34,6 +34,7 @@ from decals.render.steps import Order, Plan, Uploaded, plan_of
 from decals.render.targets import Size, Targets
 from decals.render.textures import ImageArray
 from decals.render.tile import MARGIN, MAX_TILE, CameraBuffer, Picture, Tile, largest_tile, tiles
+from decals.render.uploads import Uploads
 from decals.render.wishes import check_scene, check_size, viewpoint_of
 from decals.scenes.viewpoint import Viewpoint
 
@@ -65,10 +66,9 @@ class Renderer:
         self._owned = context is None
         self.context = context or Context.standalone()
         self._max_tile = min(max_tile, self.context.max_texture_size - 2 * MARGIN)
-        self._drawables: Kept[Drawable] = Kept()
-        self._decals: Kept[DecalData] = Kept()
-        self._images: Kept[ImageArray] = Kept()
+        self._uploads = Uploads(self.context)
         self._targets = Slots(self.context)
+        self._made: set[Hashable] = set()
         with self.context.current():
             self._camera = CameraBuffer(self.context)
 
@@ -159,7 +159,7 @@ class Renderer:
         for name, place, side in (("x", x, size[0]), ("y", y, size[1])):
             whole(name, place, 0, side - 1, InvalidPoints)
         with self.context.current():
-            uploaded = self._upload(scene)
+            uploaded = self._uploads.of(scene)
             picture = Picture.of(viewpoint_of(scene, viewpoint), size, uploaded.bounds)
             tile = picture.part(Rectangle(x, y, 1, 1))
             targets = self._targets.of(BUFFERS_SLOT, (1, 1))
@@ -223,16 +223,36 @@ class Renderer:
             )
 
         check_scene(scene)
-        order = Order(scene, viewpoint_of(scene, viewpoint), full, Modes(mapping, contact, lamps))
+        modes = Modes(mapping, contact, lamps)
+        order = Order(scene, viewpoint_of(scene, viewpoint), full, modes)
 
         def plan(targets: Targets, held: Shown | None) -> Plan:
-            uploaded = self._upload(scene)  # again each time: others may draw in between
+            uploaded = self._uploads.of(scene)  # again each time: others may draw in between
             tile = order.tile(uploaded.bounds)
             self._camera.use(tile)
             return plan_of(scene, uploaded, tile, order.modes, targets, held, depth=True)
 
-        share = order.share(self._targets.get(slot))
-        return Drawing(self._targets.making(slot, full), plan, self.context.gl.finish, share=share)
+        making = chain(self._making(scene, modes), self._targets.making(slot, full))
+        return Drawing(making, plan, self.context.gl.finish, share=order.share(self._targets.get(slot)))
+
+    def ahead(self, scene: SceneLike, modes: Modes) -> Ahead:
+        """Say what such pictures of a scene need that takes long for the first time.
+
+        Raises
+        ------
+        InvalidScene
+            The scene holds an object of unknown kind.
+        """
+        return ahead_of_scene(self._uploads, scene, modes)
+
+    def _making(self, scene: SceneLike, modes: Modes) -> Iterator[str]:
+        """Make all of that, once; after each piece say how far it is."""
+        ahead = self.ahead(scene, modes)
+        if ahead.key not in self._made:
+            for piece, news in told(ahead.pieces):
+                piece.make()
+                yield news
+            self._made.add(ahead.key)
 
     def time_frame(
         self,
@@ -257,6 +277,10 @@ class Renderer:
             self.context.gl.finish()
             return time.perf_counter() - begin
 
+    def targets_of(self, slot: str) -> Targets | None:
+        """Give what the last drawing of a slot was drawn into, if there was one."""
+        return self._targets.get(slot)
+
     @property
     def entry(self) -> Entry:
         """How passes over all pixels are run: as fragment or as compute shaders."""
@@ -275,7 +299,7 @@ class Renderer:
     ) -> Iterator[tuple[Tile, Targets]]:
         """Draw tile after tile; the targets hold a tile until the next is asked for."""
         with self.context.current():
-            uploaded = self._upload(scene)
+            uploaded = self._uploads.of(scene)
             full = size[0] * samples, size[1] * samples
             picture = Picture.of(viewpoint_of(scene, viewpoint), full, uploaded.bounds)
             slot = BUFFERS_SLOT if buffers else WHOLE_SLOT
@@ -292,40 +316,22 @@ class Renderer:
         plan = partial(plan_of, scene, uploaded, tile, modes, depth=False)
         Drawing(iter([targets]), plan, self.context.gl.finish).complete()
 
-    def _upload(self, scene: SceneLike) -> Uploaded:
-        check_scene(scene)
-        drawables = [self._drawable(thing) for thing in scene.objects]
-        return Uploaded(drawables, *self.uploads(scene))
-
     def sweep(self) -> None:
         """Give back what was uploaded for other pictures than those since the last sweep."""
-        for kept in (self._drawables, self._decals, self._images):
-            kept.sweep()
-
-    def _drawable(self, thing: object) -> Drawable:
-        return self._drawables.get(lambda: drawable_for(self.context, thing), thing)
+        self._uploads.sweep()
 
     def uploads(self, scene: SceneLike) -> tuple[DecalData | None, ImageArray | None]:
         """Give a scene's decals and images as they are on the graphics card, for other shaders than ours.
 
         They stay until another scene is drawn. The context must be current.
         """
-        if not len(scene.decals):
-            return None, None
-        pixels = [image.pixels for image in scene.images]
-        images = self._images.get(lambda: ImageArray(self.context, pixels), *pixels)
-        decals = scene.decals
-        data = self._decals.get(lambda: DecalData(self.context, decals), decals)
-        if isinstance(decals, DecalEditor):
-            data.update(decals)
-        return data, images
+        return self._uploads.decals(scene), self._uploads.images(scene)
 
     def release(self) -> None:
         """Give everything back. Calling twice is harmless."""
         with self.context.current():
             self._targets.release()
-            for kept in (self._drawables, self._decals, self._images):
-                kept.release()
+            self._uploads.release()
             self._camera.release()
         if self._owned:
             self.context.release()

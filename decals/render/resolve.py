@@ -40,6 +40,11 @@ TRANSPARENT = Background((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
 """Nothing: alpha is how much of a pixel the objects cover."""
 
 
+def resolve_program(context: Context) -> moderngl.Program:
+    """Give the program that filters samples down."""
+    return context.program(compose("screen.vert"), compose("resolve.frag"))
+
+
 class ResolvePass:
     """Filters a tile's samples down and reads the pixels.
 
@@ -52,7 +57,7 @@ class ResolvePass:
     """
 
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
-        self._program = context.program(compose("screen.vert"), compose("resolve.frag"))
+        self._program = resolve_program(context)
         self._array = context.gl.vertex_array(self._program, [])
         self._target = context.texture(size, "f1")
         self._framebuffer = context.gl.framebuffer([self._target])

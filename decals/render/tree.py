@@ -1,5 +1,6 @@
 """BlobTrees in the G-buffer: traced, one ray per pixel of their box."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import moderngl
@@ -13,6 +14,7 @@ from decals.render.context import Context
 from decals.render.entry import GROUP, Entry, Program
 from decals.render.gbuffer import GBuffer
 from decals.render.parts import WHOLE, Part, Rectangle
+from decals.render.pieces import SHADERS, SHAPES, Ahead, Piece
 from decals.render.tape_shader import Kinds, tracing_shader
 from decals.render.tile import Tile, attach_camera, set_uniform
 from decals.scenes.viewpoint import Bounds
@@ -48,6 +50,17 @@ class TreeDrawable:
         tracer = _ComputeTracer if context.entry is Entry.COMPUTE else _FragmentTracer
         self._tracer: _FragmentTracer | _ComputeTracer = tracer(context, Kinds.of(tree.tape), tree.bounds)
 
+    @staticmethod
+    def ahead(context: Context, thing: TreeLike) -> Ahead:
+        """Say what one needs that takes long for the first time."""
+        tree, kinds = thing.tree, Kinds.of(thing.tree.tape)
+        made: tuple[tuple[str, Callable[[], object]], ...] = (
+            (SHAPES, lambda: tracing_cells(tree)),
+            (SHADERS, lambda: tracing_shader(kinds, context.entry)),
+            (SHADERS, lambda: tracing_program(context, kinds)),
+        )
+        return Ahead(kinds, [Piece(*piece) for piece in made])
+
     @property
     def bounds(self) -> Bounds:
         """The tree's box of influence."""
@@ -72,6 +85,14 @@ class TreeDrawable:
             resource.release()
 
 
+def tracing_program(context: Context, kinds: Kinds) -> Program:
+    """Give the program that traces trees of these kinds, as the context runs its passes over all pixels."""
+    source = tracing_shader(kinds, context.entry)
+    if context.entry is Entry.COMPUTE:
+        return attach_camera(context.compute_program(source))
+    return attach_camera(context.program(compose("box.vert"), source))
+
+
 def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
     """What ``trace.glsl`` is told of a tree's cells, less the textures."""
     return {
@@ -86,9 +107,7 @@ class _FragmentTracer:
     """A ray for every pixel on which the back of the box falls."""
 
     def __init__(self, context: Context, kinds: Kinds, bounds: Bounds) -> None:
-        self.program: Program = attach_camera(
-            context.program(compose("box.vert"), tracing_shader(kinds, Entry.FRAGMENT))
-        )
+        self.program: Program = tracing_program(context, kinds)
         self._array = context.gl.vertex_array(self.program, [])
         self._box = {"box_lower": bounds[0], "box_upper": bounds[1]}
         self._gl = context.gl
@@ -111,9 +130,7 @@ class _ComputeTracer:
     """An invocation for every pixel of the rectangle around the box."""
 
     def __init__(self, context: Context, kinds: Kinds, bounds: Bounds) -> None:
-        self.program: moderngl.ComputeShader = attach_camera(
-            context.compute_program(tracing_shader(kinds, Entry.COMPUTE))
-        )
+        self.program: Program = tracing_program(context, kinds)
         self._bounds = bounds
         self._gl = context.gl
 
@@ -121,6 +138,7 @@ class _ComputeTracer:
         rows = covered(self._bounds, tile).rows(part)
         if rows.area == 0:
             return
+        assert isinstance(self.program, moderngl.ComputeShader)
         set_uniform(self.program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
         gbuffer.position.bind_to_image(POSITION, read=True, write=True)
         gbuffer.normal.bind_to_image(NORMAL, read=False, write=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -10,6 +11,7 @@ from decals.field.mapping import Mapping
 from decals.render import Renderer, SceneLike, Size
 from decals.render.drawing import Drawing
 from decals.render.lamps import Lamps
+from decals.render.modes import Modes
 from decals.render.shown import Shown, same, version_of
 from decals.render.targets import Targets
 from decals.render.tile import CameraBuffer
@@ -17,6 +19,9 @@ from decals.scenes.viewpoint import Projection
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
 from decals.vtk.picking import texels_of
+
+SPARE_SLOT = "spare"
+"""Where a frame is drawn for the first time while its own targets hold what is shown."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,8 @@ class Frame:
         self.share = 0.0
         self._given: Targets | None = None
         self._given_shown: Shown | None = None
-        self._magnified = False
+        self._given_samples = 0
+        self._ready: set[Hashable] = set()
         self._coming: tuple[Seen, Drawing] | None = None
         with context.current():
             self.renderer = Renderer(context)
@@ -89,7 +95,7 @@ class Frame:
 
     def draw(self, scene: SceneLike, look: Look, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's own targets; ``wait`` until the card has finished."""
-        drawing = self._drawing(scene, look, viewpoint)
+        drawing = self._drawing(scene, look, viewpoint, look.slot)
         self.share = drawing.share
         if self.share:
             with self.context.current():
@@ -97,6 +103,7 @@ class Frame:
                 self.renderer.sweep()
                 if wait:
                     self.context.gl.finish()
+            self._ready.add(self._key(scene, look))
         return drawing.targets
 
     def prepare(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> float | None:
@@ -106,21 +113,50 @@ class Frame:
         has taken, none where some of it was there already; None while it is not done.
         """
         seen = Seen.of(scene, look, viewpoint)
-        if self._coming is None or not seen.same(self._coming[0]):
-            self._coming = seen, self._drawing(scene, look, viewpoint)
-        drawing = self._coming[1]
+        drawing = self._coming_of(seen, scene, look, viewpoint, look.slot)
         if drawing.share:
             with self.context.current():
                 if not drawing.advance(seconds):
                     return None
         self._coming = None
+        self._ready.add(self._key(scene, look))
         return drawing.seconds if drawing.share == 1.0 else 0.0
+
+    def ready(self, scene: SceneLike, look: Look) -> bool:
+        """Whether a frame needs nothing, such as a program, that takes long for the first time."""
+        return self._key(scene, look) in self._ready
+
+    def warm(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> str | None:
+        """Make for about so long what such a frame needs, and draw it once; what is shown stays.
+
+        Says how far it is; None once the frame is `ready`.
+        """
+        seen = Seen.of(scene, look, viewpoint)
+        free = self._held is None or self._held is not self.renderer.targets_of(look.slot)
+        drawing = self._coming_of(seen, scene, look, viewpoint, look.slot if free else SPARE_SLOT)
+        with self.context.current():
+            if not drawing.advance(seconds):
+                return drawing.news
+        self._coming = None
+        self._ready.add(self._key(scene, look))
+        return None
+
+    def _coming_of(
+        self, seen: Seen, scene: SceneLike, look: Look, viewpoint: Projection, slot: str
+    ) -> Drawing:
+        """Give the drawing that goes on, or another where something changed since."""
+        if self._coming is None or not seen.same(self._coming[0]):
+            self._coming = seen, self._drawing(scene, look, viewpoint, slot)
+        return self._coming[1]
+
+    def _key(self, scene: SceneLike, look: Look) -> Hashable:
+        return self.renderer.ahead(scene, Modes(look.mapping, look.contact, look.lamps)).key
 
     def share_of(self, scene: SceneLike, look: Look, viewpoint: Projection) -> float:
         """Part of a whole frame's work, 0 to 1, that a frame would take now."""
-        return self._drawing(scene, look, viewpoint).share
+        return self._drawing(scene, look, viewpoint, look.slot).share
 
-    def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection) -> Drawing:
+    def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection, slot: str) -> Drawing:
         return self.renderer.drawing(
             scene,
             size=look.size,
@@ -129,23 +165,37 @@ class Frame:
             contact=look.contact,
             viewpoint=viewpoint,
             lamps=look.lamps,
-            slot=look.slot,
+            slot=slot,
         )
 
     def nearest(self, x: int, y: int, size: Size) -> float:
         """Least depth put into VTK's frame, of this size, at a pixel: 1 for nothing, 0 for not known."""
-        if self._given is None or self._given_shown is None or self._given.shown is not self._given_shown:
+        held = self._held
+        if held is None:
             return 0.0
+        magnified = self._given_samples == 0
         with self.context.current():
-            gbuffer = self._given.gbuffer
-            return gbuffer.read_depth(texels_of(x, y, size, gbuffer.size, magnified=self._magnified))
+            return held.gbuffer.read_depth(texels_of(x, y, size, held.gbuffer.size, magnified=magnified))
+
+    @property
+    def _held(self) -> Targets | None:
+        """What was put into VTK's frame last, if nothing else was drawn there since."""
+        if self._given is None or self._given_shown is None or self._given.shown is not self._given_shown:
+            return None
+        return self._given
 
     def composite(
         self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int
     ) -> None:
         """Put what was drawn into VTK's frame; see `Composite.draw`."""
-        self._given, self._given_shown, self._magnified = targets, targets.shown, samples == 0
+        self._given, self._given_shown, self._given_samples = targets, targets.shown, samples
         self._composite.draw(window, viewport, targets, samples)
+
+    def again(self, window: Any, viewport: tuple[int, int, int, int]) -> None:
+        """Put into VTK's frame what was there before, as far as it is still there."""
+        self.share, held = 0.0, self._held
+        if held is not None:
+            self._composite.draw(window, viewport, held, self._given_samples)
 
     def release(self) -> None:
         """Give everything back."""

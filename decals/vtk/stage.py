@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, cast
@@ -32,6 +31,7 @@ from decals.vtk.lights import TOO_MANY, Lights, too_many_lights, vtk_lamps
 from decals.vtk.modes import complaints
 from decals.vtk.picking import Hit, hidden, hit_at
 from decals.vtk.settings import Settings
+from decals.vtk.weak import weakly
 
 FARTHEST = 2.0**30
 """Pixels that VTK can count."""
@@ -55,6 +55,11 @@ class Stage(Settings):
     ----------
     measure
         Whether frames wait for the graphics card, so that who times them knows how long they took.
+    patient
+        Whether frames do without what takes long for the first time, such as programs: until `warm` has made
+        it, the picture before stays, or there is none.
+    waiting
+        Whether the last frame did without.
     applied
         The stock actors that have our decals.
     drawing
@@ -66,21 +71,20 @@ class Stage(Settings):
     ) -> None:
         super().__init__()
         self.plotter, self.vtk_renderer = plotter, renderer
-        self.measure = False
+        self.measure = self.patient = self.waiting = False
         self.drawing = False
         self._scene: SceneLike | None = None
         self._context = context
         self._frame: Frame | None = None
         self._failed: Seen | None = None
         self._drawn_size: Size | None = None
-        me = weakref.ref(self)
-        self._anchor = Anchor(renderer, lambda: _draw(me))
+        self._anchor = Anchor(renderer, weakly(self.draw))
         self._placed: tuple[object, ...] = ()
         self.applied = Applied(self)
         self._said: set[str] = set()
         self._tags = [
-            renderer.AddObserver(vtkCommand.StartEvent, lambda *_: _prepare(me)),
-            renderer.AddObserver(vtkCommand.EndEvent, lambda *_: _finish(me)),
+            renderer.AddObserver(vtkCommand.StartEvent, weakly(self._prepare)),
+            renderer.AddObserver(vtkCommand.EndEvent, weakly(self._finish)),
         ]
 
     @property
@@ -94,7 +98,8 @@ class Stage(Settings):
 
     @scene.setter
     def scene(self, scene: SceneLike | None) -> None:
-        _check_scene(scene)
+        if scene is not None:
+            check_scene(scene)
         self._notice_clearing()
         self._scene, self._failed = scene, None
         if scene is None:
@@ -257,10 +262,14 @@ class Stage(Settings):
         frame = self._use_frame()
         viewport = frame.context.viewport()
         look = self._look(viewport[2:], self.draw_scale, self.samples)
+        self._drawn_size = viewport[2:]
+        self.waiting = self.patient and not frame.ready(scene, look)
+        if self.waiting:
+            frame.again(self.vtk_renderer.GetRenderWindow(), viewport)
+            return
         targets = frame.draw(scene, look, self.viewpoint(), wait=self.measure)
         samples = 0 if self.draw_scale < 1.0 else look.samples  # 0: magnified
         frame.composite(self.vtk_renderer.GetRenderWindow(), viewport, targets, samples)
-        self._drawn_size = viewport[2:]
 
     def _look(self, size: Size, scale: float, samples: int) -> Look:
         """How the part of a window is drawn that has this size."""
@@ -285,6 +294,24 @@ class Stage(Settings):
                 look = self._look(self._drawn_size, 1.0, samples)
                 return self._use_frame().prepare(scene, look, self.viewpoint(), seconds)
         return 0.0
+
+    def warm(self, seconds: float) -> str | None:
+        """Make for about so long what a `patient` stage's last frame did without.
+
+        Says how far that is, such as ``"shaders 3 of 7"``; None once all is there, or where the scene cannot
+        be drawn: what is wrong is raised once.
+        """
+        scene = self.scene
+        self.waiting = False
+        if scene is None or self._drawn_size is None:
+            return None
+        with self._once(scene, self.draw_scale, self.samples) as hopeful:
+            if not hopeful:
+                return None
+            look = self._look(self._drawn_size, self.draw_scale, self.samples)
+            news = self._use_frame().warm(scene, look, self.viewpoint(), seconds)
+        self.waiting = news is not None
+        return news
 
     @contextmanager
     def _once(self, scene: SceneLike, scale: float, samples: int) -> Iterator[bool]:
@@ -313,30 +340,3 @@ class Stage(Settings):
             self._frame.release()
         self._frame = None
         self._scene = None
-
-
-def _check_scene(scene: object) -> None:
-    """Refuse what has no objects, decals and images to draw."""
-    if scene is not None:
-        check_scene(scene)
-
-
-def _prepare(stage: weakref.ref[Stage]) -> None:
-    """Let a stage prepare a frame, if it still exists."""
-    alive = stage()
-    if alive is not None:
-        alive._prepare()
-
-
-def _finish(stage: weakref.ref[Stage]) -> None:
-    """Let a stage end a frame, if it still exists."""
-    alive = stage()
-    if alive is not None:
-        alive._finish()
-
-
-def _draw(stage: weakref.ref[Stage]) -> None:
-    """Let a stage draw, if it still exists: VTK must not keep it alive."""
-    alive = stage()
-    if alive is not None:
-        alive.draw()

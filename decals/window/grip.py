@@ -9,7 +9,7 @@ from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 from decals.edit.actions import Actions
 from decals.scenes.scene import bounds_of
 from decals.surfaces.surface import Floats
-from decals.window.weak import weakly
+from decals.vtk.weak import weakly
 
 SIZE = 0.03
 """Radius of the handle, in diagonals of the scene."""

@@ -54,6 +54,11 @@ class Quality:
         self._scale = self._choose()
 
     @property
+    def known(self) -> bool:
+        """Whether there was any frame to judge by."""
+        return bool(self._seconds)
+
+    @property
     def scale(self) -> float:
         """Size for the next frame of something that moves."""
         return 1.0 if self._scale is None else self._scale

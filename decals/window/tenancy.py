@@ -14,7 +14,7 @@ class Tenancy:
 
     def __init__(self, stage: "Stage") -> None:
         self._stage, self._scene = stage, stage.scene
-        self._settings = stage.samples, stage.draw_scale, stage.measure
+        self._settings = stage.samples, stage.draw_scale, stage.measure, stage.patient
 
     def end(self, document: Document) -> None:
         """Let the stage draw with its own settings again, and show what it did.
@@ -22,6 +22,6 @@ class Tenancy:
         In place of a scene that is the edited one. What somebody had it show since stays.
         """
         stage = self._stage
-        stage.samples, stage.draw_scale, stage.measure = self._settings
+        stage.samples, stage.draw_scale, stage.measure, stage.patient = self._settings
         if stage.scene is document:
             stage.scene = document.scene if isinstance(self._scene, Scene) else self._scene

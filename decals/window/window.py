@@ -17,6 +17,7 @@ from decals.render.libraries import require_gl
 from decals.scenes.scene import Scene
 from decals.surfaces.surface import Floats
 from decals.vtk.settings import MOST_SAMPLES
+from decals.vtk.weak import weakly
 from decals.window.bindings import Bindings
 from decals.window.grip import Grip
 from decals.window.home import (
@@ -32,13 +33,8 @@ from decals.window.marks import Marks
 from decals.window.quality import Quality
 from decals.window.tenancy import Tenancy
 from decals.window.ticker import TICK, Ticker, running_loop
-from decals.window.weak import weakly
-
-SLICE = 0.04
-"""Seconds that are drawn on a whole frame at a time; in between the window listens."""
-
-NEWS = 0.1
-"""Seconds between two pictures of how far the background work is."""
+from decals.window.timing import Timing
+from decals.window.waiting import NEWS, SLICE, Waiting
 
 GLANCE = 0.25
 """Size of the very first frame, when nobody knows how fast the machine is."""
@@ -123,12 +119,8 @@ class EditWindow:
         )
         self.stage.scene = self.document
         self.stage.measure, self.stage.samples = True, self.samples
-        self._began = 0.0
-        renderer = self.stage.vtk_renderer
-        self._timing = [
-            renderer.AddObserver("StartEvent", weakly(self._frame_begins)),
-            renderer.AddObserver("EndEvent", weakly(self._frame_ends)),
-        ]
+        self.waiting = Waiting(self.stage, weakly(self._show_status), weakly(self._give_up))
+        self._timing = Timing(self.stage, self.quality)
         self._end_screenshots = before_screenshots(self.plotter, weakly(self.make_whole))
 
     @property
@@ -144,7 +136,8 @@ class EditWindow:
     @property
     def busy(self) -> bool:
         """Whether something goes on in the background, or a whole frame is still to be drawn."""
-        return not self._closed and (self.background.busy or self._moved > 0.0)
+        goes_on = self.background.busy or self._moved > 0.0 or self.stage.waiting
+        return not self._closed and goes_on
 
     # -- what is seen -----------------------------------------------------------------------------------
 
@@ -182,7 +175,7 @@ class EditWindow:
         self.marks.say(self._status())
 
     def _status(self) -> str:
-        told = (self.background.progress, self.actions.message)
+        told = (self.waiting.news, self.background.progress, self.actions.message)
         return "   ".join(filter(None, told)) or "h: help"
 
     def _edited(self) -> None:
@@ -202,20 +195,22 @@ class EditWindow:
             self.stage.draw_scale, self.stage.samples = self.quality.scale, 1
 
     def rest(self) -> None:
-        """Draw a whole frame."""
+        """Draw a whole frame now, however long that takes."""
         self.stage.draw_scale, self.stage.samples = 1.0, self.samples
         self._moved, self._whole = 0.0, self._shown
+        patient, self.stage.patient = self.stage.patient, False
         self.plotter.render()
+        self.stage.patient = patient
 
     def make_whole(self) -> None:
         """Draw a whole frame now, unless the last one was."""
-        if (self.stage.draw_scale, self.stage.samples) != (1.0, self.samples):
+        if self.stage.waiting or (self.stage.draw_scale, self.stage.samples) != (1.0, self.samples):
             self.rest()
 
     def _refine(self) -> None:
         """Draw better than now, slice by slice: first at the window's size, then with all samples."""
         samples = 1 if self.stage.draw_scale < 1.0 else self.samples
-        if self.quality.expected(samples) > SLICE:
+        if not self.quality.known or self.quality.expected(samples) > SLICE:
             seconds = self.stage.prepare(samples, SLICE)
             if seconds is None:
                 return
@@ -227,27 +222,27 @@ class EditWindow:
             self.stage.draw_scale, self.stage.samples = 1.0, samples
             self.plotter.render()
 
-    def _frame_begins(self) -> None:
-        self._began = time.perf_counter()
-
-    def _frame_ends(self) -> None:
-        if self.stage.drawn:
-            size = self.stage.draw_scale * self.stage.samples
-            self.quality.saw(size, time.perf_counter() - self._began, self.stage.drawn)
-
     # -- what goes on -----------------------------------------------------------------------------------
 
     def tick(self) -> None:
         """Look after the background work, and draw a whole frame once nothing moves."""
         now, dragging = time.perf_counter(), self.tools.dragging or self.grip.moving
+        if self.waiting.go_on():
+            return
         if self.background.look(dragging=dragging):
             self.redraw(whole=not dragging)
         elif self.background.busy and now - self._told > NEWS:
             self._told = now
-            self.marks.say(self._status())
-            self.plotter.render()
+            self._show_status()
         elif self._moved and now - self._moved > REST:
             self._refine()
+
+    def _give_up(self) -> None:
+        self._moved = 0.0  # better frames would fail alike
+
+    def _show_status(self) -> None:
+        self.marks.say(self._status())
+        self.plotter.render()
 
     def elsewhere(self, x: int, y: int) -> bool:
         """Whether a place is in a subplot of the same plotter that another window edits."""
@@ -272,21 +267,26 @@ class EditWindow:
         InvalidEdit
             The window was closed.
         """
-        if self._closed:
-            raise InvalidEdit("the window was closed; open another EditWindow on its session")
-        self.actions_shown()
-        self.plotter.iren.initialize()
-        if self._timed:
-            self._timer = self._interactor.CreateRepeatingTimer(TICK)
-        if self.ticking:
-            self.stage.draw_scale, self._moved = GLANCE, time.perf_counter() - REST
-            self._ticker.wake()
+        self.begin()
         if self._guest:
             self.plotter.render()
             return
         self.plotter.show(auto_close=False, interactive=self._timed)
         if self._timed:
             self.close()
+
+    def begin(self) -> None:
+        """Do what `show` does before it waits for events; the scene comes into the window with `tick`."""
+        if self._closed:
+            raise InvalidEdit("the window was closed; open another EditWindow on its session")
+        self.actions_shown()
+        if self.ticking:
+            self.stage.patient = True
+            self.stage.draw_scale, self._moved = GLANCE, time.perf_counter() - REST
+        self.plotter.iren.initialize()
+        if self._timed:
+            self._timer = self._interactor.CreateRepeatingTimer(TICK)
+        self._ticker.wake()
 
     def close(self) -> None:
         """Close the window, or leave the plotter that was lent, once what goes to a file is there.
@@ -323,8 +323,7 @@ class EditWindow:
         self.marks.release()
         if self._timer:
             self._interactor.DestroyTimer(self._timer)
-        for tag in self._timing:
-            self.stage.vtk_renderer.RemoveObserver(tag)
+        self._timing.release()
         self._tenancy.end(self.document)
         self.plotter.render()
 

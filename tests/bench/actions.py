@@ -54,7 +54,7 @@ class Hand:
     def _bring(self) -> None:
         stage = self.window.stage
         with stage.current():
-            stage.renderer._upload(self.window.document)
+            stage.renderer._uploads.of(self.window.document)
             stage.renderer.context.gl.finish()
 
     def _place(self) -> tuple[int, int]:

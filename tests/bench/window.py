@@ -21,6 +21,7 @@ import numpy as np
 from decals.edit import EditSession
 from decals.window import EditWindow
 from decals.window.window import REST
+from tests.bench.opening import opening
 from tests.bench.scenes import bench_scene
 from tests.window.driver import Driver
 
@@ -39,11 +40,17 @@ TARGETS = {
     },
     "knot_rest_longest_block_ms": "≤ 100",
     "creature_rest_longest_block_ms": "≤ 100",
+    "knot_1000_open_longest_block_ms": "≤ 100",
+    "knot_100000_open_longest_block_ms": "≤ 100",
+    "creature_1000_open_longest_block_ms": "≤ 100",
+    "creature_100000_open_longest_block_ms": "≤ 100",
 }
 MODELS = ("knot", "creature")
 BACKGROUND = {"scatter": "g", "relax": "x", "save": "Ctrl+s"}
 """What goes on in the background, and its keys."""
-KINDS = ("whole", "rest", "drag", "turn", "primitive", *BACKGROUND)
+KINDS = ("open", "whole", "rest", "drag", "turn", "primitive", *BACKGROUND)
+OPENED = (1_000, 100_000)
+"""Decals in windows that open; what is compiled stays with the driver (Mesa: MESA_SHADER_CACHE_DIR)."""
 STEPS = 25
 SEEDED = 1000
 """Decals up to which they are those of `decals.seed`."""
@@ -192,6 +199,11 @@ def measure(
     name: str, kinds: tuple[str, ...], size: tuple[int, int], count: int, steps: int
 ) -> Iterator[Figures]:
     """Measure one model, kind after kind of what may be done to it."""
+    if "open" in kinds:
+        for decals in OPENED:
+            yield opening(name, size, decals)
+    if set(kinds) <= {"open"}:
+        return
     session = EditSession(bench_scene(name, count, size, seeded=count <= SEEDED))
     with (
         TemporaryDirectory() as folder,

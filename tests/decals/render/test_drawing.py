@@ -71,6 +71,8 @@ def test_targets_are_made_one_texture_at_a_time(drawer: Renderer, monkeypatch: p
         drawer.context, "_new_texture", lambda size, kind: made.append(kind) or new(size, kind)
     )
     with drawer.context.current():
+        drawer.draw(both(), size=(8, 8))  # so that all else is there
+        made.clear()
         drawing = drawer.drawing(both(), size=(61, 37), slot="new")
         for number in range(len(KINDS) + 1):
             assert made == list(KINDS[:number])

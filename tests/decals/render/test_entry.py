@@ -12,7 +12,7 @@ from decals.errors import NoGraphics
 from decals.field.mapping import Mapping
 from decals.render import entry as entries
 from decals.render.context import Context
-from decals.render.entry import COMPUTE_BASELINE, OVERRIDE, Entry, measure
+from decals.render.entry import COMPUTE_BASELINE, OVERRIDE, Entry, measure, probe
 from decals.render.renderer import Buffers, Renderer
 from tests.decals.render.pictures import SIZE, compare, scattered, view_of
 from tests.decals.shapes import torus
@@ -66,29 +66,53 @@ def test_odd_sizes_and_tiles(compute: Renderer, fragment: Renderer) -> None:
     assert (np.abs(parts.astype(int) - whole).max(axis=-1) > 2).mean() < 0.01
 
 
-def test_a_context_chooses_the_faster_one(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def card(context: Context, monkeypatch: pytest.MonkeyPatch) -> Context:
+    """Give a context that has not measured anything yet, as on a graphics card."""
     if context.gl.version_code < COMPUTE_BASELINE:
         pytest.skip(f"no compute shaders in {context.name}")
     monkeypatch.delenv(OVERRIDE, raising=False)
-    for faster in Entry:
-        monkeypatch.setattr(entries, "_chosen", {})
-        monkeypatch.setattr(entries, "measure", lambda _, entry, faster=faster: 1.0 + (entry is not faster))
-        assert Context(context.gl).entry is faster
+    monkeypatch.setattr(entries, "_times", {})
+    made = Context(context.gl)
+    made.software = False
+    return made
 
 
-def test_equally_fast_means_fragment(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(OVERRIDE, raising=False)
-    monkeypatch.setattr(entries, "_chosen", {})
+@pytest.mark.parametrize("faster", Entry)
+def test_a_context_chooses_the_faster_one(
+    card: Context, monkeypatch: pytest.MonkeyPatch, faster: Entry
+) -> None:
+    monkeypatch.setattr(entries, "measure", lambda _, entry: 1.0 + (entry is not faster))
+    assert card.entry is faster
+
+
+def test_equally_fast_means_fragment(card: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(entries, "measure", lambda _, entry: 1.0 if entry is Entry.COMPUTE else 1.4)
-    assert Context(context.gl).entry is Entry.FRAGMENT
+    assert card.entry is Entry.FRAGMENT
 
 
-def test_it_measures_once_for_each_driver(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(OVERRIDE, raising=False)
-    monkeypatch.setattr(entries, "_chosen", {})
-    first = Context(context.gl).entry
-    monkeypatch.setattr(entries, "measure", lambda *_: pytest.fail("measured again"))
-    assert Context(context.gl).entry is first
+def test_it_measures_each_once_for_each_driver(card: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Entry] = []
+    monkeypatch.setattr(entries, "measure", lambda _, entry: seen.append(entry) or 1.0)
+    probe(card, Entry.COMPUTE)
+    assert seen == [Entry.COMPUTE]
+    assert card.entry is Entry.FRAGMENT
+    other = Context(card.gl)
+    other.software = False
+    assert other.entry is Entry.FRAGMENT
+    assert sorted(seen) == sorted(Entry)
+
+
+@pytest.mark.parametrize("known", ["software", "wished", "environment"])
+def test_what_is_known_is_not_measured(card: Context, monkeypatch: pytest.MonkeyPatch, known: str) -> None:
+    monkeypatch.setattr(entries, "measure", lambda *_: pytest.fail("measured"))
+    card.software = known == "software"
+    card.wished_entry = Entry.FRAGMENT if known == "wished" else None
+    if known == "environment":
+        monkeypatch.setenv(OVERRIDE, "fragment")
+    for entry in Entry:
+        probe(card, entry)
+    assert card.entry is Entry.FRAGMENT
 
 
 def test_both_can_be_measured(context: Context) -> None:

@@ -137,12 +137,12 @@ def test_one_call_makes_its_own_context(renderer: Renderer, both: Scene) -> None
 def test_an_edited_scene_releases_what_it_no_longer_shows(context: Context, both: Scene) -> None:
     with Renderer(context) as own:
         own.render(both, size=(16, 12))
-        drawable = own._drawables._things[(id(both.objects[0]),)][1]
+        drawable = own._uploads._drawables._things[(id(both.objects[0]),)][1]
         own.render(both, size=(16, 12))
-        assert own._drawables._things[(id(both.objects[0]),)][1] is drawable
+        assert own._uploads._drawables._things[(id(both.objects[0]),)][1] is drawable
         own.render(both.replace(objects=both.objects[1:]), size=(16, 12))
-        assert len(own._drawables._things) == 1
-    assert not own._drawables._things
+        assert len(own._uploads._drawables._things) == 1
+    assert not own._uploads._drawables._things
 
 
 def test_tiles_send_the_same_rays(

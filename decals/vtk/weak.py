@@ -2,15 +2,17 @@
 
 import weakref
 from collections.abc import Callable
+from types import MethodType
 
 
 def weakly(method: Callable[[], None]) -> Callable[..., None]:
     """Give a function that calls a method of an object, whatever it is told, as long as the object lives."""
-    found = weakref.WeakMethod(method)
+    assert isinstance(method, MethodType)
+    owner, name = weakref.ref(method.__self__), method.__name__
 
     def call(*_: object) -> None:
-        alive = found()
+        alive = owner()
         if alive is not None:
-            alive()
+            getattr(alive, name)()
 
     return call
