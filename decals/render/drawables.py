@@ -31,7 +31,8 @@ class Drawable(Protocol):
         The tile's camera is bound already (`decals.render.tile.attach_camera`). What is rasterised writes
         through ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth; the rest writes to the
         textures and leaves the depth alone (`GBuffer.complete_depth` adds it where somebody asks for it).
-        State that is changed beyond `GBuffer.use` is put back.
+        State that is changed beyond `GBuffer.use` is put back. It draws the same each time: where targets
+        hold the same objects already, it is not asked again.
         """
         ...
 

@@ -195,6 +195,52 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
     assert pl.bounds.z_max > 4.2
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda pl: pl.enable_parallel_projection(),
+        lambda pl: setattr(pl.decals.stage, "lights", "vtk"),
+        lambda pl: setattr(pl.decals.stage, "draw_scale", 0.5),
+        lambda pl: setattr(pl.decals.stage, "contact", Contact.RADIAL),
+        lambda pl: pl.add_mesh(pv.Sphere(radius=0.2, center=(0.2, -0.4, 0.4))),
+        lambda pl: setattr(pl.decals.stage.actor, "position", (0.1, 0.2, 0.1)),
+    ],
+)
+def test_frames_drawn_in_part_are_those_drawn_whole(
+    plotter: Factory, change: Callable[[pv.Plotter], None]
+) -> None:
+    """In two subplots of one window, each with a document of its own, seen and lit in VTK's ways."""
+    pl = plotter(shape=(1, 2), window_size=(240, 120))
+    rng, documents = np.random.default_rng(1), []
+    for column in range(2):
+        pl.subplot(0, column)
+        pl.decals.add_scene(both())
+        pl.decals.stage.scene = document = Edited()
+        change(pl)
+        documents.append(document)
+    stages = pl.decals.stages
+    shot(pl)
+    for step in range(6):
+        editor = documents[step % 2].decals
+        number = int(rng.choice(editor.numbers))
+        editor.change(number, positions=editor[number].positions + np.float32(0.1), tints=[(1.0, 0.3, 0.2)])
+        seen = shot(pl)
+        assert stages[step % 2].drawn < 0.6
+        for stage in stages:
+            stage.renderer._targets.forget()
+        np.testing.assert_array_equal(seen, shot(pl))
+        assert [stage.drawn for stage in stages] == [1.0, 1.0]
+
+
+class Edited:
+    """A scene whose decals are edited."""
+
+    camera, images, objects = both().camera, both().images, both().objects
+
+    def __init__(self) -> None:
+        self.decals = DecalEditor(both().decals)
+
+
 def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pytest.MonkeyPatch) -> None:
     def none() -> None:
         raise RuntimeError("Cannot detect window with OpenGL support")
