@@ -93,6 +93,12 @@ class Actions(ShapeActions):
         stroke = self._stroke
         self.background.afterwards(lambda: self._end(stroke))
 
+    def begin(self, label: str) -> None:
+        """End what goes on; all that follows is one entry until `settle`."""
+        self.settle()
+        self._stroke = object()
+        self.session.begin(label)
+
     def _end(self, stroke: object) -> None:
         """End a stroke, unless it has ended and another one goes on."""
         if stroke is self._stroke:

@@ -80,6 +80,10 @@ class ShapeActions(ABC):
         self._colors = 0
 
     @abstractmethod
+    def begin(self, label: str) -> None:
+        """End what goes on; all that follows is one entry until `settle`."""
+
+    @abstractmethod
     def settle(self) -> None:
         """End what goes on: the next action is an entry of its own."""
 
@@ -158,8 +162,7 @@ class ShapeActions(ABC):
 
     def begin_grip(self) -> None:
         """Begin to move the held primitive."""
-        self.settle()
-        self.session.begin("move a primitive")
+        self.begin(MovePrimitive.label)
 
     def move_grip(self, offset: ArrayLike) -> None:
         """Move the held primitive by an offset from where it was at first."""

@@ -158,8 +158,7 @@ class _Held:
 
     def begin(self) -> None:
         """Let what follows be one entry."""
-        self._actions.settle()
-        self._actions.session.begin("move")
+        self._actions.begin("move")
 
     def move(self, ray: Ray, hidden: Callable[[Floats], bool]) -> None:
         """Go to where the ray meets a surface; stay where it meets none that is seen."""

@@ -194,6 +194,27 @@ def test_of_a_drag_of_many_the_last_place_counts_and_it_is_one_entry():
     assert digest(session.document) == digest(expected.document)
 
 
+def test_a_drag_that_begins_before_the_last_one_is_all_seen_is_an_entry_of_its_own():
+    actions = threaded()
+    session = actions.session
+    numbers = np.arange(60)
+    held = Held(Turn(numbers, 10.0))
+    actions.begin("move")
+    actions.background.follow("turn", held)
+    assert held.begun.wait(LONG)
+    actions.settle()
+    actions.begin("again")
+    session.do(Turn([1], 10.0))
+    held.go.set()
+    finish(actions)
+    session.do(Turn([2], 10.0))
+    session.do(Turn([3], 10.0))
+    actions.settle()
+    assert session.labels == ("again",)
+    session.undo()
+    assert digest(session.document) == digest(EditSession(scene()).document)
+
+
 def test_while_something_is_dragged_other_edits_wait():
     actions = threaded()
     actions.background.edit("scale", doing(Scale(np.arange(60), 2.0)))
