@@ -182,8 +182,11 @@ class EditWindow:
         """Draw the next frame as at rest, or with fewer samples, where little of it changed; or coarsely."""
         for samples in (self.samples, 1):
             if self.quality.in_time(samples, self.stage.to_draw(samples)):
-                self._moved = time.perf_counter()
                 self.stage.draw_scale, self.stage.samples = 1.0, samples
+                if samples == self.samples:
+                    self._moved, self._whole = 0.0, self._shown  # nothing is left for later
+                else:
+                    self._moved = time.perf_counter()
                 return
         self.moving()
 

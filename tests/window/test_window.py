@@ -294,6 +294,7 @@ def test_a_drag_keeps_the_picture_whole_where_little_changes_however_slow_frames
         driver.event("MouseMoveEvent", (at[0] + step, at[1]))
         assert (stage.draw_scale, stage.samples) == (1.0, 2)
         assert 0.0 < stage.drawn < 0.2
+        assert not window._moved, "nothing is left to be drawn once the hand rests"
     assert window.quality.expected(2.0) > 0.2
     during = np.asarray(driver.plotter.screenshot(None, return_img=True))
     stage.renderer._targets.forget()
