@@ -143,11 +143,13 @@ class Background:
             self.edit(label, step)
 
     def afterwards(self, call: Callable[[], None]) -> None:
-        """Call something once nothing follows any more."""
-        if self._following:
-            self._afterwards.append(call)
-        else:
-            call()
+        """Call something once nothing follows any more, after what was to be called before it."""
+        self._afterwards.append(call)
+        self._call_waiting()
+
+    def _call_waiting(self) -> None:
+        while self._afterwards and not self._following:
+            self._afterwards.pop(0)()
 
     def wait(self, *, making: bool = True) -> None:
         """Refuse what has to come after the edit that goes on.
@@ -269,10 +271,7 @@ class Background:
         self._making = self._following = False
         if wish is not None:
             self.follow(*wish)
-            return
-        calls, self._afterwards = self._afterwards, []
-        for call in calls:
-            call()
+        self._call_waiting()
 
     def cancel(self) -> None:
         """Stop the edit that goes on; saves are not stopped."""

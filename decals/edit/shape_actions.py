@@ -180,19 +180,10 @@ class ShapeActions(ABC):
     def end_grip(self) -> None:
         """Let go of the held primitive; where nothing is left to lay decals on, it goes back."""
         if self.grip is not None:
-            number = self.grip[0]
-
-            def step(session: EditSession) -> str:
-                try:
-                    session.document.objects[number].surface  # noqa: B018  (asking may fail)
-                except (DecalsError, BlobTreeError) as error:
-                    session.cancel()
-                    return str(error)
-                session.document.make_surfaces()
-                return ""
-
-            long = self.background.following or not self.background.busy_editing
-            self._follow(MovePrimitive.label, step, long=long)
+            step = _checked(self.grip[0])
+            self.background.afterwards(
+                lambda: self._follow(MovePrimitive.label, step, long=not self.background.busy_editing)
+            )
         self.settle()
 
     # -- primitives -------------------------------------------------------------------------------------
@@ -303,6 +294,21 @@ class ShapeActions(ABC):
     def _document_view(self) -> tuple[ArrayLike, ArrayLike]:
         camera = self.session.document.camera
         return camera.position, camera.target
+
+
+def _checked(number: int) -> Step:
+    """The step that takes a stroke back where it left nothing of an object to lay decals on."""
+
+    def step(session: EditSession) -> str:
+        try:
+            session.document.objects[number].surface  # noqa: B018  (asking may fail)
+        except (DecalsError, BlobTreeError) as error:
+            session.cancel()
+            return str(error)
+        session.document.make_surfaces()
+        return ""
+
+    return step
 
 
 def under(cursor: Cursor) -> Pick:

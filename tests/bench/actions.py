@@ -53,9 +53,12 @@ class Hand:
 
     def _bring(self) -> None:
         stage = self.window.stage
-        with stage.current():
-            stage.renderer._uploads.of(self.window.document)
-            stage.renderer.context.gl.finish()
+        look = stage._look(SIZE, 1.0, 1)
+        stage.waiting = not stage._use_frame().ready(self.window.document, look)
+        if not stage.waiting:  # otherwise the window makes programs, slice by slice
+            with stage.current():
+                stage.renderer._uploads.of(self.window.document)
+                stage.renderer.context.gl.finish()
 
     def _place(self) -> tuple[int, int]:
         """A place where a decal shows."""
@@ -82,7 +85,7 @@ class Hand:
         """Longest time that a step, and what it leaves to the background, is deaf; its whole time; in ms."""
         begin = time.perf_counter()
         times = [_timed(step)]
-        while self.window.background.busy:
+        while self.window.background.busy or self.window.stage.waiting:
             self.window._told = 0.0
             times.append(_timed(self.window.tick))
             time.sleep(0.005)

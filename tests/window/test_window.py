@@ -8,6 +8,7 @@ import pytest
 from decals.edit.commands import Scale
 from decals.edit.objects import RemoveObject
 from decals.edit.population import lying_on
+from decals.edit.trees import alone
 from decals.errors import InvalidEdit, InvalidScene
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
@@ -130,7 +131,10 @@ def test_outlines_wait_until_a_drag_has_ended(driver):
     assert driver.window.marks.lines.n_lines == 1
 
 
-def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
+@pytest.mark.parametrize("carried", [5_000, 5])
+def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver, carried, monkeypatch):
+    monkeypatch.setattr("decals.edit.shape_actions.CARRIED", carried)
+    monkeypatch.setattr("decals.edit.session.FEW", carried)
     point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
     bare = driver.shot()
     driver.key("m", driver.pixel(point))
@@ -141,7 +145,7 @@ def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
     widget = driver.window.grip.widget
     center = driver.window.actions.grip_center
     assert widget.GetCenter() == pytest.approx(center.tolist())
-    before = driver.document.decals.decals.positions
+    before, first_tree = driver.document.decals.decals.positions, driver.document.objects[number].tree
     widget.InvokeEvent("StartInteractionEvent")
     for step in (0.1, 0.2, 0.4):
         widget.SetCenter(*np.add(center, (step, 0, 0)).tolist())
@@ -151,6 +155,9 @@ def test_a_primitive_is_moved_by_its_handle_and_decals_follow(driver):
     moved = np.linalg.norm(driver.document.decals.decals.positions - before, axis=1)
     assert moved.max() > 0.2
     assert (moved == 0).any()
+    low, high = alone(driver.document.objects[number].tree, path).bounds
+    moved_by = low + high - sum(alone(first_tree, path).bounds)
+    assert moved_by / 2 == pytest.approx([0.4, 0, 0], abs=1e-5)
     assert driver.session.labels == ("move a primitive",)
     assert (driver.shot() != first).any()
     driver.key("z", ctrl=True)
