@@ -20,8 +20,8 @@ PASSES = {
     ),
 }
 PEELING = (
-    "depth peeling draws no translucent actors where there is multisampling, with decals or without; "
-    "call `disable_anti_aliasing()` or `enable_anti_aliasing('ssaa')`"
+    "with some drivers depth peeling draws no translucent actors where there is multisampling, "
+    "with decals or without; call `disable_anti_aliasing()` or `enable_anti_aliasing('ssaa')`"
 )
 WATCHED = "add_on_render_callback"
 """Method of a plotter by which every view of trame-pyvista asks to hear of frames."""

@@ -58,7 +58,8 @@ def test_nobody_warns_who_draws_nothing(plotter: Factory, mode: str) -> None:
 
 
 def test_vtks_own_peeling_with_multisampling_is_as_we_say(plotter: Factory) -> None:
-    """Without us, too, it leaves out translucent actors."""
+    """Without us, too, it leaves out translucent actors with Mesa's drivers, and shows them with others."""
+    makers = set()
 
     def reddish(multisampling: bool) -> int:
         pl = plotter()
@@ -66,9 +67,11 @@ def test_vtks_own_peeling_with_multisampling_is_as_we_say(plotter: Factory) -> N
         pl.enable_depth_peeling(4)
         pl.enable_anti_aliasing("msaa") if multisampling else pl.disable_anti_aliasing()
         seen = shot(pl)
+        makers.add(pl.render_window.GetState().GetVersion())
         return int((seen[..., 0] > seen[..., 1] + 60).sum())
 
-    assert reddish(True) < 0.2 * reddish(False)
+    share = reddish(True) / reddish(False)
+    assert share < 0.2 if any("Mesa" in maker for maker in makers) else share > 0.9
 
 
 def test_exports_say_what_they_leave_out(plotter: Factory, tmp_path: Path) -> None:
