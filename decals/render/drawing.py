@@ -36,6 +36,8 @@ class Drawing:
         goes on.
     finish
         Waits until the card has done what it was told.
+    left
+        Gives the part of the work of a whole picture, 0 to 1, that there would be now.
     clock
         Seconds.
 
@@ -46,7 +48,7 @@ class Drawing:
     seconds
         What drawing it has taken until now.
     share
-        Part of the work of a whole picture, 0 to 1, that there was when it was ordered.
+        Part of the work of a whole picture, 0 to 1, that there was when it was begun.
     """
 
     def __init__(
@@ -55,12 +57,13 @@ class Drawing:
         plan: Callable[[Targets, Shown | None], Plan],
         finish: Callable[[], None],
         *,
-        share: float = 1.0,
+        left: Callable[[], float] = lambda: 1.0,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._making = targets
         self._targets: Targets | None = None
-        self.done, self.seconds, self.share, self.news = False, 0.0, share, ""
+        self.done, self.seconds, self.share, self.news = False, 0.0, 1.0, ""
+        self.left = left
         self._plan, self._finish, self._clock = plan, finish, clock
         self._held: Shown | None = None
         self._number, self._at, self._step = 0, 0, FIRST
@@ -112,10 +115,13 @@ class Drawing:
 
     def _begin(self, targets: Targets) -> Plan:
         """Begin, anew if somebody else has drawn into the targets since, or go on."""
-        if targets.drawing is not self:
+        anew = targets.drawing is not self
+        if anew:
             self._held, targets.drawing, targets.shown = targets.shown, self, None
             self._number, self._at, self._step = 0, 0, FIRST
-        return self._plan(targets, self._held)
+        plan = self._plan(targets, self._held)
+        self.share = plan.share if anew else self.share
+        return plan
 
     def _draw(self, steps: Sequence[Step]) -> None:
         """Draw the next part, if there is any."""

@@ -233,7 +233,9 @@ class Renderer:
             return plan_of(scene, uploaded, tile, order.modes, targets, held, depth=True)
 
         making = chain(self._making(scene, modes), self._targets.making(slot, full))
-        return Drawing(making, plan, self.context.gl.finish, share=order.share(self._targets.get(slot)))
+        return Drawing(
+            making, plan, self.context.gl.finish, left=lambda: order.share(self._targets.get(slot))
+        )
 
     def ahead(self, scene: SceneLike, modes: Modes) -> Ahead:
         """Say what such pictures of a scene need that takes long for the first time.

@@ -71,10 +71,13 @@ class Plan:
         What they show then.
     steps
         In this order; none where they show it already.
+    share
+        Part of the work of a whole tile, 0 to 1.
     """
 
     shown: Shown
     steps: list[Step]
+    share: float
 
 
 def plan_of(
@@ -100,7 +103,7 @@ def plan_of(
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     lit = gbuffer, paint, tile, radius, modes.lamps
     steps += [partial(targets.light_pass.draw, part, *lit) for part in stale.light]
-    return Plan(shown, steps)
+    return Plan(shown, steps, stale.share(tile))
 
 
 def _surface(uploaded: Uploaded, tile: Tile, targets: Targets, *, depth: bool) -> list[Step]:

@@ -96,13 +96,13 @@ class Frame:
     def draw(self, scene: SceneLike, look: Look, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's own targets; ``wait`` until the card has finished."""
         drawing = self._drawing(scene, look, viewpoint, look.slot)
+        with self.context.current():
+            drawing.complete()
+            self.renderer.sweep()
+            if wait and drawing.share:
+                self.context.gl.finish()
         self.share = drawing.share
         if self.share:
-            with self.context.current():
-                drawing.complete()
-                self.renderer.sweep()
-                if wait:
-                    self.context.gl.finish()
             self._ready.add(self._key(scene, look))
         return drawing.targets
 
@@ -114,7 +114,7 @@ class Frame:
         """
         seen = Seen.of(scene, look, viewpoint)
         drawing = self._coming_of(seen, scene, look, viewpoint, look.slot)
-        if drawing.share:
+        if drawing.left():
             with self.context.current():
                 if not drawing.advance(seconds):
                     return None
@@ -154,7 +154,7 @@ class Frame:
 
     def share_of(self, scene: SceneLike, look: Look, viewpoint: Projection) -> float:
         """Part of a whole frame's work, 0 to 1, that a frame would take now."""
-        return self._drawing(scene, look, viewpoint, look.slot).share
+        return self._drawing(scene, look, viewpoint, look.slot).left()
 
     def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection, slot: str) -> Drawing:
         return self.renderer.drawing(

@@ -283,9 +283,9 @@ def test_things_that_move_are_drawn_smaller_where_the_card_is_slow(driver):
 
 
 def knows(quality, monkeypatch):
-    """Let it be sure that a frame with four samples a pixel takes longer than one may."""
-    quality.saw(1.0, 0.06)
-    quality.saw(2.0, 0.21)
+    """Let it be sure that frames of the window's size take longer than they may."""
+    quality.saw(1.0, 0.1)
+    quality.saw(2.0, 0.4)
     monkeypatch.setattr(quality, "saw", lambda *_: None)
 
 

@@ -115,7 +115,10 @@ class Machine:
 
     def drawing(self) -> Drawing:
         steps = [lambda part, number=number: self.step(number, part) for number in range(len(self.costs))]
-        plan, targets = SimpleNamespace(steps=steps, shown=None), SimpleNamespace(drawing=None, shown=None)
+        plan, targets = (
+            SimpleNamespace(steps=steps, shown=None, share=1.0),
+            SimpleNamespace(drawing=None, shown=None),
+        )
         return Drawing(iter([targets]), lambda *_: plan, lambda: None, clock=lambda: self.now)  # type: ignore[arg-type,return-value]
 
 

@@ -102,8 +102,9 @@ def test_after_any_edits_the_bits_are_those_of_a_whole_picture(
             for number, view in enumerate(views):
                 asked = {"size": SIZE, "contact": contact, **view}
                 drawing = drawer.drawing(edited, slot=f"kept {number}", **asked)
-                shares.append(drawing.share)
+                shares.append(drawing.left())
                 drawing.complete() if step % 4 else advance(drawing)
+                assert drawing.share == shares[-1]
                 whole = drawer.drawing(edited, slot="whole", **asked)
                 whole.targets.shown = None
                 whole.complete()
@@ -112,7 +113,7 @@ def test_after_any_edits_the_bits_are_those_of_a_whole_picture(
                     assert found == expected[name], (step, name)
     assert min(shares[:2]) >= 2 / 3
     assert 0.0 < np.median(shares[2:]) < 0.5
-    assert drawer.drawing(edited, slot=f"kept {number}", **asked).share == 0.0
+    assert drawer.drawing(edited, slot=f"kept {number}", **asked).left() == 0.0
 
 
 def advance(drawing: Any) -> None:
@@ -141,7 +142,7 @@ def test_what_else_changes_is_drawn_over_the_same_surface(
             type(first.gbuffer), "clear", lambda *_: pytest.fail("the surface is drawn again")
         )
         drawing = drawer.drawing(edited, size=SIZE, **change)
-        assert drawing.share == pytest.approx(share)
+        assert drawing.left() == pytest.approx(share)
         drawing.complete()
         found = bits(drawing.targets)
         monkeypatch.undo()
