@@ -5,6 +5,7 @@ loop, its interactor, ours. DISPLAY names the display; it should have no window 
 """
 
 import ctypes
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,21 +15,26 @@ from tests.edit.scenes import scene
 from tests.window.driver import Driver
 
 SIZE = (320, 240)
-PATIENCE = 100
-"""Ticks of the window's timer that an event may take."""
+PATIENCE = 60.0
+"""Seconds that an event may take."""
 
 Step = tuple[str, Callable[[], None], Callable[[], bool]]
 """What is tried, how, and what holds once it was done."""
 
 
 class Hands:
-    """Mouse and keys of a display, as the XTEST extension moves them."""
+    """Mouse and keys of a display, as the XTEST extension moves them.
+
+    However long this program is held up between a key's press and its release, the key does not repeat.
+    """
 
     def __init__(self) -> None:
         self._x, self._test = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
         self._x.XOpenDisplay.restype = ctypes.c_void_p
         self._x.XStringToKeysym.restype = ctypes.c_ulong
         self._display = ctypes.c_void_p(self._x.XOpenDisplay(None))
+        self._x.XAutoRepeatOff(self._display)
+        self._x.XFlush(self._display)
 
     def move(self, at: tuple[int, int]) -> None:
         """Point at a pixel of the window, from its lower left corner; it lies in the display's corner."""
@@ -141,21 +147,20 @@ class Play:
         self._window, self._path = window, path
         self._steps: Iterator[Step] | None = None
         self._holds: Callable[[], bool] = lambda: True
-        self._waited = 0
+        self._since = time.monotonic()
         self.name = ""
         self.failure: BaseException | None = None
 
     def tick(self) -> None:
         """Look whether the last step is done, and begin the next."""
-        self._waited += 1
         try:
             if self._steps is None:
                 self._steps = steps(self._window, Hands(), self._path)
             if not self._holds():
-                assert self._waited < PATIENCE, f"{self.name!r} had no effect"
+                assert time.monotonic() < self._since + PATIENCE, f"{self.name!r} had no effect"
                 return
             self.name, act, self._holds = next(self._steps)
-            self._waited = 0
+            self._since = time.monotonic()
             act()
         except BaseException as error:  # VTK would only print it
             self.failure = error
