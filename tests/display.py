@@ -8,6 +8,13 @@ from collections.abc import Iterator
 
 import pytest
 
+NUMBERS = range(100, 30_000)
+"""Of displays: each process has one of its own.
+
+Servers that choose theirs take the least that is free. One that is on its way out then removes the socket of
+the one that has just begun under its number, and nobody can connect to that any more.
+"""
+
 
 @pytest.fixture
 def display() -> Iterator[str]:
@@ -16,12 +23,14 @@ def display() -> Iterator[str]:
     if server is None:
         pytest.skip("Xvfb is not installed (on Debian: apt-get install xvfb)")
     reading, writing = os.pipe()
-    command = [server, "-displayfd", str(writing), "-screen", "0", "640x480x24"]
+    name = f":{NUMBERS[os.getpid() % len(NUMBERS)]}"
+    command = [server, name, "-displayfd", str(writing), "-screen", "0", "640x480x24"]
     process = subprocess.Popen(command, pass_fds=(writing,), stderr=subprocess.DEVNULL)
     os.close(writing)
     try:
         with os.fdopen(reading) as told:
-            yield f":{told.readline().strip()}"
+            assert told.readline().strip() == name[1:], f"no display {name}"
+            yield name
     finally:
         process.terminate()
         process.wait(30)
