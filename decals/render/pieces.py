@@ -17,10 +17,13 @@ class Piece:
         What it belongs to, one of the names above.
     make
         Makes it. The context must be current.
+    beside
+        Whether it needs no graphics, so that it may be made in another thread.
     """
 
     name: str
     make: Callable[[], object]
+    beside: bool = False
 
 
 @dataclass(frozen=True, eq=False)

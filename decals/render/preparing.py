@@ -49,7 +49,7 @@ def _coat(uploads: Uploads, scene: SceneLike, modes: Modes) -> list[Piece]:
         *index,
         Piece(DECALS, partial(uploads.decals, scene)),
         Piece(IMAGES, partial(uploads.images, scene)),
-        Piece(SHADERS, partial(_functions, scene, modes)),
+        Piece(SHADERS, partial(library, modes.contact, layered=decals.layered), beside=True),
     ]
 
 

@@ -1,6 +1,5 @@
 """BlobTrees in the G-buffer: traced, one ray per pixel of their box."""
 
-from collections.abc import Callable
 from typing import Protocol
 
 import moderngl
@@ -54,12 +53,12 @@ class TreeDrawable:
     def ahead(context: Context, thing: TreeLike) -> Ahead:
         """Say what one needs that takes long for the first time."""
         tree, kinds = thing.tree, Kinds.of(thing.tree.tape)
-        made: tuple[tuple[str, Callable[[], object]], ...] = (
-            (SHAPES, lambda: tracing_cells(tree)),
-            (SHADERS, lambda: tracing_shader(kinds, context.entry)),
-            (SHADERS, lambda: tracing_program(context, kinds)),
+        pieces = (
+            Piece(SHAPES, lambda: tracing_cells(tree), beside=True),
+            Piece(SHADERS, lambda: tracing_shader(kinds, context.entry)),
+            Piece(SHADERS, lambda: tracing_program(context, kinds)),
         )
-        return Ahead(kinds, [Piece(*piece) for piece in made])
+        return Ahead(kinds, pieces)
 
     @property
     def bounds(self) -> Bounds:

@@ -9,9 +9,11 @@ from typing import Any, Self
 from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.render import Renderer, SceneLike, Size
+from decals.render.beside import Beside
 from decals.render.drawing import Drawing
 from decals.render.lamps import Lamps
 from decals.render.modes import Modes
+from decals.render.pieces import Ahead
 from decals.render.shown import Shown, same, version_of
 from decals.render.targets import Targets
 from decals.render.tile import CameraBuffer
@@ -87,6 +89,7 @@ class Frame:
         self._given_shown: Shown | None = None
         self._given_samples = 0
         self._ready: set[Hashable] = set()
+        self._beside: dict[Hashable, Beside] = {}
         self._coming: tuple[Seen, Drawing] | None = None
         with context.current():
             self.renderer = Renderer(context)
@@ -103,7 +106,7 @@ class Frame:
                 self.context.gl.finish()
         self.share = drawing.share
         if self.share:
-            self._ready.add(self._key(scene, look))
+            self._ready.add(self._ahead(scene, look).key)
         return drawing.targets
 
     def prepare(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> float | None:
@@ -119,18 +122,23 @@ class Frame:
                 if not drawing.advance(seconds):
                     return None
         self._coming = None
-        self._ready.add(self._key(scene, look))
+        self._ready.add(self._ahead(scene, look).key)
         return drawing.seconds if drawing.share == 1.0 else 0.0
 
     def ready(self, scene: SceneLike, look: Look) -> bool:
         """Whether a frame needs nothing, such as a program, that takes long for the first time."""
-        return self._key(scene, look) in self._ready
+        return self._ahead(scene, look).key in self._ready
 
     def warm(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> str | None:
         """Make for about so long what such a frame needs, and draw it once; what is shown stays.
 
         Says how far it is; None once the frame is `ready`.
         """
+        ahead = self._ahead(scene, look)
+        if ahead.key not in self._beside:
+            self._beside[ahead.key] = Beside(ahead.pieces)
+        if not self._beside[ahead.key].done(seconds):
+            return self._beside[ahead.key].news
         seen = Seen.of(scene, look, viewpoint)
         free = self._held is None or self._held is not self.renderer.targets_of(look.slot)
         drawing = self._coming_of(seen, scene, look, viewpoint, look.slot if free else SPARE_SLOT)
@@ -138,7 +146,7 @@ class Frame:
             if not drawing.advance(seconds):
                 return drawing.news
         self._coming = None
-        self._ready.add(self._key(scene, look))
+        self._ready.add(ahead.key)
         return None
 
     def _coming_of(
@@ -149,8 +157,8 @@ class Frame:
             self._coming = seen, self._drawing(scene, look, viewpoint, slot)
         return self._coming[1]
 
-    def _key(self, scene: SceneLike, look: Look) -> Hashable:
-        return self.renderer.ahead(scene, Modes(look.mapping, look.contact, look.lamps)).key
+    def _ahead(self, scene: SceneLike, look: Look) -> Ahead:
+        return self.renderer.ahead(scene, Modes(look.mapping, look.contact, look.lamps))
 
     def share_of(self, scene: SceneLike, look: Look, viewpoint: Projection) -> float:
         """Part of a whole frame's work, 0 to 1, that a frame would take now."""
@@ -200,6 +208,8 @@ class Frame:
     def release(self) -> None:
         """Give everything back."""
         self._given = self._given_shown = self._coming = None
+        for beside in self._beside.values():
+            beside.end()
         with self.context.current():
             self.renderer.release()
             self._composite.release()

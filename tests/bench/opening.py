@@ -25,9 +25,10 @@ class Ticking(EditWindow):
 def measure(name: str, size: tuple[int, int], count: int) -> Figures:
     """Open a window on a model; VTK's own first frame, without anything of ours, is counted apart.
 
-    A block is the time between two chances for the window to listen; which were the longest is printed.
+    A block is the time between two chances for the window to listen, on the clock and in processor time of
+    all threads, which other work on the machine does not lengthen; what the longest ones did is printed.
     """
-    ticks, what, seen = [], [], 0.0
+    ticks, used, what, seen = [], [], [], 0.0
     session = EditSession(bench_scene(name, count, size))
     with Ticking(session, off_screen=True, size=size) as window:
         begin = time.perf_counter()
@@ -36,19 +37,21 @@ def measure(name: str, size: tuple[int, int], count: int) -> Figures:
         window.plotter.show(auto_close=False, interactive=False)
         vtk = time.perf_counter() - begin
         while window._moved or window.stage.waiting:
-            at = time.perf_counter()
+            at, busy = time.perf_counter(), time.process_time()
             window.tick()
             now = time.perf_counter()
             ticks.append(1e3 * (now - at))
+            used.append(1e3 * (time.process_time() - busy))
             what.append(window.waiting.news or "drawing")
             seen = seen or (not window.stage.waiting) * (now - begin)
         whole = time.perf_counter() - begin
-    longest = sorted(zip(ticks, what, strict=True), reverse=True)[:4]
+    longest = sorted(zip(ticks, used, what, strict=True), reverse=True)[:4]
     prefix = f"{name}_{count}_open"
-    print(f"{prefix}:", ", ".join(f"{took:.0f} ms {said}" for took, said in longest))
+    print(f"{prefix}:", ", ".join(f"{took:.0f} ms ({own:.0f}) {said}" for took, own, said in longest))
     return {
         f"{prefix}_vtk_ms": 1e3 * vtk,
         f"{prefix}_longest_block_ms": max(ticks),
+        f"{prefix}_longest_used_ms": max(used),
         f"{prefix}_slices": len(ticks),
         f"{prefix}_seen_s": seen,
         f"{prefix}_whole_s": whole,

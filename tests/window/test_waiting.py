@@ -1,9 +1,13 @@
 """The first frames of a window: what they take is made slice by slice, and what is seen then is the same."""
 
+import threading
+
 import numpy as np
 import pytest
 
+from decals.errors import TooMuchData
 from decals.render import preparing
+from decals.render.decal_data import library
 from decals.render.drawing import PICTURE
 from decals.render.pieces import told
 from decals.window import EditWindow
@@ -86,9 +90,10 @@ def test_each_piece_is_a_chance_to_listen(waiting, monkeypatch):
     monkeypatch.setattr("decals.window.waiting.SLICE", 0.0)
     window = waiting()
     pieces = window.stage.renderer.ahead(window.document, _modes(window)).pieces
-    heard = slices(window, 5000)
+    heard = slices(window, 100_000)
     expected = [f"preparing: {news}" for _, news in told(pieces)]
-    assert heard[: len(expected)] == expected
+    first = heard.index(expected[0])  # before that, what is made in a thread
+    assert heard[first : first + len(expected)] == expected
     assert f"preparing: {PICTURE}" in heard
 
 
@@ -155,6 +160,38 @@ def test_a_window_closed_in_between_gives_everything_back(waiting, monkeypatch, 
     assert not context._compute_programs
     assert not any(context._stock.values())
     window.tick()  # a timer that was on its way
+
+
+def test_what_needs_no_graphics_is_made_in_a_thread_while_the_window_listens(waiting, monkeypatch):
+    go, where = threading.Event(), []
+
+    def slow(*arguments, **options):
+        where.append(threading.current_thread())
+        assert go.wait(60)
+        return library(*arguments, **options)
+
+    monkeypatch.setattr(preparing, "library", slow)
+    monkeypatch.setattr("decals.window.waiting.SLICE", 0.0)
+    window = waiting()
+    for _ in range(20):
+        window.tick()
+        assert window.stage.waiting
+    assert where[0] is not threading.current_thread()
+    go.set()
+    slices(window, 100_000)
+    assert (pixels(window) != bare()).any()
+
+
+def test_what_goes_wrong_in_the_thread_is_raised_where_the_window_listens(waiting, monkeypatch):
+    def refuse(*_arguments, **_options):
+        raise TooMuchData("no room")
+
+    monkeypatch.setattr(preparing, "library", refuse)
+    window = waiting()
+    with pytest.raises(TooMuchData, match="no room"):
+        slices(window)
+    assert not window.stage.waiting
+    window.tick()
 
 
 def test_a_shader_that_is_refused_is_said_once_and_clearly(waiting, monkeypatch):
