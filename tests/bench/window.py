@@ -83,17 +83,22 @@ def around(at: tuple[int, int], steps: int, radius: float = 30.0) -> list[tuple[
 
 
 def drag(driver: Driver, name: str, steps: int) -> Figures:
-    """Drag one decal among all."""
+    """Drag one decal among all; steps beside the surface, which change nothing, do not count."""
     _, at = next(driver.visible())
     driver.click(at)
     driver.event("LeftButtonPressEvent", at)
     stage = driver.window.stage
     draw, drawn = stage.draw, []
     stage.draw = lambda: drawn.append(timed(draw)[0])  # type: ignore[method-assign]
-    times = [
-        timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
-        for place in around(at, steps + WARM)
-    ]
+    times, shares = [], []
+    for place in around(at, 2 * steps + WARM, radius=15.0):
+        before = driver.document.decals.version
+        step = timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
+        if driver.document.decals.version == before:
+            del drawn[len(times) :]
+            continue
+        times.append(step)
+        shares.append(stage.drawn)
     del stage.draw
     scale = driver.window.stage.draw_scale
     driver.event("LeftButtonReleaseEvent", at)
@@ -101,6 +106,8 @@ def drag(driver: Driver, name: str, steps: int) -> Figures:
     return medians(f"{name}_drag", times) | {
         f"{name}_drag_scale": scale,
         f"{name}_drag_draw_ms": float(np.median(drawn[WARM:] or drawn)),
+        f"{name}_drag_share": float(np.median(shares[WARM:] or shares)),
+        f"{name}_drag_steps": len(times[WARM:] or times),
     }
 
 
