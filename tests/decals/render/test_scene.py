@@ -8,6 +8,7 @@ import pytest
 from blobtree import Point, Segment, polygonize
 from blobtree.tracing.trace import trace
 from decals.coat.seeding import seed
+from decals.errors import InvalidScene
 from decals.field.mapping import Mapping
 from decals.model import Decals
 from decals.render import STUDIO, TRANSPARENT, Renderer, render, render_buffers, tile
@@ -159,7 +160,7 @@ def test_tiles_send_the_same_rays(
 
 @pytest.mark.parametrize(("size", "samples"), [((0, 4), 1), ((4, -1), 1), ((4, 4), 0), ((4,), 1)])
 def test_impossible_sizes_are_refused(renderer: Renderer, both: Scene, size: Any, samples: int) -> None:
-    with pytest.raises(ValueError, match="a picture needs a width"):
+    with pytest.raises(InvalidScene, match=r"(size|samples): expected"):
         renderer.render(both, size=size, samples=samples)
 
 
