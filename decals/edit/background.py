@@ -168,14 +168,24 @@ class Background:
             raise InvalidEdit(WAIT)
 
     def _on_fork(self, label: str, step: Step, done: Callable[[], None] | None) -> Job:
-        """The job that does a step to a fork; the session adopts it, or has it done to another one."""
+        """The job that does a step to a fork; the session adopts it, or has it done to another one.
+
+        What could not be done to a fork that is behind by then may well be done to the next.
+        """
 
         def work(_tell: Progress, _stop: Cancel) -> Outcome:
-            text = step(fork)
-            fork.prepare(surfaces=not following)
+            text = ""
+            failed: Exception | None = None
+            try:
+                text = step(fork)
+                fork.prepare(surfaces=not following)
+            except (DecalsError, BlobTreeError) as error:
+                failed = error
 
             def outcome() -> Job | None:
-                if not self._session.adopt(fork):
+                if failed is not None and fork.current:
+                    raise failed
+                if failed is not None or not self._session.adopt(fork):
                     if not self._following:
                         self._settle()
                     return self._on_fork(label, step, done)

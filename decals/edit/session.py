@@ -179,7 +179,7 @@ class EditSession:
         fork can be done to another.
         """
         instance("fork", fork, Fork, InvalidEdit, "session.fork() makes one")
-        if (fork.origin, fork.origin_age) != (self, self._age):
+        if fork.origin is not self or not fork.current:
             return False
         if fork.small:
             for rows, parts in fork.puts:
@@ -250,6 +250,11 @@ class Fork(EditSession):
         self._done, self._undone, self._stroke = [*origin._done], [*origin._undone], origin._stroke
         self._saved, self._age = origin._saved, origin._age
         self._listeners = [self.heard.append]
+
+    @property
+    def current(self) -> bool:
+        """Whether nothing was done to the other one since."""
+        return self.origin_age == self.origin._age
 
     def _put(self, rows: Rows, parts: Parts) -> None:
         super()._put(rows, parts)
