@@ -27,9 +27,11 @@ from decals.render.mesh import mesh_rows
 from decals.render.renderer import Renderer
 from decals.render.tile import CameraBuffer, Tile
 from decals.scenes.scene import MeshObject, Scene
-from implicit_decals.shaders import compose
+from implicit_decals.shaders import Source, compose
 
 Arrays = dict[str, NDArray[Any]]
+Sources = dict[int, tuple[str, str]]
+"""Body and whole text of programs, by their identity."""
 TARGETS = ("g_position", "g_normal", "g_color", "g_paint")
 """Textures that the picture itself fills."""
 
@@ -57,7 +59,25 @@ def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact 
 def _listening(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
     """Note every pass that runs, with what it reads, and the camera."""
     units: dict[int, Any] = {}
-    use_camera = CameraBuffer.use
+    bodies: dict[str, str] = {}
+    sources: Sources = {}
+    use_camera, source_of = CameraBuffer.use, entry._source
+    of_fragment, of_compute = Context.program, Context.compute_program
+
+    def composed(point: Entry, body: str, *rest: Any) -> Source:
+        source = source_of(point, body, *rest)
+        bodies[source.text] = body
+        return source
+
+    def program(self: Context, vertex: Source, fragment: Source) -> moderngl.Program:
+        made = of_fragment(self, vertex, fragment)
+        sources[id(made)] = bodies.get(fragment.text, ""), fragment.text
+        return made
+
+    def compute_program(self: Context, source: Source) -> moderngl.ComputeShader:
+        made = of_compute(self, source)
+        sources[id(made)] = bodies.get(source.text, ""), source.text
+        return made
 
     def camera(self: CameraBuffer, tile: Tile) -> CameraBuffer:
         arrays["camera"] = np.frombuffer(tile.block(), np.float32)
@@ -67,7 +87,11 @@ def _listening(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
         for kind in (moderngl.Texture, moderngl.TextureArray):
             stack.enter_context(patch.object(kind, "use", _noting_use(kind.use, units)))
         for kind in (entry.FragmentPass, entry.ComputePass):
-            stack.enter_context(patch.object(kind, "run", _noting_run(kind.run, units, arrays, passes)))
+            noting = _noting_run(kind.run, units, sources, arrays, passes)
+            stack.enter_context(patch.object(kind, "run", noting))
+        stack.enter_context(patch.object(entry, "_source", composed))
+        stack.enter_context(patch.object(Context, "program", program))
+        stack.enter_context(patch.object(Context, "compute_program", compute_program))
         stack.enter_context(patch.object(CameraBuffer, "use", camera))
         yield
 
@@ -80,19 +104,22 @@ def _noting_use(original: Any, units: dict[int, Any]) -> Any:
     return use
 
 
-def _noting_run(original: Any, units: dict[int, Any], arrays: Arrays, passes: dict[str, Any]) -> Any:
+def _noting_run(
+    original: Any, units: dict[int, Any], sources: Sources, arrays: Arrays, passes: dict[str, Any]
+) -> Any:
     def run(self: Any, where: Any) -> None:
+        body, text = sources[id(self.program)]
         uniforms, textures = {}, {}
         for name in self.program:
             member = self.program[name]
             if not isinstance(member, moderngl.Uniform):
                 continue
-            kind = _type(self.source.text, name)
+            kind = _type(text, name)
             if "sampler" in kind:
                 textures[name] = _texture(units[member.value], name, arrays)
             elif "image" not in kind:
                 uniforms[name] = member.value
-        passes[self.body] = {"text": self.source.text, "uniforms": uniforms, "textures": textures}
+        passes[body] = {"text": text, "uniforms": uniforms, "textures": textures}
         original(self, where)
 
     return run
