@@ -250,19 +250,13 @@ class Background:
         While hands drag something, other edits than what follows them wait for its end. Waits for at most so
         many seconds for each of an edit and a save.
         """
-        saved = self._take(self._saves, timeout)
-        if saved and self._next_save is not None:
-            job, self._next_save = self._next_save, None
-            self._saves.start(job)
+        saved = self._take(self._saves, timeout, self._save_next)
         if dragging and not self._following:
             return saved
-        edited = self._take(self._edits, timeout)
-        if edited:
-            self._go_on()
-        return saved or edited
+        return self._take(self._edits, timeout, self._go_on) or saved
 
-    def _take(self, worker: Worker, timeout: float | None) -> bool:
-        """Carry out what a worker's job came to, if it is done."""
+    def _take(self, worker: Worker, timeout: float | None, go_on: Callable[[], None]) -> bool:
+        """Carry out what a worker's job came to, if it is done; whatever came of it, what waits goes on."""
         if not worker.busy:
             return False
         again: Job | None = None
@@ -271,9 +265,19 @@ class Background:
             again = None if outcome is None else outcome()
         except (DecalsError, BlobTreeError) as error:
             self._say(str(error))
-        if again is not None:
-            worker.start(again)
-        return not worker.busy
+        finally:
+            if again is not None:
+                worker.start(again)
+            ended = not worker.busy
+            if ended:
+                go_on()
+        return ended
+
+    def _save_next(self) -> None:
+        """Begin with the save that was asked for while another one went on."""
+        job, self._next_save = self._next_save, None
+        if job is not None:
+            self._saves.start(job)
 
     def _go_on(self) -> None:
         """Begin with the last of what hands asked for meanwhile, or let who waits know that there is none."""
@@ -300,17 +304,15 @@ class Background:
         """
         self.cancel()
         self._edits.take(PATIENCE)
-        failed: DecalsError | None = None
+        failed: Exception | None = None
         while self._saves.busy:
             try:
                 outcome = self._saves.take(None)
                 failed = None
                 if outcome is not None:
                     outcome()
-            except DecalsError as error:
+            except Exception as error:  # it is raised once the save that waits is done
                 failed = error
-            job, self._next_save = self._next_save, None
-            if job is not None:
-                self._saves.start(job)
+            self._save_next()
         if failed is not None:
             raise failed

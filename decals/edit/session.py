@@ -210,7 +210,7 @@ class EditSession:
         return stop
 
     def _tell(self, change: Change) -> None:
-        for listener in self._listeners:
+        for listener in [*self._listeners]:  # some end with what they hear
             listener(change)
 
     @property
@@ -259,6 +259,13 @@ class Fork(EditSession):
     def _put(self, rows: Rows, parts: Parts) -> None:
         super()._put(rows, parts)
         self.puts.append((rows, parts))
+
+    def adopt(self, fork: "Fork") -> bool:
+        """Go on where a fork of this one is, as any session does."""
+        adopted = super().adopt(fork)
+        if adopted:
+            self.puts += fork.puts
+        return adopted
 
     @property
     def small(self) -> bool:

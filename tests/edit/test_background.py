@@ -440,6 +440,65 @@ def test_a_fork_goes_its_own_way_and_is_adopted_once():
     assert digest(session.document) == digest(EditSession(scene()).document)
 
 
+@pytest.mark.parametrize("few", [0, 500])
+def test_a_fork_of_a_fork_brings_all_that_was_done(monkeypatch, few):
+    monkeypatch.setattr("decals.edit.session.FEW", few)
+    session, alone = EditSession(scene()), EditSession(scene())
+    fork = session.fork()
+    further = fork.fork()
+    for command in (Scale([1, 4], 2.0), Delete([3])):
+        further.do(command)
+        alone.do(command)
+    assert fork.adopt(further)
+    fork.do(Turn([5], 9.0))
+    alone.do(Turn([5], 9.0))
+    assert session.adopt(fork)
+    assert session.labels == alone.labels
+    assert digest(session.document) == digest(alone.document)
+
+
+def test_what_nobody_foresaw_is_raised_and_what_waits_goes_on():
+    actions = threaded()
+    called = []
+
+    def step(_session):
+        raise MemoryError
+
+    actions.background.follow("move", step)
+    actions.background.afterwards(lambda: called.append(True))
+    with pytest.raises(MemoryError):
+        actions.background.look(timeout=LONG)
+    assert called
+    assert not actions.background.following
+    actions.background.edit("scale", doing(Scale(np.arange(60), 2.0)))
+    finish(actions)
+    assert actions.session.labels == ("scale",)
+
+
+def test_after_a_save_that_nobody_foresaw_fails_the_later_one_is_written(tmp_path, monkeypatch):
+    path = tmp_path / "scene.json"
+    actions = threaded(path=path)
+    actions.session.do(Scale([1], 2.0))
+    begun, go = threading.Event(), threading.Event()
+
+    def failing(*_args, **_options):
+        begun.set()
+        assert go.wait(LONG)
+        raise MemoryError
+
+    with monkeypatch.context() as patched:
+        patched.setattr("decals.edit.session.save_scene", failing)
+        press(actions, "save")
+        assert begun.wait(LONG)
+        press(actions, "save")
+    go.set()
+    with pytest.raises(MemoryError):
+        actions.background.look(timeout=LONG)
+    finish(actions)
+    assert load_scene(path).decals.radii[1] == 2 * scene().decals.radii[1]
+    assert not actions.session.modified
+
+
 KEYS = (
     "larger", "turn_left", "delete", "duplicate", "next_tint", "fainter", "layer_up", "relax", "place",
     "undo", "undo", "redo", "redo",

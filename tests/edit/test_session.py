@@ -104,6 +104,20 @@ def test_what_does_nothing_leaves_no_entry(session):
     assert session.labels == ()
 
 
+def test_a_listener_may_end_with_what_it_hears(session):
+    heard = []
+
+    def once(_change):
+        heard.append("once")
+        stop()
+
+    stop = session.listen(once)
+    session.listen(lambda _change: heard.append("always"))
+    session.do(Scale([1], 2.0))
+    session.do(Scale([1], 2.0))
+    assert heard == ["once", "always", "always"]
+
+
 def test_listeners_hear_of_every_change(session):
     heard = []
     stop = session.listen(lambda change: heard.append(change.after.numbers.tolist()))
