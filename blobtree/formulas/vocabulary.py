@@ -10,7 +10,7 @@ import hashlib
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache
 from threading import RLock
 from types import FunctionType
 from typing import Any
@@ -21,6 +21,7 @@ from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
 from blobtree.kernel_options import KERNEL_OPTIONS
+from blobtree.lazy import Lazy
 from blobtree.typed.instantiate import rebound, references, typed
 from blobtree.typed.unroll import original, unrolled
 
@@ -40,7 +41,7 @@ class Vocabulary:
     _kernels: dict[wp.Kernel, wp.Kernel] = field(default_factory=dict, compare=False, repr=False)
     _functions: dict[wp.Function, wp.Function] = field(default_factory=dict, compare=False, repr=False)
 
-    @cached_property
+    @Lazy
     def digest(self) -> str:
         """A digest of the rows beyond the built-in ones, the same in every process."""
         rows: tuple[Skeleton | Operator, ...] = (*self.skeletons, *self.operators)

@@ -10,7 +10,6 @@ import math
 import reprlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
+from blobtree.lazy import Lazy
 from blobtree.nodes.bounds import influence_bounds
 from blobtree.nodes.identity import equal, from_records, hash_of, text_of, to_records
 from blobtree.nodes.outline import outline
@@ -122,16 +122,16 @@ class Node(Viewing):
 
     # -- asking -------------------------------------------------------------------------------------
 
-    @cached_property
+    @Lazy
     def _program(self) -> list[Instruction]:
         return compile_program(self)
 
-    @cached_property
+    @Lazy
     def tape(self) -> Tape:
         """The flat form of this tree that every backend reads."""
         return compile_tape(self._program)
 
-    @cached_property
+    @Lazy
     def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Corners (3,), (3,) of a box outside of which the field is exactly 0."""
         return influence_bounds(self._program)

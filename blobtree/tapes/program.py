@@ -8,7 +8,6 @@ first, so a tree of n leaves needs at most log₂ n registers and a spine of any
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
@@ -18,6 +17,7 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import RICCI, SUM, Operator, Reach
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.warps import SpaceWarp
+from blobtree.lazy import Lazy
 from blobtree.nodes import affine
 from blobtree.nodes.traversal import branches
 
@@ -41,7 +41,7 @@ class Placement:
     growth: float = 0.0
     """What offsets add to its radii, in its own units."""
 
-    @cached_property
+    @Lazy
     def uniform_scale(self) -> float | None:
         """The factor by which all lengths are scaled, None where directions differ."""
         return affine.uniform_scale(self.matrix)

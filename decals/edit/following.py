@@ -1,12 +1,12 @@
 """Decals that follow a node of a tree: how far each goes along, and where it ends on the new surface."""
 
-from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import ISO, Node
+from blobtree.lazy import Lazy
 from decals.edit.document import Document, Lineage
 from decals.edit.places import Places, nearest
 from decals.edit.trees import Doubles, Path, alone, moved, node_at, with_node, within, world_matrix
@@ -88,7 +88,7 @@ class Start:
         owned: NDArray[np.intp] = rows[self._owners[rows] == number]
         return owned
 
-    @cached_property
+    @Lazy
     def weights(self) -> Doubles:
         """How far each decal goes along with the node; not at all beyond its reach."""
         _, _, path = self._asked

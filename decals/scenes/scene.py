@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Self
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from blobtree import Node
+from blobtree.lazy import Lazy
 from decals.checks import instance, shown, triple
 from decals.errors import InvalidScene, NoGraphics
 from decals.images import load_image
@@ -94,7 +94,7 @@ class TreeObject:
         if not isinstance(self.tree, Node):
             raise InvalidScene(f"object {self.name!r}: expected a BlobTree, got {type(self.tree).__name__}")
 
-    @cached_property
+    @Lazy
     def surface(self) -> ImplicitSurface:
         """The tree's surface, polygonized once to know where it lies."""
         return ImplicitSurface(self.tree)

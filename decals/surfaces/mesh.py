@@ -1,12 +1,12 @@
 """A triangle mesh as a surface for decals."""
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from blobtree.lazy import Lazy
 from decals.errors import InvalidMesh
 from decals.model import LARGEST
 from decals.surfaces.ground import asked, inside, vectors
@@ -73,12 +73,12 @@ class MeshSurface:
         """Corners of the box around the faces."""
         return self._bounds
 
-    @cached_property
+    @Lazy
     def closed(self) -> bool:
         """Whether the faces bound a volume, with or without the degenerate ones."""
         return any(_is_closed(self.vertices, faces) for faces in (self.faces, self._corners))
 
-    @cached_property
+    @Lazy
     def _winding(self) -> int:
         """1 if the mesh is closed and winds counter-clockwise seen from outside, -1 if clockwise, else 0."""
         if not self.closed:

@@ -1,7 +1,6 @@
 """A triangle mesh in the memory of a Warp device."""
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.launch import launch
+from blobtree.lazy import Lazy
 from decals.surfaces.ground import Scalars, Vectors
 from decals.surfaces.mesh_queries import closest_faces, closest_points, first_hits, mark_inside
 from decals.surfaces.surface import Floats
@@ -75,7 +75,7 @@ class MeshGround:
             inputs = [self._winding_mesh.id, self._low, self._high, points]
             launch(mark_inside, len(points), inputs, [flags], device=self.device)
 
-    @cached_property
+    @Lazy
     def _winding_mesh(self) -> wp.Mesh:
         """Winding numbers ask for faces that wind counter-clockwise."""
         turned = np.ascontiguousarray(self._corners[:, :: self._winding()])
