@@ -261,6 +261,8 @@ class Stage(Settings):
     def _draw(self, scene: SceneLike) -> None:
         frame = self._use_frame()
         viewport = frame.context.viewport()
+        if 0 in viewport[2:]:  # a tile of a large screenshot in which nothing of this subplot lies
+            return
         look = self._look(viewport[2:], self.draw_scale, self.samples)
         self._drawn_size = viewport[2:]
         self.waiting = self.patient and not frame.ready(scene, look)

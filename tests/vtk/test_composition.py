@@ -231,6 +231,22 @@ def test_a_larger_screenshot_is_drawn_larger(plotter: Factory) -> None:
     assert (difference <= 6).mean() > 0.95
 
 
+@pytest.mark.parametrize("shape", [(1, 2), (2, 2), (1, 3)])
+def test_a_larger_screenshot_of_subplots_shows_each(plotter: Factory, shape: tuple[int, int]) -> None:
+    """VTK draws it in tiles: some hold nothing of a subplot, others a part of it."""
+    pl = plotter(shape=shape, window_size=(240, 160))
+    for row, column in np.ndindex(shape):
+        pl.subplot(row, column)
+        pl.decals.add_implicit(BALL)
+        place(pl)
+    small = red(shot(pl))
+    large = red(np.asarray(pl.screenshot(None, return_img=True, scale=2))[..., :3].astype(int))
+    assert small.sum() > 200
+    np.testing.assert_allclose(large.sum(), 4 * small.sum(), rtol=0.05)
+    inside = binary_erosion(np.kron(small, np.ones((2, 2), bool)), iterations=4)
+    assert large[inside].all()
+
+
 def test_moving_the_whole_scene(plotter: Factory) -> None:
     """Scaling a plotter, or moving the actor that stands for us, moves what we draw."""
     pl = plotter()
