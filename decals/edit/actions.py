@@ -239,6 +239,8 @@ class Actions(ShapeActions):
 
         def work(tell: Progress, stop: Callable[[], bool]) -> Command:
             count = int((nearest(objects, positions).objects == number).sum())
+            if not count:
+                raise InvalidEdit(f"{objects[number].name!r} has no decals to scatter; a puts one there")
             return Scatter((number,), count, seed).coat(objects, images, progress=tell, cancel=stop)
 
         self.background.make("scatter", work)

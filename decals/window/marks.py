@@ -1,5 +1,6 @@
 """What the window shows besides the scene: outlines of what is selected, a line of text, and the help."""
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,14 @@ LINE, LETTER = 1.3, 0.62
 """Height of a line and width of a letter, in sizes of the font."""
 LARGEST = 18
 """Size of the help's font, in pixels."""
+MARGIN = 12
+"""Pixels left free beside text."""
+NARROWER = 0.9
+"""Of the letters that fit into a line on average, so many do in one of wide letters."""
+MOST_TALK = 0.3
+"""Part of the height that what is said may take."""
+CUT = " …"
+"""Ends what is longer than that."""
 
 
 class Marks:
@@ -32,6 +41,7 @@ class Marks:
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
         self._plotter: Any = plotter
+        self._renderer: Any = plotter.renderer
         self._lines = pv.PolyData()
         self._outlined: tuple[object, ...] = ()
         self._actor = plotter.add_mesh(
@@ -47,12 +57,13 @@ class Marks:
         self._actor.mapper.dataset = self._lines
         self._actor.use_bounds = False
         self._actor.ForceTranslucentOn()  # so that it leaves no depth: what it surrounds is not behind it
+        self._said = ""
         self._status: Any = plotter.add_text(
-            "", position=(12, 10), font_size=9, color="black", render=False, name="decals-status"
+            "", position=(MARGIN, 10), font_size=9, color="black", render=False, name="decals-status"
         )
         self._help: Any = plotter.add_text(
             "\n".join(help_lines()),
-            position=(12, 40),
+            position=(MARGIN, 40),
             font_size=8,
             color="black",
             font="courier",
@@ -79,18 +90,27 @@ class Marks:
         self._actor.SetVisibility(bool(lines))
 
     def say(self, text: str) -> None:
-        """Show a line of text at the bottom."""
+        """Show text at the bottom, in several lines where one is too long."""
+        self._said = text
         self._status.SetInput(text)
+        size = [0.0, 0.0]
+        self._status.GetSize(self._renderer, size)
+        width, height = self._renderer.GetSize()
+        room = width - 2 * MARGIN
+        if size[0] > room > 0:
+            letters = max(int(len(text) * room / size[0] * NARROWER), len(CUT))
+            most = max(int(height * MOST_TALK / size[1]), 1)
+            self._status.SetInput("\n".join(textwrap.wrap(text, letters, max_lines=most, placeholder=CUT)))
 
     def show_help(self, shown: bool) -> None:
         """Show the help, as large as the window allows, or hide it."""
         self._help.SetVisibility(shown)
         if not shown:
             return
-        width, height = self._plotter.window_size
+        width, height = self._renderer.GetSize()
         lines = help_lines()
         tall = (height - 60) / (LINE * len(lines))
-        wide = (width - 24) / (LETTER * max(map(len, lines)))
+        wide = (width - 2 * MARGIN) / (LETTER * max(map(len, lines)))
         self._help.prop.SetFontSize(max(6, min(LARGEST, int(min(tall, wide)))))
 
     def release(self) -> None:
@@ -100,8 +120,8 @@ class Marks:
 
     @property
     def status(self) -> str:
-        """The line of text at the bottom."""
-        return str(self._status.GetInput())
+        """What is said at the bottom."""
+        return self._said
 
     @property
     def help_shown(self) -> bool:

@@ -14,6 +14,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.scenes.scene_file import load_scene
 from decals.window import EditWindow
+from tests.edit.scenes import scene
 
 
 def test_a_drag_deforms_the_neighbours_and_undo_gives_back_the_first_picture(driver):
@@ -177,6 +178,14 @@ def test_scattering_goes_on_in_the_background(driver):
     driver.finish()
     assert number not in driver.document.decals.numbers
     assert driver.session.labels == ("scatter",)
+
+
+def test_scattering_where_no_decals_are_says_so(opened):
+    shown = scene()
+    driver = opened(shown.replace(decals=shown.decals[:0]))
+    driver.press("g", (90, 60))
+    assert driver.session.labels == ()
+    assert "no decals to scatter" in driver.window.marks.status
 
 
 def test_escape_stops_what_goes_on_in_the_background(driver):

@@ -1,0 +1,42 @@
+"""Text in a window: it is to be read in narrow windows too, and leaves the picture its place."""
+
+import pytest
+
+LONG = "expected an existing folder for the scene, found none at 'a/folder/that/is/not/there'; make it first"
+
+
+def box(actor, renderer):
+    """Left, right, bottom and top of a text, in pixels of its subplot."""
+    corners = [0.0] * 4
+    actor.GetBoundingBox(renderer, corners)
+    left, bottom = actor.GetPosition()
+    return left + corners[0], left + corners[1], bottom + corners[2], bottom + corners[3]
+
+
+@pytest.mark.parametrize("width", [240, 320, 640])
+def test_a_long_line_is_broken_where_the_window_ends(opened, width):
+    window = opened().window
+    window.plotter.window_size = (width, 480)
+    window.plotter.render()
+    window.marks.say(LONG)
+    _, right, _, _ = box(window.marks._status, window.plotter.renderer)
+    assert right <= width
+    shown = window.marks._status.GetInput()
+    assert "".join(shown.split()) == "".join(LONG.split())  # a word longer than a line is cut
+    assert window.marks.status == LONG
+
+
+def test_in_a_very_small_window_what_is_said_is_cut(opened):
+    window = opened().window
+    window.marks.say(LONG)
+    _, right, _, top = box(window.marks._status, window.plotter.renderer)
+    assert right <= 180
+    assert top <= 60
+    assert window.marks._status.GetInput().endswith(" …")
+    assert window.marks.status == LONG
+
+
+def test_a_line_that_fits_is_left_as_it_is(opened):
+    window = opened().window
+    window.marks.say("h: help")
+    assert window.marks._status.GetInput() == "h: help"
