@@ -24,7 +24,7 @@ from decals.grid import edit_kernels as kernels
 from decals.grid.cells import ALONE, FINEST, NEIGHBOURHOOD, REACH_WITH_SLACK
 from decals.grid.index import DecalIndex
 from decals.grid.journal import Journal, Range
-from decals.grid.rows import DecalRows, as_numbers, records_with_spare, runs_of, with_spare
+from decals.grid.rows import DecalRows, records_with_spare, runs_of, with_spare
 from decals.grid.trail import Balls, Trail, same_order
 from decals.model import RECORD, Decals
 
@@ -192,7 +192,8 @@ class DecalEditor:
             Not a decal for each number, a number twice, one below 0, or one far beyond the last; nothing
             changes then.
         """
-        rows = self._checked(numbers, decals)
+        _check(decals)
+        rows = self._rows.fitting(numbers, len(decals))
         self._note_many(rows)
         version, known = self._journal.version + 1, rows[self._rows.there(rows)]
         left = self._balls(known)
@@ -235,19 +236,6 @@ class DecalEditor:
     def _balls(self, rows: NDArray[np.int64]) -> Balls:
         """Centres and influence of decals."""
         return self._arrays[RECORDS][RECORD * rows]
-
-    def _checked(self, numbers: ArrayLike, decals: Decals) -> NDArray[np.int64]:
-        _check(decals)
-        rows = as_numbers(numbers)
-        if len(rows) != len(decals):
-            raise InvalidDecals(f"expected a decal for each of {len(rows)} numbers, got {len(decals)}")
-        if len(np.unique(rows)) < len(rows):
-            raise InvalidDecals(f"expected each number once, got {rows.tolist()!s:.80}; drop the repeats")
-        most = self.next_number + len(rows)
-        wrong = rows[(rows < 0) | (rows >= most)]
-        if len(wrong):
-            raise InvalidDecals(f"expected numbers from 0 to {most - 1}, got {wrong[0]}")
-        return rows
 
     def _note_many(self, rows: NDArray[np.int64]) -> None:
         """Leave the index behind where a new one costs less than one change after another."""

@@ -64,9 +64,18 @@ class DecalRows:
         if missing.any():
             number = int(asked[missing][0])
             raise InvalidDecals(f"expected the number of a decal, got {number}; it was deleted or never was")
-        if len(np.unique(asked)) < len(asked):
-            raise InvalidDecals(f"expected each number once, got {asked.tolist()!s:.80}; drop the repeats")
-        return asked
+        return _each_once(asked)
+
+    def fitting(self, numbers: ArrayLike, count: int) -> Numbers:
+        """Give numbers for so many decals, each once and none far beyond the last, or `InvalidDecals`."""
+        asked = as_numbers(numbers)
+        if len(asked) != count:
+            raise InvalidDecals(f"expected a decal for each of {len(asked)} numbers, got {count}")
+        most = self.end + count
+        wrong = asked[(asked < 0) | (asked >= most)]
+        if len(wrong):
+            raise InvalidDecals(f"expected numbers from 0 to {most - 1}, got {wrong[0]}")
+        return _each_once(asked)
 
     def take(self, numbers: ArrayLike) -> Decals:
         """Decals of these numbers, in their order."""
@@ -112,6 +121,13 @@ def as_numbers(numbers: ArrayLike) -> Numbers:
     if array.ndim != 1 or array.dtype.kind not in "iu":
         raise InvalidDecals(f"expected numbers of decals, got {numbers!r:.80}")
     return array.astype(np.int64)
+
+
+def _each_once(numbers: Numbers) -> Numbers:
+    """Give numbers of which none comes twice, or `InvalidDecals`."""
+    if len(np.unique(numbers)) < len(numbers):
+        raise InvalidDecals(f"expected each number once, got {numbers.tolist()!s:.80}; drop the repeats")
+    return numbers
 
 
 def with_spare(array: NDArray[Any], least: int = 0) -> NDArray[Any]:

@@ -25,3 +25,8 @@ class Tenancy:
         stage.samples, stage.draw_scale, stage.measure, stage.patient = self._settings
         if stage.scene is document:
             stage.scene = document.scene if isinstance(self._scene, Scene) else self._scene
+
+
+def edits_at(stage: "Stage", x: int, y: int) -> bool:
+    """Whether some window edits in a stage that covers a place."""
+    return isinstance(stage.scene, Document) and stage.covers(x, y)

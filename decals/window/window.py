@@ -9,7 +9,6 @@ import pyvista as pv
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
 from decals.checks import shown, whole
 from decals.edit.actions import Actions
-from decals.edit.document import Document
 from decals.edit.session import EditSession
 from decals.edit.tools import Tools
 from decals.errors import InvalidEdit, InvalidScene
@@ -31,7 +30,7 @@ from decals.window.home import (
 from decals.window.looking import camera_of, ray_through, view_of
 from decals.window.marks import Marks
 from decals.window.quality import Quality
-from decals.window.tenancy import Tenancy
+from decals.window.tenancy import Tenancy, edits_at
 from decals.window.ticker import TICK, Ticker, running_loop
 from decals.window.timing import Timing
 from decals.window.waiting import NEWS, SLICE, Waiting
@@ -249,10 +248,7 @@ class EditWindow:
 
     def elsewhere(self, x: int, y: int) -> bool:
         """Whether a place is in a subplot of the same plotter that another window edits."""
-        return any(
-            stage is not self.stage and isinstance(stage.scene, Document) and stage.covers(x, y)
-            for stage in self.plotter.decals.stages
-        )
+        return any(edits_at(stage, x, y) for stage in self.plotter.decals.stages if stage is not self.stage)
 
     def _hidden(self, x: float, y: float, position: Floats) -> bool:
         """Whether an actor that was added to the plotter hides a point of a surface."""
