@@ -20,7 +20,10 @@ MOST = 4096
 """Balls that are kept, and edits; who asks for older ones is told that anything may have changed."""
 
 UNEVEN = 100.0
-"""In radial contact, sizes that differ more than so many times: rounding no longer tells reach from none."""
+"""In radial contact, sizes that may differ so many times: rounding still tells reach from none.
+
+(It does up to some 2,000 times: float32 has 2⁻²⁴, and what tells them apart falls with the square.)
+"""
 
 
 class Trail:

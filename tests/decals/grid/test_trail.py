@@ -94,6 +94,49 @@ def test_radial_contact_reaches_as_far_as_neighbours_do_and_anywhere_among_very_
     assert reach_of(ball[:0], Contact.RADIAL, 1e9).shape == (0, 4)
 
 
+@pytest.mark.parametrize("shift", [0.0, 1000.0])
+def test_small_decals_cut_no_ray_whose_rim_they_do_not_reach(shift: float) -> None:
+    """What `UNEVEN` is for: around a large decal's rim a small one is moved, resized and deleted."""
+    rng, changed = np.random.default_rng(8), 0
+    for step in range(60):
+        small = 1.0 / rng.uniform(2.0, UNEVEN)
+        ways = rng.normal(size=(1, 3)) + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        distances = np.array([[0.0], [1.0 + rng.uniform(-3.5, 3.5) * small]])
+        normal = np.array([[0.0, 0.0, 1.0]])
+        decals = Decals(
+            shift + distances * ways, normal.repeat(2, 0), [[1, 0, 0]] * 2, [1.0, small], spill=[True, True]
+        )
+        editor = DecalEditor(decals)
+        rays = ways[1] + rng.normal(size=(2000, 3)) * small * np.exp(rng.uniform(-6.0, 1.5, (2000, 1)))
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        points = (decals.positions[0] + rng.uniform(0.05, 1.0, (2000, 1)) * rays).astype(np.float32)
+
+        def seen(editor: DecalEditor = editor, points: np.ndarray = points) -> np.ndarray:
+            found = evaluate(editor, points, np.tile([0.0, 0.0, 1.0], (2000, 1)), contact=Contact.RADIAL)
+            return np.column_stack([found.owner, found.field, found.uv])
+
+        before, version = seen(), editor.version
+        if step % 3:
+            editor.change(1, positions=decals.positions[1:] + np.float32(0.3 * small) * decals.normals[1:])
+        else:
+            editor.delete(1)
+        touched = editor.touched(version)
+        assert touched is not None
+        reach = reach_of(touched, Contact.PAPER, 0.0)
+        assert reach is not None
+        offsets = points.astype(np.float64) - decals.positions[0]
+        rims = decals.positions[0] + offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
+        near = [
+            (np.linalg.norm(places[:, None] - reach[:, :3], axis=2) < reach[:, 3]).any(axis=1)
+            for places in (points.astype(np.float64), rims)
+        ]
+        different = (seen() != before).any(axis=1)
+        assert not (different & ~near[0] & ~near[1]).any()
+        changed += int((different & ~near[0]).sum())
+    assert changed
+
+
 def test_an_editor_that_becomes_another_has_changed_everywhere() -> None:
     editor = DecalEditor(coat(np.random.default_rng(7)))
     version, other = editor.version, editor.copy()

@@ -1,6 +1,5 @@
 """Pictures drawn part by part: the same bits as at once, however the parts fall, whoever draws in between."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -10,23 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.render.context import Context
 from decals.render.drawing import MOST, UNITS, Drawing
-from decals.render.entry import COMPUTE_BASELINE
 from decals.render.parts import Part
 from decals.render.renderer import Renderer
 from decals.render.targets import KINDS, Targets
 from tests.vtk.scenes import both
 
 SIZE = (117, 90)
-
-
-@pytest.fixture(scope="module", params=["fragment", "compute"])
-def drawer(request: pytest.FixtureRequest, context: Context) -> Iterator[Renderer]:
-    if request.param == "compute" and context.gl.version_code < COMPUTE_BASELINE:
-        pytest.skip(f"no compute shaders in {context.name}")
-    with Context.standalone(entry=request.param) as made, Renderer(made) as renderer:
-        yield renderer
 
 
 def bits(targets: Targets) -> dict[str, bytes]:

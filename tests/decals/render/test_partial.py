@@ -1,6 +1,5 @@
 """What edits cannot reach is not drawn again, and nobody sees a difference: not in a single bit."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +10,6 @@ from decals.field.contact import Contact
 from decals.field.mapping import Mapping
 from decals.grid.editor import DecalEditor
 from decals.model import Decals, Interaction
-from decals.render.context import Context
-from decals.render.entry import COMPUTE_BASELINE
 from decals.render.lamps import Lamp, Lamps
 from decals.render.renderer import Renderer
 from decals.scenes.camera import Camera
@@ -22,14 +19,6 @@ from tests.decals.render.test_drawing import bits
 from tests.vtk.scenes import both
 
 SIZE = (117, 90)
-
-
-@pytest.fixture(scope="module", params=["fragment", "compute"])
-def drawer(request: pytest.FixtureRequest, context: Context) -> Iterator[Renderer]:
-    if request.param == "compute" and context.gl.version_code < COMPUTE_BASELINE:
-        pytest.skip(f"no compute shaders in {context.name}")
-    with Context.standalone(entry=request.param) as made, Renderer(made) as renderer:
-        yield renderer
 
 
 @dataclass
