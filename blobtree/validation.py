@@ -16,6 +16,7 @@ Matrix = tuple[tuple[float, ...], ...]
 
 LARGEST_NUMBER = 1e18
 """Beyond it float32 squares overflow."""
+LIMIT = f"none may be beyond {LARGEST_NUMBER:g}"
 
 
 def finite_vector(name: str, value: object) -> Vector:
@@ -31,7 +32,7 @@ def finite_vector(name: str, value: object) -> Vector:
     except (TypeError, ValueError):
         numbers = ()
     if len(numbers) != 3 or not all(abs(number) <= LARGEST_NUMBER for number in numbers):
-        raise InvalidNode(f"{name}: expected three finite numbers (x, y, z), got {value!r}")
+        raise InvalidNode(f"{name}: expected three finite numbers (x, y, z), got {value!r}; {LIMIT}")
     return numbers
 
 
@@ -50,7 +51,7 @@ def finite_number(name: str, value: object) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not abs(number) <= LARGEST_NUMBER:
-        raise InvalidNode(f"{name}: expected a finite number, got {value!r}")
+        raise InvalidNode(f"{name}: expected a finite number, got {value!r}; {LIMIT}")
     return number
 
 

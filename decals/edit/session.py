@@ -129,6 +129,7 @@ class EditSession:
 
     def begin(self, label: str) -> None:
         """Let all that follows be one entry, until `end`."""
+        instance("label", label, str, InvalidEdit, "it says what was done, such as 'a drag'")
         self.end()
         self._age += 1
         self._stroke = Done(label, Change())

@@ -51,6 +51,13 @@ def test_places_are_three_finite_numbers(bad: Any) -> None:
             attempt()
 
 
+def test_a_number_that_is_too_large_hears_how_large_it_may_be() -> None:
+    with pytest.raises(InvalidNode, match=r"got \(0, 0, 1e\+19\); none may be beyond 1e\+18$"):
+        Point((0, 0, 1e19), radius=1.0)
+    with pytest.raises(InvalidNode, match=r"got 1e\+19; none may be beyond 1e\+18$"):
+        Point((0, 0, 0), radius=1e19)
+
+
 @pytest.mark.parametrize("bad", BAD_POSITIVES, ids=repr)
 def test_radii_are_above_zero(bad: Any) -> None:
     for attempt in (lambda: Point((0, 0, 0), radius=bad), lambda: Segment((0, 0, 0), (1, 0, 0), radius=bad)):

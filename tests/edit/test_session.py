@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from decals.edit import Add, Alter, Carry, Delete, EditSession, Scale
-from decals.errors import InvalidDecals, InvalidScene
+from decals.errors import InvalidDecals, InvalidEdit, InvalidScene
 from decals.scenes.scene_file import load_scene
 from tests.edit.scenes import digest, one, scene
 
@@ -73,6 +73,12 @@ def test_an_error_within_a_stroke_takes_all_of_it_back(session):
     with pytest.raises(InvalidDecals):
         scale_and_fail(session)
     assert digest(session.document) == before
+    assert session.labels == ()
+
+
+def test_a_stroke_says_in_words_what_it_is(session):
+    with pytest.raises(InvalidEdit, match="label: expected a str, got None"), session.stroke(None):
+        session.do(Scale([1], 1.5))
     assert session.labels == ()
 
 
