@@ -205,8 +205,9 @@ class EditWindow:
         self.stage.patient = patient
 
     def make_whole(self) -> None:
-        """Draw a whole frame now, unless the last one was."""
-        if self.stage.waiting or (self.stage.draw_scale, self.stage.samples) != (1.0, self.samples):
+        """Draw a whole frame now, unless the last one was, or the window is closed."""
+        was = not self.stage.waiting and (self.stage.draw_scale, self.stage.samples) == (1.0, self.samples)
+        if not (was or self._closed):
             self.rest()
 
     def _refine(self) -> None:
@@ -227,9 +228,9 @@ class EditWindow:
     # -- what goes on -----------------------------------------------------------------------------------
 
     def tick(self) -> None:
-        """Look after the background work, and draw a whole frame once nothing moves."""
+        """Look after the background work, and draw a whole frame once nothing moves; nothing once closed."""
         now, dragging = time.perf_counter(), self.tools.dragging or self.grip.moving
-        if self.waiting.go_on():
+        if self._closed or self.waiting.go_on():
             return
         if self.background.look(dragging=dragging):
             self.redraw(whole=not dragging)

@@ -77,6 +77,27 @@ def test_a_subplot_that_showed_a_scene_shows_the_edited_one(plotter: Factory) ->
     pl.decals.add(edited.decals[:1])
 
 
+def test_a_tick_after_the_end_leaves_the_plotter_alone(plotter: Factory) -> None:
+    """Scripts tick by themselves, and a timer's last event may be on its way."""
+    pl = plotter()
+    pl.decals.add_scene(scene())
+    pl.decals.stage.samples = 1
+    window = EditWindow(scene(), plotter=pl, samples=3)
+    window.show()
+    window.moving()
+    window._moved = 1.0  # long ago
+    window.close()
+    renders: list[int] = []
+    tag = pl.render_window.AddObserver("StartEvent", lambda *_: renders.append(1))
+    for _ in range(3):
+        window.tick()
+    window.make_whole()  # as for a screenshot, where somebody wrapped that too
+    pl.render_window.RemoveObserver(tag)
+    assert pl.decals.stage.samples == 1
+    assert pl.decals.stage.draw_scale == 1.0
+    assert not renders
+
+
 def test_what_somebody_shows_meanwhile_stays(plotter: Factory) -> None:
     pl = plotter()
     pl.decals.add_scene(scene())
