@@ -4,7 +4,7 @@ from collections.abc import Callable
 from os import PathLike
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree import BlobTreeError
 from blobtree.progress import Progress
@@ -19,7 +19,7 @@ from decals.edit.population import Relax, Scatter
 from decals.edit.session import Command, Done, EditSession
 from decals.edit.shape_actions import TINTS, Cursor, ShapeActions, under
 from decals.errors import DecalsError, InvalidEdit
-from decals.model import LAYERS, PLAIN, Decals
+from decals.model import LAYERS, PLAIN, Decals, Interaction
 from decals.scenes.camera import Camera
 
 LARGER, TURN, FAINTER = 1.1, 7.5, 0.8
@@ -127,6 +127,11 @@ class Actions(ShapeActions):
             raise InvalidEdit("select a decal first: click on one")
         return np.array(self.selection, np.int64)
 
+    @property
+    def _last(self) -> Decals:
+        """The decal that was selected last."""
+        return self.session.document.decals[int(self._chosen()[-1])]
+
     def _alter(self, label: str, name: str, value: Callable[[Decals], ArrayLike]) -> None:
         self._do(Adjust(self._chosen(), name, value, label))
 
@@ -218,13 +223,22 @@ class Actions(ShapeActions):
         self._alter("fade", "opacities", lambda d: np.minimum(d.opacities / FAINTER, 1.0))
 
     def _layer_up(self, _cursor: Cursor, step: int = 1) -> None:
-        self._alter("change the layer", "layers", lambda d: np.clip(d.layers + step, -LAYERS, LAYERS - 1))
+        def shifted(decals: Decals) -> NDArray[np.int32]:
+            layers: NDArray[np.int32] = np.clip(decals.layers + step, -LAYERS, LAYERS - 1)
+            return layers
+
+        self._alter(f"layer {shifted(self._last)[0]}", "layers", shifted)
 
     def _layer_down(self, cursor: Cursor) -> None:
         self._layer_up(cursor, -1)
 
     def _next_interaction(self, _cursor: Cursor) -> None:
-        self._alter("change the interaction", "interactions", lambda d: (d.interactions + 1) % 3)
+        def other(decals: Decals) -> NDArray[np.int32]:
+            interactions: NDArray[np.int32] = (decals.interactions + 1) % len(Interaction)
+            return interactions
+
+        name = Interaction(int(other(self._last)[0])).name.lower()
+        self._alter(f"interaction: {name}", "interactions", other)
 
     # -- many -------------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from decals.edit.actions import LARGER, Actions
 from decals.edit.population import lying_on
 from decals.edit.tools import Tools
 from decals.edit.trees import primitive_at
+from decals.model import Interaction
 from tests.edit.scenes import digest, scene
 
 SIZE = 400, 300
@@ -236,6 +237,19 @@ def test_keys_change_what_is_selected(hands, keys, column, expected):
     for _ in hands.session.labels:
         hands.key("z", ctrl=True)
     assert digest(hands.document) == hands.first
+
+
+def test_layers_and_interactions_are_said_by_name(hands):
+    hands.actions.selection = (3,)
+    for key, said in (("Prior", "layer 1"), ("Next", "layer 0"), ("Next", "layer -1")):
+        hands.key(key)
+        assert hands.actions.message == said
+    names = []
+    for _ in range(3):
+        hands.key("k")
+        names.append(hands.actions.message)
+        assert names[-1].endswith(Interaction(hands.document.decals[3].interactions[0]).name.lower())
+    assert sorted(names) == ["interaction: contact", "interaction: independent", "interaction: overlap"]
 
 
 def test_tints_go_round(hands):
