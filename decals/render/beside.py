@@ -29,8 +29,12 @@ class Beside:
         self._thread.join()
 
     def done(self, seconds: float) -> bool:
-        """Wait for so long at most; whether all is made. What went wrong is raised here."""
+        """Wait for so long at most; whether all is made. What went wrong is raised here, once.
+
+        What is missing then is made by whoever asks for it: another scene may need no more of the same.
+        """
         self._thread.join(seconds)
-        if self._error is not None:
-            raise self._error
+        error, self._error = self._error, None
+        if error is not None:
+            raise error
         return not self._thread.is_alive()

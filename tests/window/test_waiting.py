@@ -5,6 +5,7 @@ import threading
 import numpy as np
 import pytest
 
+from decals.edit import EditSession, Scale
 from decals.errors import TooMuchData
 from decals.render import preparing
 from decals.render.decal_data import library
@@ -192,6 +193,30 @@ def test_what_goes_wrong_in_the_thread_is_raised_where_the_window_listens(waitin
         slices(window)
     assert not window.stage.waiting
     window.tick()
+
+
+def test_what_went_wrong_in_the_thread_is_tried_again_once_something_changed(waiting, opened, monkeypatch):
+    """Another scene may need the same programs, and no more of what there was too much of."""
+    session, failures = EditSession(scene()), [TooMuchData("no room")]
+
+    def refuse(*arguments, **options):
+        if failures:
+            raise failures.pop()
+        return library(*arguments, **options)
+
+    monkeypatch.setattr(preparing, "library", refuse)
+    window = waiting(session)
+    with pytest.raises(TooMuchData, match="no room"):
+        slices(window)
+    session.do(Scale([3], 1.2))
+    window.redraw(whole=True)
+    slices(window)
+    window.rest()
+    monkeypatch.undo()
+    whole = opened(session.document.scene, samples=2)
+    whole.window.marks.say("")
+    whole.window.rest()
+    np.testing.assert_array_equal(pixels(window), pixels(whole.window))
 
 
 def test_a_shader_that_is_refused_is_said_once_and_clearly(waiting, monkeypatch):
