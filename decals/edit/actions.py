@@ -25,6 +25,9 @@ from decals.scenes.camera import Camera
 LARGER, TURN, FAINTER = 1.1, 7.5, 0.8
 """What one step of the wheel or a key does: factors, and degrees."""
 
+FIRST_COAT = 100
+"""Decals of a coat for an object that has none."""
+
 
 class Actions(ShapeActions):
     """Selection, and one method for each action of the table; those on shapes stand in `ShapeActions`.
@@ -252,9 +255,7 @@ class Actions(ShapeActions):
         positions = document.decals.column("positions")
 
         def work(tell: Progress, stop: Callable[[], bool]) -> Command:
-            count = int((nearest(objects, positions).objects == number).sum())
-            if not count:
-                raise InvalidEdit(f"{objects[number].name!r} has no decals to scatter; a puts one there")
+            count = int((nearest(objects, positions).objects == number).sum()) or FIRST_COAT
             return Scatter((number,), count, seed).coat(objects, images, progress=tell, cancel=stop)
 
         self.background.make("scatter", work)

@@ -56,7 +56,7 @@ BINDINGS = (
     Binding("layer_down", ("Next",), "a layer down", Group.DECALS),
     Binding("next_interaction", ("k",), "contact, overlap or independent", Group.DECALS),
     Binding("relax", ("x",), "even out the decals around the cursor", Group.MANY),
-    Binding("scatter", ("g",), "a new coat, as many as now, on the object under the cursor", Group.MANY),
+    Binding("scatter", ("g",), "a new coat on the object under the cursor", Group.MANY),
     Binding("grip", ("m",), "take hold of the primitive under the cursor, or let it go", Group.SHAPE),
     Binding(
         "thicker", ("bracketright",), "the primitive that is held, or under the cursor, thicker", Group.SHAPE

@@ -5,6 +5,7 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
+from decals.edit.actions import FIRST_COAT
 from decals.edit.commands import Scale
 from decals.edit.objects import RemoveObject
 from decals.edit.population import lying_on
@@ -180,12 +181,13 @@ def test_scattering_goes_on_in_the_background(driver):
     assert driver.session.labels == ("scatter",)
 
 
-def test_scattering_where_no_decals_are_says_so(opened):
+def test_an_object_without_decals_gets_a_first_coat(opened):
     shown = scene()
     driver = opened(shown.replace(decals=shown.decals[:0]))
     driver.press("g", (90, 60))
-    assert driver.session.labels == ()
-    assert "no decals to scatter" in driver.window.marks.status
+    driver.finish()
+    assert driver.session.labels == ("scatter",)
+    assert len(driver.document.decals) == FIRST_COAT
 
 
 def test_escape_stops_what_goes_on_in_the_background(driver):
