@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from blobtree.launch import leaving_room
 from blobtree.progress import Cancel, Progress
+from decals.edit.sharing import SHORT_TURNS
 
 Outcome = Callable[[], "Job | None"]
 """Carries out, in the thread of the window, what a job came to; it may give a job to go on with."""
@@ -71,7 +72,7 @@ class Worker:
 
     def _run(self, job: Job) -> None:
         try:
-            with leaving_room():
+            with leaving_room(), SHORT_TURNS:
                 self._outcome = job.work(self._tell, self._cancelled.is_set)
         except Exception as error:  # it is raised where the outcome is asked for
             self._error = error
