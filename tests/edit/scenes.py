@@ -7,7 +7,7 @@ import numpy as np
 
 from blobtree import Point, Segment
 from decals.coat.seeding import seed
-from decals.edit import Document
+from decals.edit import Document, EditSession
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject
@@ -49,3 +49,14 @@ def digest(document: Document) -> str:
     return hashlib.sha256(
         b"".join([repr(parts).encode(), *map(np.ndarray.tobytes, [*arrays, records])])
     ).hexdigest()
+
+
+def goes_back_and_forth(session: EditSession) -> None:
+    """Make sure that undoing all gives back the first state of `scene`, and redoing all the last."""
+    entries, last = len(session.labels), digest(session.document)
+    for _ in range(entries):
+        session.undo()
+    assert digest(session.document) == digest(EditSession(scene()).document)
+    for _ in range(entries):
+        session.redo()
+    assert digest(session.document) == last

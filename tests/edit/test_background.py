@@ -1,62 +1,23 @@
 """Long edits beside the window: what they come to is what they would have come to at once."""
 
 import threading
-from functools import partial
-from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from decals.edit import Actions, Delete, EditSession, MovePrimitive, Pick, RemoveObject, Scale, Turn
+from decals.edit import Actions, Delete, EditSession, MovePrimitive, RemoveObject, Scale, Turn
 from decals.edit.background import WAIT, doing
-from decals.errors import InvalidEdit, InvalidScene
-from decals.scenes.scene_file import load_scene
+from decals.errors import InvalidEdit
+from tests.edit.background import (
+    LONG,
+    Held,
+    finish,
+    press,
+    threaded,
+)
 from tests.edit.scenes import digest, scene
 
-LONG = 30.0
-"""Seconds that a test would wait for a thread; it never takes as long."""
-
-
-@pytest.fixture(autouse=True)
-def few_are_many(monkeypatch):
-    monkeypatch.setattr("decals.edit.background.MANY", 5)
-    monkeypatch.setattr("decals.edit.session.FEW", 5)
-
-
-def threaded(**options):
-    return Actions(EditSession(scene()), threaded=True, **options)
-
-
-def finish(actions):
-    while actions.background.busy:
-        actions.background.look(timeout=LONG)
-
-
-def surface_pick(actions):
-    item = actions.session.document.objects[0]
-    positions, normals = item.surface.project([[0.0, 0.3, 1.2]])
-    return Pick(0, positions[0], normals[0], -1)
-
-
-def press(actions, action):
-    actions.perform(action, lambda: surface_pick(actions))
-
-
-class Held:
-    """A step that waits in its thread until it is let go."""
-
-    def __init__(self, command):
-        self.begun, self.go, self.runs = threading.Event(), threading.Event(), 0
-        self._step = doing(command)
-
-    def __call__(self, session):
-        self.runs += 1
-        self.begun.set()
-        assert self.go.wait(LONG)
-        return self._step(session)
+pytestmark = pytest.mark.usefixtures("few_are_many")
 
 
 @pytest.mark.parametrize(
@@ -275,186 +236,12 @@ def test_relaxing_goes_on_where_its_object_went():
     assert actions.session.labels[0] == "remove an object"
 
 
-def hold_writing(monkeypatch):
-    """Let saves wait until they are let go; the events that say that one has begun, and let it go."""
-    from decals.scenes import scene_file
-
-    begun, go, write = threading.Event(), threading.Event(), scene_file.write_atomically
-
-    def slowly(path, content):
-        begun.set()
-        assert go.wait(LONG)
-        write(path, content)
-
-    monkeypatch.setattr(scene_file, "write_atomically", slowly)
-    return begun, go
-
-
-def test_a_save_writes_what_was_there_when_it_was_asked_for(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
-    actions = threaded(path=path)
-    session = actions.session
-    session.do(Scale([1], 2.0))
-    saved = session.document.decals.decals
-    begun, go = hold_writing(monkeypatch)
-    press(actions, "save")
-    assert begun.wait(LONG)
-    session.do(Scale([1], 3.0))
-    assert session.modified
-    assert "save" in actions.background.progress
-    assert not path.exists()
-    go.set()
-    finish(actions)
-    assert str(path) in actions.message
-    assert load_scene(path).decals.packed().tobytes() == saved.packed().tobytes()
-    assert session.modified
-    session.undo()
-    assert not session.modified
-    session.undo()
-    assert session.modified
-
-
-def test_who_asks_twice_to_save_gets_the_later_state(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
-    actions = threaded(path=path)
-    session = actions.session
-    begun, go = hold_writing(monkeypatch)
-    press(actions, "save")
-    assert begun.wait(LONG)
-    session.do(Scale([1], 3.0))
-    press(actions, "save")
-    assert "once more" in actions.message
-    press(actions, "let_go")
-    go.set()
-    finish(actions)
-    assert not session.modified
-    assert load_scene(path).decals.radii[1] == session.document.decals[1].radii[0]
-
-
-def test_saving_and_a_long_edit_go_on_together(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
-    actions = threaded(path=path)
-    begun, go = hold_writing(monkeypatch)
-    press(actions, "save")
-    assert begun.wait(LONG)
-    actions.background.edit("scale", doing(Scale(np.arange(60), 2.0)))
-    assert "save" in actions.background.progress
-    assert "scale" in actions.background.progress
-    go.set()
-    finish(actions)
-    assert actions.session.modified
-    assert actions.session.labels == ("scale",)
-
-
-def test_a_save_that_fails_says_so_and_nothing_counts_as_saved(tmp_path):
-    actions = threaded(path=tmp_path / "nowhere" / "scene.json")
-    actions.session.do(Scale([1], 2.0))
-    press(actions, "save")
-    finish(actions)
-    assert "existing folder" in actions.message
-    assert actions.session.modified
-
-
-def test_no_room_for_the_file_is_said_and_the_old_file_stays(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
-    actions = threaded(path=path)
-    press(actions, "save")
-    finish(actions)
-    before = path.read_bytes()
-    actions.session.do(Scale([1], 2.0))
-
-    def full(_descriptor):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    press(actions, "save")
-    finish(actions)
-    assert "No space left" in actions.message
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
-    assert actions.session.modified
-
-
-def test_closing_waits_for_the_file(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
-    actions = threaded(path=path)
-    session = actions.session
-    begun, go = hold_writing(monkeypatch)
-    press(actions, "save")
-    assert begun.wait(LONG)
-    session.do(Scale([1], 3.0))
-    press(actions, "save")
-    go.set()
-    actions.background.close()
-    assert not session.modified
-    assert load_scene(path).decals.radii[1] == session.document.decals[1].radii[0]
-    assert not actions.background.busy
-
-
-def test_closing_says_what_could_not_be_saved(tmp_path):
-    actions = threaded(path=tmp_path / "nowhere" / "scene.json")
-    press(actions, "save")
-    with pytest.raises(InvalidScene, match="existing folder"):
-        actions.background.close()
-    actions.background.close()
-
-
 def test_closing_drops_an_edit():
     actions = threaded()
     first = digest(actions.session.document)
     actions.background.edit("scale", doing(Scale(np.arange(60), 2.0)))
     actions.background.close()
     assert digest(actions.session.document) == first
-
-
-def test_what_few_decals_come_to_is_a_change_of_these_alone(monkeypatch):
-    monkeypatch.setattr("decals.edit.session.FEW", 500)
-    session = EditSession(scene())
-    editor = session.document.decals
-    version = editor.version
-    fork = session.fork()
-    fork.do(Scale([1, 4], 2.0))
-    assert session.adopt(fork)
-    records = editor.changes(version)["decal_records"]
-    assert sum(end - first for first, end in records) == 8
-    assert editor.touched(version) is not None
-
-
-def test_a_fork_goes_its_own_way_and_is_adopted_once():
-    session = EditSession(scene())
-    session.do(Scale([1], 2.0))
-    first, heard = digest(session.document), []
-    session.listen(heard.append)
-    fork = session.fork()
-    fork.undo()
-    fork.do(Delete([3, 4]))
-    assert digest(session.document) == first
-    late = session.fork()
-    assert session.adopt(fork)
-    assert [change.after.numbers.tolist() for change in heard] == [[1], [3, 4]]
-    assert session.labels == ("delete",)
-    assert not session.document.decals.has([3]).any()
-    assert not session.adopt(late)
-    assert not EditSession(scene()).adopt(session.fork())
-    session.undo()
-    assert digest(session.document) == digest(EditSession(scene()).document)
-
-
-@pytest.mark.parametrize("few", [0, 500])
-def test_a_fork_of_a_fork_brings_all_that_was_done(monkeypatch, few):
-    monkeypatch.setattr("decals.edit.session.FEW", few)
-    session, alone = EditSession(scene()), EditSession(scene())
-    fork = session.fork()
-    further = fork.fork()
-    for command in (Scale([1, 4], 2.0), Delete([3])):
-        further.do(command)
-        alone.do(command)
-    assert fork.adopt(further)
-    fork.do(Turn([5], 9.0))
-    alone.do(Turn([5], 9.0))
-    assert session.adopt(fork)
-    assert session.labels == alone.labels
-    assert digest(session.document) == digest(alone.document)
 
 
 def test_what_nobody_foresaw_is_raised_and_what_waits_goes_on():
@@ -473,119 +260,6 @@ def test_what_nobody_foresaw_is_raised_and_what_waits_goes_on():
     actions.background.edit("scale", doing(Scale(np.arange(60), 2.0)))
     finish(actions)
     assert actions.session.labels == ("scale",)
-
-
-def test_after_a_save_that_nobody_foresaw_fails_the_later_one_is_written(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
-    actions = threaded(path=path)
-    actions.session.do(Scale([1], 2.0))
-    begun, go = threading.Event(), threading.Event()
-
-    def failing(*_args, **_options):
-        begun.set()
-        assert go.wait(LONG)
-        raise MemoryError
-
-    with monkeypatch.context() as patched:
-        patched.setattr("decals.edit.session.save_scene", failing)
-        press(actions, "save")
-        assert begun.wait(LONG)
-        press(actions, "save")
-    go.set()
-    with pytest.raises(MemoryError):
-        actions.background.look(timeout=LONG)
-    finish(actions)
-    assert load_scene(path).decals.radii[1] == 2 * scene().decals.radii[1]
-    assert not actions.session.modified
-
-
-KEYS = (
-    "larger", "turn_left", "delete", "duplicate", "next_tint", "fainter", "layer_up", "relax", "place",
-    "undo", "undo", "redo", "redo",
-)  # fmt: skip
-OPERATIONS = st.one_of(
-    st.tuples(st.just("press"), st.sampled_from(KEYS), st.sampled_from(["all", "one", "two"])),
-    st.tuples(st.sampled_from(["look", "look", "escape", "save"])),
-)
-
-
-class Twins:
-    """Actions in a thread, and others at once that are asked when the thread's are seen."""
-
-    def __init__(self, path):
-        self.live, self.shadow = threaded(path=path), Actions(EditSession(scene()))
-        self.path, self.pending, self.saved = Path(path), None, None
-
-    def press(self, key, chosen):
-        numbers = self.live.session.document.decals.numbers
-        selection = {"all": numbers, "one": numbers[:1], "two": numbers[-2:]}[chosen]
-        at, was_busy = surface_pick(self.live), self.live.background.busy_editing
-        entries = self.shadow.session.next_undo, self.shadow.session.next_redo
-        self.live.selection = tuple(selection.tolist())
-        self.live.perform(key, lambda: at)
-        echo = partial(self._echo, key, tuple(selection.tolist()), at, entries)
-        if self.live.background.busy_editing and not was_busy:
-            self.pending = echo
-        elif self.live.message != WAIT:
-            echo()
-
-    def _echo(self, key, selection, at, entries):
-        """Do what was seen now; an undo only where nothing else came before it."""
-        now = self.shadow.session.next_undo, self.shadow.session.next_redo
-        if (key == "undo" and now[0] is not entries[0]) or (key == "redo" and now[1] is not entries[1]):
-            return
-        self.shadow.selection = selection
-        self.shadow.perform(key, lambda: at)
-
-    def look(self):
-        self.live.background.look(timeout=LONG)
-        if not self.live.background.busy_editing and self.pending is not None:
-            self.pending()
-            self.pending = None
-
-    def escape(self):
-        self.live.background.cancel()
-        self.pending = None
-
-    def save(self):
-        self.saved = self.live.session.document.decals.decals.packed().tobytes()
-        self.live.perform("save", lambda: None)
-
-    def settle(self):
-        while self.live.background.busy:
-            self.look()
-
-    def same(self):
-        return digest(self.live.session.document) == digest(self.shadow.session.document)
-
-
-@settings(max_examples=40, deadline=None)
-@given(operations=st.lists(OPERATIONS, max_size=14), few=st.sampled_from([0, 5, 500]))
-def test_whatever_comes_between_nothing_is_lost(tmp_path_factory, operations, few):
-    with patch("decals.edit.session.FEW", few):
-        go_through(operations, tmp_path_factory)
-
-
-def go_through(operations, tmp_path_factory):
-    twins = Twins(tmp_path_factory.mktemp("saves") / "scene.json")
-    for name, *arguments in operations:
-        getattr(twins, name)(*arguments)
-        if twins.pending is None:
-            assert twins.same()
-    twins.settle()
-    assert twins.same()
-    session = twins.live.session
-    twins.live.settle()
-    last = digest(session.document)
-    entries = len(session.labels)
-    for _ in range(entries):
-        session.undo()
-    assert digest(session.document) == digest(EditSession(scene()).document)
-    for _ in range(entries):
-        session.redo()
-    assert digest(session.document) == last
-    if twins.saved is not None:
-        assert load_scene(twins.path).decals.packed().tobytes() == twins.saved
 
 
 def test_an_edit_that_no_thread_does_raises_at_once():

@@ -10,7 +10,7 @@ from decals.edit import Background, EditSession
 from decals.edit.background import doing
 from decals.errors import DecalsError
 from tests.edit.fuzz import Monkey
-from tests.edit.scenes import digest, scene
+from tests.edit.scenes import digest, goes_back_and_forth, scene
 
 
 def play(session, monkey, count):
@@ -113,13 +113,7 @@ def test_random_commands_in_the_background_while_hands_go_on(seed, count, few, m
         assert session.labels == shadow.labels
         assert content(session) == content(shadow)
         check_whole(session.document)
-    entries, last = len(session.labels), digest(session.document)
-    for _ in range(entries):
-        session.undo()
-    assert digest(session.document) == digest(EditSession(scene()).document)
-    for _ in range(entries):
-        session.redo()
-    assert digest(session.document) == last
+    goes_back_and_forth(session)
 
 
 def content(session):
