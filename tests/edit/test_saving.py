@@ -45,15 +45,21 @@ def test_a_save_writes_what_was_there_when_it_was_asked_for(tmp_path, monkeypatc
     assert session.modified
 
 
-def test_who_asks_twice_to_save_gets_the_later_state(tmp_path, monkeypatch):
-    path = tmp_path / "scene.json"
+def saving_twice(path, monkeypatch):
+    """Actions that write, and were asked to save a later state too; the event that lets the writing go on."""
     actions = threaded(path=path)
-    session = actions.session
     begun, go = hold_writing(monkeypatch)
     press(actions, "save")
     assert begun.wait(LONG)
-    session.do(Scale([1], 3.0))
+    actions.session.do(Scale([1], 3.0))
     press(actions, "save")
+    return actions, go
+
+
+def test_who_asks_twice_to_save_gets_the_later_state(tmp_path, monkeypatch):
+    path = tmp_path / "scene.json"
+    actions, go = saving_twice(path, monkeypatch)
+    session = actions.session
     assert "once more" in actions.message
     press(actions, "let_go")
     go.set()
@@ -108,13 +114,8 @@ def test_no_room_for_the_file_is_said_and_the_old_file_stays(tmp_path, monkeypat
 
 def test_closing_waits_for_the_file(tmp_path, monkeypatch):
     path = tmp_path / "scene.json"
-    actions = threaded(path=path)
+    actions, go = saving_twice(path, monkeypatch)
     session = actions.session
-    begun, go = hold_writing(monkeypatch)
-    press(actions, "save")
-    assert begun.wait(LONG)
-    session.do(Scale([1], 3.0))
-    press(actions, "save")
     go.set()
     actions.background.close()
     assert not session.modified
