@@ -1,38 +1,58 @@
-# Every target sets up what it needs first: `make demo` and `make test` work in a fresh clone.
+# Each target sets up what it needs first: `make demo` and `make test` work in a fresh clone.
 
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
-# Compiled Warp kernels live and die with the environment that compiled them.
+# Compiled Warp kernels belong to the environment that compiled them.
 export WARP_CACHE_PATH ?= $(CURDIR)/$(VENV)/warp-cache
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
+# Tests that no ordinary machine can run: those that need a CUDA device or a browser.
+ORDINARY := not gpu and not browser
+PYTEST := $(BIN)/python -m pytest --durations=10
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check format lint types wheel check-lower gl clean
+.PHONY: help demo test test-slow test-all check format lint prose types types-tests wheel check-lower docs gl clean
 
-help:  ## Say what each target does
+help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s%s\n", $$1, $$2 }' Makefile
 
 demo: $(INSTALLED) gl  ## Draw the pictures under out/
 	$(BIN)/implicit-decals demo
 
-test: $(INSTALLED) gl  ## Run the tests, less the slow ones and those that need a CUDA device or a browser
-	$(BIN)/python -m pytest -m "not slow and not gpu and not browser"
+test: $(INSTALLED) gl  ## Run the tests, except those that are slow or need a CUDA device or a browser
+	$(PYTEST) --numprocesses 2 --dist loadfile -m "not slow and $(ORDINARY)"
 
-check: lint types wheel  ## Check format, lint, types and the built wheel
+test-slow: $(INSTALLED) gl  ## Run the slow tests, except those that need a CUDA device or a browser
+	$(PYTEST) -m "slow and $(ORDINARY)"
+
+test-all: test test-slow  ## Run both
+
+check: lint prose types wheel  ## Check format, lint, prose, types and the built wheel
 
 lint: $(INSTALLED)  ## Check format and lint
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 
-# setuptools maps apps/ and shaders/ to implicit_decals.*; mypy reads no such mapping, so it is shown a tree
-# that has the packages where an installed copy has them (pyproject.toml puts it on mypy's path).
-types: $(INSTALLED)  ## Check types
-	@mkdir -p build/types/implicit_decals
-	@ln -sfn ../../../apps build/types/implicit_decals/apps
-	@ln -sfn ../../../shaders build/types/implicit_decals/shaders
-	$(BIN)/mypy -p blobtree -p decals -p implicit_decals.apps -p implicit_decals.shaders
+prose: $(INSTALLED)  ## List words and docstrings that the style rules exclude
+	$(BIN)/python .ci/check_prose.py
+
+# setuptools installs apps/ and shaders/ as decals.apps and decals.shaders; mypy cannot read that mapping.
+# It checks a tree of links that has the packages where an installed copy has them.
+LINKS := build/types
+MYPY = cd $(LINKS) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml
+$(LINKS): FORCE
+	@rm -rf $@ && mkdir -p $@/decals
+	@ln -s $(CURDIR)/blobtree $(CURDIR)/tests $@/
+	@ln -s $(CURDIR)/decals/* $(CURDIR)/apps $(CURDIR)/shaders $@/decals/
+FORCE:
+
+types: $(INSTALLED) $(LINKS)  ## Check types
+	$(MYPY) -p blobtree -p decals
+
+types-tests: $(INSTALLED) $(LINKS)  ## List the type errors of the tests
+	-$(MYPY) -p blobtree -p decals -p tests
 
 wheel: $(INSTALLED)  ## Build the wheel and try it outside the checkout
 	$(BIN)/python .ci/check_wheel.py
@@ -40,23 +60,27 @@ wheel: $(INSTALLED)  ## Build the wheel and try it outside the checkout
 check-lower: $(INSTALLED) gl  ## Run the tests with the oldest dependencies that pyproject.toml allows
 	$(BIN)/python .ci/check_lower.py
 
-format: $(INSTALLED)  ## Format the code and mend what lint can mend
+docs: $(INSTALLED) gl  ## Build the documentation under build/docs, with the extra `docs`
+	$(BIN)/python -m pip install --quiet --editable '.[dev,docs]'
+	$(BIN)/python -m sphinx -E -W --keep-going -b html docs build/docs
+
+format: $(INSTALLED)  ## Format the code and apply lint's automatic corrections
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
 gl: | $(BIN)/python
 	@.ci/install-gl $(BIN)/python
 
-clean:  ## Remove everything that is made, the environment included
+clean:  ## Remove all generated files, the environment included
 	rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
 	@.ci/make-venv $(VENV)
 
-# An editable install: only a changed pyproject.toml asks for another one.
+# An editable install: repeated only after a change of pyproject.toml.
 # setuptools warns at each that a folder may hide the package; here the folder is the package.
 $(INSTALLED): pyproject.toml | $(BIN)/python
-	@echo "Installing what pyproject.toml asks for into $(VENV): the first time 1.5 GB, in some minutes"
+	@echo "Installing the dependencies of pyproject.toml into $(VENV): the first time 1.5 GB, some minutes"
 	@PYTHONWARNINGS="ignore:Editable installation" $(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@

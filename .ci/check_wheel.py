@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("blobtree", "decals", "implicit_decals.apps", "implicit_decals.shaders")
+PACKAGES = ("blobtree", "decals", "decals.apps", "decals.shaders")
 IMPORT_ALL = """
 import importlib, pathlib, pkgutil, sys
 for package in map(importlib.import_module, sys.argv[2:]):
@@ -35,7 +35,7 @@ def expected_files() -> set[str]:
     """Name every module, shader and marker of the four packages as the wheel should hold it."""
     files = set()
     for package in PACKAGES:
-        folder = ROOT / package.removeprefix("implicit_decals.")
+        folder = ROOT / {"decals.apps": "apps", "decals.shaders": "shaders"}.get(package, package)
         inside = package.replace(".", "/")
         found = [
             p for pattern in ("*.py", "*.glsl", "*.vert", "*.frag", "*.comp") for p in folder.rglob(pattern)
@@ -52,7 +52,7 @@ def check_content(wheel: Path) -> None:
     if missing:
         sys.exit(f"the wheel lacks {', '.join(missing)}: see packages and package-data in pyproject.toml")
     tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
-    if tops != {"blobtree", "decals", "implicit_decals"}:
+    if tops != {"blobtree", "decals"}:
         sys.exit(f"the wheel has {sorted(tops)} at its top level")
 
 

@@ -1,1 +1,1 @@
-"""What people start: the command line, its commands and the samples."""
+"""Applications: the command line, its commands, the sample models and the gallery."""

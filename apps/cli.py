@@ -1,6 +1,6 @@
-"""The command ``implicit-decals``: argument parsing, and errors as one line each.
+"""The command ``implicit-decals``: argument parsing and one-line error messages.
 
-Nothing heavy is imported here, so that ``--help`` and ``--version`` answer at once.
+This module imports nothing heavy, so ``--help`` and ``--version`` are fast.
 """
 
 import sys
@@ -11,8 +11,8 @@ from cyclopts import App, CycloptsError
 from rich.console import Console
 from rich.markup import escape
 
-from .commands.help_texts import BENCH_TABLE, HELP
-from .errors import UsageError
+from decals.apps.commands.help_texts import BENCH_TABLE, HELP
+from decals.apps.errors import UsageError
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -25,10 +25,10 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 for _name, _help in HELP.items():
-    app.command(f"implicit_decals.apps.commands.{_name}:{_name}", name=_name, help=_help)
+    app.command(f"decals.apps.commands.{_name}:{_name}", name=_name, help=_help)
 
 _bench = App(name="bench", help="Measure this machine.", help_format="plaintext")
-_bench.command("implicit_decals.apps.commands.bench:table", name="table", help=BENCH_TABLE)
+_bench.command("decals.apps.commands.bench:table", name="table", help=BENCH_TABLE)
 app.command(_bench)
 
 
@@ -38,12 +38,12 @@ def run(tokens: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     tokens : sequence of str, optional
-        The arguments; those of the process if not given.
+        The arguments. Default: those of the process.
 
     Returns
     -------
     int
-        0 if all went well, 2 for input that cannot be used, 130 if interrupted, else the command's own code.
+        The exit code: 0 for success, 2 for invalid input, 130 for an interrupt, else that of the command.
     """
     try:
         result = app(tokens, print_error=False, exit_on_error=False, result_action="return_value")
@@ -51,28 +51,28 @@ def run(tokens: Sequence[str] | None = None) -> int:
         Console(stderr=True).print("interrupted")
         return INTERRUPTED
     except OSError as error:
-        return _complain(f"{error.strerror or error}: {error.filename or 'a file'}")
-    except Exception as error:  # which kinds are bad input is asked only now: their imports take a second
-        if not isinstance(error, _bad_input()):
-            raise  # a bug: its traceback is what we want to see
-        return _complain(str(error))
+        return _print_error(f"{error.strerror or error}: {error.filename or 'a file'}")
+    except Exception as error:  # the errors of invalid input are imported only now, as that takes a second
+        if not isinstance(error, _input_errors()):
+            raise  # a bug: show its traceback
+        return _print_error(str(error))
     return result if isinstance(result, int) else 0
 
 
-def _bad_input() -> tuple[type[Exception], ...]:
-    """Give the errors that mean bad input; their packages are loaded by now, or failed to."""
-    from blobtree import BlobTreeError
-    from decals.errors import DecalsError
+def _input_errors() -> tuple[type[Exception], ...]:
+    """Return the exceptions that report invalid input."""
+    from blobtree import ImplicitDecalsError
 
-    return CycloptsError, UsageError, DecalsError, BlobTreeError
+    return CycloptsError, UsageError, ImplicitDecalsError
 
 
-def _complain(message: str) -> int:
+def _print_error(message: str) -> int:
+    """Print a message as one line on stderr; return the exit code."""
     line = " ".join(message.split())
     Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {escape(line)}", highlight=False)
     return BAD_INPUT
 
 
 def main() -> None:
-    """Entry point of the command."""
+    """Run the command line and exit with its code."""
     sys.exit(run())

@@ -1,5 +1,5 @@
-"""What people can get wrong on the command line."""
+"""Errors of the command line."""
 
 
 class UsageError(ValueError):
-    """An argument that cannot be used; the message says what was expected, what came and what to do."""
+    """An unusable argument; the message names the expected value, the actual one and a remedy."""

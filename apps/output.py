@@ -1,4 +1,4 @@
-"""Where results go: checked before the long work, written in one step after it."""
+"""Output files: checked before the long work, written atomically after it."""
 
 import io
 import tempfile
@@ -11,16 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from blobtree.nodes.io import write_atomically
-
-from .errors import UsageError
+from blobtree.io import write_atomically
+from decals.apps.errors import UsageError
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
 
 
 def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
-    """Make sure that a file of one of these kinds can be written there.
+    """Check that a file of one of these formats can be written.
 
     Raises
     ------
@@ -34,26 +33,26 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
         raise UsageError(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
     folder = path.parent
     if not folder.is_dir():
-        raise UsageError(f"the output folder {str(folder)!r} does not exist; make it first")
+        raise UsageError(f"the output folder {str(folder)!r} does not exist; create it first")
     try:
-        tempfile.TemporaryFile(dir=folder).close()  # permissions alone do not tell
+        tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof
     except OSError as error:
         reason = f"the output folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
         raise UsageError(reason) from error
 
 
 def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write uint8[h, w, 3 or 4] as the kind of picture that the extension names."""
-    kind = Image.registered_extensions()[path.suffix.lower()]
+    """Write uint8[h, w, 3 or 4] in the format of the file's extension."""
+    file_format = Image.registered_extensions()[path.suffix.lower()]
     content = io.BytesIO()
     picture = Image.fromarray(pixels)
-    (picture.convert("RGB") if kind == "JPEG" else picture).save(content, kind)
+    (picture.convert("RGB") if file_format == "JPEG" else picture).save(content, file_format)
     write_atomically(path, content.getvalue())
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary path of the same kind beside ``path``, and move it there if all went well."""
+    """Yield a temporary path beside ``path``, and rename it to ``path`` on success."""
     temporary = path.with_name(f".{uuid.uuid4().hex}{path.suffix}")
     try:
         yield temporary

@@ -1,25 +1,22 @@
-"""Where pictures are taken from: presets and directions, and a camera that fits the objects closely."""
+"""The ``--camera`` option: presets and directions of view."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from decals.errors import DecalsError
-from decals.scenes.camera import Camera
-from decals.scenes.scene import MeshObject, SceneObject, bounds_of
-
-from .errors import UsageError
+from decals import Camera, ImplicitDecalsError, MeshObject
+from decals.apps.errors import UsageError
+from decals.scenes.camera import THREE_QUARTER as THREE_QUARTER_DIRECTION
+from decals.scenes.objects import SceneObject
 
 Vector = tuple[float, float, float]
 Size = tuple[int, int]
-Floats = NDArray[np.float64]
 
 THREE_QUARTER = "three-quarter"
 PRESETS: dict[str, Vector] = {
-    THREE_QUARTER: (0.55, 0.35, 1.0),
+    THREE_QUARTER: THREE_QUARTER_DIRECTION,
     "front": (0.0, 0.0, 1.0),
     "back": (0.0, 0.0, -1.0),
     "left": (-1.0, 0.0, 0.0),
@@ -87,50 +84,22 @@ def parse_view(camera: str | None, axes: Axes) -> View:
 
 
 def frame(objects: Sequence[SceneObject], view: View, size: Size) -> Camera:
-    """Look at objects so that they just fill a picture of this size.
-
-    Of all eyes that look in the view's direction, the nearest one that sees every point of the surfaces. Each
-    edge of the picture is a plane through the eye; two opposite ones fix its place across and its distance.
+    """Return a camera that looks at objects so that they fill a picture of this size.
 
     Raises
     ------
     UsageError
         If the objects are too large or too small for a camera.
     """
-    aspect = size[0] / size[1]
-    try:
-        base = Camera.framing(bounds_of(objects), direction=view.direction, up=view.up, aspect=aspect)
-    except DecalsError as error:
-        raise UsageError(f"no camera sees the model: {error}") from error
-    half = math.tan(math.radians(base.fov) / 2) / _MARGIN
-    x, y, z = base.axes @ (_points(objects) - np.asarray(base.target)).T
-    across, far_x = _between(x, z, half * aspect)
-    above, far_y = _between(y, z, half)
-    distance = max(far_x, far_y)
-    middle = float(z.mean())
-    if not distance > middle:  # all points in one place
-        return base
-    eye, target = (
-        np.asarray(base.target) + np.array([across, above, depth]) @ base.axes for depth in (distance, middle)
+    points = np.concatenate(
+        [
+            item.vertices if isinstance(item, MeshObject) else item.surface.sample(_SAMPLES, seed=0)[0]
+            for item in objects
+        ]
     )
-    return Camera(_triple(eye), _triple(target), base.up, base.fov)
-
-
-def _between(x: Floats, z: Floats, slope: float) -> tuple[float, float]:
-    """Place and distance of the nearest eye, looking along -z, that sees (x, z) between two planes."""
-    right, left = float((x + slope * z).max()), float((-x + slope * z).max())
-    return 0.5 * (right - left), 0.5 * (right + left) / slope
-
-
-def _points(objects: Sequence[SceneObject]) -> Floats:
-    """All vertices of meshes, and many points of other surfaces."""
-    parts = [
-        item.vertices if isinstance(item, MeshObject) else item.surface.sample(_SAMPLES, seed=0)[0]
-        for item in objects
-    ]
-    return np.concatenate(parts).astype(np.float64)
-
-
-def _triple(vector: Floats) -> Vector:
-    x, y, z = vector.tolist()
-    return x, y, z
+    try:
+        return Camera.fitting(
+            points, direction=view.direction, up=view.up, aspect=size[0] / size[1], margin=_MARGIN
+        )
+    except ImplicitDecalsError as error:
+        raise UsageError(f"no camera sees the model: {error}") from error

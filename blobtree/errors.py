@@ -1,58 +1,68 @@
-"""What can go wrong in a BlobTree.
+"""The exceptions of both packages, as one tree.
 
-BlobTreeError (ValueError)
-├── InvalidNode         a node was given a parameter that makes no field
-├── InvalidPoints       points to evaluate are not a finite n×3 array
-├── InvalidResolution   a cell size or resolution that no grid can have
-├── InvalidDevice       a Warp device that there is not
-├── InvalidFile         a file that holds no BlobTree
-├── InvalidDefinition   an own skeleton or operator is not what its definition claims
-├── UnknownKind         a node of an own kind that this process has no definition of
-├── MissingPackage      a package that this one call needs is not installed (also an ImportError)
-├── Cancelled           the caller's `cancel` stopped the work
-└── UntranslatableFunction   a typed function outside the subset that GLSL shares
+::
+
+    ImplicitDecalsError(Exception)            root of every error raised on purpose
+    ├── InvalidInput(ValueError)              an argument that cannot be used
+    │   ├── InvalidNode                       a parameter that makes no field
+    │   ├── InvalidPoints                     points or directions of a wrong shape, or not finite
+    │   ├── InvalidResolution                 a cell size or resolution that no grid can have
+    │   ├── InvalidDevice                     a Warp device that does not exist
+    │   ├── InvalidFile                       a file that holds no BlobTree
+    │   ├── InvalidDefinition                 a custom node that differs from what its definition claims
+    │   ├── UnknownKind                       a custom node without a definition in this process
+    │   ├── UntranslatableFunction            a typed function outside the subset that GLSL shares
+    │   └── (decals.errors adds its own)
+    ├── MissingPackage(ImportError)           an optional package is not installed
+    └── Cancelled                             the caller's `cancel` stopped the work
+
+A message says what was expected, what came, and what to do.
 """
 
 
-class BlobTreeError(ValueError):
-    """Root of every error that `blobtree` raises on purpose."""
+class ImplicitDecalsError(Exception):
+    """Root of every error that `blobtree` and `decals` raise on purpose."""
 
 
-class InvalidNode(BlobTreeError):
+class InvalidInput(ImplicitDecalsError, ValueError):
+    """An argument that cannot be used."""
+
+
+class InvalidNode(InvalidInput):
     """A node was given a parameter that makes no field."""
 
 
-class InvalidPoints(BlobTreeError):
-    """Points to evaluate are not a finite n×3 array."""
+class InvalidPoints(InvalidInput):
+    """Points or directions of a wrong shape, or not finite."""
 
 
-class InvalidResolution(BlobTreeError):
+class InvalidResolution(InvalidInput):
     """A cell size or resolution that no grid can have."""
 
 
-class InvalidDevice(BlobTreeError):
-    """A Warp device that there is not."""
+class InvalidDevice(InvalidInput):
+    """A Warp device that does not exist."""
 
 
-class InvalidFile(BlobTreeError):
+class InvalidFile(InvalidInput):
     """A file that holds no BlobTree."""
 
 
-class InvalidDefinition(BlobTreeError):
-    """A user's skeleton or operator is not what its definition claims."""
+class InvalidDefinition(InvalidInput):
+    """A custom skeleton or operator differs from what its definition claims."""
 
 
-class UnknownKind(BlobTreeError):
-    """A node of a user's kind that this process has no definition of."""
+class UnknownKind(InvalidInput):
+    """A custom node without a definition in this process."""
 
 
-class MissingPackage(BlobTreeError, ImportError):
-    """A package that this one call needs is not installed."""
+class UntranslatableFunction(InvalidInput):
+    """A typed function outside the subset of Python that GLSL shares."""
 
 
-class Cancelled(BlobTreeError):
+class MissingPackage(ImplicitDecalsError, ImportError):
+    """An optional package is not installed."""
+
+
+class Cancelled(ImplicitDecalsError):
     """The caller's `cancel` stopped the work; nothing has changed."""
-
-
-class UntranslatableFunction(BlobTreeError):
-    """A typed function steps outside the subset of Python that GLSL shares."""

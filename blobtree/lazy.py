@@ -1,22 +1,22 @@
-"""Properties that are made when somebody asks for the first time, from any thread."""
+"""Properties that are computed at first access, from any thread."""
 
 from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar, overload
 
-Made = TypeVar("Made")
+Value = TypeVar("Value")
 
 
-class Lazy(Generic[Made]):
-    """A decorator as `functools.cached_property`, without a lock.
+class Lazy(Generic[Value]):
+    """A decorator like `functools.cached_property`, without a lock.
 
-    Before Python 3.12 that has one for all objects of a class: a window that asks one of them would wait for
-    what a thread makes of another. Here two threads that ask the same one at once both make it, and get the
-    same.
+    Before Python 3.12, `cached_property` holds one lock for all objects of a class, so a slow computation for
+    one object blocks access to all others. Here two threads may compute the same value at once; both get the
+    value that was stored first.
     """
 
-    def __init__(self, make: Callable[[Any], Made]) -> None:
-        self._make = make
-        self.__doc__ = make.__doc__
+    def __init__(self, compute: Callable[[Any], Value]) -> None:
+        self._compute = compute
+        self.__doc__ = compute.__doc__
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -25,10 +25,10 @@ class Lazy(Generic[Made]):
     def __get__(self, instance: None, owner: type) -> Self: ...
 
     @overload
-    def __get__(self, instance: object, owner: type | None = None) -> Made: ...
+    def __get__(self, instance: object, owner: type | None = None) -> Value: ...
 
-    def __get__(self, instance: object | None, owner: type | None = None) -> Self | Made:
+    def __get__(self, instance: object | None, owner: type | None = None) -> Self | Value:
         if instance is None:
             return self
-        found: Made = vars(instance).setdefault(self._name, self._make(instance))
-        return found
+        value: Value = vars(instance).setdefault(self._name, self._compute(instance))
+        return value

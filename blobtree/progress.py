@@ -1,21 +1,21 @@
-"""How long work reports itself and is stopped: two callback types, used by every room."""
+"""Callbacks by which long work reports its progress and is cancelled."""
 
 from collections.abc import Callable
 
-from blobtree.errors import BlobTreeError, Cancelled
+from blobtree.errors import Cancelled, ImplicitDecalsError
 
 Progress = Callable[[str, float], None]
-"""Called with the stage in plain words and the fraction of it that is done, from 0 to 1."""
+"""A function (stage in plain words, fraction of it that is done, from 0 to 1)."""
 
 Cancel = Callable[[], bool]
-"""Asked again and again whether to stop."""
+"""A function that returns True once the work is to stop; it is called often."""
 
 
 def watched(progress: Progress | None, cancel: Cancel | None) -> Progress:
-    """A callback that passes reports on and raises `Cancelled` at the first one after `cancel` says so."""
+    """Return a callback that forwards reports, and raises `Cancelled` after `cancel` returned True."""
     for name, callback in (("progress", progress), ("cancel", cancel)):
         if callback is not None and not callable(callback):
-            raise BlobTreeError(f"{name}: expected a function or None, got {callback!r}")
+            raise ImplicitDecalsError(f"{name}: expected a function or None, got {callback!r}")
 
     def report(stage: str, fraction: float) -> None:
         if cancel is not None and cancel():

@@ -1,4 +1,4 @@
-"""Checks that turn what people type into plain tuples of finite numbers, or say what is wrong with it."""
+"""Checks of arguments: each returns the value as plain finite numbers, or raises an error that says more."""
 
 import math
 import reprlib
@@ -20,13 +20,7 @@ LIMIT = f"none may be beyond {LARGEST_NUMBER:g}"
 
 
 def finite_vector(name: str, value: object) -> Vector:
-    """`value` as three floats.
-
-    Raises
-    ------
-    InvalidNode
-        It is not three finite numbers.
-    """
+    """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
     try:
         numbers = tuple(float(component) for component in cast(Iterable[Any], value))
     except (TypeError, ValueError):
@@ -36,8 +30,24 @@ def finite_vector(name: str, value: object) -> Vector:
     return numbers
 
 
+def nonzero_vector(name: str, value: object) -> Vector:
+    """Return `value` as three floats that are not all 0; raise `InvalidNode` otherwise."""
+    vector = finite_vector(name, value)
+    if not any(vector):
+        raise InvalidNode(f"{name}: expected a direction, got the zero vector")
+    return vector
+
+
+def non_negative_vector(name: str, value: object) -> Vector:
+    """Return `value` as three floats from 0; raise `InvalidNode` otherwise."""
+    vector = finite_vector(name, value)
+    if min(vector) < 0.0:
+        raise InvalidNode(f"{name}: expected three numbers from 0, got {value!r}")
+    return vector
+
+
 def positive_number(name: str, value: object) -> float:
-    """`value` as a finite float above zero; InvalidNode otherwise."""
+    """Return `value` as a finite float above 0; raise `InvalidNode` otherwise."""
     number = finite_number(name, value)
     if number <= 0.0:
         raise InvalidNode(f"{name}: expected a number above 0, got {value!r}")
@@ -45,7 +55,7 @@ def positive_number(name: str, value: object) -> float:
 
 
 def finite_number(name: str, value: object) -> float:
-    """`value` as a finite float; InvalidNode otherwise."""
+    """Return `value` as a finite float; raise `InvalidNode` otherwise."""
     try:
         number = float(cast(Any, value))
     except (TypeError, ValueError):
@@ -56,7 +66,7 @@ def finite_number(name: str, value: object) -> float:
 
 
 def color_triple(value: object) -> Vector:
-    """`value` as red, green, blue in [0, 1]; InvalidNode otherwise."""
+    """Return `value` as red, green and blue in [0, 1]; raise `InvalidNode` otherwise."""
     color = finite_vector("color", value)
     if min(color) < 0.0 or max(color) > 1.0:
         raise InvalidNode(f"color: expected red, green, blue in [0, 1], got {value!r}")
@@ -64,7 +74,7 @@ def color_triple(value: object) -> Vector:
 
 
 def affine_matrix(value: ArrayLike) -> Matrix:
-    """`value` (3×4 or 4×4) as an invertible affine map; InvalidNode otherwise."""
+    """Return `value` (3×4 or 4×4) as an invertible affine map; raise `InvalidNode` otherwise."""
     try:
         matrix = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -80,7 +90,7 @@ def affine_matrix(value: ArrayLike) -> Matrix:
 
 
 def point_array(points: ArrayLike) -> NDArray[np.float32]:
-    """`points` as float32[n, 3] of finite numbers up to LARGEST_NUMBER; InvalidPoints otherwise."""
+    """Return `points` as float32[n, 3], finite up to LARGEST_NUMBER; raise `InvalidPoints` otherwise."""
     try:
         with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused below
             array = np.asarray(points, dtype=np.float32)
@@ -98,9 +108,3 @@ def point_array(points: ArrayLike) -> NDArray[np.float32]:
             "drop those points first"
         )
     return np.ascontiguousarray(array)
-
-
-def settle(node: object, **fields: object) -> None:
-    """Put checked values into a frozen node while it is being made."""
-    for name, value in fields.items():
-        object.__setattr__(node, name, value)

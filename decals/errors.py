@@ -1,62 +1,65 @@
-"""What can go wrong with decals, as exceptions.
+"""The exceptions of this package; `blobtree.errors` has the rest of the tree.
 
 ::
 
-    DecalsError(Exception)                    everything this package raises on purpose
-    ├── InvalidDecals(ValueError)             arrays that are no decals: shapes, NaN, radius ≤ 0, ...
-    ├── InvalidMesh(ValueError)               a mesh that has no surface: empty, NaN, zero area, ...
-    ├── InvalidPoints(ValueError)             points or directions that are none: shapes, NaN, ...
-    ├── InvalidDevice(ValueError)             a Warp device that there is not
-    ├── InvalidSeeding(ValueError)            an impossible wish for seeds: negative count, no surface, ...
-    ├── InvalidImage(ValueError)              a file or array that is no image
-    ├── InvalidScene(ValueError)              a scene or scene file that does not hold together
-    ├── InvalidEdit(ValueError)               a command that makes no sense for the document as it is
-    ├── TooMuchData(ValueError)               more than fits into a texture of this graphics card
-    └── NoGraphics(RuntimeError)              no usable OpenGL here; the message says what to install
-
-A message says what was expected, what came, and what to do.
+    ImplicitDecalsError(Exception)            root of every error raised on purpose
+    ├── InvalidInput(ValueError)              an argument that cannot be used
+    │   ├── InvalidDecals                     arrays that are no decals: shapes, NaN, radius ≤ 0
+    │   ├── InvalidMesh                       a mesh without a surface: empty, NaN, zero area
+    │   ├── InvalidScattering                 an impossible request for particles: negative count, no surface
+    │   ├── InvalidImage                      a file or array that is no image
+    │   ├── InvalidScene                      a scene or scene file that is not consistent
+    │   ├── InvalidEdit                       a command that the document cannot take
+    │   └── TooMuchData                       more than fits into a texture of this graphics card
+    └── NoGraphics(RuntimeError)              no usable OpenGL; the message says what to install
 """
 
+from blobtree.errors import Cancelled, ImplicitDecalsError, InvalidDevice, InvalidInput, InvalidPoints
 
-class DecalsError(Exception):
-    """Root of every error that this package raises on purpose."""
+__all__ = [
+    "Cancelled",
+    "ImplicitDecalsError",
+    "InvalidDecals",
+    "InvalidDevice",
+    "InvalidEdit",
+    "InvalidImage",
+    "InvalidInput",
+    "InvalidMesh",
+    "InvalidPoints",
+    "InvalidScattering",
+    "InvalidScene",
+    "NoGraphics",
+    "TooMuchData",
+]
 
 
-class InvalidDecals(DecalsError, ValueError):
+class InvalidDecals(InvalidInput):
     """Arrays that do not describe decals."""
 
 
-class InvalidMesh(DecalsError, ValueError):
-    """A mesh that has no surface to put decals on."""
+class InvalidMesh(InvalidInput):
+    """A mesh without a surface to put decals on."""
 
 
-class InvalidPoints(DecalsError, ValueError):
-    """Points or directions that are none."""
+class InvalidScattering(InvalidInput):
+    """An impossible request for particles."""
 
 
-class InvalidDevice(DecalsError, ValueError):
-    """A Warp device that there is not."""
-
-
-class InvalidSeeding(DecalsError, ValueError):
-    """A wish for seeds that cannot be met."""
-
-
-class InvalidImage(DecalsError, ValueError):
+class InvalidImage(InvalidInput):
     """A file or array that is no image."""
 
 
-class InvalidScene(DecalsError, ValueError):
-    """A scene, or a scene file, that does not hold together."""
+class InvalidScene(InvalidInput):
+    """A scene or scene file that is not consistent."""
 
 
-class InvalidEdit(DecalsError, ValueError):
-    """A command that makes no sense for the document as it is."""
+class InvalidEdit(InvalidInput):
+    """A command that the document cannot take."""
 
 
-class TooMuchData(DecalsError, ValueError):
+class TooMuchData(InvalidInput):
     """More decals, or a larger tree, than fit into a texture of this graphics card."""
 
 
-class NoGraphics(DecalsError, RuntimeError):
+class NoGraphics(ImplicitDecalsError, RuntimeError):
     """No usable OpenGL on this machine; the message says what to install."""

@@ -1,77 +1,81 @@
-"""Decals as data: a frozen, validated structure of arrays (paper, section 3.1)."""
+"""`Decals`: decals as data, a frozen and validated structure of arrays (paper, section 3.1)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from enum import IntEnum
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree.formulas.kernels import RIM
-from decals.columns import (
-    Bools,
-    Ints,
+from blobtree._typing import BoolArray, Float32Array, Int32Array
+from blobtree.formulas.falloff import RIM
+from decals.images.pixels import decode_srgb
+from decals.validation import (
+    bool_array,
     check_range,
-    chosen_rows,
-    flags,
-    floats,
-    orthogonal,
-    shares,
-    unit,
-    whole,
+    finite_array,
+    orthogonal_vectors,
+    row_selection,
+    unit_interval,
+    unit_vectors,
+    whole_array,
 )
 
 FACING_LIMIT = -0.25
-"""Smallest cosine between a decal's normal and that of the surface it colours, unless it spills."""
+"""Smallest cosine between the normals of a decal and of the surface that it colours, unless it spills."""
 
-LARGEST = 2.0**50
+MAX_COORDINATE = 2.0**50
 """Largest coordinate or radius, about 1e15: its square still fits float32."""
 
-SMALLEST_RADIUS = 2.0**-50
+MIN_RADIUS = 2.0**-50
 """Smallest radius, about 1e-15: its square is still a normal float32."""
 
-LAYERS = 2**19
-"""Layers run from -LAYERS to LAYERS - 1."""
+LAYER_LIMIT = 2**19
+"""Layers are numbered from -LAYER_LIMIT to LAYER_LIMIT - 1."""
 
-PLAIN = -1
-"""Image of a decal that shows its tint alone."""
+NO_IMAGE = -1
+"""Image number of a decal that shows only its tint."""
 
 RECORD = 4
 """Rows of the packed record of a decal."""
 
-DEFAULT_RANK = 4 * LAYERS + 1
+DEFAULT_RANK = 4 * LAYER_LIMIT + 1
 """Rank of a contact decal of layer 0."""
 
-MOST_IMAGES = 2**24
-"""Images that there may be: the packed record carries an image's number as a float32."""
-
-Floats = NDArray[np.float32]
+MAX_IMAGES = 2**24
+"""Largest number of images: a packed record holds an image number as a float32."""
 
 
 class Interaction(IntEnum):
-    """What a decal does to the others of its layer (paper, sections 1 and 3.2), from the lowest up.
+    """Interaction of a decal with the others of its layer (paper, sections 1 and 3.2), in draw order.
 
-    In every layer the contact decals together are one sheet: at each point the one of highest field shows,
-    deformed so that it touches its neighbours. Independent decals lie under the sheet of their layer,
-    overlapping ones over it; both are drawn whole, push nobody and are pushed by nobody.
+    The decals of a layer that push each other are called contact decals. At each point, the contact decal of
+    highest field shows, deformed so that it touches its neighbours. Independent decals are drawn below the
+    contact decals of their layer, overlapping decals above them. Both are undeformed and push no other decal.
+
+    Examples
+    --------
+    >>> import decals
+    >>> list(decals.Interaction)
+    [<Interaction.INDEPENDENT: 0>, <Interaction.PUSH: 1>, <Interaction.OVERLAP: 2>]
     """
 
     INDEPENDENT = 0
-    """Undeformed, overlapped by the contact decals of its layer."""
-    CONTACT = 1
-    """Jostles with the other contact decals of its layer."""
+    """Undeformed, drawn below the contact decals of its layer."""
+    PUSH = 1
+    """Pushes, and is pushed by, the other contact decals of its layer."""
     OVERLAP = 2
-    """Undeformed, drawn over the contact decals of its layer: eyes on scales."""
+    """Undeformed, drawn above the contact decals of its layer, such as eyes on scales."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Decals:
-    """n decals, one row each; arrays are checked, copied and read-only.
+    """n decals, one row each. Arrays are checked, copied and read-only.
 
     Each decal is a point primitive and a tangent frame (paper, section 3.1 and figure 1). Normals and
-    tangents may come in any length. A tangent that is not perpendicular to its normal is projected onto
-    the tangent plane (Gram-Schmidt); frames that are orthonormal within rounding are kept bit for bit.
+    tangents may have any length. A tangent that is not perpendicular to its normal is projected onto the
+    tangent plane (Gram-Schmidt). Frames that are orthonormal within rounding are kept bit for bit.
 
     Parameters
     ----------
@@ -82,62 +86,102 @@ class Decals:
     tangents : float32[n, 3]
         Direction of the image's u axis; the v axis is normal × tangent.
     radii : float32[n]
-        Visible radius of an undisturbed decal: where its rim lies.
+        Visible radius in model units: distance of the rim of an undeformed decal from its centre.
     images : int32[n], optional
-        Index into the scene's list of images, or PLAIN (-1) for the tint alone. Default 0.
+        Index into the scene's list of images, or NO_IMAGE (-1) for the tint alone. Default 0.
     spill : bool[n], optional
-        Whether a decal also colours surface that faces away from it, such as the far side of a thin wall.
+        True if a decal also colours surface that faces away from it, such as the far side of a thin wall.
+        Default False.
     interactions : int32[n], optional
-        An `Interaction` each. Default CONTACT.
+        An `Interaction` each. Default PUSH.
     layers : int32[n], optional
-        Layers are drawn from the lowest up, decals of equal rank in the order of their numbers. Default 0.
+        Layers are drawn from the lowest up. Overlapping or independent decals of one layer are drawn in the
+        order of their numbers. Default 0.
     tints : float32[n, 3], optional
-        sRGB colour by which the image is multiplied (in linear light), or of a plain decal. Default white.
+        sRGB colour from 0 to 1 by which the image is multiplied in linear light. Default white.
     opacities : float32[n], optional
-        From 0, unseen, to 1, the default.
+        From 0 (invisible) to 1, the default.
 
     Raises
     ------
     InvalidDecals
-        For wrong shapes, NaN or infinity, coordinates beyond LARGEST, radii outside SMALLEST_RADIUS to
-        LARGEST, zero normals or tangents, a tangent along its normal, or images, interactions, layers, tints
-        or opacities out of range.
+        Wrong shapes, NaN or infinity, coordinates beyond MAX_COORDINATE, radii outside MIN_RADIUS to
+        MAX_COORDINATE, zero normals or tangents, a tangent along its normal, or images, interactions, layers,
+        tints or opacities out of range.
+
+    See Also
+    --------
+    scatter : distribute decals over models.
+    DecalEditor : change decals in place.
+
+    Examples
+    --------
+    >>> import decals
+    >>> disks = decals.Decals(
+    ...     positions=[[0, 0, 0], [1, 0, 0]],
+    ...     normals=[[0, 0, 1]] * 2,
+    ...     tangents=[[1, 0, 0]] * 2,
+    ...     radii=[0.6, 0.3],
+    ... )
+    >>> disks
+    Decals(2, radii from 0.3 to 0.6)
+    >>> disks.replace(layers=[0, 1]).layered
+    True
     """
 
-    positions: Floats
-    normals: Floats
-    tangents: Floats
-    radii: Floats
+    positions: Float32Array
+    normals: Float32Array
+    tangents: Float32Array
+    radii: Float32Array
     _: KW_ONLY
-    images: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
-    spill: Bools = None  # type: ignore[assignment]  # filled in by __post_init__
-    interactions: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
-    layers: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
-    tints: Floats = None  # type: ignore[assignment]  # filled in by __post_init__
-    opacities: Floats = None  # type: ignore[assignment]  # filled in by __post_init__
+    images: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    spill: BoolArray = None  # type: ignore[assignment]  # filled in by __post_init__
+    interactions: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    layers: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    tints: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    opacities: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            positions: ArrayLike,
+            normals: ArrayLike,
+            tangents: ArrayLike,
+            radii: ArrayLike,
+            *,
+            images: ArrayLike | None = None,
+            spill: ArrayLike | None = None,
+            interactions: ArrayLike | None = None,
+            layers: ArrayLike | None = None,
+            tints: ArrayLike | None = None,
+            opacities: ArrayLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
-        positions = floats("positions", self.positions, (-1, 3))
+        positions = finite_array("positions", self.positions, (-1, 3))
         count = len(positions)
-        normals = floats("normals", self.normals, (count, 3))
-        tangents = floats("tangents", self.tangents, (count, 3))
-        radii = floats("radii", self.radii, (count,))
-        check_range("radii", radii, SMALLEST_RADIUS, LARGEST)
-        check_range("positions", positions, -LARGEST, LARGEST)
-        normals = unit("normals", normals)
+        normals = finite_array("normals", self.normals, (count, 3))
+        tangents = finite_array("tangents", self.tangents, (count, 3))
+        radii = finite_array("radii", self.radii, (count,))
+        check_range("radii", radii, MIN_RADIUS, MAX_COORDINATE)
+        check_range("positions", positions, -MAX_COORDINATE, MAX_COORDINATE)
+        normals = unit_vectors("normals", normals)
         arrays = {
             "positions": positions.astype(np.float32),
             "normals": normals.astype(np.float32),
-            "tangents": orthogonal(unit("tangents", tangents), normals).astype(np.float32),
+            "tangents": orthogonal_vectors(unit_vectors("tangents", tangents), normals).astype(np.float32),
             "radii": radii.astype(np.float32),
-            "images": whole("images", self.images, count, low=PLAIN, high=MOST_IMAGES - 1, default=0),
-            "spill": flags("spill", self.spill, count),
-            "interactions": whole(
-                "interactions", self.interactions, count, low=0, high=2, default=Interaction.CONTACT
+            "images": whole_array("images", self.images, count, low=NO_IMAGE, high=MAX_IMAGES - 1, default=0),
+            "spill": bool_array("spill", self.spill, count),
+            "interactions": whole_array(
+                "interactions", self.interactions, count, low=0, high=2, default=Interaction.PUSH
             ),
-            "layers": whole("layers", self.layers, count, low=-LAYERS, high=LAYERS - 1, default=0),
-            "tints": shares("tints", self.tints, (count, 3)).astype(np.float32),
-            "opacities": shares("opacities", self.opacities, (count,)).astype(np.float32),
+            "layers": whole_array(
+                "layers", self.layers, count, low=-LAYER_LIMIT, high=LAYER_LIMIT - 1, default=0
+            ),
+            "tints": unit_interval("tints", self.tints, (count, 3)).astype(np.float32),
+            "opacities": unit_interval("opacities", self.opacities, (count,)).astype(np.float32),
         }
         for name, array in arrays.items():
             array.flags.writeable = False
@@ -145,74 +189,79 @@ class Decals:
 
     @classmethod
     def empty(cls) -> Self:
-        """No decals at all."""
-        none = np.zeros((0, 3), np.float32)
-        return cls(positions=none, normals=none, tangents=none, radii=none[:, 0])
+        """Return 0 decals."""
+        rows = np.zeros((0, 3), np.float32)
+        return cls(positions=rows, normals=rows, tangents=rows, radii=rows[:, 0])
 
     @classmethod
     def concatenate(cls, parts: Iterable["Decals"]) -> Self:
-        """All decals of all parts, in their order."""
+        """Return all decals of all parts, in their order."""
         sources = [cls.empty(), *parts]
-        return cls.of_rows({name: np.concatenate([getattr(p, name) for p in sources]) for name in _FIELDS})
+        return cls.of_rows({name: np.concatenate([getattr(p, name) for p in sources]) for name in COLUMNS})
 
     @classmethod
     def of_rows(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """Decals whose arrays are rows of other decals', under the same names: nothing is checked again."""
-        made = cls.__new__(cls)
-        for name in _FIELDS:
+        """Return decals of arrays that are rows of valid decals, by name, without another check."""
+        decals = cls.__new__(cls)
+        for name in COLUMNS:
             arrays[name].flags.writeable = False
-            object.__setattr__(made, name, arrays[name])
-        return made
+            object.__setattr__(decals, name, arrays[name])
+        return decals
 
     def replace(self, **arrays: ArrayLike) -> Self:
-        """Exchange some arrays; the result is checked again."""
+        """Return decals with other arrays of these names; the result is checked.
+
+        Raises
+        ------
+        InvalidDecals
+            An array is invalid.
+        """
         return replace(self, **arrays)  # type: ignore[arg-type]  # any array-like is converted
 
     def __len__(self) -> int:
         return len(self.positions)
 
     def __repr__(self) -> str:
-        """How many, and how large: thousands of rows would bury a notebook."""
+        """Return the number of decals and the range of their radii."""
         if len(self) == 0:
             return "Decals(0)"
         return f"Decals({len(self)}, radii from {self.radii.min():.3g} to {self.radii.max():.3g})"
 
     def __getitem__(self, rows: slice | ArrayLike) -> Self:
-        """Pick some of the decals by a slice, a mask or an array of indices."""
-        chosen = rows if isinstance(rows, slice) else np.atleast_1d(chosen_rows(rows))
-        arrays = {name: getattr(self, name)[chosen] for name in _FIELDS}
+        """Return some of the decals, by a slice, a mask or an array of indices."""
+        chosen = rows if isinstance(rows, slice) else np.atleast_1d(row_selection(rows))
+        arrays = {name: getattr(self, name)[chosen] for name in COLUMNS}
         return type(self).of_rows(arrays) if arrays["radii"].ndim == 1 else type(self)(**arrays)
 
     @property
-    def bitangents(self) -> Floats:
+    def bitangents(self) -> Float32Array:
         """Direction of each image's v axis, n × u: float32[n, 3]."""
         return np.cross(self.normals, self.tangents)
 
     @property
-    def influence(self) -> Floats:
+    def influence(self) -> Float32Array:
         """Radius s at which each decal's field ends (paper, figure 1): float32[n], radii / 0.454202."""
         return (self.radii / np.float64(RIM)).astype(np.float32)
 
     @property
-    def ranks(self) -> Ints:
-        """Place of each decal's sheet or own drawing in the stack, from the lowest up: int32[n].
+    def ranks(self) -> Int32Array:
+        """Position of each decal in the draw order, from the lowest up: int32[n].
 
-        Decals of one rank are drawn in the order of their numbers, save contact decals, which share a sheet.
+        Independent or overlapping decals of equal rank are drawn in the order of their numbers. Contact
+        decals of equal rank are drawn at once, because they deform each other.
         """
-        return (self.layers + LAYERS) * 4 + self.interactions
+        return (self.layers + LAYER_LIMIT) * 4 + self.interactions
 
     @property
     def layered(self) -> bool:
-        """Whether decals lie over each other: they are not all contact decals of one layer."""
-        return bool(
-            (self.interactions != Interaction.CONTACT).any() or (self.layers != self.layers[:1]).any()
-        )
+        """True if decals can cover each other: they are not all contact decals of one layer."""
+        return bool((self.interactions != Interaction.PUSH).any() or (self.layers != self.layers[:1]).any())
 
-    def packed(self) -> Floats:
-        """Lay out the record that devices read: float32[4n, 4], RECORD rows a decal.
+    def packed(self) -> Float32Array:
+        """Return the records that devices read: float32[4n, 4], RECORD rows for each decal.
 
-        Rows are (position, s), (normal, rank), (tangent, image) and (tint in linear light, opacity). The rank
-        of a decal that spills is a half more: decals/field/ownership.py reads both.
+        Rows are (position, s), (normal, rank), (tangent, image) and (tint in linear light, opacity), with the
+        influence radius s. A decal that spills has ½ added to its rank. `decals.record` reads the records.
         """
         record = np.empty((len(self), RECORD, 4), np.float32)
         record[:, 0, :3] = self.positions
@@ -221,15 +270,10 @@ class Decals:
         record[:, 1, 3] = self.ranks + np.where(self.spill, 0.5, 0.0)
         record[:, 2, :3] = self.tangents
         record[:, 2, 3] = self.images
-        record[:, 3, :3] = linear_light(self.tints)
+        record[:, 3, :3] = decode_srgb(self.tints.astype(np.float64))
         record[:, 3, 3] = self.opacities
         return record.reshape(-1, 4)
 
 
-def linear_light(colors: Floats) -> Floats:
-    """Decode sRGB colours from 0 to 1."""
-    wide = colors.astype(np.float64)
-    return np.where(wide <= 0.04045, wide / 12.92, ((wide + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-_FIELDS = tuple(field.name for field in fields(Decals))
+COLUMNS = tuple(field.name for field in fields(Decals))
+"""Names of the arrays of `Decals`."""

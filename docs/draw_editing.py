@@ -1,6 +1,6 @@
 """Draw the pictures of docs/editing.md: ``python docs/draw_editing.py [FOLDER]``.
 
-A window without a screen is driven by the same events that hands make.
+A window without a screen is driven by the same events that user make.
 """
 
 import sys

@@ -24,7 +24,7 @@ def draw(path: Path) -> None:
     plotter.set_background("white")
     for column, creases in enumerate((False, True)):
         plotter.subplot(0, column)
-        mesh = cut.mesh(resolution=36, split_normals=creases)
+        mesh = cut.to_pyvista(resolution=36, split_normals=creases)
         plotter.add_mesh(mesh, color=CLAY, show_edges=True, edge_color=INK, line_width=1)
         plotter.camera_position = VIEW
     plotter.subplot(0, 2)

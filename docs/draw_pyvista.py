@@ -1,7 +1,7 @@
 """Draw the pictures of docs/pyvista.md: run its Python as it stands.
 
 ``python docs/draw_pyvista.py`` writes docs/images/pyvista/*.png, but for browser.png, a browser's picture:
-``python -m tests.doors.in_browser page docs/images/pyvista/browser.png`` takes that.
+``python -m tests.frontends.in_browser page docs/images/pyvista/browser.png`` takes that.
 """
 
 import os

@@ -1,10 +1,10 @@
-// How open the sky is above a pixel, from the G-buffer around it: screen-space obscurance, in the manner of McGuire,
-// Osman, Bukowski and Hennessy (HPG 2011): taps on a spiral that is turned differently at each sample.
+// Screen-space obscurance from the G-buffer around a pixel, after McGuire, Osman, Bukowski and Hennessy (HPG 2011):
+// taps on a spiral that is turned differently at each sample.
 //@ include camera.glsl
 uniform ivec2 tile_corner;      // of this tile in the picture, in samples
 uniform ivec2 tile_size;
-uniform float ambient_radius;   // in the world: what is farther away hides nothing
-uniform int ambient_limit;      // in samples: as far as the G-buffer may be asked
+uniform float ambient_radius;   // in the world: farther surface hides nothing
+uniform int ambient_limit;      // in samples: farthest tap in the G-buffer
 
 const int TAPS = 13;
 const float TURNS = 5.0;        // of the spiral of taps; prime to TAPS

@@ -3,11 +3,11 @@ layout(std140) uniform CameraBlock {
     mat4 view_projection;
     vec4 eye;         // xyz: where the ray through the tile's lower left corner begins; w: 1 in perspective, 0 parallel
     vec4 ray_corner;  // xyz: that ray's direction; in perspective its part along the view is 1, else it is unit
-    vec4 ray_right;   // xyz: what one pixel to the right adds, to the direction in perspective, else to the origin
+    vec4 ray_right;   // xyz: step of one pixel to the right, of the direction in perspective, else of the origin
     vec4 ray_up;      // xyz: the same for one pixel up
 };
 
-// What the way to a place in pixels, such as gl_FragCoord.xy, adds.
+// Offset of a position in pixels, such as gl_FragCoord.xy.
 vec3 ray_step(vec2 pixel) {
     return pixel.x * ray_right.xyz + pixel.y * ray_up.xyz;
 }
@@ -25,7 +25,7 @@ float ray_spread(vec3 position, vec3 ray) {
     return eye.w > 0.0 ? dot(position - eye.xyz, ray) / dot(ray, ray) : 1.0;
 }
 
-// What gl_FragDepth must be at a point, equal to what a rasterised triangle there gets.
+// Value of gl_FragDepth at a point, equal to that of a rasterised triangle there.
 float window_depth(vec3 position) {
     vec4 clip = view_projection * vec4(position, 1.0);
     return 0.5 * clip.z / clip.w + 0.5;

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .errors import ComposeError
+from decals.shaders.errors import ComposeError
 
 DIRECTORY = Path(__file__).parent
 """Where the project's own shader files lie."""

@@ -1,5 +1,5 @@
-// Our picture in somebody else's frame: colour, blended by how much of the pixel is covered, and depth.
-// SAMPLES: texels a pixel along each axis; 0: fewer than one, magnified. Known beforehand, the loops cost half.
+// Our picture in VTK's frame: colour, blended by the covered part of the pixel, and depth.
+// SAMPLES: texels a pixel along each axis; 0: fewer than one, magnified. As a constant it halves the loops' cost.
 //@ include color.glsl
 uniform sampler2D light;  // linear, premultiplied alpha; filtered bilinearly, to its edges
 uniform sampler2D depth;

@@ -1,5 +1,5 @@
-// Which decals show at a surface point, where in their images the point lies, and what colour that is. All formulas
-// and loops are those of decals/field/ownership.py; GLSL adds the image look-up.
+// Owner, image coordinates and colour of decals at a surface point. All formulas and loops are those of
+// decals/field/ownership.py; GLSL adds the image look-up.
 //@ include footprint.glsl
 uniform sampler2D decal_records;  // decal i: 4i (position, s), 4i + 1 (normal, rank), (u, image), (tint, opacity)
 uniform sampler2D index_levels;
@@ -10,7 +10,7 @@ uniform int index_mask;
 uniform int decal_mapping;
 uniform sampler2DArray decal_images;  // linear, premultiplied
 
-const float OPAQUE = 0.9999;  // decals under so much alpha are not looked for
+const float OPAQUE = 0.9999;  // alpha under which no further decal is searched
 
 //@ slot functions
 
@@ -28,28 +28,25 @@ DecalHit decal_hit(int owner, vec3 q, vec3 n) {
     if (owner < 0) {
         return DecalHit(-1, 0.0, vec2(0.0));
     }
-    float complement = complement_at(q, n, owner, decal_contact, decal_layered, decal_records,
-        index_level_count, index_levels, index_table, index_mask, index_ids);
-    return DecalHit(owner, 1.0 - complement, uv_at(q, n, owner, complement, decal_mapping, decal_records));
+    float complement = complement_at(q, n, owner, decal_contact);
+    return DecalHit(owner, 1.0 - complement, uv_at(q, n, owner, complement, decal_mapping));
 }
 
 // The topmost decal.
 DecalHit decal_at(vec3 q, vec3 n) {
-    if (decal_sheet) {
-        vec2 found = sheet_at(q, n, decal_contact, decal_records,
-            index_level_count, index_levels, index_table, index_mask, index_ids);
-        int owner = int(found.x);
+    if (decal_single_layer) {
+        vec2 owner_complement = single_layer_at(q, n, decal_contact);
+        int owner = int(owner_complement.x);
         if (owner < 0) {
             return DecalHit(-1, 0.0, vec2(0.0));
         }
-        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.y, decal_mapping, decal_records));
+        return DecalHit(owner, 1.0 - owner_complement.y, uv_at(q, n, owner, owner_complement.y, decal_mapping));
     }
-    return decal_hit(owner_at(q, n, decal_contact, decal_layered, decal_records,
-        index_level_count, index_levels, index_table, index_mask, index_ids), q, n);
+    return decal_hit(owner_at(q, n, decal_contact), q, n);
 }
 
-// Premultiplied linear colour of one decal. The derivatives are those of the image of the one decal that owns
-// the pixel, rolled out and pushed by nobody, so no edge between decals, or of an object, ever shows in them.
+// Premultiplied linear colour of one decal. The derivatives are those of its undeformed image, rolled out, so no
+// edge between decals, or of an object, shows in them.
 vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
     if (!in_image(hit.uv)) {
         return vec4(0.0);
@@ -61,8 +58,8 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
         float s = decal_texel(4 * hit.owner).w;
         vec3 n_p = decal_texel(4 * hit.owner + 1).xyz;
         float scale = 0.5 / (RIM * s);
-        vec2 dx = scale * tangent_coordinates(turned_back(surface_step(q, n, ray, ray_right.xyz), n_p, n), n_p, u.xyz);
-        vec2 dy = scale * tangent_coordinates(turned_back(surface_step(q, n, ray, ray_up.xyz), n_p, n), n_p, u.xyz);
+        vec2 dx = scale * tangent_coordinates(unroll_step(surface_step(q, n, ray, ray_right.xyz), n_p, n), n_p, u.xyz);
+        vec2 dy = scale * tangent_coordinates(unroll_step(surface_step(q, n, ray, ray_up.xyz), n_p, n), n_p, u.xyz);
         color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
     }
     return tint.w * color * vec4(tint.rgb, 1.0);
@@ -76,8 +73,8 @@ vec4 decal_color(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
     }
     while (hit.owner >= 0 && color.a < OPAQUE) {
         color += (1.0 - color.a) * decal_paint(hit, q, n, ray);
-        int below = owner_below(q, n, rank_of(hit.owner, decal_records), number_below(hit.owner, decal_records),
-            decal_contact, decal_layered, decal_records, index_level_count, index_levels, index_table, index_mask, index_ids);
+        int below = owner_below(q, n, rank_of(hit.owner, decal_records), next_number_below(hit.owner, decal_records),
+            decal_contact);
         hit = decal_hit(below, q, n);
     }
     return color;

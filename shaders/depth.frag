@@ -1,4 +1,4 @@
-// The depth of what the G-buffer shows, for objects that could not write their own.
+// Depth of the surface in the G-buffer, for objects that were not rasterised.
 //@ include camera.glsl
 uniform sampler2D g_position;
 

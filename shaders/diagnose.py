@@ -3,8 +3,8 @@
 import re
 from collections.abc import Mapping
 
-from .compose import Source
-from .errors import CompileError
+from decals.shaders.compose import Source
+from decals.shaders.errors import CompileError
 
 _COMPLAINTS = (
     re.compile(r"\d+:(?P<line>\d+)\(\d+\):\s*(?P<text>.*)"),  # Mesa       0:12(4): error: ...

@@ -1,4 +1,4 @@
-// What every kind of object writes for each pixel that it covers.
+// The G-buffer's targets, which every kind of object writes for each pixel that it covers.
 //@ include surface.glsl
 layout(location = 0) out vec4 g_position;
 layout(location = 1) out vec4 g_normal;

@@ -1,11 +1,11 @@
-// The tape's interpreter, blobtree/tapes/interpreter.py in GLSL: one composition per reading. Defines:
-// INTERPRET, FIELD (its type), LEAF, UNSTRETCH, UNWARP, COMBINE, PRIMITIVE_COLOR (what LEAF gets for it).
-// Slots: the registers, and a case per instruction that occurs (decals/render/tape_shader.py).
-FIELD INTERPRET(vec3 q, vec3 heading, float reach, sampler2D tape, ivec2 span) {
+// The tape's interpreter, blobtree/tape/interpreter.py in GLSL: one composition per evaluator. Defines:
+// INTERPRET, FIELD (its type), LEAF, PULLBACK_AFFINE, PULLBACK_WARP, COMBINE, PRIMITIVE_COLOR (LEAF's colour).
+// Slots: the registers, and a case per instruction that occurs (decals/rendering/tape_shader.py).
+FIELD INTERPRET(vec3 q, vec3 direction, float reach, sampler2D tape, ivec2 span) {
     FIELD accumulator = FIELD(0.0);
     //@ slot registers optional
-    vec3 place = q;
-    vec3 aim = heading;
+    vec3 point = q;
+    vec3 local_direction = direction;
     float speed = 1.0;
     int at = span.x;
     while (at < span.y) {
@@ -24,7 +24,7 @@ FIELD INTERPRET(vec3 q, vec3 heading, float reach, sampler2D tape, ivec2 span) {
 #undef INTERPRET
 #undef FIELD
 #undef LEAF
-#undef UNSTRETCH
-#undef UNWARP
+#undef PULLBACK_AFFINE
+#undef PULLBACK_WARP
 #undef COMBINE
 #undef PRIMITIVE_COLOR

@@ -1,4 +1,4 @@
-// What a pass finds at a pixel.
+// Result of a pass at a pixel.
 struct Pixel {
     vec4 color;
 #ifdef TWO_TARGETS

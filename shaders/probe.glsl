@@ -1,5 +1,5 @@
-// A short piece of work like the decal pass, to see which entry point runs it faster: a walk of dependent fetches
-// over the pixel's surroundings, a little arithmetic at each.
+// A short pass whose work is like that of the decal pass, for the measurement of both backends: dependent fetches
+// around the pixel, with a little arithmetic at each.
 //@ include pixel.glsl
 uniform sampler2D noise;
 

@@ -1,10 +1,10 @@
-// What is visible at a pixel, as the G-buffer holds it: see gbuffer.glsl.
+// The visible surface at a pixel, as in the G-buffer: see gbuffer.glsl.
 //@ include color.glsl
 uniform int object_id;  // index in the scene
 
 struct Surface {
     vec4 position;  // xyz, object_id + 1; w = 0 is background
-    vec4 normal;    // xyz: unit (zero where a mesh's cancel), smooth; w: 1 where the outside is seen, else -1
+    vec4 normal;    // xyz: unit (zero where a mesh's cancel), smooth; w: 1 if the outside is visible, else -1
     vec4 color;     // rgb: linear light; w: 1, and 0 in the background
 };
 

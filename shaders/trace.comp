@@ -1,5 +1,5 @@
 // The same object as trace.frag draws as a compute shader, for GLSL 4.30 on: an invocation for every pixel of its
-// box's rectangle. No compute shader writes a depth buffer, so positions tell what lies nearer.
+// box's rectangle. Compute shaders write no depth buffer, so positions are compared.
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
 //@ include trace.glsl
 uniform ivec4 rectangle;  // lower left corner, size
@@ -9,11 +9,11 @@ layout(binding = 1) writeonly uniform image2D g_normal;
 layout(binding = 2) writeonly uniform image2D g_color;
 
 void main() {
-    ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(place, rectangle.zw))) {
+    ivec2 offset = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(offset, rectangle.zw))) {
         return;
     }
-    ivec2 texel = rectangle.xy + place;
+    ivec2 texel = rectangle.xy + offset;
     Hit hit = trace_pixel(vec2(texel) + 0.5);
     vec4 before = imageLoad(g_position, texel);
     if (hit.distance < 0.0 || (before.w > 0.0 && dot(before.xyz - hit.position, hit.direction) <= 0.0)) {

@@ -1,7 +1,7 @@
-// What the ray through a pixel sees of an implicit object (blobtree/tracing/rays.py); body of trace.frag and trace.comp.
+// The ray through a pixel against an implicit object (blobtree/tracing/rays.py); body of trace.frag and trace.comp.
 //@ include camera.glsl
 //@ include surface.glsl
-// blobtree.tracing.cells.TracingCells
+// blobtree.tracing.tree_cells.TracingCells
 uniform sampler2D tape;
 uniform isampler2D blocks;
 uniform vec3 grid_lower;
@@ -15,28 +15,28 @@ vec4 tape_texel(sampler2D data, int i) {
 
 //@ slot library
 //@ slot dispatch
-//@ slot readings
+//@ slot evaluators
 
-vec3 field_bound(vec3 q, vec3 heading, float reach, sampler2D tape_, ivec2 span) {
-    return interpret_bound(q, heading, reach, tape_, span);
+vec3 field_bound(vec3 q, vec3 direction, float reach, sampler2D tape_, ivec2 span) {
+    return interpret_bound(q, direction, reach, tape_, span);
 }
 
 vec4 field_gradient(vec3 q, sampler2D tape_, ivec2 span) {
     return interpret_gradient(q, vec3(0.0), 0.0, tape_, span);
 }
 
-// What the ray through a place in pixels, such as gl_FragCoord.xy, comes to.
+// First intersection of the ray through a position in pixels, such as gl_FragCoord.xy.
 struct Hit {
     float distance;  // along the ray, below 0 for a miss
     vec3 direction;  // unit
     vec3 position;
-    ivec2 span;      // of the tape that holds there
+    ivec2 span;      // of the tape in the block of the hit
 };
 
 Hit trace_pixel(vec2 pixel) {
     vec3 origin = ray_origin(pixel);
     vec3 direction = normalize(ray_direction(pixel));
-    vec3 hit = trace_ray(origin, direction, grid_lower, block_size, grid_counts, tolerance, tape, blocks);
+    vec3 hit = trace_ray(origin, direction);
     vec3 position = origin + direction * hit.x;
     float depth = window_depth(position);
     if (depth < 0.0 || depth > 1.0) {

@@ -5,31 +5,36 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import count
 
 import pytest
 
-NUMBERS = range(100, 30_000)
-"""Of displays: each process has one of its own.
+FIRST_NUMBER, LAST_NUMBER, NUMBERS_PER_PROCESS = 100, 30_000, 50
+"""Display numbers: each process, and each server of a process, has its own.
 
-Servers that choose theirs take the least that is free. One that is on its way out then removes the socket of
-the one that has just begun under its number, and nobody can connect to that any more.
+A server that chooses its number takes the lowest free one. A server that is just closing then removes the
+socket of its successor, which can no longer be reached. For the same reason a server stays as it is
+(``-noreset``) when its last client leaves: while it resets, new clients are refused.
 """
+
+_started = count()
 
 
 @pytest.fixture
 def display() -> Iterator[str]:
-    """A virtual display of its own."""
+    """Yield the name of a new virtual display."""
     server = shutil.which("Xvfb")
     if server is None:
         pytest.skip("Xvfb is not installed (on Debian: apt-get install xvfb)")
     reading, writing = os.pipe()
-    name = f":{NUMBERS[os.getpid() % len(NUMBERS)]}"
-    command = [server, name, "-displayfd", str(writing), "-screen", "0", "640x480x24"]
+    offset = os.getpid() * NUMBERS_PER_PROCESS + next(_started) % NUMBERS_PER_PROCESS
+    name = f":{FIRST_NUMBER + offset % (LAST_NUMBER - FIRST_NUMBER)}"
+    command = [server, name, "-noreset", "-displayfd", str(writing), "-screen", "0", "640x480x24"]
     process = subprocess.Popen(command, pass_fds=(writing,), stderr=subprocess.DEVNULL)
     os.close(writing)
     try:
-        with os.fdopen(reading) as told:
-            assert told.readline().strip() == name[1:], f"no display {name}"
+        with os.fdopen(reading) as number:
+            assert number.readline().strip() == name[1:], f"no display {name}"
             yield name
     finally:
         process.terminate()
@@ -37,7 +42,7 @@ def display() -> Iterator[str]:
 
 
 def run_module(module: str, *arguments: str, **environment: str) -> str:
-    """Run a module of the tests as a program, and give what it printed."""
+    """Run a module of the tests as a program, and return its output."""
     done = subprocess.run(
         [sys.executable, "-m", module, *arguments],
         env={**os.environ, **environment},

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from implicit_decals.shaders import CompileError, ComposeError, Origin, Source, compile_error, compose
-from implicit_decals.shaders.compose import DIRECTORY
+from decals.shaders import CompileError, ComposeError, Origin, Source, compile_error, compose
+from decals.shaders.compose import DIRECTORY
 
 
 @pytest.fixture

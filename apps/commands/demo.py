@@ -1,4 +1,4 @@
-"""``implicit-decals demo``: three pictures that show what this is about."""
+"""``implicit-decals demo``: three pictures that show the method."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,15 +6,14 @@ from typing import Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from decals.render import Renderer
-
-from ..errors import UsageError
-from ..machine.warp_start import start_warp
-from ..models.hatching import hatching, mosaic
-from ..models.spanning import spanning
-from ..output import check_output, write_picture
-from .options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
-from .progress_bars import FINDING, progress_bars
+from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
+from decals.apps.errors import UsageError
+from decals.apps.gallery import spanning
+from decals.apps.models.demo_scenes import nest_scene, tile_scene
+from decals.apps.output import check_output, write_picture
+from decals.rendering import Renderer
+from decals.rendering.options import RenderOptions
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 
@@ -25,15 +24,15 @@ def demo(
     size: str = "1200x900",
     samples: Whole = 2,
 ) -> None:
-    """Draw three pictures that show what this is about.
+    """Draw three pictures that show the method.
 
-    hero.png: an implicit creature and a mesh under one coat of scales. contact.png: close by, decals that
-    push each other meet in black lines. span.png: one decal across a mesh and an implicit surface.
+    hero.png: an implicit creature and a mesh, covered with scales. contact.png: a close-up of tiles that
+    push each other. span.png: one decal across a mesh and an implicit surface.
 
     Parameters
     ----------
     output
-        Folder for the pictures; it is made if it is missing.
+        Folder for the pictures. It is created if it does not exist.
     size
         Width and height of the pictures in pixels.
     samples
@@ -44,13 +43,12 @@ def demo(
     _make_folder(output)
     for name in PICTURES:
         check_output(output / name, (".png",))
-    start_warp()
     with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:
-        progress(FINDING, 0.0)
-        nest = hatching(progress=progress)
-        for name, scene in zip(PICTURES, (nest, mosaic(nest), spanning()), strict=True):
+        progress(PREPARING, 0.0)
+        nest = nest_scene(progress=progress)
+        for name, scene in zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True):
             progress(f"Drawing {name}", 0.0)
-            write_picture(output / name, renderer.render(scene, size=pixels, samples=samples))
+            write_picture(output / name, renderer.render(scene, RenderOptions(size=pixels, samples=samples)))
     for name in PICTURES:
         Console().print(str(output / name), soft_wrap=True, highlight=False)
 

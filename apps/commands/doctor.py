@@ -1,19 +1,18 @@
-"""``implicit-decals doctor``: what this machine has of what the project needs, and what to do about it."""
+"""``implicit-decals doctor``: check the software and hardware of this machine, and give advice."""
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from decals.render.libraries import missing_gl_libraries
-
-from ..machine.finding import Finding, Status
-from ..machine.graphics import context_findings, library_finding
-from ..machine.sample_meshes import sample_finding
-from ..machine.software import package_findings, platform_finding, python_finding, warp_finding
+from decals.apps.doctor.finding import Finding, Status
+from decals.apps.doctor.graphics import context_findings, library_finding
+from decals.apps.doctor.sample_meshes import sample_finding
+from decals.apps.doctor.software import package_findings, platform_finding, python_finding, warp_finding
+from decals.rendering.gl_libraries import missing_gl_libraries
 
 
 def examine() -> list[Finding]:
-    """Look at everything."""
+    """Run all checks."""
     missing = missing_gl_libraries()
     return [
         python_finding(),
@@ -27,19 +26,19 @@ def examine() -> list[Finding]:
 
 
 def report(findings: list[Finding], console: Console) -> int:
-    """Print the findings, then what to do.
+    """Print the findings, then the advice.
 
     Parameters
     ----------
     findings
-        What `examine` returned.
+        The result of `examine`.
     console
-        Where to print.
+        The console to print on.
 
     Returns
     -------
     int
-        The exit code: 0 if everything that drawing needs is here, else 1.
+        The exit code: 0 if nothing that drawing needs is missing, else 1.
     """
     styles = {Status.GOOD: "green", Status.NOTE: "yellow", Status.MISSING: "bold red"}
     table = Table("", "", "", show_header=False, box=None, padding=(0, 2, 0, 0))
@@ -52,18 +51,18 @@ def report(findings: list[Finding], console: Console) -> int:
             console.print(
                 f"\n{finding.name}: {finding.advice}", markup=False, highlight=False, soft_wrap=True
             )
-    lacking = [finding.name for finding in findings if finding.status is Status.MISSING]
-    verdict = f"Missing: {', '.join(lacking)}." if lacking else "Everything that drawing needs is here."
+    missing = [finding.name for finding in findings if finding.status is Status.MISSING]
+    verdict = f"Missing: {', '.join(missing)}." if missing else "Everything that drawing needs is installed."
     console.print(f"\n{verdict}", markup=False, highlight=False)
-    return 1 if lacking else 0
+    return 1 if missing else 0
 
 
 def doctor() -> int:
-    """Say what is here of what the project needs, and what to do about the rest.
+    """Check the software and hardware of this machine, and print advice.
 
     Returns
     -------
     int
-        The exit code: 0 if everything that drawing needs is here, else 1.
+        The exit code: 0 if nothing that drawing needs is missing, else 1.
     """
     return report(examine(), Console())

@@ -1,19 +1,19 @@
-"""What ``--help`` says of each command: a line, then examples."""
+"""The text that ``--help`` prints for each command: a summary and examples."""
 
 HELP = {
-    "demo": """Draw three pictures that show what this is about.
+    "demo": """Draw three pictures that show the method.
 
-For instance:
+For example:
 
 implicit-decals demo
 
 implicit-decals demo --output pictures
 """,
-    "render": """Cover models with one coat of decals and draw a picture.
+    "render": """Cover models with decals and draw a picture.
 
-Several models keep their own coordinates; where they touch, the decals run across.
+All models share one coordinate system. Decals continue from one model to another where they touch.
 
-For instance:
+For example:
 
 implicit-decals render knot --decals 800 -o knot.png
 
@@ -23,27 +23,29 @@ implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json 
 
 implicit-decals render dragon.json --size 2400x1800 -o large.png
 """,
-    "view": """Open models or a scene in a window, and push decals by hand.
+    "edit": """Open models or a scene in an editor window.
 
-For instance:
+For example:
 
-implicit-decals view knot --decals 300 --image scale --image eye --save knot.json
+implicit-decals edit knot --decals 300 --image scale --image eye --save knot.json
 
-implicit-decals view knot.json
+implicit-decals edit knot.json
 """,
-    "seed": """Spread seeds over models and write the decals that lie on them.
+    "scatter": """Scatter decals over models and write a scene, or a table of decals.
 
-Several models keep their own coordinates; where they touch, seeds push each other.
+All models share one coordinate system. Decals of different models push each other where the models touch.
 
-For instance:
+For example:
 
-implicit-decals seed knot --count 2000 -o seeds.json
+implicit-decals scatter knot --count 2000 -o scene.json
 
-implicit-decals seed bunny.ply --spacing 0.02 --sizing touching --along curvature -o seeds.csv
+implicit-decals render scene.json -o picture.png
+
+implicit-decals scatter bunny.ply --spacing 0.02 --sizing touching --along curvature -o decals.csv
 """,
-    "polygonize": """Write an implicit model's surface as a triangle mesh.
+    "polygonize": """Write the surface of an implicit model as a triangle mesh.
 
-For instance:
+For example:
 
 implicit-decals polygonize spheres -o spheres.ply
 
@@ -51,13 +53,13 @@ implicit-decals polygonize blob.json --cell-size 0.02 -o blob.obj
 
 implicit-decals polygonize part.json --chord-error 0.001 --creases -o part.stl
 """,
-    "doctor": "Say what is here of what the project needs, and what to do about the rest.",
+    "doctor": "Check the software and hardware of this machine, and print advice.",
 }
 
-BENCH_TABLE = """Print the paper's figure 14 as this machine has it, beside the paper's numbers.
+BENCH_TABLE = """Measure figure 14 of the paper on this machine, and print it beside the paper's numbers.
 
-For instance:
+For example:
 
 implicit-decals bench table --size 800x600 --counts 100,1000 --models knot,spheres
 """
-"""Of ``implicit-decals bench table``."""
+"""The text for ``implicit-decals bench table``."""

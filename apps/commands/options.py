@@ -1,4 +1,4 @@
-"""Command-line values and the ranges that they must lie in."""
+"""Types, parsers and range checks of command-line values."""
 
 import re
 from collections.abc import Sequence
@@ -6,20 +6,20 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from ..errors import UsageError
-from ..views import Size
+from decals.apps.errors import UsageError
+from decals.apps.views import Size
 
 MAX_EDGE = 16384
 """Longest edge of a picture, in pixels."""
 MAX_SAMPLES = 8
 TILE = 768
-"""Most samples that are drawn at once, per axis: a command must be interruptible within seconds."""
+"""Samples per axis that are drawn at once: small enough to interrupt a command within seconds."""
 MAX_DECALS = 1_000_000
 MAX_SEED = 2**32 - 1
 
 
 def _whole(_type: Any, tokens: Sequence[Token]) -> int:
-    """Read a whole number; a fraction is no way to write one, though Python would round it."""
+    """Parse a whole number; reject fractions, which Python would round."""
     text = tokens[0].value
     if not re.fullmatch(r"[+-]?\d+(_\d+)*", text.strip()):
         raise ValueError(f"expected a whole number, got {text!r}")
@@ -29,15 +29,15 @@ def _whole(_type: Any, tokens: Sequence[Token]) -> int:
 Whole = Annotated[int, Parameter(converter=_whole)]
 """A whole number on the command line."""
 OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=False)]
-"""One that need not be given."""
+"""An optional whole number on the command line."""
 
 
 Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
-"""Modules that define a user's own kinds of nodes."""
+"""Modules that define custom nodes."""
 
 
 def parse_size(text: str) -> Size:
-    """Read a picture size such as ``"1200x900"``."""
+    """Parse a picture size such as ``"1200x900"``."""
     match = re.fullmatch(r"(\d{1,9})[xX×](\d{1,9})", text.strip())
     if match is None:
         raise UsageError(f"--size: expected WIDTHxHEIGHT such as 1200x900, got {text!r}")
@@ -48,6 +48,6 @@ def parse_size(text: str) -> Size:
 
 
 def check_count(option: str, value: int, low: int, high: int) -> None:
-    """Make sure that a whole number lies in its range."""
+    """Raise `UsageError` if a whole number lies outside its range."""
     if not low <= value <= high:
         raise UsageError(f"{option}: expected a whole number from {low} to {high}, got {value}")

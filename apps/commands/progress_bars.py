@@ -1,4 +1,4 @@
-"""Progress callbacks as bars on stderr, one per stage."""
+"""Progress bars on stderr, one per stage."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,23 +8,23 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from blobtree import Progress as Report
 
-FINDING = "Finding the surfaces"
-"""Stage in which models become surfaces, and the first time kernels are compiled."""
+PREPARING = "Preparing the surfaces"
+"""Stage in which surfaces are built, and kernels compiled on first use."""
 
 _COLUMNS = (TextColumn("{task.description:<34}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
 
 
 @contextmanager
 def progress_bars() -> Iterator[Report]:
-    """Show the stages that the callback is told of, each with a bar and its time.
+    """Show a bar with the elapsed time for each stage that the callback reports.
 
-    A stage that follows another completes it, so nobody need report the last percent. Where the work fails
-    or is interrupted the bars go, and what went wrong is all that is left to read.
+    A new stage completes the bar of the previous one. After an error or an interrupt the bars disappear, so
+    only the message remains.
 
     Examples
     --------
     >>> with progress_bars() as progress:
-    ...     progress("Counting sheep", 0.5)
+    ...     progress("Drawing", 0.5)
     """
     with Progress(*_COLUMNS, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
         stages: dict[str, TaskID] = {}
@@ -40,7 +40,7 @@ def progress_bars() -> Iterator[Report]:
             yield report
         except BaseException:
             bars.live.transient = True
-            bars.console.quiet = not bars.console.is_interactive  # or it ends with an empty line in a file
+            bars.console.quiet = not bars.console.is_interactive  # avoid an empty line in a redirected stderr
             raise
         for task in stages.values():
             bars.update(task, completed=1.0)

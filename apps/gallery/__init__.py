@@ -1,6 +1,6 @@
-"""Runnable examples, a picture each: ``python -m implicit_decals.apps.gallery.NAME -o picture.png``.
+"""Examples: ``python -m decals.apps.gallery.NAME -o picture.png`` draws the picture of one.
 
-Every module has a function ``panels``, which makes the scenes that stand side by side in its picture.
+The function ``panels`` of each module makes the scenes that its picture shows side by side.
 """
 
 EXAMPLES = (
@@ -18,10 +18,10 @@ EXAMPLES = (
     "contact_modes",
     "size_ratio",
     "mapping_modes",
-    "own_nodes",
+    "custom_nodes",
     "creases",
 )
-"""Names of the examples."""
+"""The names of all examples."""
 
 DOWNLOADED = ("models", "dragon")
-"""Examples whose meshes pyvista downloads on first use."""
+"""The examples whose meshes pyvista downloads on first use."""

@@ -1,15 +1,15 @@
-"""Figure 12 of the paper: the knot, implicit spheres and the horse."""
+"""Three models
+============
+
+Figure 12 of the paper: tiles on a knot, rocks on implicit spheres, scales on a horse.
+"""
 
 from collections.abc import Sequence
 
-from decals.coat.seeding import seed
-from decals.scenes.scene import DecalImage, Scene
+from decals import DecalImage, Scene, scatter
+from decals.apps.gallery.helpers import Panel, main, sample, sample_camera
 
-from ..models.samples import axes_of, sample
-from ..views import frame, parse_view
-from .panels import Panel, main
-
-LOOKS = {
+COVERS = {
     "knot": (400, ("tile#2f7f95", "tile#c9a227", "tile#b5533c")),
     "spheres": (500, ("rock", "rock#8a7f70")),
     "horse": (900, ("scale#8a5a34", "scale#a9733f")),
@@ -18,18 +18,18 @@ LOOKS = {
 
 
 def panels() -> Sequence[Panel]:
-    """Cover each model."""
-    made = []
-    for name, (count, images) in LOOKS.items():
-        item = sample(name)
+    """Cover each model with decals."""
+    panels = []
+    for name, (count, images) in COVERS.items():
+        model = sample(name)
         scene = Scene(
-            objects=(item,),
-            camera=frame([item], parse_view(None, axes_of(name)), (1, 1)),
+            objects=(model,),
+            camera=sample_camera(name),
             images=tuple(DecalImage.load(image) for image in images),
-            decals=seed(item.surface, count=count, images=len(images)),
+            decals=scatter(model.surface, count=count, images=len(images)),
         )
-        made.append(Panel(scene))
-    return made
+        panels.append(Panel(scene))
+    return panels
 
 
 if __name__ == "__main__":

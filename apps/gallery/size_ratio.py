@@ -1,19 +1,19 @@
-"""A large decal among small ones, in the contact modes paper, smooth and radial."""
+"""Decals of unlike size
+=====================
+
+A large decal among small ones, in the contact modes PRODUCT, MIN and RADIAL.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from decals.field.contact import Contact
-from decals.model import Decals
-from decals.scenes.scene import Scene
-
-from .panels import Panel, main
-from .stage import checker, plane, straight_down
+from decals import Contact, Decals, Scene
+from decals.apps.gallery.helpers import Panel, camera_above, checker_image, main, plane
 
 
 def panels() -> Sequence[Panel]:
-    """Press small decals into the rim of a large one."""
+    """Put small decals around the rim of a large one, in each contact mode."""
     angles = np.arange(9) * (2 * np.pi / 9)
     around = (
         np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * (0.45 + 0.04 * np.arange(9))[:, None]
@@ -26,7 +26,7 @@ def panels() -> Sequence[Panel]:
         tangents=np.tile(np.array([1, 0, 0], np.float32), (count, 1)),
         radii=np.array([0.85, *(0.10 + 0.012 * np.arange(9))], np.float32),
     )
-    scene = Scene(objects=(plane(),), camera=straight_down(), images=(checker(10),), decals=decals)
+    scene = Scene(objects=(plane(),), camera=camera_above(), images=(checker_image(10),), decals=decals)
     return [Panel(scene, contact=mode) for mode in Contact]
 
 

@@ -1,1 +1,1 @@
-"""Models and scenes that are made here or loaded: the samples, the demo's, people's own files."""
+"""Sample models, the scenes of the demo, and loading of models and definitions."""

@@ -1,4 +1,4 @@
-"""The creature of the demo: a young dragon of blended points and segments, sitting up, its paws held out."""
+"""The creature of the demo: a sitting young dragon of blended points and segments."""
 
 from blobtree import Node, Point, Ricci, Segment
 
@@ -8,11 +8,11 @@ _SOCKET = (0.17, 0.12, 0.07)
 _HORN = (0.90, 0.85, 0.72)
 
 _BLEND = 3.0
-"""Exponent of the Ricci blend: smooth joints that do not swell as a plain sum's do."""
+"""Exponent of the Ricci blend: its joints are smooth and bulge less than those of a sum."""
 
 
 def creature() -> Node:
-    """Make the creature: 3 units long, 2.6 high, facing +x, its feet on y = 0."""
+    """Return the creature: 3 units long, 2.6 high, facing +x, its feet on y = 0."""
     parts = [*_trunk(), *_tail(), *_side(1.0), *_side(-1.0)]
     return Ricci(tuple(parts), exponent=_BLEND)
 
@@ -42,7 +42,7 @@ def _tail() -> list[Node]:
 
 
 def _side(z: float) -> list[Node]:
-    """One side's leg, arm, eye socket, nostril and horn; ``z`` is 1 for the left, -1 for the right."""
+    """Return the leg, arm, eye socket, nostril and horn of the left (``z`` = 1) or right side (-1)."""
     return [
         Point((-0.42, 0.44, 0.46 * z), radius=0.38, color=_SKIN),
         Segment((-0.22, 0.20, 0.60 * z), (0.26, 0.13, 0.68 * z), radius=0.17, color=_SKIN),

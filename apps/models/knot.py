@@ -1,11 +1,11 @@
-"""A torus knot as a triangle mesh, made rather than loaded."""
+"""A torus knot as a triangle mesh."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.scenes.mesh_file import MeshArrays
+from decals.surfaces.mesh_file import MeshArrays
 
 Floats = NDArray[np.floating[Any]]
 
@@ -25,9 +25,9 @@ def torus_knot(
     Parameters
     ----------
     turns, windings : int
-        How often the knot runs around the torus' axis and through its hole; without a common divisor.
+        Turns of the knot around the axis of the torus and through its hole; coprime.
     radius, bend, tube : float
-        Radius of the torus' ring, of the torus' own tube on which the knot lies, and of the knot's tube.
+        Major and minor radius of the torus, and radius of the tube around the knot, in the model's units.
     along, around : int
         Quads along the knot and around its tube.
 
@@ -41,7 +41,7 @@ def torus_knot(
     centre = _knot(t, turns, windings, radius, bend)
     ahead = _knot(t + 1e-4, turns, windings, radius, bend) - _knot(t - 1e-4, turns, windings, radius, bend)
     tangent = _unit(ahead)
-    # The torus' own normal makes a frame that turns with the knot and closes on itself.
+    # The normal of the torus gives a frame that is periodic along the knot.
     out = _unit(centre - radius * np.stack([np.cos(turns * t), np.sin(turns * t), 0.0 * t], axis=-1))
     side = _unit(np.cross(tangent, out))
     out = np.cross(side, tangent)
@@ -63,7 +63,7 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _grid_faces(along: int, around: int) -> NDArray[np.int32]:
-    """Triangles of a grid that closes on itself both ways."""
+    """Return the triangles of a grid that is periodic in both directions."""
     i, j = (index.reshape(-1) for index in np.indices((along, around)))
     a, b = i * around + j, (i + 1) % along * around + j
     c, d = (i + 1) % along * around + (j + 1) % around, i * around + (j + 1) % around

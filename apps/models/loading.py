@@ -1,74 +1,46 @@
-"""From a MODEL argument to an object: a sample's name, a mesh file, a BlobTree or a scene in JSON."""
+"""MODEL arguments: names of samples, and files by `decals.load_model`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from blobtree import BlobTreeError, from_json
-from decals.errors import DecalsError
-from decals.paths import is_file
-from decals.scenes.mesh_file import read_mesh
-from decals.scenes.scene import MeshObject, Scene, SceneObject, TreeObject
-from decals.scenes.scene_file import is_scene, load_scene
-
-from ..errors import UsageError
-from .samples import SAMPLES, sample, sample_mesh
+from decals import ImplicitDecalsError, Scene
+from decals import load_model as load_file
+from decals.apps.errors import UsageError
+from decals.apps.models.samples import SAMPLES, sample, sample_mesh
+from decals.scenes.objects import SceneObject, as_objects
+from decals.validation import is_file
 
 
 def load_model(model: str) -> SceneObject | Scene:
-    """Load what a MODEL argument names.
+    """Load the sample or the file that a MODEL argument names.
 
     Raises
     ------
-    UsageError, decals.errors.DecalsError, blobtree.BlobTreeError
+    UsageError, ImplicitDecalsError
         If it is neither a sample nor a file, or the file cannot be used; the message names it.
     """
+    if model in SAMPLES:
+        return sample(model)
+    if not is_file(Path(model)):
+        raise UsageError(
+            f"expected a mesh file, a BlobTree or scene in JSON, or a sample ({', '.join(SAMPLES)}); "
+            f"found no file {model!r}"
+        )
     try:
-        return _load(model)
-    except (DecalsError, BlobTreeError) as error:
+        return load_file(model, samples=sample_mesh)
+    except ImplicitDecalsError as error:
         if model in str(error):
             raise
         raise UsageError(f"{model!r}: {error}") from error
 
 
-def _load(model: str) -> SceneObject | Scene:
-    if model in SAMPLES:
-        return sample(model)
-    path = Path(model)
-    if not is_file(path):
-        raise UsageError(
-            f"expected a mesh file, a BlobTree or scene in JSON, or a sample ({', '.join(SAMPLES)}); "
-            f"found no file {model!r}"
-        )
-    if path.suffix.lower() == ".json":
-        return _load_json(path)
-    vertices, faces = read_mesh(path)
-    return MeshObject(path.stem, vertices, faces, source=str(path))
-
-
-def _load_json(path: Path) -> TreeObject | Scene:
-    text = _read(path)
-    if is_scene(text):
-        return load_scene(path, samples=sample_mesh)
-    return TreeObject(path.stem, from_json(text))
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"could not read {str(path)!r} ({error.strerror}); check its permissions") from error
-
-
 def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
-    """Load one whole scene, or models side by side, each in its own coordinates.
-
-    The second object of a name becomes ``name-2``.
+    """Load one whole scene, or several models, each in its own coordinates and under its own name.
 
     Raises
     ------
     UsageError
-        If a scene comes with other models.
+        If a scene is named together with other models.
     """
     objects: list[SceneObject] = []
     for model in models:
@@ -79,12 +51,5 @@ def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
                     f"expected meshes and BlobTrees, {model!r} is a whole scene; render it alone"
                 )
             return loaded
-        objects.append(_renamed(loaded, [item.name for item in objects]))
-    return objects
-
-
-def _renamed(item: SceneObject, taken: Sequence[str]) -> SceneObject:
-    name, number = item.name, 2
-    while name in taken:
-        name, number = f"{item.name}-{number}", number + 1
-    return item if name == item.name else replace(item, name=name)
+        objects.append(loaded)
+    return as_objects(objects)

@@ -1,4 +1,4 @@
-"""Sample models by name: those of the paper (its figure 14), and the creature of the demo."""
+"""Sample models by name: those of the paper's figure 14, and the creature of the demo."""
 
 import logging
 import warnings
@@ -6,35 +6,35 @@ from collections.abc import Callable
 from functools import partial
 
 from blobtree import Node
-from decals.scenes.mesh_file import MeshArrays, surface_triangles
-from decals.scenes.object_records import SAMPLE
-from decals.scenes.scene import MeshObject, SceneObject, TreeObject
-
-from ..errors import UsageError
-from ..views import UPRIGHT, Axes
-from .creature import creature
-from .knot import torus_knot
-from .spheres import spheres
+from decals import MeshObject, TreeObject
+from decals.apps.errors import UsageError
+from decals.apps.models.creature import creature
+from decals.apps.models.knot import torus_knot
+from decals.apps.models.spheres import spheres
+from decals.apps.views import UPRIGHT, Axes
+from decals.scenes.objects import SceneObject
+from decals.scenes.records import SAMPLE
+from decals.surfaces.mesh_file import MeshArrays, dataset_triangles
 
 _DATA = "https://github.com/pyvista/vtk-data"
 
 
 def _download(name: str) -> MeshArrays:
-    """Get a mesh through pyvista: from its cache, from ``PYVISTA_DATA``, or from the internet."""
+    """Return a mesh of pyvista's: from its cache, from ``PYVISTA_DATA``, or from the internet."""
     logging.getLogger("pooch").setLevel(logging.WARNING)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about a PYVISTA_DATA that is no folder; what counts is the mesh
-            from pyvista import examples  # it looks at PYVISTA_DATA when it is imported
+            warnings.simplefilter("ignore")  # pyvista warns if PYVISTA_DATA is not a folder
+            from pyvista import examples  # reads PYVISTA_DATA when imported
 
             surface = getattr(examples, f"download_{name}")()
-    except Exception as error:  # no network, no permission, a broken cache: all end here
+    except Exception as error:  # no network, no permission, a broken cache, ...
         reason = type(error).__name__
         raise UsageError(
             f"the sample {name!r} is downloaded by pyvista on first use, and that failed ({reason}); "
             f"connect to the internet, or set PYVISTA_DATA to a copy of {_DATA}"
         ) from error
-    return surface_triangles(surface, name=name)
+    return dataset_triangles(surface, name=name)
 
 
 _MESHES: dict[str, Callable[[], MeshArrays]] = {
@@ -47,28 +47,28 @@ _TREES: dict[str, Callable[[], Node]] = {"creature": creature, "spheres": sphere
 _AXES = {"horse": Axes(up=(0.0, 0.0, 1.0), front=(1.0, 0.0, 0.0))}
 
 SAMPLES: tuple[str, ...] = tuple(sorted([*_MESHES, *_TREES]))
-"""Names of the samples."""
+"""Names of the sample models."""
 
 
 def axes_of(model: str) -> Axes:
-    """Which way a sample stands; other models stand along y."""
+    """Return the axes of a sample; for other models, y points upward."""
     return _AXES.get(model, UPRIGHT["y"])
 
 
 def sample_mesh(name: str) -> MeshArrays:
-    """Vertices and faces of a sample mesh; a `decals.scenes.object_records.SampleLoader`."""
+    """Return the vertices and faces of a sample mesh; a `decals.scenes.records.SampleLoader`."""
     if name not in _MESHES:
         raise UsageError(f"expected a sample mesh ({', '.join(sorted(_MESHES))}), got {name!r}")
     return _MESHES[name]()
 
 
 def sample(name: str) -> SceneObject:
-    """Make or fetch a sample as an object of its own name.
+    """Return a sample as an object of the same name.
 
     Raises
     ------
     UsageError
-        If there is no such sample, or it had to be downloaded and could not.
+        If the sample does not exist or cannot be downloaded.
     """
     if name in _TREES:
         return TreeObject(name, _TREES[name]())

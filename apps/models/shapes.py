@@ -1,24 +1,24 @@
-"""Meshes that the demo makes for itself."""
+"""Meshes of the demo and the gallery: an egg and a rounded box."""
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
-from decals.scenes.mesh_file import MeshArrays
+from decals.surfaces.mesh_file import MeshArrays
 
 _SUBDIVISIONS = 5
 _SQUARES = 48
 
 
 def egg(center: ArrayLike, *, radius: float, height: float) -> MeshArrays:
-    """Make an egg that stands on its thick end: float32[10242, 3] and int32[20480, 3].
+    """Return an egg on its thick end: float32[10242, 3] vertices and int32[20480, 3] faces.
 
     Parameters
     ----------
     center : (3,)
         Middle of the egg.
     radius, height : float
-        Half the largest width, about, and half the height.
+        Half the largest width (approximately) and half the height.
     """
     directions, faces = _ball()
     taper = radius * (1.0 - 0.16 * directions[:, 1])
@@ -27,19 +27,19 @@ def egg(center: ArrayLike, *, radius: float, height: float) -> MeshArrays:
 
 
 def rounded_box(center: ArrayLike, *, half: ArrayLike, rounding: float) -> MeshArrays:
-    """Make a box with flat sides and round edges: float32[13826, 3] and int32[27648, 3].
+    """Return a box with round edges: float32[13826, 3] vertices and int32[27648, 3] faces.
 
     Parameters
     ----------
     center, half : (3,)
         Middle of the box and half its sides.
     rounding : float
-        Radius of its edges, at most the shortest half side.
+        Radius of the edges, at most the shortest half side.
     """
     cube, faces = _cube()
     sides = np.asarray(half, np.float64)
     core = sides - rounding
-    # Half the quads of a side go to its flat part and a quarter to either edge.
+    # Half of the quads along a side cover its flat part, a quarter each of the two edges.
     inner = core * np.clip(2.0 * cube, -1.0, 1.0)
     outward = np.sign(cube) * np.tan(0.25 * np.pi * np.clip(2.0 * np.abs(cube) - 1.0, 0.0, 1.0))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -47,9 +47,9 @@ def rounded_box(center: ArrayLike, *, half: ArrayLike, rounding: float) -> MeshA
 
 
 def _cube() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Surface of the cube from -1 to 1, in equal squares each cut in two."""
+    """Return the surface of the cube from -1 to 1, in equal squares of two triangles."""
     grid = pv.ImageData(dimensions=(_SQUARES + 1,) * 3, spacing=(2.0 / _SQUARES,) * 3, origin=(-1.0,) * 3)
-    surface = grid.extract_surface(algorithm="geometry").triangulate()  # the other one leaves seams
+    surface = grid.extract_surface(algorithm="geometry").triangulate()  # the default algorithm leaves seams
     return np.asarray(surface.points, np.float64), surface.regular_faces.astype(np.int32)
 
 

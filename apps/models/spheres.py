@@ -19,5 +19,5 @@ _BALLS = (
 
 
 def spheres() -> Node:
-    """Make a cluster of balls that melt into each other."""
+    """Return a sum of balls that blend into each other."""
     return Sum(tuple(Point(center, radius=radius, color=color) for center, radius, color in _BALLS))

@@ -1,20 +1,20 @@
-"""Operators: how two fields become one, as value and partial derivatives.
+"""Operators: the combination of two fields, as value and partial derivatives.
 
 Each operator is two typed functions:
 
 * `partials(a, b, parameter) -> vec3(F, ∂F/∂a, ∂F/∂b)`;
-* `slope(slope_a, slope_b, max_a, max_b, parameter)`: a bound on |∇F| wherever the operands' gradients are
-  bounded by slope_a, slope_b and their values by max_a, max_b. The tracer's proof rests on it; slopes along
-  a ray are bounded by it too, for a field may well change along one direction alone.
+* `slope(slope_a, slope_b, max_a, max_b, parameter)`: a bound on |∇F| where the operands' gradients are
+  bounded by slope_a, slope_b and their values by max_a, max_b. The tracer relies on it, for slopes along a
+  ray too.
 
-And two that let a cell forget what cannot matter in it; a = (smallest, largest) of the operand over the cell:
+Two more prune the operands of a cell; a = (smallest, largest) value of the operand over the cell:
 
 * `range(a, b, parameter) -> (smallest, largest)` of F;
-* `choice(a, b) -> KEEP_…`: which operands F depends on there.
+* `choice(a, b) -> KEEP_…`: the operands on which F depends there.
 
-Whatever rides along with the field (colour) is averaged with the weights |∂F/∂a|·a and |∂F/∂b|·b: a sum mixes
-by strength, a union takes the winner, a difference paints the cut with the tool that cut it.
-Every operator here gives its first operand back where the second is exactly 0, save intersection, which is 0.
+Colours are averaged with the weights |∂F/∂a|·a and |∂F/∂b|·b: a sum mixes by strength, a union takes the
+colour of the larger field, a difference paints the cut in the colour of its tool. Where the second operand is
+exactly 0, every operator here returns the first, except the intersection, which is 0.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ def sum_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:
 def sum_slope(
     slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
 ) -> wp.float32:
-    """|∇a + ∇b| ≤ |∇a| + |∇b|."""
+    """Bound the slope of a sum: |∇a + ∇b| ≤ |∇a| + |∇b|."""
     return slope_a + slope_b
 
 
@@ -97,7 +97,7 @@ def intersection_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) ->
 def extremum_slope(
     slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, exponent: wp.float32
 ) -> wp.float32:
-    """Max and min have the gradient of one operand or of the other."""
+    """|∇F| of max and min is that of one of the operands."""
     return wp.max(slope_a, slope_b)
 
 
@@ -106,7 +106,7 @@ def difference_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> w
     """F = min(a, c) with the complement c = m − b(2m − 1), m = max(a, 1), never below 0.
 
     For a ≤ 1 this is min(a, 1 − b) of the literature (Wyvill 1999). Where fields add up to more than 1 the
-    complement starts from a itself, so that a tool which does not reach a place changes nothing there.
+    complement starts from a itself, so that a tool changes nothing outside its influence.
     """
     top = wp.max(a, 1.0)
     complement = top - b * (2.0 * top - 1.0)
@@ -137,19 +137,19 @@ KEEP_NONE = 3
 
 @wp.func
 def sum_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
-    """Grows with both operands."""
+    """F is monotone in both operands."""
     return a + b
 
 
 @wp.func
 def ricci_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
-    """Grows with both operands."""
+    """F is monotone in both operands."""
     return wp.vec2(ricci_norm(a[0], b[0], exponent), ricci_norm(a[1], b[1], exponent))
 
 
 @wp.func
 def blend_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
-    """A blend depends on every operand that is not 0."""
+    """Return the dependence of a blend: on every operand that is not 0 everywhere."""
     if b[1] <= 0.0:
         return KEEP_LEFT
     if a[1] <= 0.0:
@@ -159,13 +159,13 @@ def blend_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
 
 @wp.func
 def union_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
-    """Grows with both operands."""
+    """F is monotone in both operands."""
     return wp.max(a, b)
 
 
 @wp.func
 def union_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
-    """The operand that is always the larger one."""
+    """Return the dependence of a union: on one operand where that one is always the larger."""
     if b[1] <= a[0] or b[1] <= 0.0:
         return KEEP_LEFT
     if a[1] <= b[0] or a[1] <= 0.0:
@@ -175,13 +175,13 @@ def union_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
 
 @wp.func
 def intersection_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
-    """Grows with both operands."""
+    """F is monotone in both operands."""
     return wp.min(a, b)
 
 
 @wp.func
 def intersection_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
-    """The operand that is always the smaller one; nothing where one is absent."""
+    """Return the dependence of an intersection: on the operand that is always the smaller."""
     if a[1] <= 0.0 or b[1] <= 0.0:
         return KEEP_NONE
     if a[1] <= b[0]:
@@ -193,7 +193,7 @@ def intersection_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
 
 @wp.func
 def difference_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
-    """The complement m − b(2m − 1) is linear in m and in b, so its extremes lie at the corners."""
+    """Bound a difference: the complement m − b(2m − 1) is linear in m and b, its extremes lie at corners."""
     low_top = wp.max(a[0], 1.0)
     high_top = wp.max(a[1], 1.0)
     c0 = low_top - b[0] * (2.0 * low_top - 1.0)
@@ -207,7 +207,7 @@ def difference_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
 
 @wp.func
 def difference_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
-    """The tool is forgotten where it does not cut; everything where it has cut all away."""
+    """Return the dependence of a difference: it ignores a tool that does not cut."""
     if a[1] <= 0.0 or b[0] >= 1.0:
         return KEEP_NONE
     if b[1] <= 0.0 or (a[1] <= 1.0 and a[1] + b[1] <= 1.0):
@@ -215,17 +215,17 @@ def difference_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     return KEEP_BOTH
 
 
-class Reach(Enum):
-    """Where F(a, b) may differ from 0."""
+class Support(Enum):
+    """Part of space in which F(a, b) may differ from 0."""
 
-    EITHER = "where a or b does"
-    LEFT = "where a does; b cuts it away"
-    COMMON = "where a and b do"
+    EITHER = "where a or b differs from 0"
+    LEFT = "where a differs from 0; b removes from it"
+    COMMON = "where both a and b differ from 0"
 
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """One row of the table: an operator's name, its functions and its algebra."""
+    """One row of the table: an operator's name, functions and algebraic properties."""
 
     name: str
     partials: wp.Function
@@ -233,19 +233,19 @@ class Operator:
     range: wp.Function
     choice: wp.Function
     commutes: bool = True
-    """Operands may change places and nest in any way."""
+    """True if operands may be exchanged and nested in any way."""
     starts_from_zero: bool = True
-    """F(0, b) = b, so that a fold may start from the empty field."""
-    rises: bool = False
+    """True if F(0, b) = b, so that a fold may start from the empty field."""
+    monotone: bool = False
     """F never falls where its operands rise, and `slope` takes slopes below 0, of operands that fall."""
-    reach: Reach = Reach.EITHER
+    support: Support = Support.EITHER
     digest: str = ""
-    """Of the sources of a user's operator."""
+    """Digest of the sources of a custom operator."""
 
 
-SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice, rises=True)
-RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice, rises=True)
-UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice, rises=True)
+SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice, monotone=True)
+RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice, monotone=True)
+UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice, monotone=True)
 INTERSECTION = Operator(
     "intersection",
     intersection_partials,
@@ -253,8 +253,8 @@ INTERSECTION = Operator(
     intersection_range,
     intersection_choice,
     starts_from_zero=False,
-    rises=True,
-    reach=Reach.COMMON,
+    monotone=True,
+    support=Support.COMMON,
 )
 DIFFERENCE = Operator(
     "difference",
@@ -264,8 +264,8 @@ DIFFERENCE = Operator(
     difference_choice,
     commutes=False,
     starts_from_zero=False,
-    reach=Reach.LEFT,
+    support=Support.LEFT,
 )
 
 OPERATORS = (SUM, RICCI, UNION, INTERSECTION, DIFFERENCE)
-"""Every operator; its place here is its code on the tape."""
+"""Every operator; its index here is its code on the tape."""

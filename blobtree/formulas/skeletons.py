@@ -1,10 +1,11 @@
-"""Skeletons: for a point in space, the point of the skeleton that acts on it.
+"""Skeletons: the closest point of a skeleton to a point in space.
 
 A skeleton is one typed function `(q, tape, at) -> vec4(closest point, radius of influence there)` that reads
-its parameters from `tape[at:]`; polygonizer, tracer, particles and shaders all have it from this one table.
+its parameters from `tape[at:]`. Mesher, tracer, particles and shaders take it from this one table.
 The field of a primitive is g(|q − closest| / influence). Because the closest point minimises that ratio, its
 own motion does not enter the gradient (envelope theorem), so gradients are exact; and the ratio changes by at
-most 1 / slimmest per unit, `slimmest(tape, at)` being the smallest influence anywhere on the skeleton.
+most 1 / min_influence per unit, `min_influence(tape, at)` being the smallest influence anywhere on the
+skeleton.
 """
 
 import math
@@ -69,25 +70,67 @@ def closest_on_cone(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 
 @wp.func
-def slimmest_of_one(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
-    """The influence of a skeleton that has one."""
+def closest_on_circle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (centre, influence); tape[at + 1] = (unit axis, radius of the circle)."""
+    center = tape[at]
+    axis = tape[at + 1]
+    n = wp.vec3(axis[0], axis[1], axis[2])
+    w = q - wp.vec3(center[0], center[1], center[2])
+    flat = w - n * wp.dot(w, n)
+    if wp.length(flat) <= 1.0e-6 * wp.length(w):
+        flat = wp.cross(n, wp.vec3(0.0, 1.0, 0.0))
+        if wp.abs(n[0]) < 0.6:
+            flat = wp.cross(n, wp.vec3(1.0, 0.0, 0.0))
+    c = wp.normalize(flat) * axis[3]
+    return wp.vec4(center[0] + c[0], center[1] + c[1], center[2] + c[2], center[3])
+
+
+@wp.func
+def closest_on_disc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (centre, influence); tape[at + 1] = (unit axis, radius of the disc)."""
+    center = tape[at]
+    axis = tape[at + 1]
+    n = wp.vec3(axis[0], axis[1], axis[2])
+    w = q - wp.vec3(center[0], center[1], center[2])
+    c = w - n * wp.dot(w, n)
+    if wp.length(c) > axis[3]:
+        c = wp.normalize(c) * axis[3]
+    return wp.vec4(center[0] + c[0], center[1] + c[1], center[2] + c[2], center[3])
+
+
+@wp.func
+def closest_on_box(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (centre, influence); tape[at + 1] = (lengths along the axes, 0)."""
+    center = tape[at]
+    size = tape[at + 1]
+    return wp.vec4(
+        wp.clamp(q[0], center[0] - 0.5 * size[0], center[0] + 0.5 * size[0]),
+        wp.clamp(q[1], center[1] - 0.5 * size[1], center[1] + 0.5 * size[1]),
+        wp.clamp(q[2], center[2] - 0.5 * size[2], center[2] + 0.5 * size[2]),
+        center[3],
+    )
+
+
+@wp.func
+def min_influence_of_one(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return the influence radius of a skeleton that has one."""
     return tape[at][3]
 
 
 @wp.func
-def slimmest_of_cone(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
-    """The influence at the thinner end."""
+def min_influence_of_cone(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return the influence radius at the thinner end."""
     return wp.min(tape[at][3], tape[at + 1][3])
 
 
 @wp.func
 def squared_distances_to_ball(
-    center: wp.vec3, radius: wp.float32, c: wp.vec4, slimmest: wp.float32
+    center: wp.vec3, radius: wp.float32, c: wp.vec4, min_influence: wp.float32
 ) -> wp.vec2:
     """Bounds on (|x − skeleton| / influence)² over a ball, c being the skeleton's answer at its center."""
     distance = wp.length(center - wp.vec3(c[0], c[1], c[2])) / c[3]
-    nearest = wp.max(distance - radius / slimmest, 0.0)
-    farthest = distance + radius / slimmest
+    nearest = wp.max(distance - radius / min_influence, 0.0)
+    farthest = distance + radius / min_influence
     return wp.vec2(nearest * nearest, farthest * farthest)
 
 
@@ -109,37 +152,65 @@ def box_to_point(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4
 def box_to_segment(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
     """Bounds on (|x − segment| / influence)² over the ball around the cube center ± half."""
     c = closest_on_segment(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, slimmest_of_one(tape, at))
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
 
 
 @wp.func
 def box_to_cone(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
     """Bounds on (|x − axis| / influence)² over the ball around the cube center ± half."""
     c = closest_on_cone(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, slimmest_of_cone(tape, at))
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_cone(tape, at))
+
+
+@wp.func
+def box_to_circle(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − circle| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_circle(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+
+
+@wp.func
+def box_to_disc(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − disc| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_disc(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+
+
+@wp.func
+def box_to_box(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − box| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_box(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
 
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """One row of the table: how a kind is called, computed and stored."""
+    """One row of the table: a kind's name, functions and size on the tape."""
 
     name: str
     closest: wp.Function
-    slimmest: wp.Function
+    min_influence: wp.Function
     box_distances: wp.Function
     parameters: int
-    """Texels (vec4) that the parameters take on the tape."""
-    takes_maps: bool = True
-    """Maps that keep shapes fold into its parameters; else each primitive carries its map."""
+    """Number of texels (vec4) of its parameters on the tape."""
+    folds_maps: bool = True
+    """True if similarity maps fold into its parameters; otherwise each primitive carries its map."""
     convex: bool = False
-    """It is a convex set with one influence everywhere, so the tracer may rely on how distances change."""
+    """True for a convex set with one influence radius: distances along a ray are then convex."""
     digest: str = ""
-    """Of the sources of a user's kind."""
+    """Digest of the sources of a custom kind."""
 
 
-POINT = Skeleton("point", closest_on_point, slimmest_of_one, box_to_point, parameters=1, convex=True)
-SEGMENT = Skeleton("segment", closest_on_segment, slimmest_of_one, box_to_segment, parameters=2, convex=True)
-CONE = Skeleton("cone", closest_on_cone, slimmest_of_cone, box_to_cone, parameters=2)
+POINT = Skeleton("point", closest_on_point, min_influence_of_one, box_to_point, parameters=1, convex=True)
+SEGMENT = Skeleton(
+    "segment", closest_on_segment, min_influence_of_one, box_to_segment, parameters=2, convex=True
+)
+CONE = Skeleton("cone", closest_on_cone, min_influence_of_cone, box_to_cone, parameters=2)
+CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, box_to_circle, parameters=2)
+DISC = Skeleton("disc", closest_on_disc, min_influence_of_one, box_to_disc, parameters=2, convex=True)
+BOX = Skeleton(
+    "box", closest_on_box, min_influence_of_one, box_to_box, parameters=2, folds_maps=False, convex=True
+)
 
-SKELETONS = (POINT, SEGMENT, CONE)
-"""Every kind; its place here is its code on the tape."""
+SKELETONS = (POINT, SEGMENT, CONE, CIRCLE, DISC, BOX)
+"""Every kind; its index here is its code on the tape."""

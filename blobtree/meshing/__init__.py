@@ -1,1 +1,1 @@
-"""Blocks to closed triangles with their vertices on the surface, on its creases too."""
+"""Triangle meshes of the surface in sparse cells, with vertices on the surface and on its creases."""

@@ -1,45 +1,36 @@
-"""Kernels that measure how far triangles lie from the surface."""
+"""Kernels that measure the distance of triangles to the surface."""
 
 from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.kernels import ISO
-from blobtree.kernel_options import KERNEL_OPTIONS
-from blobtree.meshing.visible import Cells, block_at
-from blobtree.tapes.evaluate import field_gradient
+from blobtree.cells.block_kernels import CellBlocks
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import ISO
+from blobtree.meshing.local_field import gradient_at
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 NEWTON_STEPS = 30
-"""Many, for beside a kink they go from side to side."""
+"""Most steps to the surface; beside a kink, steps alternate between its sides."""
 
-ON_SURFACE = wp.constant(1e-5)
-"""Field error, in units of ISO, of a sample that has arrived."""
+CONVERGED = wp.constant(1e-5)
+"""Field error, in units of ISO, at which a sample is on the surface."""
 
-_SAMPLES = (
+SAMPLE_WEIGHTS = (
     (1 / 3, 1 / 3, 1 / 3),
     *((1 / 2, 1 / 2, 0.0), (0.0, 1 / 2, 1 / 2), (1 / 2, 0.0, 1 / 2)),
     *((2 / 3, 1 / 6, 1 / 6), (1 / 6, 2 / 3, 1 / 6), (1 / 6, 1 / 6, 2 / 3)),
 )
-"""Barycentric coordinates: the middle, those of the edges, and between the middle and the corners."""
+"""Barycentric coordinates: the centroid, the midpoints of edges, and points between centroid and corners."""
 
-_Samples: Any = wp.types.matrix(shape=(len(_SAMPLES), 3), dtype=wp.float32)
-_SAMPLE = _Samples(*(number for sample in _SAMPLES for number in sample))
-
-
-@wp.func
-def gradient_at(p: wp.vec3, cells: Cells) -> wp.vec4:
-    """(value, gradient) at p, by the tape of its block or, where there is none, the whole one."""
-    block = block_at(p, cells)
-    if block < 0:
-        return field_gradient(p, cells.whole, wp.vec2i(0, cells.whole.shape[0]))
-    return field_gradient(p, cells.tape, cells.spans[block])
+_Weights: Any = wp.types.matrix(shape=(len(SAMPLE_WEIGHTS), 3), dtype=wp.float32)
+_WEIGHTS = _Weights(*(number for sample in SAMPLE_WEIGHTS for number in sample))
 
 
 @wp.func
-def way_to_surface(start: wp.vec3, cells: Cells) -> wp.float32:
-    """Length of a way from `start` to the surface; the side of a cell where none was found."""
+def distance_by_projection(start: wp.vec3, cells: CellBlocks) -> wp.float32:
+    """Return the distance from `start` to its projection onto the surface, or a cell's side if that fails."""
     p = start
     for _step in range(NEWTON_STEPS):
         f = gradient_at(p, cells)
@@ -48,7 +39,7 @@ def way_to_surface(start: wp.vec3, cells: Cells) -> wp.float32:
         steepness = wp.length(g)
         if steepness == 0.0:
             return cells.cell
-        if wp.abs(gap) <= ON_SURFACE * ISO:
+        if wp.abs(gap) <= CONVERGED * ISO:
             return wp.length(p - start) + wp.abs(gap) / steepness
         p += g * (wp.clamp(gap / steepness, -0.5 * cells.cell, 0.5 * cells.cell) / steepness)
     return cells.cell
@@ -57,18 +48,18 @@ def way_to_surface(start: wp.vec3, cells: Cells) -> wp.float32:
 @wp.kernel
 def measure_triangles(
     first: wp.int32,
-    cells: Cells,
+    cells: CellBlocks,
     vertices: wp.array(dtype=wp.vec3),
     faces: wp.array(dtype=wp.vec3i),
     errors: wp.array(dtype=wp.float32),
 ) -> None:
-    """The largest distance of a triangle's samples to the surface."""
+    """Write the largest distance of each triangle's samples to the surface."""
     i = first + wp.tid()
     a = vertices[faces[i][0]]
     b = vertices[faces[i][1]]
     c = vertices[faces[i][2]]
     largest = float(0.0)
-    for k in range(wp.static(len(_SAMPLES))):
-        sample = a * _SAMPLE[k, 0] + b * _SAMPLE[k, 1] + c * _SAMPLE[k, 2]
-        largest = wp.max(largest, way_to_surface(sample, cells))
+    for k in range(wp.static(len(SAMPLE_WEIGHTS))):
+        sample = a * _WEIGHTS[k, 0] + b * _WEIGHTS[k, 1] + c * _WEIGHTS[k, 2]
+        largest = wp.max(largest, distance_by_projection(sample, cells))
     errors[i] = largest

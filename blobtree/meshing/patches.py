@@ -1,14 +1,14 @@
-"""Which edges of a cell belong to one sheet of surface (dual marching cubes, Nielson 2004).
+"""Tables of the patches of surface in a cell (dual marching cubes, Nielson 2004).
 
-Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2); bit c of a cell's code says whether it is inside.
-The surface inside a cell falls apart into patches, each around a loop of crossed edges; the dual mesh has one
-vertex per patch. On a face where inside and outside corners alternate, the inside ones are kept apart: both
-cells that share the face see the same corners, so both decide alike.
+Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2). Bit c of a cell's code is set if that corner is
+inside. The surface in a cell consists of patches, each bounded by a loop of crossed edges; the dual mesh has
+one vertex per patch. On a face where inside and outside corners alternate, the inside corners are kept apart.
+Both cells at the face see the same corners, so both decide alike.
 
-There is one exception. Where both strands on such a face belong to one patch in both cells, the mesh would
-have an edge with four triangles; there the inside corners are joined instead, which splits the patch in
-either cell (Wenger 2013). It only happens to cells with a single alternating face, so a cell has two rows in
-the tables: its code, and its code + FLIPPED.
+There is one exception. If both strands on such a face belong to one patch in both cells, the mesh would have
+an edge with four triangles. The inside corners are joined there instead, which splits the patch in both cells
+(Wenger 2013). Only cells with a single alternating face are concerned, so a code has two rows in the tables:
+code, and code + FLIPPED.
 """
 
 import numpy as np
@@ -24,14 +24,17 @@ FACES: tuple[tuple[int, ...], ...] = tuple(
     for axis in range(3)
     for side in range(2)
 )
-
+"""The 6 faces as their corners: two across x, two across y, two across z."""
 
 FLIPPED = 256
-"""Added to a cell's code where its alternating face joins the inside corners."""
+"""Offset of the rows in which the alternating face joins the inside corners."""
+
+MAX_PATCHES = 4
+"""Most patches in one cell."""
 
 
 def _crossed_edges(code: int, face: tuple[int, ...]) -> list[int]:
-    """The edges of a face whose ends differ."""
+    """Return the edges of a face whose ends differ."""
     return [
         edge
         for edge, (a, b) in enumerate(EDGES)
@@ -40,11 +43,12 @@ def _crossed_edges(code: int, face: tuple[int, ...]) -> list[int]:
 
 
 def _alternating_faces(code: int) -> list[int]:
+    """Return the faces whose corners are inside and outside by turns."""
     return [f for f, face in enumerate(FACES) if len(_crossed_edges(code, face)) == 4]
 
 
 def _loops(code: int, *, join_inside: bool) -> list[int]:
-    """For each edge the smallest edge of its loop, −1 where the edge is not crossed."""
+    """Return for each edge the smallest edge of its loop, −1 if the edge is not crossed."""
     loop = [edge if (code >> a & 1) != (code >> b & 1) else -1 for edge, (a, b) in enumerate(EDGES)]
 
     def join(first: int, second: int) -> None:
@@ -63,18 +67,19 @@ def _loops(code: int, *, join_inside: bool) -> list[int]:
 
 
 def _knotted_face(code: int) -> int:
-    """The alternating face whose strands belong to one patch, −1 where there is none."""
+    """Return the alternating face whose strands belong to one patch, −1 if there is none."""
     loop = _loops(code, join_inside=False)
     knotted = [
         face
         for face in _alternating_faces(code)
-        if len({loop[e] for e in _crossed_edges(code, FACES[face])}) == 1
+        if len({loop[edge] for edge in _crossed_edges(code, FACES[face])}) == 1
     ]
     assert not knotted or len(_alternating_faces(code)) == 1
     return knotted[0] if knotted else -1
 
 
 def _tables() -> tuple[NDArray[np.int8], NDArray[np.int8], NDArray[np.int8]]:
+    """Return PATCH_OF_EDGE, PATCH_COUNT and KNOTTED_FACE."""
     patch_of_edge = np.full((2 * FLIPPED, 12), -1, dtype=np.int8)
     patch_count = np.zeros(2 * FLIPPED, dtype=np.int8)
     for row in range(2 * FLIPPED):
@@ -87,5 +92,5 @@ def _tables() -> tuple[NDArray[np.int8], NDArray[np.int8], NDArray[np.int8]]:
 
 
 PATCH_OF_EDGE, PATCH_COUNT, KNOTTED_FACE = _tables()
-"""By row: patch (512, 12) of every edge, −1 where it is not crossed; number of patches (512,).
-By code: the face (256,) on which the exception may apply, −1 where there is none."""
+"""By row: the patch of each edge (512, 12), −1 if it is not crossed, and the number of patches (512,).
+By code: the face (256,) that the exception may concern, −1 if there is none."""

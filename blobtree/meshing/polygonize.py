@@ -1,32 +1,39 @@
-"""Field → triangle mesh on sparse cells: one vertex per patch of surface in a cell, Newton onto the surface.
+"""`polygonize` and `Polygonizer`: the surface of a field as a triangle mesh.
 
-Dual marching cubes (Nielson 2004) over the blocks that the surface may cross, so cost grows with the
-surface's area; vertices lie on the surface as exactly as float32 can tell.
+Dual marching cubes (Nielson 2004) on sparse cells: one vertex per patch of surface in a cell, projected onto
+the surface by Newton's method. The cost grows with the area of the surface, and vertices lie on the surface
+as exactly as float32 can tell.
 """
 
-from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
+from blobtree.cells.grid import Grid, aligned_grid
+from blobtree.cells.sparse_cells import build_cells
 from blobtree.errors import InvalidResolution
-from blobtree.launch import fresh_memory
-from blobtree.meshing.chord import FIRST_RESOLUTION, MOST_PASSES, SMALLEST, finer, largest_error
+from blobtree.meshing.chord import (
+    FIRST_RESOLUTION,
+    MAX_PASSES,
+    MIN_RELATIVE_ERROR,
+    largest_chord_error,
+    next_cell_size,
+)
 from blobtree.meshing.creases import sharpened
-from blobtree.meshing.surface import Surface, extract_surface
-from blobtree.nodes.tree import Node, checked_tree
+from blobtree.meshing.device_mesh import DeviceMesh, extract_mesh
+from blobtree.meshing.mesh import Mesh, download
 from blobtree.progress import Cancel, Progress, watched
-from blobtree.sparse.cells import build_cells
-from blobtree.sparse.grid import Grid, aligned_grid
+from blobtree.tape.model import ImplicitModel, checked_tree
 
 DEFAULT_RESOLUTION = 64
-FINEST_RESOLUTION = 1 << 20
-"""Cells along a side beyond which their places do not fit into 32 bits."""
 
-SMALLEST_MODEL, LARGEST_MODEL = 1e-15, 1e15
+MAX_RESOLUTION = 1 << 20
+"""Cells along a side beyond which 32 bits cannot hold their coordinates."""
+
+MIN_MODEL_SIZE, MAX_MODEL_SIZE = 1e-15, 1e15
 """Sizes between which squared distances, in cells too, neither vanish nor overflow in float32."""
+
 _STAGES = (
     "finding the surface",
     "sampling the field",
@@ -35,29 +42,11 @@ _STAGES = (
     "finding creases",
     "measuring chords",
 )
-"""What work reports, in order."""
-
-Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles: float32[n, 3] `vertices`, outward unit `normals` and `colors`; int32[m, 3] `faces`.
-
-    A normal on a crease is the mean of those on either side.
-    """
-
-    vertices: Floats
-    faces: Ints
-    normals: Floats
-    colors: Floats
-    meetings: NDArray[np.uint8] | None = None
-    """Where creases were asked for, how many smooth pieces meet in each vertex (n,), see `creases`."""
+"""The stages of a pass that `progress` is called with, in order."""
 
 
 def polygonize(
-    tree: Node,
+    tree: ImplicitModel,
     *,
     resolution: int | None = None,
     cell_size: float | None = None,
@@ -67,35 +56,62 @@ def polygonize(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Mesh:
-    """The surface of `tree` as closed, consistently oriented triangles (counter-clockwise from outside).
+    """Return the surface of `tree` as closed, consistently oriented triangles.
+
+    Give at most one of `resolution`, `cell_size` and `chord_error`.
 
     Parameters
     ----------
-    resolution
-        Cells along the longest side of the tree's box; 64 by default.
-    cell_size
-        Side of a cell in the model's units, in place of `resolution`; thinner features may be lost.
-    chord_error
-        In place of either, how far the triangles may lie from the surface, in the model's units. Passes with
-        smaller and smaller cells are measured at seven samples in every triangle, until none lies farther.
-        Parts of the model thinner than a 32nd of its box may be lost, as in any cells of that size.
-    creases
-        Vertices lie on the edges and corners that unions, intersections and differences leave.
-    device
-        Warp device that does the work, by default the current one.
-    progress
-        Called with a stage in plain words and the fraction done.
-    cancel
-        Asked many times whether to stop.
+    tree : Node
+        The model.
+    resolution : int, optional
+        Cells along the longest side of the tree's box of influence; 64 by default.
+    cell_size : float, optional
+        Side of a cell, in the model's units. Features thinner than a cell may be lost.
+    chord_error : float, optional
+        Largest distance of the triangles to the surface, in the model's units. Passes with smaller and
+        smaller cells are measured at seven samples in every triangle, until no sample lies farther. Features
+        thinner than a 32nd of the box may be lost.
+    creases : bool, optional
+        Move vertices onto the edges and corners that unions, intersections and differences leave.
+    device : str, optional
+        Warp device that computes the mesh; by default the current one.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``, with the stage in plain words and the fraction done.
+    cancel : callable, optional
+        Called many times; the work stops if it returns True.
+
+    Returns
+    -------
+    Mesh
+        Vertices, faces (counter-clockwise seen from outside), outward normals and colours.
 
     Raises
     ------
-    InvalidNode, InvalidDevice
-        `tree` or `device` is none.
+    InvalidNode
+        `tree` is not a model.
+    InvalidDevice
+        `device` is not a Warp device.
     InvalidResolution
-        Several or senseless sizes were given, more cells than can be counted, or none that are small enough.
+        Several sizes are given, or one that is not positive, too small for float32, or too small for memory.
     Cancelled
-        `cancel` said so.
+        `cancel` returned True.
+
+    See Also
+    --------
+    Polygonizer : update a mesh after edits.
+    split_creases : prepare a mesh with creases for rendering.
+
+    Examples
+    --------
+    >>> from blobtree import Point, polygonize
+    >>> ball = Point((0, 0, 0), radius=1.0)
+    >>> mesh = polygonize(ball, resolution=16)
+    >>> bool(abs(ball(mesh.vertices) - 0.5).max() < 1e-5)  # on the surface
+    True
+    >>> lens = ball & ball.translate((1, 0, 0))
+    >>> int((polygonize(lens, resolution=16, creases=True).sheet_counts == 2).sum()) > 10
+    True
     """
     checked_tree(tree)
     if chord_error is None:
@@ -112,58 +128,67 @@ def polygonize(
         raise InvalidResolution(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"
         )
-    chord_error = _above_zero("chord_error", "length", chord_error)
-    smallest = SMALLEST * float(np.abs(tree.bounds).max())
-    if chord_error < smallest:
-        raise InvalidResolution(
-            f"chord_error: {chord_error:g} is below what float32 can tell there; allow {smallest:.2g} or more"
-        )
-    report = watched(progress, cancel)
-    tried: list[tuple[float, float]] = []
+    chord_error = _chord_error(tree, chord_error)
+    return _within_chord_error(tree, chord_error, creases, device, watched(progress, cancel))
+
+
+def _within_chord_error(
+    tree: ImplicitModel, chord_error: float, creases: bool, device: str | None, report: Progress
+) -> Mesh:
+    """Return the mesh of the first pass whose triangles lie within `chord_error` of the surface."""
+    passes: list[tuple[float, float]] = []
     size = _cell_size(tree, FIRST_RESOLUTION, None)
-    for number in range(1, MOST_PASSES + 1):
-        passing = _numbered(report, number)
-        polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=passing)
-        error = largest_error(polygonizer.shown, passing)
+    for number in range(1, MAX_PASSES + 1):
+        pass_report = _numbered(report, number)
+        polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=pass_report)
+        error = largest_chord_error(polygonizer.device_mesh, pass_report)
         if error <= chord_error:
             return polygonizer.mesh
-        tried.append((size, error))
-        size = finer(tried, chord_error)
+        passes.append((size, error))
+        size = next_cell_size(passes, chord_error)
     raise InvalidResolution(
-        f"chord_error: {chord_error:g} was not reached in {MOST_PASSES} passes, the last with cells of "
-        f"{tried[-1][0]:g} came to {tried[-1][1]:g}; allow more, or ask for creases where CSG cuts edges"
+        f"chord_error: {chord_error:g} was not reached in {MAX_PASSES} passes, the last with cells of "
+        f"{passes[-1][0]:g} came to {passes[-1][1]:g}; allow more, or ask for creases where CSG cuts edges"
     )
 
 
 def _numbered(report: Progress, number: int) -> Progress:
-    """Reports of one pass among several, its stages taken together."""
+    """Return a callback that reports the stages of one pass as fractions of that pass."""
     return lambda stage, fraction: report(
         f"meshing, pass {number}", (_STAGES.index(stage) + fraction) / len(_STAGES)
     )
 
 
 class Polygonizer:
-    """The mesh of a tree that is being edited: after an edit only what it touched is made anew.
+    """The mesh of a tree that is being edited, of which an update computes the changed parts alone.
 
-        polygonizer = Polygonizer(tree, resolution=128)
-        show(polygonizer.mesh)
-        show(polygonizer.update(edited_tree))
+    Each mesh is the one that `polygonize` returns for that tree and `cell_size`, bit for bit. The caller need
+    not say what was edited: blocks of cells are compared by the primitives and operators that act in them.
+    Cells are counted from the world's origin, so the grid stays in place while the model changes its size.
 
-    Every mesh is the one that `polygonize` makes of that tree with this `cell_size`, bit for bit and in the
-    same order. Which parts of the tree differ need not be said: blocks of cells are compared by what acts in
-    them. Cells count from the world's origin, so the grid stays where it is while the model changes its size.
-
-    Parameters are those of `polygonize`; `resolution` settles the size of the cells by the first tree.
+    Parameters
+    ----------
+    tree, resolution, cell_size, creases, device, progress, cancel
+        As for `polygonize`. `resolution` sets the cell size by the box of the first tree.
 
     Raises
     ------
     InvalidNode, InvalidDevice, InvalidResolution, Cancelled
-        As for `polygonize`; the last mesh stays.
+        As for `polygonize`. If an update raises, the last mesh stays.
+
+    Examples
+    --------
+    >>> from blobtree import Point, Polygonizer
+    >>> polygonizer = Polygonizer(Point((0, 0, 0), radius=1.0), resolution=16)
+    >>> before = len(polygonizer.mesh.vertices)
+    >>> after = len(polygonizer.update(Point((0, 0, 0), radius=2.0)).vertices)
+    >>> after > 3 * before  # four times the area in cells of the same size
+    True
     """
 
     def __init__(
         self,
-        tree: Node,
+        tree: ImplicitModel,
         *,
         resolution: int | None = None,
         cell_size: float | None = None,
@@ -176,82 +201,69 @@ class Polygonizer:
         self._device = device
         self._creases = creases
         self._cell_size = _cell_size(tree, resolution, cell_size)
-        self._surface, self._shown, self._meetings = self._extract(tree, None, watched(progress, cancel))
+        report = watched(progress, cancel)
+        self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
         self._tree = tree
         self._mesh: Mesh | None = None
 
     @property
-    def tree(self) -> Node:
-        """The tree that the mesh shows."""
+    def tree(self) -> ImplicitModel:
+        """The tree of the mesh."""
         return self._tree
 
     @property
     def cell_size(self) -> float:
-        """Side of a cell in the model's units."""
+        """Side of a cell, in the model's units."""
         return self._cell_size
 
     @property
-    def surface(self) -> Surface:
-        """The triangles as arrays in the device's memory, before vertices go onto creases."""
-        return self._surface
+    def dual_mesh(self) -> DeviceMesh:
+        """The triangles in the device's memory, before vertices are moved onto creases."""
+        return self._dual_mesh
 
     @property
-    def shown(self) -> Surface:
-        """The same with its vertices on creases, where these were asked for."""
-        return self._shown
+    def device_mesh(self) -> DeviceMesh:
+        """The triangles in the device's memory, with vertices on creases if these were asked for."""
+        return self._device_mesh
 
     @property
     def mesh(self) -> Mesh:
         """The triangles as NumPy arrays."""
         if self._mesh is None:
-            self._mesh = download(self._shown, self._meetings)
+            self._mesh = download(self._device_mesh, self._sheet_counts)
         return self._mesh
 
-    def update(self, tree: Node, *, progress: Progress | None = None, cancel: Cancel | None = None) -> Mesh:
-        """The mesh of `tree`, the parts that are as before being taken over; creases are found anew."""
-        self.update_surface(tree, progress=progress, cancel=cancel)
+    def update(
+        self, tree: ImplicitModel, *, progress: Progress | None = None, cancel: Cancel | None = None
+    ) -> Mesh:
+        """Return the mesh of `tree`, in which unchanged parts are copied; creases are computed again."""
+        self.update_device_mesh(tree, progress=progress, cancel=cancel)
         return self.mesh
 
-    def update_surface(
-        self, tree: Node, *, progress: Progress | None = None, cancel: Cancel | None = None
-    ) -> Surface:
-        """The same without bringing the triangles to the host."""
+    def update_device_mesh(
+        self, tree: ImplicitModel, *, progress: Progress | None = None, cancel: Cancel | None = None
+    ) -> DeviceMesh:
+        """Do the same as `update`, and leave the triangles on the device."""
         report = watched(progress, cancel)
         checked_tree(tree)
-        self._surface, self._shown, self._meetings = self._extract(tree, self._surface, report)
+        extracted = self._extract(tree, self._dual_mesh, report)
+        self._dual_mesh, self._device_mesh, self._sheet_counts = extracted
         self._tree, self._mesh = tree, None
-        return self._shown
+        return self._device_mesh
 
     def _extract(
-        self, tree: Node, previous: Surface | None, report: Progress
-    ) -> tuple[Surface, Surface, NDArray[np.uint8] | None]:
-        """The surface, how it is shown, and what meets in the vertices then."""
+        self, tree: ImplicitModel, previous: DeviceMesh | None, report: Progress
+    ) -> tuple[DeviceMesh, DeviceMesh, NDArray[np.uint8] | None]:
+        """Return `dual_mesh`, `device_mesh` and the sheet counts of the vertices."""
         grid = _grid(tree, self._cell_size)
-        before = previous.cells if previous is not None else None
-        cells = build_cells(tree.tape, grid, device=self._device, previous=before, report=report)
-        surface = extract_surface(cells, report, previous)
-        return (surface, *sharpened(surface, report)) if self._creases else (surface, surface, None)
+        old_cells = previous.cells if previous is not None else None
+        cells = build_cells(tree.tape, grid, device=self._device, previous=old_cells, report=report)
+        mesh = extract_mesh(cells, report, previous)
+        return (mesh, *sharpened(mesh, report)) if self._creases else (mesh, mesh, None)
 
 
-def download(surface: Surface, meetings: NDArray[np.uint8] | None = None) -> Mesh:
-    """The triangles of a surface as NumPy arrays."""
-    arrays = [surface.vertices, surface.faces, surface.normals, surface.colors]
-    vertices, faces, normals, colors = map(_on_host, arrays)
-    return Mesh(vertices, faces, normals, colors, meetings)
-
-
-def _on_host(array: Any) -> Any:
-    """A device's vectors as NumPy array; the CPU's own memory is handed out as it is."""
-    if array.device.is_cpu:
-        return array.numpy()
-    host = fresh_memory((len(array), 3), np.int32 if array.dtype == wp.vec3i else np.float32)
-    wp.copy(wp.array(host, dtype=array.dtype, device="cpu", copy=False), array)
-    wp.synchronize_device(array.device)
-    return host
-
-
-def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> float:
-    """Side of a cell that the caller asked for in one way or the other."""
+def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:
+    """Return the side of a cell from `resolution` or `cell_size`, once it is checked."""
     lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
     longest = float((upper - lower).max())
     if resolution is not None and cell_size is not None:
@@ -264,21 +276,32 @@ def _cell_size(tree: Node, resolution: int | None, cell_size: float | None) -> f
             )
         cell_size = longest / int(cells)
     cell_size = _above_zero("cell_size", "size", cell_size)
-    if not SMALLEST_MODEL < longest < LARGEST_MODEL:
+    if not MIN_MODEL_SIZE < longest < MAX_MODEL_SIZE:
         raise InvalidResolution(
-            f"the model is {longest:.3g} long; between {SMALLEST_MODEL:g} and {LARGEST_MODEL:g} float32 can "
+            f"the model is {longest:.3g} long; between {MIN_MODEL_SIZE:g} and {MAX_MODEL_SIZE:g} float32 can "
             "square its distances: scale it"
         )
-    if longest / cell_size > FINEST_RESOLUTION:
+    if longest / cell_size > MAX_RESOLUTION:
         raise InvalidResolution(
-            f"cell_size: {cell_size:g} makes {longest / cell_size:.3g} cells along the model, at most "
-            f"{FINEST_RESOLUTION:,} can be counted; take larger cells"
+            f"cell_size: expected at most {MAX_RESOLUTION:,} cells along the model, got "
+            f"{longest / cell_size:.3g} with cells of {cell_size:g}; take larger cells"
         )
     return cell_size
 
 
+def _chord_error(tree: ImplicitModel, value: object) -> float:
+    """Return `value` as a chord error that float32 can resolve."""
+    chord_error = _above_zero("chord_error", "length", value)
+    smallest = MIN_RELATIVE_ERROR * float(np.abs(tree.bounds).max())
+    if chord_error < smallest:
+        raise InvalidResolution(
+            f"chord_error: {chord_error:g} is below what float32 can tell there; allow {smallest:.2g} or more"
+        )
+    return chord_error
+
+
 def _above_zero(name: str, noun: str, value: object) -> float:
-    """`value` as a finite number above zero; InvalidResolution otherwise."""
+    """Return `value` as a finite number above zero; raise `InvalidResolution` otherwise."""
     try:
         number = float(cast(Any, value))
     except (TypeError, ValueError):
@@ -288,7 +311,7 @@ def _above_zero(name: str, noun: str, value: object) -> float:
     return number
 
 
-def _grid(tree: Node, cell_size: float) -> Grid:
-    """Cells around the box of influence, one more on every side so that the rim lies outside the surface."""
+def _grid(tree: ImplicitModel, cell_size: float) -> Grid:
+    """Return cells around the box of influence, and one more on every side so that the surface is closed."""
     lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
     return aligned_grid(lower - cell_size, upper + cell_size, cell_size)

@@ -1,180 +1,298 @@
-"""Primitives: the leaves of a tree, each a skeleton with a radius and a colour."""
+"""Primitives: the leaves of a tree, each a skeleton with a visible radius and a colour.
+
+A new primitive is a row of `formulas.skeletons` and a class here. The class names that row, declares its
+parameters, and returns points whose convex hull holds the skeleton. If the formula reads its parameters in
+the order of declaration, `texels` need not be written.
+"""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from itertools import chain
-from typing import ClassVar
+from itertools import product
+from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blobtree.formulas.kernels import RIM
-from blobtree.formulas.skeletons import CONE, POINT, SEGMENT, Skeleton
+from blobtree._typing import Float64Array
+from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
+from blobtree.nodes.parameters import (
+    Color,
+    Parameter,
+    Quantity,
+    Radius,
+    columns_of,
+    mapped,
+    parameters_of,
+    unit_vectors,
+)
 from blobtree.nodes.tree import Node
-from blobtree.validation import Vector, color_triple, finite_vector, positive_number, settle
-
-Floats = NDArray[np.float64]
+from blobtree.tape.program import ProgramPrimitive
+from blobtree.validation import Vector
 
 DEFAULT_COLOR: Vector = (0.8, 0.8, 0.8)
 
 SHORTEST_AXIS = 1e-12
-"""Squared length of an axis, over squared influence, below which a segment is a point."""
+"""Squared length of an axis, over squared influence radius, below which a segment is a point."""
+
+INFLUENCE_SLOT = 3
+"""Place of the influence radius among the parameters on the tape, in floats: beside a first point."""
+
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
+"""Corners (8, 3) of a cube around the origin."""
+
+OCTAGON_ANGLES = np.arange(8) * (np.pi / 4.0)
+
+Columns = dict[str, Float64Array]
+"""Values (n, size) of n primitives by the names of their parameters."""
 
 
-class Primitive(Node):
-    """A skeleton with a radius and a colour: a leaf of the tree."""
+class Primitive(ProgramPrimitive, Node):
+    """A skeleton with a visible radius and a colour: a leaf of the tree."""
 
     skeleton: ClassVar[Skeleton]
     radius: float
     color: Vector
 
-    @property
-    def influences(self) -> tuple[float, ...]:
-        """Distances from the skeleton at which the field fades to 0, one per radius of the primitive."""
-        return (self.radius / RIM,)
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """Points whose convex hull holds the skeleton."""
-        raise NotImplementedError  # every kind has its own
+    @classmethod
+    def radii(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:
+        """Return the visible radii (n, k) of n primitives of this kind, in the order of declaration."""
+        declared = parameters_of(cls).values()
+        columns = [columns_of(primitives, item) for item in declared if item.quantity is Quantity.RADIUS]
+        return np.concatenate(columns, axis=1)
 
     @classmethod
-    def hulls(cls, primitives: Sequence["Primitive"]) -> Floats:
-        """Points (n, k, 3) whose convex hulls hold the skeletons of n primitives of this kind."""
-        count = len(primitives[0].control_points)
-        points = chain.from_iterable(primitive.control_points for primitive in primitives)
-        size = 3 * count * len(primitives)
-        return np.fromiter(chain.from_iterable(points), np.float64, size).reshape(-1, count, 3)
+    def _skeleton_parameters(cls) -> list[Parameter]:
+        """Return the parameters of the skeleton, without radii and colour."""
+        surface = (Quantity.RADIUS, Quantity.COLOR)
+        return [p for p in parameters_of(cls).values() if p.quantity not in surface]
 
     @classmethod
-    def packed(cls, primitives: Sequence["Primitive"], influences: Floats, matrices: Floats | None) -> Floats:
-        """Parameters (n, ·, 4) on the tape of n primitives of this kind, under maps (n, 4, 4) if any.
+    def hulls(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:
+        """Return points (n, k, 3) whose convex hulls hold the skeletons of n primitives of this kind."""
+        return cls.hull({item.name: columns_of(primitives, item) for item in cls._skeleton_parameters()})
 
-        The maps are those that fold into the parameters; influences (n, ·) are scaled by them already.
+    @classmethod
+    def hull(cls, columns: Columns) -> Float64Array:
+        """Return points (n, k, 3) whose convex hulls hold n skeletons; by default their points."""
+        points = [
+            columns[item.name] for item in cls._skeleton_parameters() if item.quantity is Quantity.POINT
+        ]
+        return np.stack(points, axis=1)
+
+    @classmethod
+    def packed(
+        cls,
+        primitives: Sequence[ProgramPrimitive],
+        influences: Float64Array,
+        matrices: Float64Array | None,
+    ) -> Float64Array:
+        """Return the parameters (n, ·, 4) on the tape of n primitives of this kind.
+
+        Parameters
+        ----------
+        primitives
+            Primitives of this kind.
+        influences
+            Influence radii (n, k), scaled by the maps already.
+        matrices
+            Similarity maps (n, 4, 4) that fold into the parameters, None for none.
         """
-        points = cls.hulls(primitives)
-        if matrices is not None:
-            points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
-        return cls.texels(points, influences)
+        columns = {
+            item.name: mapped(item.quantity, columns_of(primitives, item), matrices)
+            for item in cls._skeleton_parameters()
+        }
+        return cls.texels(columns, influences)
 
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Parameters (n, ·, 4) on the tape, as `skeletons` describes them.
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return parameters as texels (n, ·, 4), as `formulas.skeletons` reads them.
 
-        For n primitives with control points (n, k, 3) and influences (n, ·).
+        By default the numbers follow each other as declared, with the influence radius in INFLUENCE_SLOT.
         """
-        raise NotImplementedError  # every kind has its own
+        count = len(influences)
+        numbers = np.concatenate([np.empty((count, 0)), *columns.values()], axis=1)
+        head, tail = numbers[:, :INFLUENCE_SLOT], numbers[:, INFLUENCE_SLOT:]
+        head = np.pad(head, ((0, 0), (0, INFLUENCE_SLOT - head.shape[1])))
+        tail = np.pad(tail, ((0, 0), (0, -tail.shape[1] % 4)))
+        return np.concatenate([head, influences[:, :1], tail], axis=1).reshape(count, -1, 4)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point(Primitive):
-    """A ball of `radius` around `center`."""
+    """A ball.
 
+    Examples
+    --------
+    >>> from blobtree import Point
+    >>> Point((0, 0, 0), radius=1.0)([[1, 0, 0]]).round(3).tolist()
+    [0.5]
+    """
+
+    file_tag = "point"
     skeleton = POINT
 
-    center: Vector
+    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the ball")]
     _: KW_ONLY
-    radius: float
-    color: Vector = DEFAULT_COLOR
-
-    def __post_init__(self) -> None:
-        settle(
-            self,
-            center=finite_vector("center", self.center),
-            radius=positive_number("radius", self.radius),
-            color=color_triple(self.color),
-        )
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """The centre."""
-        return (self.center,)
-
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Centre and influence."""
-        return np.concatenate([points, influences[:, :, None]], axis=2)
+    radius: Radius
+    color: Color = DEFAULT_COLOR
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segment(Primitive):
-    """A capsule of `radius` around the straight line from `start` to `end`; equal ends make a ball."""
+    """A capsule around a straight line; equal ends make a ball.
 
+    Examples
+    --------
+    >>> from blobtree import Segment
+    >>> Segment((0, 0, 0), (2, 0, 0), radius=0.5)([[1, 0.5, 0]]).round(3).tolist()
+    [0.5]
+    """
+
+    file_tag = "segment"
     skeleton = SEGMENT
 
-    start: Vector
-    end: Vector
+    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the line")]
+    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the line")]
     _: KW_ONLY
-    radius: float
-    color: Vector = DEFAULT_COLOR
+    radius: Radius
+    color: Color = DEFAULT_COLOR
 
-    def __post_init__(self) -> None:
-        settle(
-            self,
-            start=finite_vector("start", self.start),
-            end=finite_vector("end", self.end),
-            radius=positive_number("radius", self.radius),
-            color=color_triple(self.color),
-        )
-
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """Start and end."""
-        return (self.start, self.end)
-
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Start and influence; axis and 1 / length²."""
-        axes = points[:, 1] - points[:, 0]
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start and influence radius; axis and 1 / length²."""
+        axes = columns["end"] - columns["start"]
         squares = (axes**2).sum(axis=1)
         short = squares <= SHORTEST_AXIS * influences[:, 0] ** 2
         inverses = np.where(short, 0.0, 1.0 / np.where(short, 1.0, squares))
-        return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, inverses)], axis=1)
+        return np.stack([_beside(columns["start"], influences[:, 0]), _beside(axes, inverses)], axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cone(Primitive):
-    """A round cone: the hull of a ball of `radius` at `start` and one of `end_radius` at `end`.
+    """A round cone: the convex hull of two balls; if one ball holds the other, the larger ball alone.
 
-    Where one ball holds the other, the larger ball alone.
+    Examples
+    --------
+    >>> from blobtree import Cone
+    >>> Cone((0, 0, 0), (2, 0, 0), radius=1.0, end_radius=0.5)([[2.5, 0, 0]]).round(3).tolist()
+    [0.5]
     """
 
+    file_tag = "cone"
     skeleton = CONE
 
-    start: Vector
-    end: Vector
+    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the axis")]
+    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the axis")]
     _: KW_ONLY
-    radius: float
-    end_radius: float
-    color: Vector = DEFAULT_COLOR
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the start")]
+    end_radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the end")]
+    color: Color = DEFAULT_COLOR
 
-    def __post_init__(self) -> None:
-        settle(
-            self,
-            start=finite_vector("start", self.start),
-            end=finite_vector("end", self.end),
-            radius=positive_number("radius", self.radius),
-            end_radius=positive_number("end_radius", self.end_radius),
-            color=color_triple(self.color),
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start and influence radius there; axis and influence radius at the end."""
+        axes = columns["end"] - columns["start"]
+        return np.stack(
+            [_beside(columns["start"], influences[:, 0]), _beside(axes, influences[:, 1])], axis=1
         )
 
-    @property
-    def influences(self) -> tuple[float, ...]:
-        """At the start and at the end."""
-        return (self.radius / RIM, self.end_radius / RIM)
 
-    @property
-    def control_points(self) -> tuple[Vector, ...]:
-        """Start and end."""
-        return (self.start, self.end)
+@dataclass(frozen=True, eq=False, repr=False)
+class Torus(Primitive):
+    """A torus: a tube around a circle.
 
-    @staticmethod
-    def texels(points: Floats, influences: Floats) -> Floats:
-        """Start and influence there; axis and influence at the end."""
-        axes = points[:, 1] - points[:, 0]
-        return np.stack([_beside(points[:, 0], influences[:, 0]), _beside(axes, influences[:, 1])], axis=1)
+    Examples
+    --------
+    >>> from blobtree import Torus
+    >>> ring = Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.2)
+    >>> ring([[1.2, 0, 0], [0, 1, 0.2], [0, 0, 0]]).round(3).tolist()
+    [0.5, 0.5, 0.0]
+    """
+
+    file_tag = "torus"
+    skeleton = CIRCLE
+
+    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the circle")]
+    axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the circle's plane, of any length")]
+    ring_radius: Annotated[float, Parameter(Quantity.LENGTH, "radius of the circle")]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the tube")]
+    color: Color = DEFAULT_COLOR
+
+    @classmethod
+    def hull(cls, columns: Columns) -> Float64Array:
+        """Return the corners of an octagon around the circle."""
+        return _octagons(columns["center"], columns["axis"], columns["ring_radius"])
 
 
-def _beside(vectors: Floats, numbers: Floats) -> Floats:
-    """`vectors` (n, 3) and `numbers` (n,) as texels (n, 4)."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Disc(Primitive):
+    """A flat disc with a rounded edge: everything within `radius` of the disc.
+
+    Examples
+    --------
+    >>> from blobtree import Disc
+    >>> plate = Disc((0, 0, 0), (0, 0, 1), 1.0, radius=0.1)
+    >>> plate([[0.5, 0, 0.1], [1.1, 0, 0]]).round(3).tolist()
+    [0.5, 0.5]
+    """
+
+    file_tag = "disc"
+    skeleton = DISC
+
+    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the disc")]
+    axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the disc's plane, of any length")]
+    disc_radius: Annotated[float, Parameter(Quantity.LENGTH, "radius of the disc, without its edge")]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
+    color: Color = DEFAULT_COLOR
+
+    @classmethod
+    def hull(cls, columns: Columns) -> Float64Array:
+        """Return the corners of an octagon around the disc."""
+        return _octagons(columns["center"], columns["axis"], columns["disc_radius"])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Box(Primitive):
+    """A solid box with rounded edges, parallel to the axes: everything within `radius` of the box.
+
+    Examples
+    --------
+    >>> from blobtree import Box
+    >>> brick = Box((0, 0, 0), (2, 1, 1), radius=0.1)
+    >>> brick([[1.1, 0, 0], [0, 0.6, 0], [0, 0, 0]]).round(3).tolist()
+    [0.5, 0.5, 1.0]
+    """
+
+    file_tag = "box"
+    skeleton = BOX
+
+    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the box")]
+    size: Annotated[Vector, Parameter(Quantity.EXTENTS, "lengths along x, y and z, without the radius")]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edges")]
+    color: Color = DEFAULT_COLOR
+
+    @classmethod
+    def hull(cls, columns: Columns) -> Float64Array:
+        """Return the corners of the box."""
+        corners: Float64Array = columns["center"][:, None] + 0.5 * columns["size"][:, None] * CORNERS
+        return corners
+
+
+def _beside(vectors: Float64Array, numbers: Float64Array) -> Float64Array:
+    """Return `vectors` (n, 3) and `numbers` (n,) as texels (n, 4)."""
     return np.column_stack([vectors, numbers])
+
+
+def _octagons(centers: Float64Array, axes: Float64Array, radii: Float64Array) -> Float64Array:
+    """Return the corners (n, 8, 3) of regular octagons around circles with radii (n, 1)."""
+    normals = unit_vectors(axes)
+    smallest = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, smallest)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normals, first)
+    cosines, sines = np.cos(OCTAGON_ANGLES)[:, None], np.sin(OCTAGON_ANGLES)[:, None]
+    directions = cosines * first[:, None] + sines * second[:, None]
+    corners: Float64Array = centers[:, None] + (radii / np.cos(np.pi / 8.0))[:, :, None] * directions
+    return corners

@@ -1,52 +1,87 @@
-"""BlobTree nodes: immutable values that combine with Python's operators (Wyvill, Guy & Galin 1999).
+"""Nodes of a BlobTree: immutable values that combine with Python's operators (Wyvill, Guy & Galin 1999).
 
     body = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0, 0), radius=0.4)
     model = (body | Point((2, 1, 0), radius=0.5)) - Point((0, 0, 1), radius=0.5)
 
-`radius` is what an isolated primitive shows; the radius of influence that the field needs is radius / RIM.
+`radius` is the visible radius of an isolated primitive; its influence radius is radius / RIM.
 """
 
 import math
-import reprlib
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_type_hints
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from blobtree import affine
+from blobtree._typing import Float32Array
+from blobtree.cells.interval import range_over
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
-from blobtree.lazy import Lazy
-from blobtree.nodes.bounds import influence_bounds
-from blobtree.nodes.identity import equal, from_records, hash_of, text_of, to_records
-from blobtree.nodes.outline import outline
-from blobtree.sparse.interval import range_over
-from blobtree.tapes.evaluate import colors_at, gradients_at, values_at
-from blobtree.tapes.program import Instruction, compile_program
-from blobtree.tapes.tape import Tape, compile_tape
+from blobtree.meshing.creases import split_creases
+from blobtree.meshing.polygonize import polygonize
+from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
+from blobtree.nodes.values import equal, from_records, hash_of, outline, text_of, to_records
+from blobtree.progress import Cancel, Progress
+from blobtree.pyvista_views import LEVELS, SLICE_RESOLUTION, slice_tree, to_polydata
+from blobtree.tape.model import ImplicitModel
+from blobtree.tape.program import Placement
 from blobtree.tracing.trace import Hits, raycast
-from blobtree.validation import Matrix, affine_matrix, finite_number, finite_vector, settle
-from blobtree.views.viewing import Viewing
+from blobtree.validation import Matrix, affine_matrix, finite_number, finite_vector
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 LARGEST_EXPONENT = 100.0
 """Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
 
+NODE_KINDS: dict[str, type["Node"]] = {}
+"""Every built-in class of nodes by its name in files."""
 
-class Node(Viewing):
+
+class Node(ImplicitModel):
     """Part of a BlobTree: a field that is 0 far away and larger than ISO inside.
 
-    Every node is a value: it never changes, and equal nodes compare equal. All that Python asks of a value is
-    answered here, for a tree of any depth; so a kind of node is a dataclass with `eq=False, repr=False`.
+    A node is a value: it never changes, and equal trees compare equal. `==`, `hash`, `repr`, pickling and
+    copying work for trees of any depth. ``a + b`` blends, ``a | b`` is the union, ``a & b`` the intersection
+    and ``a - b`` the difference of two nodes.
+
+    A class of nodes is a dataclass with `eq=False, repr=False` whose fields declare a `Parameter` or hold
+    operands.
+
+    Examples
+    --------
+    >>> from blobtree import Point, Segment
+    >>> model = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0, 0), radius=0.4)
+    >>> model([[0, 0, 0], [9, 0, 0]]).round(2).tolist()
+    [2.0, 0.0]
+    >>> print(model)
+    Sum()
+      Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8))
+      Segment(start=(0.0, 0.0, 0.0), end=(2.0, 0.0, 0.0), radius=0.4, color=(0.8, 0.8, 0.8))
     """
+
+    file_tag: ClassVar[str]
+    """Name of this kind in files."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "file_tag" in vars(cls):
+            cls.__doc__ = documented(cls.__doc__ or "", cls)
+            NODE_KINDS[cls.file_tag] = cls
+
+    def __post_init__(self) -> None:
+        for name, check in _checks(type(self)):
+            object.__setattr__(self, name, check(getattr(self, name)))
 
     @property
     def children(self) -> tuple["Node", ...]:
-        """The nodes that this one combines, none for a primitive."""
+        """The operands of this node, from left to right; empty for a primitive."""
         return ()
 
-    # -- being a value ------------------------------------------------------------------------------
+    # -- values -------------------------------------------------------------------------------------
 
     def __eq__(self, other: object) -> bool:
         return equal(self, other) if isinstance(other, Node) else NotImplemented
@@ -69,7 +104,7 @@ class Node(Viewing):
     def __deepcopy__(self, _memo: dict[int, Any]) -> Self:
         return self
 
-    # -- combining ----------------------------------------------------------------------------------
+    # -- combinations -------------------------------------------------------------------------------
 
     def __add__(self, other: "Node") -> "Node":
         return _folded(Sum, self, other)
@@ -83,18 +118,73 @@ class Node(Viewing):
     def __sub__(self, other: "Node") -> "Node":
         return Difference(self, other) if isinstance(other, Node) else NotImplemented
 
-    # -- placing ------------------------------------------------------------------------------------
+    # -- maps ---------------------------------------------------------------------------------------
 
     def transform(self, matrix: ArrayLike) -> "Transform":
-        """This node under an affine map, 3×4 or 4×4, that takes its points (columns) to the world."""
+        """Return this node under an affine map.
+
+        Parameters
+        ----------
+        matrix : array-like (3, 4) or (4, 4)
+            Map from this node's space to the world; it multiplies points as columns.
+
+        Raises
+        ------
+        InvalidNode
+            The matrix is not finite, affine and invertible.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> moved = Point((0, 0, 0), radius=1.0).transform([[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+        >>> moved([[5, 0, 0]]).tolist()
+        [1.0]
+        """
         return Transform(self, affine_matrix(matrix))
 
     def translate(self, offset: ArrayLike) -> "Transform":
-        """This node moved by `offset` (3,)."""
+        """Return this node moved by a vector.
+
+        Parameters
+        ----------
+        offset : array-like (3,)
+            Displacement, in model units.
+
+        Raises
+        ------
+        InvalidNode
+            The offset is not three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0).translate((5, 0, 0))([[5, 0, 0]]).tolist()
+        [1.0]
+        """
         return self.transform(np.column_stack([np.eye(3), finite_vector("offset", offset)]))
 
     def rotate(self, axis: ArrayLike, degrees: float) -> "Transform":
-        """This node turned about `axis` (3,) through the origin, counter-clockwise as seen from its tip."""
+        """Return this node turned about an axis through the origin.
+
+        Parameters
+        ----------
+        axis : array-like (3,)
+            Direction of the axis, of any length above 0.
+        degrees : float
+            Angle, counter-clockwise for a viewer towards whom the axis points.
+
+        Raises
+        ------
+        InvalidNode
+            The axis has no length, or a number is not finite.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> turned = Point((5, 0, 0), radius=1.0).rotate((0, 0, 1), 90)
+        >>> turned([[0, 5, 0]]).round(3).tolist()
+        [1.0]
+        """
         direction = np.array(finite_vector("axis", axis))
         length = np.linalg.norm(direction)
         if length == 0.0:
@@ -106,64 +196,311 @@ class Node(Viewing):
         return self.transform(np.column_stack([linear, np.zeros(3)]))
 
     def scale(self, factor: float | ArrayLike) -> "Transform":
-        """This node scaled about the origin by one factor, or by one per axis."""
+        """Return this node scaled about the origin.
+
+        Parameters
+        ----------
+        factor : float or array-like (3,)
+            One factor, or one per axis; negative factors mirror.
+
+        Raises
+        ------
+        InvalidNode
+            A factor is 0 or not finite.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> ellipsoid = Point((0, 0, 0), radius=1.0).scale((2, 1, 1))
+        >>> ellipsoid([[2, 0, 0]]).round(3).tolist()
+        [0.5]
+        """
         factors = finite_vector("factor", factor if isinstance(factor, Iterable) else (factor,) * 3)
         if 0.0 in factors:
             raise InvalidNode(f"factor: expected a scale other than 0, got {factor!r}")
         return self.transform(np.column_stack([np.diag(factors), np.zeros(3)]))
 
     def twist(self, degrees: float) -> "Twist":
-        """This node turned about the z axis by `degrees` per unit of height."""
+        """Return this node turned about the z axis by an angle that grows with the height.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle per model unit of height, counter-clockwise seen from above.
+
+        Raises
+        ------
+        InvalidNode
+            The angle is not a finite number.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((1, 0, 1), radius=0.5).twist(90)([[0, 1, 1]]).round(3).tolist()
+        [1.0]
+        """
         return Twist(self, degrees)
 
     def offset(self, distance: float) -> "Offset":
-        """This node with every radius larger by `distance`."""
+        """Return this node with every visible radius larger by a distance, see `Offset`.
+
+        Parameters
+        ----------
+        distance : float
+            Growth of the radii, in model units; negative values shrink them.
+
+        Raises
+        ------
+        InvalidNode
+            The distance is not a finite number. `tape` and `bounds` of the result raise it too, if a negative
+            distance leaves nothing of a primitive.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0).offset(0.5)([[1.5, 0, 0]]).round(3).tolist()
+        [0.5]
+        """
         return Offset(self, distance)
 
-    # -- asking -------------------------------------------------------------------------------------
+    # -- queries ------------------------------------------------------------------------------------
 
-    @Lazy
-    def _program(self) -> list[Instruction]:
-        return compile_program(self)
+    def __call__(self, points: ArrayLike) -> Float32Array:
+        """Return the field values at points.
 
-    @Lazy
-    def tape(self) -> Tape:
-        """The flat form of this tree that every backend reads."""
-        return compile_tape(self._program)
+        Parameters
+        ----------
+        points : array-like (n, 3)
+            Points in the world, in model units.
 
-    @Lazy
-    def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Corners (3,), (3,) of a box outside of which the field is exactly 0."""
-        return influence_bounds(self._program)
+        Returns
+        -------
+        numpy.ndarray
+            float32[n]: 0 outside every influence, 0.5 on the surface, more inside.
 
-    def __call__(self, points: ArrayLike) -> NDArray[np.float32]:
-        """Field values (n,) at `points` (n, 3)."""
-        return values_at(self.tape, points)
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0)([[0, 0, 0], [1, 0, 0]]).round(3).tolist()
+        [1.0, 0.5]
+        """
+        return super().__call__(points)
+
+    def gradient(self, points: ArrayLike) -> Float32Array:
+        """Return the exact gradients of the field at points.
+
+        Parameters
+        ----------
+        points : array-like (n, 3)
+            Points in the world, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n, 3], per model unit; they point into the model.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> bool(Point((0, 0, 0), radius=1.0).gradient([[1, 0, 0]])[0, 0] < 0)
+        True
+        """
+        return super().gradient(points)
+
+    def colors(self, points: ArrayLike) -> Float32Array:
+        """Return the blended colours at points.
+
+        Parameters
+        ----------
+        points : array-like (n, 3)
+            Points in the world, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n, 3]: red, green and blue, black outside every influence.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0, color=(1, 0, 0)).colors([[0, 0, 0]]).tolist()
+        [[1.0, 0.0, 0.0]]
+        """
+        return super().colors(points)
 
     def interval(self, lower: ArrayLike, upper: ArrayLike) -> tuple[float, float]:
-        """Numbers that the field is never below and never above in the box between two corners (3,)."""
+        """Return bounds on the field over a box, by interval arithmetic.
+
+        Parameters
+        ----------
+        lower, upper : array-like (3,)
+            Corners of the box, in model units.
+
+        Returns
+        -------
+        tuple[float, float]
+            A lower and an upper bound of the values; the values need not reach them.
+
+        Raises
+        ------
+        InvalidPoints
+            The corners are not finite, or `lower` exceeds `upper`.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0).interval((5, 5, 5), (6, 6, 6))
+        (0.0, 0.0)
+        """
         return range_over(self.tape, lower, upper)
 
-    def gradient(self, points: ArrayLike) -> NDArray[np.float32]:
-        """Exact field gradients (n, 3) at `points` (n, 3)."""
-        return gradients_at(self.tape, points)[:, 1:]
-
-    def colors(self, points: ArrayLike) -> NDArray[np.float32]:
-        """Blended colours (n, 3) at `points` (n, 3), black where no primitive reaches."""
-        return colors_at(self.tape, points)
-
     def raycast(self, origins: ArrayLike, directions: ArrayLike, *, device: str | None = None) -> Hits:
-        """What the rays from `origins` (n, 3) along `directions` (n, 3) meet first of the surface.
+        """Return the first intersections of rays with the surface.
 
-        Directions need not be unit; a ray that starts inside hits at once. `device` is the Warp device that
-        does the work, by default the current one.
+        Parameters
+        ----------
+        origins : array-like (n, 3)
+            Starts of the rays. A ray that starts inside hits at once.
+        directions : array-like (n, 3)
+            Directions of any length above 0.
+        device : str, optional
+            Warp device that does the work; the current one by default.
+
+        Returns
+        -------
+        Hits
+            Distances, positions, normals and colours.
 
         Raises
         ------
         InvalidPoints
             Origins and directions differ in number, or a direction has no length.
+        InvalidDevice
+            Warp has no such device.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> hits = Point((0, 0, 0), radius=1.0).raycast([[5, 0, 0]], [[-1, 0, 0]])
+        >>> hits.distances.round(3).tolist()
+        [4.0]
         """
         return raycast(self, origins, directions, device=device)
+
+    # -- pyvista ------------------------------------------------------------------------------------
+
+    def to_pyvista(
+        self,
+        *,
+        resolution: int | None = None,
+        cell_size: float | None = None,
+        chord_error: float | None = None,
+        creases: bool = False,
+        split_normals: bool = False,
+        device: str | None = None,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> "pv.PolyData":
+        """Return the surface as a pyvista mesh with normals and, as "RGB", colours.
+
+        Parameters
+        ----------
+        resolution, cell_size, chord_error, creases, device, progress, cancel
+            As for `polygonize`.
+        split_normals : bool
+            Give each side of a crease its own vertices and normals; implies `creases`. Creases then look
+            sharp, and the mesh is not closed there.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Triangles with active normals, point data "RGB" (uint8) and, with `creases`, "sheet_counts".
+
+        Raises
+        ------
+        MissingPackage
+            pyvista is not installed.
+        InvalidResolution, InvalidDevice, Cancelled
+            As for `polygonize`.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> mesh = Point((0, 0, 0), radius=1.0).to_pyvista(resolution=8)
+        >>> mesh.is_manifold
+        True
+        """
+        mesh = polygonize(
+            self,
+            resolution=resolution,
+            cell_size=cell_size,
+            chord_error=chord_error,
+            creases=creases or split_normals,
+            device=device,
+            progress=progress,
+            cancel=cancel,
+        )
+        return to_polydata(split_creases(self, mesh) if split_normals else mesh)
+
+    def slice(
+        self,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        normal: ArrayLike = (0.0, 0.0, 1.0),
+        *,
+        resolution: int = SLICE_RESOLUTION,
+        values: Iterable[float] = LEVELS,
+    ) -> "pv.MultiBlock":
+        """Return the field on a plane, and its lines of equal field value.
+
+        Parameters
+        ----------
+        origin : array-like (3,)
+            A point of the plane.
+        normal : array-like (3,)
+            Normal of the plane, of any length above 0.
+        resolution : int
+            Squares along the longer side of the plane's part in the tree's box.
+        values : iterable of float
+            Field values that get lines; by default 0.1, 0.2, …, 1.
+
+        Returns
+        -------
+        pyvista.MultiBlock
+            "plane", coloured by "field"; "lines", at the values; "surface", the line at 0.5. Points of lines
+            lie on their level exactly, save in kinks, where they lie between the neighbouring samples.
+
+        Raises
+        ------
+        InvalidPoints
+            The plane misses the model, or has no direction; or a value is not above 0.
+        InvalidResolution
+            The resolution is not a usable number of squares.
+        MissingPackage
+            pyvista is not installed.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> blocks = Point((0, 0, 0), radius=1.0).slice(resolution=16)
+        >>> blocks.keys()
+        ['plane', 'lines', 'surface']
+        """
+        return slice_tree(self, origin, normal, resolution=resolution, values=values)
 
 
 class Combination(Node):
@@ -171,163 +508,230 @@ class Combination(Node):
 
     operator: ClassVar[Operator]
 
-    @property
-    def parameter(self) -> float:
-        """What the operator needs besides its operands."""
-        return 0.0
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AssociativeCombination(Combination):
-    """A combination of any number of `operands`, nested alike or not."""
+    """A combination of any number of `operands`, at least one."""
 
     operands: tuple[Node, ...]
 
-    def __post_init__(self) -> None:
-        settle(self, operands=_nodes(self.operands))
-
     @property
     def children(self) -> tuple[Node, ...]:
-        """What this node combines."""
+        """The operands, from left to right."""
         return self.operands
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sum(AssociativeCombination):
-    """Smooth blend F = Σ fᵢ."""
+    """Smooth blend F = Σ fᵢ (Blinn 1982; Wyvill et al. 1986).
 
+    Examples
+    --------
+    >>> from blobtree import Point, Sum
+    >>> parts = [Point((x, 0, 0), radius=1.0) for x in (0, 1)]
+    >>> Sum(tuple(parts)) == parts[0] + parts[1]
+    True
+    """
+
+    file_tag = "sum"
     operator = SUM
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Union(AssociativeCombination):
-    """Sharp union F = max fᵢ."""
+    """Sharp union F = max fᵢ (Ricci 1973).
 
+    Examples
+    --------
+    >>> from blobtree import Point, Union
+    >>> parts = [Point((x, 0, 0), radius=1.0) for x in (0, 1)]
+    >>> Union(tuple(parts)) == parts[0] | parts[1]
+    True
+    """
+
+    file_tag = "union"
     operator = UNION
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Intersection(AssociativeCombination):
-    """Sharp intersection F = min fᵢ."""
+    """Sharp intersection F = min fᵢ (Ricci 1973).
 
+    Examples
+    --------
+    >>> from blobtree import Intersection, Point
+    >>> parts = [Point((x, 0, 0), radius=1.0) for x in (0, 1)]
+    >>> Intersection(tuple(parts)) == parts[0] & parts[1]
+    True
+    """
+
+    file_tag = "intersection"
     operator = INTERSECTION
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ricci(AssociativeCombination):
-    """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): `exponent` 1 is the sum, a large one nears the union."""
+    """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): exponent 1 is the sum, a large one nears the union.
 
+    Examples
+    --------
+    >>> from blobtree import Point, Ricci
+    >>> parts = [Point((x, 0, 0), radius=1.0) for x in (0, 1)]
+    >>> blend, total = Ricci(tuple(parts), exponent=3), parts[0] + parts[1]
+    >>> bool(blend([[0.5, 0, 0]])[0] < total([[0.5, 0, 0]])[0])
+    True
+    """
+
+    file_tag = "ricci"
     operator = RICCI
 
-    exponent: float = field(kw_only=True)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        exponent = finite_number("exponent", self.exponent)
-        if not 1.0 <= exponent <= LARGEST_EXPONENT:
-            raise InvalidNode(
-                f"exponent: expected 1 to {LARGEST_EXPONENT:g}, got {exponent!r}; for more use a union"
-            )
-        settle(self, exponent=exponent)
+    exponent: Annotated[
+        float,
+        Parameter(Quantity.FACTOR, "exponent n", low=1.0, high=LARGEST_EXPONENT, hint="for more use a union"),
+    ] = field(kw_only=True)
 
     @property
-    def parameter(self) -> float:
+    def operator_parameter(self) -> float:
         """The exponent n."""
         return self.exponent
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Difference(Combination):
-    """`solid` without `tool`: F = min(f, 1 − g) while f ≤ 1, see `operators.difference_partials`."""
+    """`solid` without `tool`: F = min(f, 1 − g) while f ≤ 1 (Wyvill, Guy & Galin 1999).
 
+    `operators.difference_partials` states what happens where fields add up to more than 1.
+
+    Examples
+    --------
+    >>> from blobtree import Difference, Point
+    >>> solid, tool = Point((0, 0, 0), radius=1.0), Point((0, 0, 1), radius=0.5)
+    >>> Difference(solid, tool) == solid - tool
+    True
+    """
+
+    file_tag = "difference"
     operator = DIFFERENCE
 
     solid: Node
     tool: Node
 
-    def __post_init__(self) -> None:
-        _nodes((self.solid, self.tool))
-
     @property
     def children(self) -> tuple[Node, ...]:
-        """What this node combines."""
+        """The solid and the tool."""
         return (self.solid, self.tool)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Transform(Node):
-    """`child` under an affine map whose 3×4 `matrix` takes the child's points (columns) to this node's space.
+class Placed(Node):
+    """A node with one `child`, which it moves, grows or deforms."""
+
+    child: Node
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The only child."""
+        return (self.child,)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Transform(Placed):
+    """`child` under an affine map.
 
     The map folds into the primitives below it when the tape is made, so it costs nothing afterwards.
+
+    Examples
+    --------
+    >>> from blobtree import Point, Transform
+    >>> moved = Transform(Point((0, 0, 0), radius=1.0), [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+    >>> moved == Point((0, 0, 0), radius=1.0).translate((5, 0, 0))
+    True
     """
 
-    child: Node
-    matrix: Matrix
+    file_tag = "transform"
 
-    def __post_init__(self) -> None:
-        _nodes((self.child,))
-        settle(self, matrix=affine_matrix(self.matrix))
+    matrix: Annotated[
+        Matrix, Parameter(Quantity.MATRIX, "rows of the map from the child's points (columns) to this node's")
+    ]
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """What this node combines."""
-        return (self.child,)
+    def child_placement(self, placement: Placement) -> Placement:
+        """Return the placement of the child: this map below those above."""
+        matrix = affine.square(self.matrix)
+        growth = placement.growth / affine.mean_scale(matrix) if placement.growth else 0.0
+        return Placement(placement.matrix @ matrix, growth)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Offset(Node):
-    """`child` with every radius below it larger by `distance`, or smaller where that is negative.
+class Offset(Placed):
+    """`child` with every visible radius below it larger by `distance`, or smaller if that is negative.
 
-    For primitives, unions and intersections of them this is the surface at that distance; where fields blend
-    it is what the blend makes of the larger primitives. Tools of differences change the other way.
+    For primitives, and for unions and intersections of them, this is the surface at that distance. Where
+    fields blend it is the blend of the larger primitives. Tools of differences change the other way.
+
+    Examples
+    --------
+    >>> from blobtree import Offset, Point
+    >>> Offset(Point((0, 0, 0), radius=1.0), 0.5)([[1.5, 0, 0]]).round(3).tolist()
+    [0.5]
     """
 
-    child: Node
-    distance: float
+    file_tag = "offset"
 
-    def __post_init__(self) -> None:
-        _nodes((self.child,))
-        settle(self, distance=finite_number("distance", self.distance))
+    distance: Annotated[float, Parameter(Quantity.DISTANCE, "growth of the visible radii")]
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """What this node combines."""
-        return (self.child,)
+    def child_placement(self, placement: Placement) -> Placement:
+        """Return the placement of the child: its radii grow by the distance too."""
+        return replace(placement, growth=placement.growth + self.distance)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Twist(Node):
-    """`child` turned about the z axis, by `degrees` per unit of height, counter-clockwise seen from above."""
+class Twist(Placed):
+    """`child` turned about the z axis by an angle that grows with the height (Barr 1984).
 
+    Examples
+    --------
+    >>> from blobtree import Point, Twist
+    >>> Twist(Point((1, 0, 1), radius=0.5), 90)([[0, 1, 1]]).round(3).tolist()
+    [1.0]
+    """
+
+    file_tag = "twist"
     warp: ClassVar[SpaceWarp] = TWIST
 
-    child: Node
-    degrees: float
-
-    def __post_init__(self) -> None:
-        _nodes((self.child,))
-        settle(self, degrees=finite_number("degrees", self.degrees))
+    degrees: Annotated[
+        float, Parameter(Quantity.ANGLE, "degrees per model unit of height, counter-clockwise from above")
+    ]
 
     @property
-    def children(self) -> tuple[Node, ...]:
-        """What this node combines."""
-        return (self.child,)
-
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """The turn per unit in radians."""
+    def warp_parameters(self) -> tuple[float, ...]:
+        """The angle per unit of height in radians."""
         return (math.radians(self.degrees),)
 
 
-def checked_tree(tree: object) -> Node:
-    """`tree`, if it is one; InvalidNode otherwise."""
-    if not isinstance(tree, Node):
-        raise InvalidNode(f"tree: expected a BlobTree node such as Point(...), got {reprlib.repr(tree)}")
-    return tree
+_CHECKS: dict[type[Node], list[tuple[str, Callable[[Any], Any]]]] = {}
+
+
+def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any]]]:
+    """Return the names of a class's fields, and the functions that return their checked values."""
+    if kind in _CHECKS:
+        return _CHECKS[kind]
+    parameters, hints = parameters_of(kind), get_type_hints(kind)
+    checks: list[tuple[str, Callable[[Any], Any]]] = []
+    for item in fields(kind):  # type: ignore[arg-type]  # every node is a dataclass
+        if item.name in parameters:
+            checks.append((item.name, parameters[item.name].check))
+        else:
+            checks.append((item.name, _node if hints[item.name] is Node else _nodes))
+    return _CHECKS.setdefault(kind, checks)
+
+
+def _node(operand: Any) -> Node:
+    """Return `operand`; raise `InvalidNode` if it is no node."""
+    return _nodes((operand,))[0]
 
 
 def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
-    """`operands` as a tuple of nodes, at least one."""
+    """Return `operands` as a tuple of nodes, at least one."""
     try:
         nodes = tuple(operands)
     except TypeError:
@@ -341,7 +745,7 @@ def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
 
 
 def _folded(kind: type[Sum] | type[Union] | type[Intersection], first: Node, second: Node) -> Node:
-    """Both under an operator of `kind`: a + b + c is one sum of three."""
+    """Return both nodes under an operator of `kind`; a + b + c is one sum of three."""
     if not isinstance(second, Node):
         return NotImplemented
     operands = [item.operands if isinstance(item, kind) else (item,) for item in (first, second)]

@@ -1,39 +1,60 @@
-"""Rays through sparse cells, with a proven step bound: none passes through the surface unseen.
+"""Tracing of rays through sparse cells, in steps with a proven bound: no step passes through the surface.
 
-A ray leaps over blocks that hold no surface; in the others it reads their pruned tapes alone. At each place
-the tape gives the value f and a bound L on how fast it rises over the next stretch of the ray, r long. So
-the ray is free for min(r, (ISO − f) / L): sphere tracing (Hart 1996) with the slope along the ray in place of
-a global Lipschitz constant (segment tracing, Galin et al. 2020). The next stretch takes twice the length of
-the last step, so rays speed up through empty space; near the surface L tends to the slope itself, and they
-arrive as by Newton's method.
+A ray skips blocks without surface. In the other blocks it reads the pruned tape of the block. At a point the
+tape gives the value f and a bound L on its slope over the next segment of the ray, of length r. The segment
+is free of surface up to min(r, (ISO − f) / L). This is sphere tracing (Hart 1996) with the slope along the
+ray in place of a global Lipschitz constant (segment tracing, Galin et al. 2020). The next segment has twice
+the length of the last step, so rays accelerate through empty space. Near the surface L tends to the slope
+itself, and a ray converges as in Newton's method.
 """
 
 import warp as wp
 
-from blobtree.formulas.kernels import ISO
-from blobtree.kernel_options import KERNEL_OPTIONS
-from blobtree.sparse.refine import SURELY_INSIDE
-from blobtree.tapes.evaluate import field_bound, field_gradient
+from blobtree.cells.refine_kernels import SURELY_INSIDE
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import ISO
+from blobtree.tape.interpreter import field_bound, field_gradient
+from blobtree.transpile.glsl import uniform_struct
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 MAX_STEPS = 1024
-"""A ray that grazes the surface for longer than this is a miss."""
+"""Most steps in a block; a ray that grazes the surface in more of them is a miss."""
 
 MISS = -1.0
 
 MAX_BLOCKS = 4096
-"""More than any ray can cross."""
+"""More blocks than any ray can cross."""
 
-FARTHEST = 1e30
-"""Farther than any ray goes, and the largest number that is taken for 1 / 0."""
+MAX_DISTANCE = 1e30
+"""A distance beyond all boxes, and the largest magnitude of a `reciprocal`."""
 
 EMPTY = -3
-"""An empty block is known by this, less the layers of blocks around it that are empty too; other blocks by
-SURELY_INSIDE, or by the first texel of their tape."""
+"""Entry of an empty block in the table, less the number of layers of empty blocks around it.
+
+The entry of another block is SURELY_INSIDE, or the texel in front of its tape, which is not negative."""
 
 BLOCK_OVERLAP = 0.1
-"""How far a ray reaches into the next block before it asks which one that is, in tolerances."""
+"""Distance behind the boundary of two blocks, in tolerances, at which a ray is in the next one."""
+
+
+@uniform_struct(
+    lower="grid_lower",
+    block_size="block_size",
+    counts="grid_counts",
+    tolerance="tolerance",
+    tape="tape",
+    blocks="blocks",
+)
+class RayCells:
+    """`tree_cells.TracingCells` on one device; ``shaders/trace.glsl`` declares the fields as uniforms."""
+
+    lower: wp.vec3
+    block_size: wp.float32
+    counts: wp.vec3i
+    tolerance: wp.float32
+    tape: wp.array(dtype=wp.vec4)
+    blocks: wp.array(dtype=wp.int32)
 
 
 @wp.func
@@ -46,7 +67,7 @@ def first_hit(
     tape: wp.array(dtype=wp.vec4),
     span: wp.vec2i,
 ) -> wp.float32:
-    """Distance along the unit `direction` to the first point inside within [t_min, t_max], else MISS.
+    """Return the distance along the unit `direction` to the first point inside in [t_min, t_max], or MISS.
 
     A ray that starts inside hits at t_min.
     """
@@ -76,7 +97,7 @@ def refine_hit(
     tape: wp.array(dtype=wp.vec4),
     span: wp.vec2i,
 ) -> wp.float32:
-    """One Newton step along the ray from a point within tolerance of the surface, 2 tolerances at most."""
+    """Return t after one Newton step of at most 2 tolerances, from within a tolerance of the surface."""
     f = field_gradient(origin + direction * t, tape, span)
     rise = f[1] * direction[0] + f[2] * direction[1] + f[3] * direction[2]
     gap = ISO - f[0]
@@ -87,7 +108,7 @@ def refine_hit(
 
 @wp.func
 def box_interval(origin: wp.vec3, direction: wp.vec3, lower: wp.vec3, upper: wp.vec3) -> wp.vec2:
-    """Where a ray is inside a box: (t_enter ≥ 0, t_leave), t_leave < t_enter where it misses."""
+    """Return the interval (t_enter ≥ 0, t_leave) of a ray in a box; t_leave < t_enter for a miss."""
     enter = float(0.0)
     leave = float(1e30)
     for axis in range(3):
@@ -104,18 +125,18 @@ def box_interval(origin: wp.vec3, direction: wp.vec3, lower: wp.vec3, upper: wp.
 
 @wp.func
 def reciprocal(direction: wp.vec3) -> wp.vec3:
-    """1 / each component, 0 where that is 0."""
+    """Return 1 / each component, or 0 where the component is 0."""
     inverse = wp.vec3()
     for axis in range(3):
         if direction[axis] != 0.0:
-            inverse[axis] = wp.clamp(1.0 / direction[axis], -FARTHEST, FARTHEST)
+            inverse[axis] = wp.clamp(1.0 / direction[axis], -MAX_DISTANCE, MAX_DISTANCE)
     return inverse
 
 
 @wp.func
-def way_out(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3) -> wp.float32:
-    """Where a ray that is inside a box leaves it, `inverse` being the `reciprocal` of its direction."""
-    leave = float(FARTHEST)
+def exit_distance(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3) -> wp.float32:
+    """Return the distance to the exit of a ray from a box; `inverse` is the `reciprocal` of its direction."""
+    leave = float(MAX_DISTANCE)
     for axis in range(3):
         if inverse[axis] > 0.0:
             leave = wp.min(leave, (upper[axis] - origin[axis]) * inverse[axis])
@@ -125,42 +146,36 @@ def way_out(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3) -
 
 
 @wp.func
-def trace_ray(
-    origin: wp.vec3,
-    direction: wp.vec3,
-    lower: wp.vec3,
-    block_size: wp.float32,
-    counts: wp.vec3i,
-    tolerance: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    blocks: wp.array(dtype=wp.int32),
-) -> wp.vec3:
-    """First hit of a ray: (distance or MISS, first texel of the tape that holds there, one past the last)."""
-    extent = block_size * wp.vec3(float(counts[0]), float(counts[1]), float(counts[2]))
-    inside = box_interval(origin, direction, lower, lower + extent)
-    entry = origin + direction * inside[0]  # distances are counted from here: an eye may be far away
-    last = inside[1] - inside[0]
+def trace_ray(origin: wp.vec3, direction: wp.vec3, cells: RayCells) -> wp.vec3:
+    """Return the first hit of a ray: (distance or MISS, first texel of the tape there, one past its last)."""
+    counts = cells.counts
+    extent = cells.block_size * wp.vec3(float(counts[0]), float(counts[1]), float(counts[2]))
+    interval = box_interval(origin, direction, cells.lower, cells.lower + extent)
+    entry = origin + direction * interval[0]  # distances count from here, for the origin may be far away
+    last = interval[1] - interval[0]
     inverse = reciprocal(direction)
     t = float(0.0)
     for _block in range(MAX_BLOCKS):
         if t > last:
             return wp.vec3(MISS, 0.0, 0.0)
-        p = (entry + direction * t - lower) / block_size
+        p = (entry + direction * t - cells.lower) / cells.block_size
         x = wp.clamp(int(wp.floor(p[0])), 0, counts[0] - 1)
         y = wp.clamp(int(wp.floor(p[1])), 0, counts[1] - 1)
         z = wp.clamp(int(wp.floor(p[2])), 0, counts[2] - 1)
-        known = blocks[(x * counts[1] + y) * counts[2] + z]
-        around = wp.max(EMPTY - known, 0)
-        corner = lower + block_size * wp.vec3(float(x - around), float(y - around), float(z - around))
-        size = block_size * float(2 * around + 1)
-        leave = way_out(entry, inverse, corner, corner + wp.vec3(size, size, size))
-        leave = wp.max(leave, t) + BLOCK_OVERLAP * tolerance
-        if known == SURELY_INSIDE:
-            return wp.vec3(inside[0] + t, 1.0, 1.0 + tape[0][0])
-        if known >= 0:
-            span = wp.vec2i(known + 1, known + 1 + int(tape[known][0]))
-            hit = first_hit(entry, direction, t, leave, tolerance, tape, span)
+        block = cells.blocks[(x * counts[1] + y) * counts[2] + z]
+        layers = wp.max(EMPTY - block, 0)
+        corner = cells.lower + cells.block_size * wp.vec3(
+            float(x - layers), float(y - layers), float(z - layers)
+        )
+        size = cells.block_size * float(2 * layers + 1)
+        leave = exit_distance(entry, inverse, corner, corner + wp.vec3(size, size, size))
+        leave = wp.max(leave, t) + BLOCK_OVERLAP * cells.tolerance
+        if block == SURELY_INSIDE:
+            return wp.vec3(interval[0] + t, 1.0, 1.0 + cells.tape[0][0])
+        if block >= 0:
+            span = wp.vec2i(block + 1, block + 1 + int(cells.tape[block][0]))
+            hit = first_hit(entry, direction, t, leave, cells.tolerance, cells.tape, span)
             if hit >= 0.0:
-                return wp.vec3(inside[0] + hit, float(span[0]), float(span[1]))
+                return wp.vec3(interval[0] + hit, float(span[0]), float(span[1]))
         t = leave
     return wp.vec3(MISS, 0.0, 0.0)

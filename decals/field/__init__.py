@@ -1,1 +1,8 @@
-"""The decal function: who shows at a point of a surface, in which order, and how its neighbours push it."""
+"""The field of decals: the owner of a surface point, the draw order, and how neighbours push an image.
+
+The public names are listed in `__init__.pyi` and are loaded at first use.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Decals at arbitrary points, without graphics: for baking, experiments and tests."""
+"""`evaluate`: decals at surface points, without graphics, for baking, experiments and tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,41 +6,42 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from decals.checks import member, shown
+from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree.device import known_device
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
-from decals.field.contact import Contact
-from decals.field.mapping import Mapping
-from decals.field.sampling import color_points, sample_points
-from decals.field.texels import RGBA, texel_arrays
-from decals.grid.editor import RECORDS, DecalEditor
-from decals.grid.index import DecalIndex, DeviceIndex
-from decals.model import PLAIN, Decals
-from decals.wishes import device_or_error
+from decals.field.mapping import ImageMapping
+from decals.field.sampling_kernels import color_points, sample_points
+from decals.images.pixels import decode_srgb, require_rgba
+from decals.index.editor import RECORDS, DecalEditor
+from decals.index.index import DecalIndex, index_on
+from decals.model import NO_IMAGE, Decals
+from decals.record import Contact
+from decals.validation import describe, member
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What decals show at m points.
+    """Decals at m points, as `evaluate` returns them.
 
     Attributes
     ----------
     owner : int32[m]
-        Number of the topmost decal that shows at each point, −1 where none does.
+        Number of the topmost decal that shows at each point; −1 outside all rims.
     uv : float32[m, 2]
-        Place in the owner's image, which is the disc of radius ½ around (½, ½); farther out the decal's rim
-        along the surface is behind, and nothing is drawn. 0 where there is no owner.
+        Image coordinates in the owner's image, which is the disc of radius ½ around (½, ½). Outside the disc
+        the owner shows nothing. 0 without owner.
     field : float32[m]
-        F after contact (paper, equation 5): 1 at the centre, ½ on rims and contact lines; 0 without owner.
+        F after contact (paper, equation 5): 1 at the centre, ½ on rims and contact lines. 0 without owner.
     color : float32[m, 4] or None
-        Colour of all decals over each other, in linear light with premultiplied alpha; None without images.
+        Colour of all decals over each other, linear with premultiplied alpha. None without images.
     """
 
-    owner: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    field: NDArray[np.float32]
-    color: NDArray[np.float32] | None = None
+    owner: Int32Array
+    uv: Float32Array
+    field: Float32Array
+    color: Float32Array | None = None
 
 
 def evaluate(
@@ -48,109 +49,159 @@ def evaluate(
     points: ArrayLike,
     normals: ArrayLike,
     *,
-    mapping: Mapping = Mapping.CORRECTED,
-    contact: Contact = Contact.PAPER,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+    contact: Contact = Contact.PRODUCT,
     index: DecalIndex | None = None,
-    images: Sequence[RGBA] | None = None,
+    images: Sequence[UInt8Array] | None = None,
     device: Any = None,
 ) -> Samples:
-    """Find owner, image coordinates, field and colour of surface points.
+    """Evaluate decals at surface points: owner, image coordinates, field and colour.
 
     Parameters
     ----------
     decals : Decals or DecalEditor
-        n decals; those of an editor are told by their numbers.
-    points, normals : float32[m, 3]
-        Surface points and the surface's geometric normals there, of any length; one of length 0 faces every
-        decal. A point that is not finite has no owner.
-    mapping : Mapping, optional
-        How the images bend with the surface.
+        n decals. The owners of an editor's decals are its numbers.
+    points : float32[m, 3]
+        Surface points in model units. A point that is not finite has no owner.
+    normals : float32[m, 3]
+        Geometric normals of the surface there, of any length. A zero normal faces every decal.
+    mapping : ImageMapping, optional
+        Image mapping. Default CORRECTED.
     contact : Contact, optional
-        How contact decals push each other.
+        Contact mode. Default PRODUCT.
     index : DecalIndex, optional
-        The index of these very decals; built where not given. An editor brings its own.
+        Index of these decals. Built if not given; an editor has its own.
     images : sequence of uint8[h, w, 4], optional
-        sRGB images with alpha, of any sizes; with them, colours are found too.
+        sRGB images with straight alpha, of any sizes, for `Samples.color`.
     device : optional
-        Warp device; its default where not given.
+        Warp device. Default: Warp's default device.
+
+    Returns
+    -------
+    Samples
+        One row for each point.
 
     Raises
     ------
     InvalidPoints
         Points and normals are not two arrays of the same shape [m, 3].
     InvalidImage
-        Something that is no image, or fewer images than decals show.
-    InvalidDecals, InvalidScene, InvalidDevice
-        Something that is no decals or an index of others, no mapping or contact, or no device of Warp's.
+        An image of another type or shape, or fewer images than the decals refer to.
+    InvalidDecals
+        No decals, or the index of others.
+    InvalidScene
+        An unknown mapping or contact mode.
+    InvalidDevice
+        Warp has no such device.
+
+    See Also
+    --------
+    render : pictures of a scene.
+
+    Examples
+    --------
+    >>> import decals
+    >>> disk = decals.Decals(positions=[[0, 0, 0]], normals=[[0, 0, 1]], tangents=[[1, 0, 0]], radii=[1])
+    >>> samples = decals.evaluate(disk, [[0, 0, 0], [0.5, 0, 0], [2, 0, 0]], [[0, 0, 1]] * 3)
+    >>> samples.owner
+    array([ 0,  0, -1], dtype=int32)
+    >>> samples.uv.round(2).tolist()
+    [[0.5, 0.5], [0.75, 0.5], [0.0, 0.0]]
+    >>> samples.field.round(2)
+    array([1.  , 0.85, 0.  ], dtype=float32)
     """
-    mapping = member("mapping", mapping, Mapping, InvalidScene)
+    mapping = member("mapping", mapping, ImageMapping, InvalidScene)
     contact = member("contact", contact, Contact, InvalidScene)
-    device = device_or_error(device)
-    places, directions = _rows("points", points), _rows("normals", normals)
-    if len(places) != len(directions):
-        raise InvalidPoints(f"normals: expected one for each of {len(places)} points, got {len(directions)}")
-    records, placed = _placed(decals, index, device)
-    count = len(places)
+    device = known_device(device)
+    positions, facings = _as_rows("points", points), _as_rows("normals", normals)
+    count = len(positions)
+    if count != len(facings):
+        raise InvalidPoints(f"normals: expected one for each of {count} points, got {len(facings)}")
+    indexed = _indexed(decals, index, device)
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
     field: Any = wp.zeros(count, dtype=wp.float32, device=device)
     inputs = [
-        wp.array(places, dtype=wp.vec3, device=device),
-        wp.array(directions, dtype=wp.vec3, device=device),
+        wp.array(positions, dtype=wp.vec3, device=device),
+        wp.array(facings, dtype=wp.vec3, device=device),
         int(mapping),
         int(contact),
-        decals.layered,
-        wp.array(records, dtype=wp.vec4, device=device, copy=False),
-        *placed.arguments(),
+        indexed,
     ]
     wp.launch(sample_points, count, inputs, [owner, uv, field], device=device)
     color = None if images is None else _colors(decals, images, [*inputs, owner], device)
     return Samples(owner.numpy(), uv.numpy(), field.numpy(), color)
 
 
-def _placed(
-    decals: Decals | DecalEditor, index: DecalIndex | None, device: Any
-) -> tuple[NDArray[np.float32], DeviceIndex]:
-    """Records and index of decals."""
+def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array]:
+    """Lay out sRGB images of any sizes in one array of texels.
+
+    Returns
+    -------
+    extents : int32[k, 3]
+        First texel, width and height of each image.
+    texels : float32[t, 4]
+        Premultiplied linear colours, row after row, the upper row first.
+
+    Raises
+    ------
+    InvalidImage
+        An array that is not ``uint8[h, w, 4]``.
+    """
+    extents, parts, first = [], [], 0
+    for number, image in enumerate(images):
+        height, width = require_rgba(f"image {number}", image).shape[:2]
+        extents.append((first, width, height))
+        colors = image.reshape(-1, 4).astype(np.float32) / np.float32(255)
+        linear = decode_srgb(colors[:, :3].astype(np.float64)).astype(np.float32)
+        parts.append(np.column_stack([linear * colors[:, 3:], colors[:, 3]]))
+        first += width * height
+    texels = np.concatenate([np.zeros((0, 4), np.float32), *parts]).astype(np.float32)
+    return np.array(extents, np.int32).reshape(-1, 3), texels
+
+
+def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any) -> Any:
+    """Return decals with their index on a device, an `IndexedDecals`."""
     if isinstance(decals, DecalEditor):
-        return decals.arrays[RECORDS], decals.index.on(device, copy=False)
+        records = decals.arrays[RECORDS]
+        return decals.index.on(device, records=records, layered=decals.layered, copy=False)
     if not isinstance(decals, Decals):
-        raise InvalidDecals(f"expected Decals or a DecalEditor, got {shown(decals)}; a scene has .decals")
+        raise InvalidDecals(f"expected Decals or a DecalEditor, got {describe(decals)}; a scene has .decals")
     if index is None:
-        return decals.packed(), DeviceIndex.of(decals, device)
+        return index_on(decals, device)
     if not isinstance(index, DecalIndex) or index.count != len(decals):
-        came = f"one of {index.count}" if isinstance(index, DecalIndex) else shown(index)
+        got = f"one of {index.count}" if isinstance(index, DecalIndex) else describe(index)
         raise InvalidDecals(
-            f"index: expected the index of these {len(decals)} decals, got {came}; DecalIndex.of makes it"
+            f"index: expected the index of these {len(decals)} decals, got {got}; DecalIndex.of makes it"
         )
-    return decals.packed(), index.on(device)
+    return index.on(device, records=decals.packed(), layered=decals.layered, copy=False)
 
 
 def _colors(
-    decals: Decals | DecalEditor, images: Sequence[RGBA], inputs: list[Any], device: Any
-) -> NDArray[np.float32]:
-    shown = decals.decals if isinstance(decals, DecalEditor) else decals
-    needed = int(shown.images.max(initial=PLAIN)) + 1
-    if len(images) < needed:
+    decals: Decals | DecalEditor, images: Sequence[UInt8Array], inputs: list[Any], device: Any
+) -> Float32Array:
+    rows = decals.decals if isinstance(decals, DecalEditor) else decals
+    min_count = int(rows.images.max(initial=NO_IMAGE)) + 1
+    if len(images) < min_count:
         raise InvalidImage(
-            f"images: expected {needed} or more, got {len(images)}; decals show them by number"
+            f"images: expected {min_count} or more, got {len(images)}; decals refer to them by number"
         )
-    places, texels = texel_arrays(images)
+    extents, texels = texel_arrays(images)
     colors: Any = wp.zeros(len(inputs[0]), dtype=wp.vec4, device=device)
     arrays: list[Any] = [
-        wp.array(places, dtype=wp.vec3i, device=device),
+        wp.array(extents, dtype=wp.vec3i, device=device),
         wp.array(texels, dtype=wp.vec4, device=device),
     ]
     wp.launch(color_points, len(inputs[0]), [*inputs, *arrays], [colors], device=device)
-    result: NDArray[np.float32] = colors.numpy()
+    result: Float32Array = colors.numpy()
     return result
 
 
-def _rows(name: str, values: ArrayLike) -> NDArray[np.float32]:
+def _as_rows(name: str, values: ArrayLike) -> Float32Array:
     try:
         array = np.asarray(values, np.float32)
     except (TypeError, ValueError):
-        raise InvalidPoints(f"{name}: expected numbers of shape [m, 3], got {shown(values)}") from None
+        raise InvalidPoints(f"{name}: expected numbers of shape [m, 3], got {describe(values)}") from None
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidPoints(f"{name}: expected shape [m, 3], got {list(array.shape)}; give one row per point")
     return array

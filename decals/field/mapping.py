@@ -1,18 +1,21 @@
-"""Mapping: where in a decal's image a surface point lies, in a direction and at a distance from its centre.
+"""Image mapping: direction and distance of a surface point from the centre, in the image of its owner.
 
-The field, so who owns a point, its rim and its lines of contact, depends on the chord |q − p| alone. A length
-along the surface is no field: it depends on the normal at q, so rims and lines of contact would break where
-the normal jumps, the cells of radial contact would not be convex, and a decal that spills would change size
-with what it meets. It enters where the image is read (`drawn_distance`): what is drawn is the surface, rolled
-out, between lines of contact that stay in place. The rim of the image lies at its radius along the surface,
-which on a curved one is a little before the rim of the field; what is left between them stays bare.
+The field depends only on the chord |q − p|, and with it the owner, the rim and the contact lines. The length
+along the surface is no such field, because it depends on the normal at q. Rims and contact lines would break
+where the normal jumps, the cells of radial contact would not be convex, and the size of a decal that spills
+would depend on the surface it meets.
 
-The corrected map sees an arc between two points and their normals, and is exact on planes, spheres and
-cylinders. From a flat face nothing is an arc yet where the next one begins, so images run on across edges.
+The length enters only where the image is read (`image_distance`). The image then shows the unrolled surface
+between contact lines that stay in place. The rim of the image lies at its radius along the surface. On a
+curved surface that is a little inside the rim of the field, and the gap between them stays uncoloured.
+
+The corrected mapping assumes a circular arc between two points with their normals. It is exact on planes,
+spheres and cylinders. Seen from a flat face, the arc to the next face has length zero at their edge, so
+images continue across edges.
 """
 
 # mypy: ignore-errors
-# (kernel code is Python to look at only: its names have Warp types)
+# (kernel code is Python only in form: its names have Warp types)
 
 from enum import IntEnum
 
@@ -21,30 +24,38 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 
-class Mapping(IntEnum):
-    """How the place of a surface point in an image is found."""
+class ImageMapping(IntEnum):
+    """Image mapping: how surface points become image coordinates.
+
+    Examples
+    --------
+    >>> import decals
+    >>> list(decals.ImageMapping)
+    [<ImageMapping.CHORD: 0>, <ImageMapping.CORRECTED: 1>]
+    """
 
     CHORD = 0
-    """Projection onto the tangent plane, at the chord's length: the paper's equation 4."""
+    """Projection onto the tangent plane, at the distance of the chord (paper, equation 4)."""
     CORRECTED = 1
-    """Rolled out along the arc that the two normals span."""
+    """Unrolled along the circular arc that the two normals define."""
 
 
-SMALLEST_BEND = 1.0e-37
-SMALLEST_TURN = 1.0e-20
-SMALLEST_COSINE = 1.0e-4
-"""Of half the angle between normals: opposed ones tell no arc from any other."""
-SMALLEST_REST = 1.0e-7
+MIN_BEND = 1.0e-37
+MIN_TURN = 1.0e-20
+MIN_COSINE = 1.0e-4
+"""Smallest cosine of half the angle between two normals; opposed normals define no arc."""
+MIN_REMAINDER = 1.0e-7
 RIM_SQUARED = 0.25001
-"""Square of the distance of an image's rim from its centre, and what rounding adds."""
+"""Squared distance of the image's rim from its centre, with a margin for rounding."""
 
 
 @wp.func
 def arc_over_chord(sine_squared: wp.float32, cosine: wp.float32) -> wp.float32:
-    """Quotient (ψ/2) / sin(ψ/2) of the half angle with this sine and cosine, from 1 at ψ = 0 to π/2 at π.
+    """Return (ψ/2) / sin(ψ/2) for the half angle with this squared sine and cosine: 1 at ψ = 0, π/2 at π.
 
-    With t = tan(ψ/4) it is 2 atan(t) / (t (1 + cosine)); atan(t)/t is Abramowitz and Stegun's 4.4.49, good to
-    2e-8 on [0, 1]. Graphics drivers' own arc tangents are worse, and differ.
+    With t = tan(ψ/4) it is 2 atan(t) / (t (1 + cosine)). The series of atan(t)/t is Abramowitz and Stegun's
+    4.4.49, with an error below 2e-8 on [0, 1]. The arc tangents of graphics drivers are less accurate, and
+    differ.
     """
     per = 1.0 / (1.0 + cosine)
     x = sine_squared * per * per
@@ -54,62 +65,69 @@ def arc_over_chord(sine_squared: wp.float32, cosine: wp.float32) -> wp.float32:
 
 
 @wp.func
-def unrolled(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec4:
-    """Offset of q = p + w, up to a part along n_p, and the length of the way there along the surface.
+def unroll(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec4:
+    """Return the unrolled offset of q = p + w, up to a part along n_p, and the length along the surface.
 
-    On an arc of radius R and angle ψ each end lies R (1 − cos ψ) below the other's tangent plane: heights
-    a = −w·n_p and b = w·n_q. The chord's projection falls short by R (ψ − sin ψ) towards n_q, the squared
-    chord by R² (ψ² − 4 sin²(ψ/2)). The first takes R from the harmonic mean of a and b, the second R² from
-    a b (1 + 2 y²) with y = (b − a)/(b + a): all of it ends where a or b does, as at an edge seen from a flat
-    face. By that factor the length grows there as on the next face, rolled out, to second order of ψ; the
-    length of a cubic has 1.6 in place of 2. Missing is κ τ′ s⁴/24 across the way (curvature κ, change of
-    torsion τ′, length s), which two normals cannot tell. Where they are equal or opposed, or where the way
-    bends up and down, it is the chord. w is in radii of the rim, so no square leaves the range of float32.
+    On an arc of radius R and angle ψ, each end lies R (1 − cos ψ) below the tangent plane of the other: the
+    heights are a = −w·n_p and b = w·n_q. The projected chord is too short by R (ψ − sin ψ) towards n_q, the
+    squared chord by R² (ψ² − 4 sin²(ψ/2)).
+
+    The first correction takes R from the harmonic mean of a and b. The second takes R² from a b (1 + 2 y²)
+    with y = (b − a)/(b + a). Both vanish with a or b, as at an edge seen from a flat face. With that factor
+    the length grows beyond the edge as on the unrolled next face, to second order in ψ. (The length of a
+    cubic would have 1.6 in place of 2.)
+
+    The error is κ τ′ s⁴/24 across the path, for curvature κ, change of torsion τ′ and length s: two normals
+    do not determine it. For equal or opposed normals, and for paths that bend up and down, the result is the
+    chord. w is in visible radii, so that no square leaves the range of float32.
     """
     a = -wp.dot(w, n_p)
     b = wp.dot(w, n_q)
     bend = a * b
     squared = wp.dot(w, w)
-    if bend <= SMALLEST_BEND:
+    if bend <= MIN_BEND:
         return wp.vec4(w[0], w[1], w[2], wp.sqrt(squared))
     turn = n_q - n_p
-    x = wp.max(0.25 * wp.dot(turn, turn), SMALLEST_TURN)
-    cosine = wp.max(0.5 * wp.length(n_q + n_p), SMALLEST_COSINE)
+    x = wp.max(0.25 * wp.dot(turn, turn), MIN_TURN)
+    cosine = wp.max(0.5 * wp.length(n_q + n_p), MIN_COSINE)
     stretch = arc_over_chord(x, cosine)
     per = 1.0 / (a + b)
     y = (b - a) * per
-    toward = turn + 2.0 * x * n_p  # across n_p: near opposed normals, what is along it would drown the rest
+    toward = (
+        turn + 2.0 * x * n_p
+    )  # perpendicular to n_p: near opposed normals, the part along n_p would dominate
     m = w + bend * per * (stretch - cosine) / (x * cosine) * toward
     arc = squared + bend * (1.0 + 2.0 * y * y) * (stretch * stretch - 1.0) / x
     return wp.vec4(m[0], m[1], m[2], wp.sqrt(arc))
 
 
 @wp.func
-def turned_back(step: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
-    """A step on the surface at q as the image rolled out has it, up to a part along n_p.
+def unroll_step(step: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
+    """Return a step on the surface at q as a step in the unrolled image, up to a part along n_p.
 
-    It turns as the normal does on the way to the centre: exact along an arc, where the projection onto the
-    tangent plane at the centre would be shorter by the cosine between the normals.
+    The step is rotated as the normal is on the path to the centre, which is exact along an arc. Its
+    projection onto the tangent plane at the centre would be too short by the cosine between the normals.
     """
-    share = wp.dot(step, n_p) / wp.max(1.0 + wp.dot(n_p, n_q), SMALLEST_COSINE * SMALLEST_COSINE)
+    share = wp.dot(step, n_p) / wp.max(1.0 + wp.dot(n_p, n_q), MIN_COSINE * MIN_COSINE)
     return step - share * n_q
 
 
 @wp.func
-def drawn_distance(rim: wp.float32, chord: wp.float32, length: wp.float32) -> wp.float32:
-    """Distance ℓ in the image, of a point that the field puts at `rim`; all in radii of the rim.
+def image_distance(rim: wp.float32, chord: wp.float32, length: wp.float32) -> wp.float32:
+    """Return the distance ℓ in the image of a point that the field puts at distance `rim`, in visible radii.
 
-    1 − ℓ = (1 − rim) (1 − length)/(1 − chord): what neighbours leave of the way to the rim, times what the
-    arc leaves of it. Both fall along a ray, so nothing folds. ℓ is the length where nobody pushes (rim =
-    chord), 1 on lines of contact (rim = 1), `rim` where the length is the chord. Beyond 1, ℓ is the length.
+    1 − ℓ = (1 − rim) (1 − length)/(1 − chord): the remaining distance to the rim after contact, times its
+    ratio of arc to chord. Both factors decrease along a ray, so no image folds. Without pushes (rim = chord)
+    ℓ is the length; on contact lines (rim = 1) it is 1; where the length is the chord it is `rim`. Beyond 1,
+    ℓ is the length.
     """
-    share = wp.clamp((length - chord) / wp.max(1.0 - chord, SMALLEST_REST), 0.0, 1.0)
+    share = wp.clamp((length - chord) / wp.max(1.0 - chord, MIN_REMAINDER), 0.0, 1.0)
     return wp.max(rim + (1.0 - rim) * share, length)
 
 
 @wp.func
 def in_image(uv: wp.vec2) -> wp.bool:
-    """Whether there is anything of the image here: it is a disc, and ends at its radius along the surface."""
+    """Return True inside the image, a disc that ends at its radius along the surface."""
     x = uv[0] - 0.5
     y = uv[1] - 0.5
     return x * x + y * y <= RIM_SQUARED
@@ -117,5 +135,5 @@ def in_image(uv: wp.vec2) -> wp.bool:
 
 @wp.func
 def tangent_coordinates(m: wp.vec3, n: wp.vec3, u: wp.vec3) -> wp.vec2:
-    """Coordinates of m along the image's axes u and v = n × u."""
+    """Return the coordinates of m along the axes u and v = n × u of the image."""
     return wp.vec2(wp.dot(m, u), wp.dot(m, wp.cross(n, u)))

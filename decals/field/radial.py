@@ -1,51 +1,213 @@
-"""Radial contact: a point moves along the ray from its owner's centre alone, so nothing ever folds.
+"""Radial contact: a point moves only along the ray from the centre of its owner, so no image folds.
 
-Rims are balls of visible radius ρ, and neighbours meet on the plane where |q − p|² − ρ² is equal for
-both: the radical plane, which passes through the circle where the rims cross. The part of a rim's ball on
-its own side of all these planes is its cell: convex, with the centre inside, so every ray from the centre
-leaves it once, at a distance R that changes continuously with the ray. The image is stretched along the
-ray: its rim lies at R.
+Rims are balls of visible radius ρ. Two neighbours meet on their radical plane, where |q − p|² − ρ² is equal
+for both; it passes through the circle in which the rims intersect. The cell of a decal is the part of its
+ball on its own side of all these planes. A cell is convex and contains the centre, so every ray from the
+centre leaves it once, at a distance R that changes continuously with the ray. The image is scaled along each
+ray so that its rim lies at R.
 
-Two decals of which one keeps less than LEAST of its radius before their plane are stacked: they do not
-push each other, and the smaller (of equal ones, that of lower number) lies over the other. So a small
-decal deep inside a large one is seen whole, and R ≥ LEAST·ρ: no image is squeezed more than 1/LEAST
-times. At every point of a ball some cell holds it, that of the least |q − p|² − ρ² at any rate: there are
-no gaps.
+Two decals are nested if one of them would keep less than MIN_KEPT_RADIUS of its radius before their plane.
+Nested decals do not push each other. The smaller one lies above the other, and of equal ones that of the
+lower number. So a small decal deep inside a large one is seen whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is
+compressed more than 1/MIN_KEPT_RADIUS times. There are no gaps: every point inside a rim lies at least in the
+cell of the decal of least |q − p|² − ρ².
 """
 
+# ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
 # mypy: ignore-errors
-# (kernel code is Python to look at only: its names have Warp types)
+# (kernel code is Python only in form: its names have Warp types)
 
 import warp as wp
 
+from decals.index.draw_order import rank_range
+from decals.index.lookup import IndexedDecals
+from decals.record import (
+    RECORD,
+    RIM_RADIUS,
+    apart,
+    complement_of,
+    faces,
+    field_complement,
+    rank_of,
+    visible_radius,
+    xyz,
+)
+
 wp.set_module_options({"enable_backward": False})
 
-LEAST = 0.21
+NO_OWNER = -1
+"""Owner of a point outside all rims."""
+
+MIN_KEPT_RADIUS = 0.21
 """Smallest share of its radius that a decal keeps towards a neighbour that pushes it."""
 
-SMALLEST_ADVANCE = 1.0e-37
+RIM_SQUARED = RIM_RADIUS * RIM_RADIUS
+MIN_ADVANCE = 1.0e-37
+"""Smallest divisor in `plane_distance`."""
+
+
+# -- geometry of two balls ------------------------------------------------------------------------------
 
 
 @wp.func
 def power(w: wp.vec3, radius: wp.float32) -> wp.float32:
-    """|w|² − ρ² of a point at w from a centre: negative inside the rim."""
+    """Return the power |w|² − ρ² of a point at w from the centre: negative inside the rim."""
     return wp.dot(w, w) - radius * radius
 
 
 @wp.func
-def are_stacked(apart: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.bool:
-    """Whether two decals, so far apart, of these radii, lie over each other and do not push."""
+def balls_nested(apart: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.bool:
+    """Return True if two decals with these radii, and centres this far apart, are nested."""
     smaller = wp.min(radius, other)
     larger = wp.max(radius, other)
     squared = wp.dot(apart, apart)
     between = squared + (smaller - larger) * (smaller + larger)
-    return between <= 2.0 * LEAST * smaller * wp.sqrt(squared) or squared <= 2.0 * LEAST * larger * wp.sqrt(
+    return between <= 2.0 * MIN_KEPT_RADIUS * smaller * wp.sqrt(
         squared
-    ) - (larger - smaller) * (larger + smaller)
+    ) or squared <= 2.0 * MIN_KEPT_RADIUS * larger * wp.sqrt(squared) - (larger - smaller) * (
+        larger + smaller
+    )
 
 
 @wp.func
 def plane_distance(ray: wp.vec3, apart: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.float32:
-    """Where a ray (unit) from a centre meets the plane between it and a neighbour ahead."""
+    """Return the distance along a unit ray from the centre to the radical plane of a neighbour ahead."""
     between = wp.dot(apart, apart) + (radius - other) * (radius + other)
-    return 0.5 * between / wp.max(wp.dot(ray, apart), SMALLEST_ADVANCE)
+    return 0.5 * between / wp.max(wp.dot(ray, apart), MIN_ADVANCE)
+
+
+# -- the same of decals ---------------------------------------------------------------------------------
+
+
+@wp.func
+def power_of(q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
+    """Return the power |q − p|² − ρ² of q with respect to a decal."""
+    return power(q - xyz(decals[RECORD * decal]), visible_radius(decal, decals))
+
+
+@wp.func
+def is_above(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True if the first of two nested decals is the upper one."""
+    size = decals[RECORD * decal][3]
+    other_size = decals[RECORD * other][3]
+    return size < other_size or (size == other_size and decal < other)
+
+
+@wp.func
+def are_nested(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True if two contact decals are nested, so that they do not push each other."""
+    return balls_nested(
+        apart(decal, other, decals), visible_radius(decal, decals), visible_radius(other, decals)
+    )
+
+
+# -- owner ----------------------------------------------------------------------------------------------
+
+
+@wp.func
+def in_cell(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.bool:
+    """Return True if q, inside the rim of a contact decal, lies in its cell."""
+    rank = wp.int32(0)
+    if index.layered:
+        rank = rank_of(decal, index.records)
+    own = power_of(q, decal, index.records)
+    for level in range(index.level_count):
+        span = rank_range(q, rank, level, index)
+        for j in range(span[0], span[1]):
+            if (
+                complement_of(q, n_q, index.ids[j], index.records) <= 0.5
+                and power_of(q, index.ids[j], index.records) < own
+            ):
+                if not are_nested(decal, index.ids[j], index.records):
+                    return False
+    return True
+
+
+@wp.func
+def topmost_above(
+    q: wp.vec3, n_q: wp.vec3, decal: wp.int32, limit: wp.int32, index: IndexedDecals
+) -> wp.int32:
+    """Return the topmost decal that is nested with a decal, above it, and has q inside its rim.
+
+    It lies below the decal `limit`, unless that is NO_OWNER. Return NO_OWNER if there is no such decal.
+    """
+    rank = wp.int32(0)
+    if index.layered:
+        rank = rank_of(decal, index.records)
+    upper = wp.int32(NO_OWNER)
+    for level in range(index.level_count):
+        span = rank_range(q, rank, level, index)
+        for j in range(span[0], span[1]):
+            if (
+                is_above(index.ids[j], decal, index.records)
+                and complement_of(q, n_q, index.ids[j], index.records) <= 0.5
+            ):
+                if upper < 0 or is_above(index.ids[j], upper, index.records):
+                    if limit < 0 or is_above(limit, index.ids[j], index.records):
+                        if are_nested(index.ids[j], decal, index.records):
+                            upper = index.ids[j]
+    return upper
+
+
+@wp.func
+def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -> wp.int32:
+    """Return the topmost contact decal of a rank whose cell contains q; NO_OWNER outside all rims."""
+    owner = wp.int32(NO_OWNER)
+    least = wp.float32(0.0)
+    holders = wp.int32(0)
+    for level in range(index.level_count):
+        span = rank_range(q, rank, level, index)
+        for j in range(span[0], span[1]):
+            if complement_of(q, n_q, index.ids[j], index.records) <= 0.5:
+                holders += 1
+                own = power_of(q, index.ids[j], index.records)
+                if (
+                    owner < 0
+                    or own < least
+                    or (own == least and is_above(index.ids[j], owner, index.records))
+                ):
+                    least = own
+                    owner = index.ids[j]
+    if holders < 2:
+        return owner
+    # Only decals nested with this owner can share q with it. Try them from the topmost down.
+    upper = topmost_above(q, n_q, owner, NO_OWNER, index)
+    while upper >= 0:
+        if in_cell(q, n_q, upper, index):
+            return upper
+        upper = topmost_above(q, n_q, owner, upper, index)
+    return owner
+
+
+# -- deformation ----------------------------------------------------------------------------------------
+
+
+@wp.func
+def radial_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.float32:
+    """Return E = 1 − F of a contact decal at q, scaled along its ray so that the rim lies at the cell's end.
+
+    A ray leaves the convex cell before the rim only through planes of decals whose balls contain the ray's
+    point on the rim. The index lists all of them there.
+    """
+    rank = wp.int32(0)
+    if index.layered:
+        rank = rank_of(owner, index.records)
+    centre = xyz(index.records[RECORD * owner])
+    radius = visible_radius(owner, index.records)
+    distance = wp.length(q - centre)
+    if distance == 0.0:
+        return 0.0
+    ray = (q - centre) / distance
+    edge = centre + radius * ray
+    end = radius
+    for level in range(index.level_count):
+        span = rank_range(edge, rank, level, index)
+        for j in range(span[0], span[1]):
+            if index.ids[j] != owner and faces(n_q, index.ids[j], index.records):
+                if not are_nested(owner, index.ids[j], index.records):
+                    other = visible_radius(index.ids[j], index.records)
+                    end = wp.min(
+                        end, plane_distance(ray, apart(owner, index.ids[j], index.records), radius, other)
+                    )
+    x = wp.min(distance / end, 1.0)
+    return field_complement(x * x * RIM_SQUARED)

@@ -1,6 +1,6 @@
-"""Decal images: five that the project draws itself, and pictures of the user's own."""
+"""Decal images: generated ones, and pictures from files."""
 
-from .builtin import BUILTIN_IMAGES, generate_image, is_builtin
-from .load import MAX_IMAGE_EDGE, load_image, read_image
+from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
+from decals.images.load import MAX_IMAGE_EDGE, load_image, read_image
 
 __all__ = ["BUILTIN_IMAGES", "MAX_IMAGE_EDGE", "generate_image", "is_builtin", "load_image", "read_image"]

@@ -1,7 +1,7 @@
-"""The drawing board of the generated decal images: coordinates, noise, light and the final filtering.
+"""Canvas of the generated decal images: coordinates, noise, light and filtering.
 
-An image is drawn as a function of continuous coordinates on a grid finer than the result, lit from a height
-field, and averaged down with premultiplied alpha, so edges are smooth at every size.
+An image is a function of continuous coordinates, lit as a height field. It is drawn on a grid finer than the
+result, and averaged with premultiplied alpha, so that edges are smooth in every size.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,15 @@ Field = NDArray[np.floating[Any]]
 Color = tuple[float, float, float]
 
 WORK_SIZE = 768
-"""Edge of the grid that small images are drawn on before they are averaged down, in samples."""
+"""Edge of the grid on which small images are drawn before averaging, in samples."""
 
 MAX_SUPERSAMPLING = 16
-"""Most samples per pixel and axis; beyond it a tiny image gains nothing."""
+"""Largest number of samples per pixel and axis."""
 
 Vector = tuple[float, float, float]
 
 SUN: Vector = (-0.28, 0.36, 0.89)
-"""Where the light painted into the images comes from: mostly overhead, as decals lie in any direction."""
+"""Direction of the light in the images: nearly overhead, because decals are turned in any direction."""
 
 
 @dataclass(frozen=True)
@@ -47,28 +47,28 @@ class Canvas:
 
     @classmethod
     def of_size(cls, samples: int) -> "Canvas":
-        """Make the canvas of ``samples`` x ``samples`` sample positions."""
+        """Return the canvas of ``samples`` x ``samples`` sample positions."""
         step = 2.0 / samples
         ticks = ((np.arange(samples, dtype=np.float32) + 0.5) * step - 1.0).astype(np.float32)
         x, y = np.meshgrid(ticks, ticks[::-1])
         return cls(x, y, np.hypot(x, y), step)
 
     def below(self, value: Field, limit: float) -> Field:
-        """Coverage of the region ``value < limit``, one sample soft; ``value`` is a distance."""
+        """Return the coverage of the region ``value < limit``, with an edge one sample wide."""
         return np.asarray(np.clip(0.5 + (np.float32(limit) - value) / np.float32(self.step), 0.0, 1.0))
 
 
 Painter = Callable[[Canvas], tuple[Field, Field]]
-"""Gives colour float32[n, n, 3] and opacity float32[n, n], both in [0, 1], on a canvas."""
+"""Function of a canvas that returns colour float32[n, n, 3] and opacity float32[n, n], both in [0, 1]."""
 
 
 def draw(paint: Painter, size: int) -> NDArray[np.uint8]:
-    """Draw an image and average it down to ``size`` x ``size`` pixels.
+    """Draw an image, averaged to ``size`` x ``size`` pixels.
 
     Parameters
     ----------
     paint : Painter
-        What to draw.
+        Colour and opacity on a canvas.
     size : int
         Edge of the result in pixels.
 
@@ -82,7 +82,7 @@ def draw(paint: Painter, size: int) -> NDArray[np.uint8]:
     layers = np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)
     mean = layers.reshape(size, factor, size, factor, 4).mean(axis=(1, 3))
     opacity = mean[..., 3:]
-    # A fully transparent pixel keeps the unweighted colour, so that filtering finds no black behind the edge.
+    # A fully transparent pixel keeps the unweighted colour, so that filters read no black behind the edge.
     plain = color.reshape(size, factor, size, factor, 3).mean(axis=(1, 3))
     straight = np.where(opacity > 1e-3, mean[..., :3] / np.maximum(opacity, 1e-3), plain)
     pixels = np.concatenate([straight, opacity], axis=-1)
@@ -90,32 +90,32 @@ def draw(paint: Painter, size: int) -> NDArray[np.uint8]:
 
 
 def rgb(code: str) -> Color:
-    """Turn ``"#rrggbb"`` into three numbers in [0, 1]."""
+    """Return ``"#rrggbb"`` as three numbers in [0, 1]."""
     red, green, blue = bytes.fromhex(code.removeprefix("#"))
     return red / 255.0, green / 255.0, blue / 255.0
 
 
 def smoothstep(low: float, high: float, value: Field) -> Field:
-    """Rise from 0 at ``low`` to 1 at ``high``, with level ends; ``low > high`` falls instead."""
+    """Return the cubic step from 0 at ``low`` to 1 at ``high``, which may be the smaller one."""
     t = np.clip((value - np.float32(low)) / np.float32(high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t), dtype=np.float32)
 
 
 def mix(first: Field | Color, second: Field | Color, amount: Field) -> Field:
-    """Blend two colours (or colour fields) by a field of amounts in [0, 1]: float32[n, n, 3]."""
+    """Return a blend of two colours, or colour fields, by amounts in [0, 1]: float32[n, n, 3]."""
     a, b = np.asarray(first, np.float32), np.asarray(second, np.float32)
     return np.asarray(a + (b - a) * amount[..., None], dtype=np.float32)
 
 
 def light(canvas: Canvas, height: Field, *, ambient: float = 0.42, sun: Vector = SUN) -> Field:
-    """Diffuse light on a height field, about 1 where it is level."""
+    """Return the diffuse light on a height field, about 1 where it is level."""
     normal = _normals(canvas, height)
     level = ambient + (1.0 - ambient) * (normal @ np.asarray(sun, np.float32)) / np.float32(sun[2])
     return np.asarray(np.maximum(level, 0.25 * ambient), dtype=np.float32)
 
 
 def shine(canvas: Canvas, height: Field, *, sharpness: float, sun: Vector = SUN) -> Field:
-    """Specular highlight on a height field seen from above, from 0 to 1 (Blinn's half-way vector)."""
+    """Return the specular highlight on a height field seen from above, from 0 to 1 (Blinn)."""
     glance = np.asarray(sun, np.float32) + np.asarray((0.0, 0.0, 1.0), np.float32)
     facing = np.maximum(_normals(canvas, height) @ (glance / np.linalg.norm(glance)), 0.0)
     return np.asarray(facing ** np.float32(sharpness), dtype=np.float32)
@@ -128,11 +128,60 @@ def _normals(canvas: Canvas, height: Field) -> Field:
 
 
 def dark_ring(canvas: Canvas, color: Field, *, width: float) -> Field:
-    """Close an image with the near-black border that becomes the contact line between neighbours.
+    """Return a colour field with the near-black border that becomes the contact line between neighbours.
 
-    Contact deformation squeezes the whole disc into the decal's cell, so whatever lies at ``rho == 1`` is
-    what two neighbours meet with (the paper's figure 8). The border runs on to the corners of the square,
-    so that no filter bleeds anything else into the line.
+    Contact deformation moves the circle ``rho == 1`` onto the contact line (paper, figure 8). The border
+    extends to the corners of the square, so that filters blend no other colour into the line.
     """
     edge = smoothstep(1.0 - 1.45 * width, 1.0 - width, canvas.rho)
     return mix(color, rgb("#0b0a0a"), edge)
+
+
+_U = np.uint32
+
+
+def _hash(ix: NDArray[np.int32], iy: NDArray[np.int32], seed: int) -> Field:
+    """Return pseudo-random numbers in [0, 1) of lattice points."""
+    h = ix.astype(_U) * _U(0x8DA6B343) ^ iy.astype(_U) * _U(0xD8163841) ^ _U(seed * 0x9E3779B1 & 0xFFFFFFFF)
+    h = (h ^ (h >> _U(15))) * _U(0x2C1B3C6D)
+    h = (h ^ (h >> _U(12))) * _U(0x297A2D39)
+    h ^= h >> _U(15)
+    return np.asarray((h >> _U(8)).astype(np.float32) * np.float32(2.0**-24), dtype=np.float32)
+
+
+def value_noise(x: Field, y: Field, *, seed: int) -> Field:
+    """Return smooth noise in [0, 1] with features one unit wide."""
+    ix, iy = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
+    fx, fy = x - np.floor(x), y - np.floor(y)
+    fx, fy = fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy)
+    low = _hash(ix, iy, seed) * (1.0 - fx) + _hash(ix + 1, iy, seed) * fx
+    high = _hash(ix, iy + 1, seed) * (1.0 - fx) + _hash(ix + 1, iy + 1, seed) * fx
+    return np.asarray(low * (1.0 - fy) + high * fy, dtype=np.float32)
+
+
+def fractal_noise(x: Field, y: Field, *, octaves: int, seed: int) -> Field:
+    """Return a sum of noises in [0, 1], each half as high and twice as fine as the one before."""
+    total = np.zeros_like(x)
+    weight, norm = 1.0, 0.0
+    for octave in range(octaves):
+        total += np.float32(weight) * value_noise(x, y, seed=seed + octave)
+        norm += weight
+        # Rotation and shift of each octave hide the lattice.
+        x, y = 1.6 * x - 1.2 * y + 7.3, 1.2 * x + 1.6 * y - 3.1
+        weight *= 0.5
+    return np.asarray(total / np.float32(norm), dtype=np.float32)
+
+
+def cell_noise(x: Field, y: Field, *, seed: int) -> tuple[Field, Field]:
+    """Return distances to the two nearest of random points, one per unit square (Worley 1996)."""
+    ix, iy = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
+    first, second = np.full_like(x, 9.0), np.full_like(x, 9.0)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            px, py = ix + np.int32(dx), iy + np.int32(dy)
+            gap_x = px.astype(np.float32) + _hash(px, py, seed) - x
+            gap_y = py.astype(np.float32) + _hash(px, py, seed + 1) - y
+            gap = np.hypot(gap_x, gap_y)
+            second = np.minimum(second, np.maximum(first, gap))
+            first = np.minimum(first, gap)
+    return first, second

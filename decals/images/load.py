@@ -1,4 +1,4 @@
-"""Pictures from files, whatever their mode, as RGBA."""
+"""Decal images from picture files of any mode, as RGBA."""
 
 import warnings
 from pathlib import Path
@@ -8,35 +8,44 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from decals.errors import InvalidImage
-from decals.paths import is_file
-
-from .builtin import BUILTIN_IMAGES, generate_image, is_builtin
+from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
+from decals.validation import is_file
 
 MAX_IMAGE_EDGE = 8192
-"""Longest edge of a picture that is taken as a decal image, in pixels."""
+"""Longest edge of a decal image that is read from a file, in pixels."""
 
-_DO_THIS = "give a picture such as PNG or JPEG, or one of: " + ", ".join(BUILTIN_IMAGES)
+_ADVICE = "give a picture such as PNG or JPEG, or one of: " + ", ".join(BUILTIN_IMAGES)
 
 
 def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint8]:
-    """Get the pixels behind an image reference.
+    """Return the pixels of a generated image or of a picture file.
 
     Parameters
     ----------
     reference : str
         The name of a generated image (see `generate_image`) or the path of a picture.
     folder : Path, optional
-        Where relative paths start; the working directory if not given.
+        Folder of relative paths. Default: the working directory.
 
     Returns
     -------
     uint8[h, w, 4]
-        Straight RGBA, row 0 at the top.
+        sRGB with straight alpha, row 0 at the top.
 
     Raises
     ------
     InvalidImage
-        If the file is missing, is no picture, or is empty or too large.
+        The file is missing, is no picture, or is empty or too large.
+
+    See Also
+    --------
+    generate_image : a generated image of any size.
+
+    Examples
+    --------
+    >>> import decals
+    >>> decals.load_image("scale").shape
+    (256, 256, 4)
     """
     if is_builtin(reference):
         return generate_image(reference)
@@ -44,9 +53,38 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
-    """Read a picture of any mode (grey, palette, 16 bit, with or without alpha) as uint8[h, w, 4]."""
+    """Return the pixels of a picture file of any mode: grey, palette, 16 bit, with or without alpha.
+
+    Parameters
+    ----------
+    path : Path
+        A file of any format that Pillow reads.
+
+    Returns
+    -------
+    uint8[h, w, 4]
+        sRGB with straight alpha, row 0 at the top.
+
+    Raises
+    ------
+    InvalidImage
+        The file is missing, is no picture, or is empty or too large.
+
+    See Also
+    --------
+    load_image : the same, or a generated image.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from PIL import Image
+    >>> from decals.images import read_image
+    >>> Image.new("L", (3, 2), 128).save("grey.png")
+    >>> read_image(Path("grey.png"))[0, 0].tolist()
+    [128, 128, 128, 255]
+    """
     if not is_file(path):
-        raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_DO_THIS}")
+        raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_ADVICE}")
     try:
         with warnings.catch_warnings(), Image.open(path) as picture:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_IMAGE_EDGE is the limit
@@ -54,7 +92,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
             picture.load()
             return _to_rgba(ImageOps.exif_transpose(picture))
     except UnidentifiedImageError as error:
-        raise InvalidImage(f"expected an image, {str(path)!r} is none: {_DO_THIS}") from error
+        raise InvalidImage(f"expected an image, {str(path)!r} is not a picture: {_ADVICE}") from error
     except Image.DecompressionBombError as error:
         raise InvalidImage(
             f"expected an image of 1 to {MAX_IMAGE_EDGE} pixels a side, "
@@ -63,7 +101,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     except (OSError, SyntaxError, ValueError) as error:
         if isinstance(error, InvalidImage):
             raise
-        raise InvalidImage(f"could not read the image {str(path)!r} ({error}): {_DO_THIS}") from error
+        raise InvalidImage(f"could not read the image {str(path)!r} ({error}): {_ADVICE}") from error
 
 
 def _check_size(picture: Image.Image, path: Path) -> None:
@@ -82,7 +120,7 @@ def _to_rgba(picture: Image.Image) -> NDArray[np.uint8]:
 
 
 def _wide_grey(values: NDArray[np.float64], mode: str) -> NDArray[np.uint8]:
-    """Bring 16- and 32-bit grey down to 8 bits; Pillow's own conversion would clip it to white."""
+    """Return 16- or 32-bit grey as 8-bit RGBA; the conversion of Pillow would clip it to white."""
     if mode == "F":
         finite = np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0)
         grey = finite * 255.0 if finite.max(initial=0.0) <= 1.0 else finite

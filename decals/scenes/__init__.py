@@ -1,1 +1,1 @@
-"""What a picture shows: objects, decals, images and camera, and their files."""
+"""Scenes: objects, decals, images and a camera, and their files. The public names are those of `decals`."""

@@ -1,4 +1,4 @@
-"""Where a picture is taken from: view and projection matrices, and the rays of the pixels.
+"""Cameras: view and projection matrices, rays of the pixels, and framing of a model.
 
 Matrices act on columns, ``M @ (x, y, z, 1)``, as in OpenGL; they are float64, and the renderer rounds the
 product, not the factors.
@@ -11,17 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from decals.checks import finite, triple
+from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
-from decals.scenes.viewpoint import Bounds, Floats, Rays
+from decals.rendering.viewpoint import Bounds, Rays
+from decals.validation import finite_number, finite_vector
 
 Vector = tuple[float, float, float]
 
-NEAR_OVER_FAR = 1e-4
-"""The near plane comes no closer than this fraction of the far one, for the depth buffer's sake."""
-DIRECTION = (0.35, 0.25, 1.0)
-"""Where pictures are taken from, unless somebody says otherwise: from the model toward the eye."""
-PARALLEL = 1e-9
+MIN_NEAR_OVER_FAR = 1e-4
+"""Least distance of the near plane as a fraction of the far one: it bounds the depth buffer's rounding."""
+DEFAULT_DIRECTION: Vector = (0.35, 0.25, 1.0)
+"""Default direction from a model toward the camera."""
+THREE_QUARTER: Vector = (0.55, 0.35, 1.0)
+"""Direction from a model toward the camera: from the right, a little above."""
+PARALLEL_SINE = 1e-9
 """Sine below which two directions count as parallel."""
 
 
@@ -31,17 +34,26 @@ class Camera:
 
     Parameters
     ----------
-    position, target
+    position, target : (x, y, z)
         The eye, and the point in the middle of the picture, in the scene's units.
-    up
-        Any direction that is not along the view; the picture's upward one.
-    fov
+    up : (x, y, z)
+        Upward direction of the picture; any vector that is not along the view.
+    fov : float
         Vertical angle of view in degrees, between 0 and 180.
 
     Raises
     ------
     InvalidScene
-        Something is not finite, position and target coincide, or ``up`` is zero or along the view.
+        If a number is not finite, position and target coincide, or ``up`` is zero or along the view.
+
+    Examples
+    --------
+    >>> import decals
+    >>> camera = decals.Camera((0, 0, 5), fov=40)
+    >>> camera.distance
+    5.0
+    >>> decals.Camera.fitting([[-1, 0, 0], [1, 0, 0]], direction=(0, 0, 1), margin=1).target
+    (0.0, 0.0, 0.0)
     """
 
     position: Vector
@@ -52,7 +64,7 @@ class Camera:
     def __post_init__(self) -> None:
         for name in ("position", "target", "up"):
             object.__setattr__(self, name, _vector(name, getattr(self, name)))
-        object.__setattr__(self, "fov", finite("a camera's fov", self.fov, InvalidScene))
+        object.__setattr__(self, "fov", finite_number("a camera's fov", self.fov, InvalidScene))
         if not 0.0 < self.fov < 180.0:
             raise InvalidScene(f"a camera's fov must lie between 0 and 180 degrees, got {self.fov}")
         scale = max(abs(x) for x in (*self.position, *self.target))
@@ -65,29 +77,29 @@ class Camera:
 
     @property
     def distance(self) -> float:
-        """How far the target is from the eye."""
+        """Distance from the eye to the target."""
         return math.dist(self.position, self.target)
 
     @property
-    def _back(self) -> Floats:
+    def _back(self) -> Float64Array:
         return _unit(np.subtract(self.position, self.target))
 
     @property
-    def axes(self) -> Floats:
+    def axes(self) -> Float64Array:
         """Unit vectors to the right, up, and toward the viewer, as rows."""
         back = self._back
         right = _unit(np.cross(_unit(np.array(self.up)), back))
         return np.stack([right, np.cross(back, right), back])
 
-    def view(self) -> Floats:
-        """World to eye space, ``float64[4, 4]``; the eye looks along −z."""
+    def view(self) -> Float64Array:
+        """Return the matrix from world to eye space, ``float64[4, 4]``; the eye looks along −z."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.axes
         matrix[:3, 3] = -self.axes @ np.array(self.position)
         return matrix
 
-    def projection(self, aspect: float, near: float, far: float) -> Floats:
-        """Eye to clip space, ``float64[4, 4]``, for an image of this width over height."""
+    def projection(self, aspect: float, near: float, far: float) -> Float64Array:
+        """Return the matrix from eye to clip space, ``float64[4, 4]``; ``aspect`` is width over height."""
         focal = 1.0 / math.tan(math.radians(self.fov) / 2)
         matrix = np.zeros((4, 4))
         matrix[0, 0] = focal / aspect
@@ -98,19 +110,19 @@ class Camera:
         return matrix
 
     def clip_range(self, bounds: Bounds) -> tuple[float, float]:
-        """Give near and far distances, along the view, that hold everything in a box before the eye."""
+        """Return the distances, along the view, of a near and a far plane that enclose a box."""
         depth = (np.array(self.position) - _corners(bounds)) @ self.axes[2]
         far = float(depth.max()) * 1.01
-        if far <= 0.0:  # all of it lies behind: any range is right
+        if far <= 0.0:  # the box lies behind the eye: any range is right
             far = self.distance
-        return max(float(depth.min()) * 0.99, far * NEAR_OVER_FAR), far
+        return max(float(depth.min()) * 0.99, far * MIN_NEAR_OVER_FAR), far
 
-    def clip_matrix(self, size: tuple[int, int], bounds: Bounds) -> Floats:
-        """World to clip space, ``float64[4, 4]``, for a picture of this size of what is in a box."""
+    def clip_matrix(self, size: tuple[int, int], bounds: Bounds) -> Float64Array:
+        """Return the matrix from world to clip space, ``float64[4, 4]``, for a picture of a box."""
         return self.projection(size[0] / size[1], *self.clip_range(bounds)) @ self.view()
 
     def rays(self, width: int, height: int) -> Rays:
-        """Give the rays through the pixels of an image of this size."""
+        """Return the rays through the pixels of a picture of this size."""
         right, up, back = self.axes
         half = math.tan(math.radians(self.fov) / 2)
         pixel = 2 * half / height
@@ -122,28 +134,33 @@ class Camera:
         cls,
         bounds: Bounds,
         *,
-        direction: Sequence[float] = DIRECTION,
+        direction: Sequence[float] = DEFAULT_DIRECTION,
         up: Sequence[float] = (0.0, 1.0, 0.0),
         fov: float = 30.0,
         aspect: float = 4 / 3,
         margin: float = 1.05,
     ) -> "Camera":
-        """Look at a box from a direction, just far enough to see all of it.
+        """Return a camera that looks at a box from a direction, just far enough to show all of it.
 
         Parameters
         ----------
-        bounds
-            Lower and upper corner, each ``[3]``.
-        direction
-            From the box toward the eye; any length.
-        up
-            Upward direction; where it is along the view, another axis takes its place.
-        fov
-            Vertical angle of view, degrees.
-        aspect
+        bounds : (float[3], float[3])
+            Lower and upper corner.
+        direction : (x, y, z)
+            Direction from the box toward the eye; any length.
+        up : (x, y, z)
+            Upward direction; if it is along the view, another axis replaces it.
+        fov : float
+            Vertical angle of view in degrees.
+        aspect : float
             Width over height of the picture.
-        margin
-            Room around the box, 1 for none.
+        margin : float
+            Size of the picture relative to the box; 1 leaves no space.
+
+        Raises
+        ------
+        InvalidScene
+            If a number is not finite, or the direction is zero.
         """
         return cls.fitting(
             _corners(bounds), direction=direction, up=up, fov=fov, aspect=aspect, margin=margin
@@ -154,37 +171,40 @@ class Camera:
         cls,
         points: ArrayLike,
         *,
-        direction: Sequence[float] = DIRECTION,
+        direction: Sequence[float] = DEFAULT_DIRECTION,
         up: Sequence[float] = (0.0, 1.0, 0.0),
         fov: float = 30.0,
         aspect: float = 4 / 3,
         margin: float = 1.05,
     ) -> "Camera":
-        """Look at points, ``[n, 3]``, as `framing` does at a box: close, with all of them in the middle.
+        """Return a camera that looks at points, ``[n, 3]``, from a direction, with all of them in the middle.
 
-        Tighter than the box around them, for shapes that do not fill it.
+        It stands closer than that of `framing` if the points do not fill their box. The four edges of the
+        picture are planes through the eye: each pair of opposite planes fixes one coordinate of the eye and a
+        least distance. Other arguments and errors are those of `framing`.
         """
-        places = _points(points)
+        positions = _points(points)
         toward, upward = _orientation(direction, up)
-        frame = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
-        half = math.tan(math.radians(frame.fov) / 2) / margin
-        x, y, z = (places @ frame.axes.T).T
-        across, wide = _squeeze(x, z, half * aspect)
-        along, high = _squeeze(y, z, half)
+        axes_camera = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
+        half = math.tan(math.radians(axes_camera.fov) / 2) / margin
+        x, y, z = (positions @ axes_camera.axes.T).T
+        across, depth_of_width = _fit_axis(x, z, half * aspect)
+        along, depth_of_height = _fit_axis(y, z, half)
         middle = (z.max() + z.min()) / 2
-        eye = max(wide, high, float(z.max()) + 0.05 * _reach(places))
-        centre = np.array([across, along, middle]) @ frame.axes
-        return cls(_triple(centre + (eye - middle) * frame.axes[2]), _triple(centre), _triple(upward), fov)
+        eye = max(depth_of_width, depth_of_height, float(z.max()) + 0.05 * _half_diagonal(positions))
+        centre = np.array([across, along, middle]) @ axes_camera.axes
+        position = _triple(centre + (eye - middle) * axes_camera.axes[2])
+        return cls(position, _triple(centre), _triple(upward), fov)
 
 
-def _squeeze(x: Floats, z: Floats, slope: float) -> tuple[float, float]:
-    """Place an eye that looks along −z so that |x| ≤ slope · depth touches the points on both sides."""
+def _fit_axis(x: Float64Array, z: Float64Array, slope: float) -> tuple[float, float]:
+    """Return x and z of the eye for which both planes |x| = slope · depth touch the points."""
     right, left = float(np.max(x + slope * z)), float(np.max(slope * z - x))
     return (right - left) / 2, (right + left) / (2 * slope)
 
 
-def _orientation(direction: Sequence[float], up: Sequence[float]) -> tuple[Floats, Floats]:
-    """Unit direction toward the eye, and an upward one that is not along it."""
+def _orientation(direction: Sequence[float], up: Sequence[float]) -> tuple[Float64Array, Float64Array]:
+    """Return the unit direction toward the eye, and an upward direction that is not along it."""
     toward, upward = np.array(_vector("direction", direction)), np.array(_vector("up", up))
     if not toward.any():
         raise InvalidScene("a camera's direction must not be zero")
@@ -194,23 +214,28 @@ def _orientation(direction: Sequence[float], up: Sequence[float]) -> tuple[Float
     return toward, upward
 
 
-def _reach(points: Floats) -> float:
-    """Give half the diagonal of the points' box, or something usable where that is a point."""
+def _half_diagonal(points: Float64Array) -> float:
+    """Return half the diagonal of the points' box; for a box without size a small positive length."""
     low, high = points.min(axis=0), points.max(axis=0)
-    reach, size = float(np.linalg.norm(high - low)) / 2, float(np.abs(points).max())
-    return reach if reach > 1e-6 * size else max(1e-3 * size, 1e-3)
+    half, size = float(np.linalg.norm(high - low)) / 2, float(np.abs(points).max())
+    return half if half > 1e-6 * size else max(1e-3 * size, 1e-3)
 
 
-def _points(points: ArrayLike) -> Floats:
-    places = np.asarray(points, np.float64)
-    if places.ndim != 2 or places.shape[1] != 3 or not len(places) or not np.isfinite(places).all():
+def _points(points: ArrayLike) -> Float64Array:
+    positions = np.asarray(points, np.float64)
+    if (
+        positions.ndim != 2
+        or positions.shape[1] != 3
+        or not len(positions)
+        or not np.isfinite(positions).all()
+    ):
         raise InvalidScene(
-            f"points must be finite, of shape [n, 3] with n > 0, got shape {list(places.shape)}"
+            f"points must be finite, of shape [n, 3] with n > 0, got shape {list(positions.shape)}"
         )
-    return places
+    return positions
 
 
-def _corners(bounds: Bounds) -> Floats:
+def _corners(bounds: Bounds) -> Float64Array:
     box = np.asarray([bounds[0], bounds[1]], np.float64)
     if box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any():
         raise InvalidScene(f"bounds must be two finite corners (lower, upper) of three numbers, got {bounds}")
@@ -219,16 +244,16 @@ def _corners(bounds: Bounds) -> Floats:
 
 
 def _vector(name: str, value: ArrayLike) -> Vector:
-    return _triple(triple(f"a camera's {name}", value, InvalidScene))
+    return _triple(finite_vector(f"a camera's {name}", value, InvalidScene))
 
 
-def _triple(array: Floats) -> Vector:
+def _triple(array: Float64Array) -> Vector:
     return float(array[0]), float(array[1]), float(array[2])
 
 
-def _unit(vector: Floats) -> Floats:
+def _unit(vector: Float64Array) -> Float64Array:
     return np.asarray(vector / math.hypot(*vector))
 
 
-def _parallel(a: Floats, unit: Floats) -> bool:
-    return math.hypot(*np.cross(_unit(a), unit)) < PARALLEL
+def _parallel(a: Float64Array, unit: Float64Array) -> bool:
+    return math.hypot(*np.cross(_unit(a), unit)) < PARALLEL_SINE

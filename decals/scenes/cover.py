@@ -1,60 +1,80 @@
-"""From models to a scene in one call: one coat of decals over all of them, and a camera that sees them."""
+"""From models to a scene in one call: decals over all of them, and a camera that shows them."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blobtree import Node, Progress
-from decals.coat.orientation import Direction
-from decals.coat.seeding import seed as seed_decals
+from blobtree import Progress
+from blobtree._typing import Float32Array
 from decals.errors import InvalidScene
-from decals.scenes.camera import Camera, Vector
-from decals.scenes.scene import DecalImage, MeshObject, Scene, SceneObject, TreeObject
+from decals.scattering.orientation import Direction
+from decals.scattering.scatter import scatter
+from decals.scenes.camera import THREE_QUARTER, Camera, Vector
+from decals.scenes.objects import SceneObject, as_objects
+from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.convert import Model
 
-THREE_QUARTER: Vector = (0.55, 0.35, 1.0)
-"""Direction toward the camera: from the right, a little above."""
+FRAMING_SAMPLES = 2000
+"""Points per object that the camera is fitted to."""
 
-SAMPLES = 2000
-"""Points per object that a picture is framed by."""
+FRAMING_MARGIN = 1.1
+"""Space around the objects in a picture, 1 for none."""
 
 
 def cover(
-    *models: Node | SceneObject,
+    *models: Model | SceneObject,
     count: int = 500,
     images: Sequence[str | DecalImage] = ("scale",),
     seed: int = 0,
     direction: Direction = None,
-    view: Vector = THREE_QUARTER,
+    view_direction: Vector = THREE_QUARTER,
     progress: Progress | None = None,
 ) -> Scene:
-    """Cover models with one coat of decals that run across wherever the models touch.
+    """Cover models with decals that lie evenly, also across the places where models touch.
 
     Parameters
     ----------
-    models
-        BlobTrees, or objects of a scene.
-    count
-        How many decals, exactly.
-    images
-        Names of generated images, paths of pictures, or images; decals choose among them at random.
-    seed
-        The same number gives the same scene.
-    direction
+    *models : Model or SceneObject
+        BlobTrees, pyvista datasets, meshes with ``vertices`` and ``faces`` (trimesh), tuples
+        ``(vertices, faces)``, paths of models, or objects of a scene.
+    count : int
+        Number of decals.
+    images : sequence of str or DecalImage
+        Names of generated images, paths of pictures, or images. Each decal shows one of them at random.
+    seed : int
+        Seed of all random choices; equal seeds give equal scenes.
+    direction : optional
         Of the images' u axes: None (random), a vector, or a function of points (n, 3) to vectors (n, 3).
-    view
+    view_direction : (x, y, z)
         Direction from the models toward the camera.
+    progress : callable, optional
+        Called with the name of a stage and the fraction done.
+
+    Returns
+    -------
+    Scene
 
     Raises
     ------
-    DecalsError
-        Something given makes no sense; the message says what.
+    ImplicitDecalsError
+        If an argument cannot be used; the message names it.
+
+    See Also
+    --------
+    decals.scatter : decals alone, with all options of their distribution
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
+    >>> len(scene.decals)
+    12
     """
-    objects = [_object(model, number) for number, model in enumerate(models, 1)]
+    objects = as_objects(models)
     pictures = [image if isinstance(image, DecalImage) else DecalImage.load(image) for image in images]
     if not objects:
         raise InvalidScene("expected at least one model, got none")
-    decals = seed_decals(
+    decals = scatter(
         [item.surface for item in objects],
         count=count,
         seed=seed,
@@ -64,20 +84,17 @@ def cover(
     )
     return Scene(
         objects=tuple(objects),
-        camera=Camera.fitting(_seen_points(objects), direction=view, margin=1.1),
+        camera=fitting_camera(objects, direction=view_direction),
         decals=decals,
         images=tuple(pictures),
     )
 
 
-def _seen_points(objects: Sequence[SceneObject]) -> NDArray[np.float32]:
-    """Points (n, 3) spread over all surfaces, for the camera to see."""
-    return np.concatenate([item.surface.sample(SAMPLES, seed=0)[0] for item in objects])
-
-
-def _object(model: Node | SceneObject, number: int) -> SceneObject:
-    if isinstance(model, Node):
-        return TreeObject(f"model {number}", model)
-    if isinstance(model, MeshObject | TreeObject):
-        return model
-    raise InvalidScene(f"model {number}: expected a BlobTree, MeshObject or TreeObject, got {model!r}")
+def fitting_camera(
+    objects: Sequence[SceneObject], *, direction: Vector = THREE_QUARTER, aspect: float = 4 / 3
+) -> Camera:
+    """Return a camera that looks from a direction and whose picture the objects fill."""
+    points: Float32Array = np.concatenate(
+        [item.surface.sample(FRAMING_SAMPLES, seed=0)[0] for item in objects]
+    )
+    return Camera.fitting(points, direction=direction, aspect=aspect, margin=FRAMING_MARGIN)

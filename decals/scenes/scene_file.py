@@ -28,19 +28,21 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Raw, Struct
 
-from blobtree.nodes.io import write_atomically
+from blobtree.io import write_atomically
 from blobtree.progress import Progress, watched
-from decals.errors import DecalsError, InvalidScene
+from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
-from decals.scenes.decal_records import DecalRecord, decals_of, records_of
-from decals.scenes.object_records import (
+from decals.scenes.records import (
+    DecalRecord,
     MeshRecord,
     SampleLoader,
     TreeRecord,
     absolute,
+    decals_of,
     object_of,
     record_of,
+    records_of,
     relative,
 )
 from decals.scenes.scene import DecalImage, Scene
@@ -76,13 +78,27 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
 def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
     """Write a scene to a JSON file, whole or not at all.
 
-    Meshes with a ``source`` and images are written as references, other meshes in full. Progress is told now
-    and then.
+    Meshes with a ``source`` and images are written as references, other meshes in full.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    path : str or path
+        The file; its folder must exist.
+    progress : callable, optional
+        Function of the stage and its finished fraction, 0 to 1, called repeatedly.
 
     Raises
     ------
     InvalidScene
         If the folder does not exist or cannot be written.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
+    >>> decals.save_scene(scene, "ball.json")
     """
     path = Path(path)
     folder = path.parent
@@ -102,16 +118,29 @@ def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
     Parameters
     ----------
     path : str or path
-        A file that `save_scene` wrote, or somebody's own.
+        A scene file, as `save_scene` writes it.
     samples : callable, optional
-        Gives the meshes whose source is ``"sample:NAME"``.
+        Function that returns the vertices and faces of a source ``"sample:NAME"``, by NAME.
+
+    Returns
+    -------
+    Scene
+        The scene of the file, with relative paths resolved from its folder.
 
     Raises
     ------
     InvalidScene
         If the file is missing or is no scene; the message names the offending field.
-    InvalidMesh, InvalidImage, blobtree.BlobTreeError
-        If something that the scene refers to is missing or broken.
+    InvalidMesh, InvalidImage, blobtree.ImplicitDecalsError
+        If a mesh, an image or a tree that the scene refers to is missing or broken.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
+    >>> decals.save_scene(scene, "ball.json")
+    >>> len(decals.load_scene("ball.json").decals)
+    20
     """
     path = Path(path)
     try:
@@ -156,7 +185,7 @@ def from_json(text: bytes, *, folder: Path, samples: SampleLoader | None = None)
 
 
 def is_scene(text: bytes) -> bool:
-    """Whether JSON says of itself that it is a scene."""
+    """Return True if JSON has the format of a scene."""
     try:
         return msgspec.json.decode(text, type=_Header).format == FORMAT
     except msgspec.MsgspecError:
@@ -198,5 +227,5 @@ def _lines(records: Iterator[Any]) -> Raw:
 def _camera(record: _CameraRecord) -> Camera:
     try:
         return Camera(record.position, record.target, record.up, record.fov)
-    except DecalsError as error:
+    except ImplicitDecalsError as error:
         raise InvalidScene(f"camera: {error}") from error

@@ -1,1 +1,8 @@
-"""What decals lie on: meshes and implicit surfaces under one protocol, on any device."""
+"""Surfaces under decals: meshes and implicit surfaces under one protocol, on any device, and their files.
+
+The public names are listed in `__init__.pyi` and are loaded at first use.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""A BlobTree as a surface for decals."""
+"""`ImplicitSurface`: the iso surface of a BlobTree, on the host and on devices."""
 
 from typing import Any
 
@@ -7,54 +7,74 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree import ISO, Node, polygonize
-from blobtree.launch import launch
+from blobtree._typing import BoolArray, Float32Array
+from blobtree.device import known_device, launch
 from blobtree.tracing.trace import trace
-from decals.checks import shown
-from decals.errors import InvalidMesh
-from decals.surfaces.ground import asked, inside, vectors
-from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Flags, Floats, as_points, as_rays, as_reaches
-from decals.surfaces.tree_ground import ARRIVED, TreeGround
-from decals.surfaces.tree_queries import approach
-from decals.wishes import device_or_error, whole
+from decals.errors import InvalidMesh, InvalidScattering
+from decals.surfaces.device_surface import Scalars, Vectors, contains_host, project_host, vectors
+from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface
+from decals.surfaces.surface import as_points, as_rays, as_reaches
+from decals.surfaces.tree_kernels import mark_above, project, project_with_mesh
+from decals.validation import describe, whole_number
+
+FIELD_TOLERANCE = 1e-4
+"""Largest field error of a point on the surface, in units of the iso value."""
+
 
 RESOLUTION = 64
-"""Cells along the longest side of the tree's box from which area and samples are taken."""
+"""Cells of the coarse mesh along the longest side of the tree's box."""
 
-STEP = 0.5
-"""Longest Newton step, in cells."""
+MAX_STEP = 0.5
+"""Longest step of Newton's method, in cells."""
 
-ROUNDS = 4
-"""How often Newton's method goes on from where it stopped, before a mesh is asked."""
+MAX_PROJECTION_ROUNDS = 4
+"""Runs of Newton's method, each from the result of the one before, in `project_without_mesh`."""
 
 
 class ImplicitSurface:
-    """The iso surface of a BlobTree: exact points and normals, area and samples from a coarse mesh.
+    """Iso surface of a BlobTree, as a `Surface`.
 
-    Points are taken to the surface by Newton's method along the exact field gradient; from where the
-    field is flat or the way too long, they start at the closest point of the coarse mesh instead.
+    Points are projected by Newton's method along the exact field gradient. Where the field is flat, or the
+    distance too large, they start at the closest point of a coarse mesh. Area and bounds are those of the
+    coarse mesh.
 
     Parameters
     ----------
-    tree
+    tree : blobtree.Node
         The model.
-    resolution
-        Cells of the coarse mesh along the longest side of the tree's box. Parts thinner than a cell
-        may get no samples.
-    device
-        Warp device that answers questions of the host, rays aside.
+    resolution : int, optional
+        Cells of the coarse mesh along the longest side of the tree's box. Parts thinner than a cell may get
+        no samples. Default 64.
+    device : str, optional
+        Warp device for queries of the host, except `raycast`. Default "cpu".
 
     Raises
     ------
     InvalidMesh
-        If the tree has no surface at that resolution.
+        The tree has no surface at this resolution.
+    InvalidDevice
+        Warp has no such device.
+
+    See Also
+    --------
+    MeshSurface : the surface of a triangle mesh.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> ball = decals.surfaces.ImplicitSurface(blobtree.Point((0, 0, 0), radius=2.0), resolution=16)
+    >>> positions, normals = ball.project([[0, 0, 3]])
+    >>> positions.round(3).tolist()
+    [[0.0, 0.0, 2.0]]
+    >>> ball.contains([[0, 0, 1.5], [0, 0, 2.5]])
+    array([ True, False])
     """
 
     def __init__(self, tree: Node, *, resolution: int = RESOLUTION, device: str = "cpu") -> None:
         if not isinstance(tree, Node):
-            raise InvalidMesh(f"tree: expected a BlobTree, got {shown(tree)}; meshes go into MeshSurface")
-        whole("resolution", resolution, 1)
-        self.tree, self.device = tree, device_or_error(device)
+            raise InvalidMesh(f"tree: expected a BlobTree, got {describe(tree)}; meshes go into MeshSurface")
+        whole_number("resolution", resolution, 1, None, InvalidScattering)
+        self.tree, self.device = tree, known_device(device)
         coarse = polygonize(tree, resolution=resolution, device=device)
         if len(coarse.faces) == 0:
             raise InvalidMesh(
@@ -62,8 +82,8 @@ class ImplicitSurface:
                 "its parts may be too small, or cut each other away"
             )
         self._coarse = MeshSurface(coarse.vertices, coarse.faces, device=device)
-        self._longest_step = _longest_step(tree, resolution)
-        self._grounds: dict[str, TreeGround] = {}
+        self._max_step = _max_step(tree, resolution)
+        self._on_devices: dict[str, DeviceImplicitSurface] = {}
 
     def __repr__(self) -> str:
         return f"ImplicitSurface({self.tree!r})"
@@ -74,71 +94,112 @@ class ImplicitSurface:
         return self._coarse.area
 
     @property
-    def bounds(self) -> tuple[Floats, Floats]:
+    def bounds(self) -> tuple[Float32Array, Float32Array]:
         """Corners of the box around the coarse mesh."""
         return self._coarse.bounds
 
-    def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
-        """Points uniform by area on the coarse mesh, taken to the surface."""
+    def sample(self, count: int, seed: int) -> tuple[Float32Array, Float32Array]:
+        """Return points uniform by area on the coarse mesh, projected onto the surface, and their normals."""
         return self.project(self._coarse.sample(count, seed)[0])
 
-    def on(self, device: str) -> TreeGround:
-        """Return the tree in the memory of a device; it is taken there once."""
-        if device not in self._grounds:
-            self._grounds[device] = TreeGround(self.tree, self._coarse.on(device), self._longest_step)
-        return self._grounds[device]
+    def on(self, device: str) -> "DeviceImplicitSurface":
+        """Return the surface in the memory of a device; later calls return the same object."""
+        if device not in self._on_devices:
+            self._on_devices[device] = DeviceImplicitSurface(
+                self.tree, self._coarse.on(device), self._max_step
+            )
+        return self._on_devices[device]
 
-    def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
-        """Surface points near the points and the normals there."""
+    def project(
+        self, points: ArrayLike, *, within: Float32Array | None = None
+    ) -> tuple[Float32Array, Float32Array]:
+        """Return surface points near the points, and the normals there."""
         queries = as_points(points)
         reaches = as_reaches(within, len(queries))
-        return asked(self.on(self.device), queries, reaches, self.device)
+        return project_host(self.on(self.device), queries, reaches, self.device)
 
-    def normal(self, points: ArrayLike) -> Floats:
+    def normal(self, points: ArrayLike) -> Float32Array:
         """Return the normals of the surface where it is closest to the points."""
         return self.project(points)[1]
 
-    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Floats:
-        """Distance to the first point inside; 0 for a ray that starts there."""
-        starts, ways = as_rays(origins, directions)
+    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
+        """Return the distance to the first point inside; 0 for a ray that starts inside."""
+        starts, headings = as_rays(origins, directions)
         distances = np.full(len(starts), np.inf, np.float32)
-        aimed = ways.any(axis=1)
-        if aimed.any():
-            distances[aimed] = trace(self.tree, starts[aimed], ways[aimed])
+        valid = headings.any(axis=1)
+        if valid.any():
+            distances[valid] = trace(self.tree, starts[valid], headings[valid])
         return distances
 
-    def contains(self, points: ArrayLike) -> Flags:
-        """Whether the field is above the iso value."""
-        return inside(self.on(self.device), as_points(points), self.device)
+    def contains(self, points: ArrayLike) -> BoolArray:
+        """Return True for each point whose field is above the iso value, ``bool[n]``."""
+        return contains_host(self.on(self.device), as_points(points), self.device)
 
 
-def _longest_step(tree: Node, resolution: int) -> float:
+class DeviceImplicitSurface:
+    """Tape of a tree, and the coarse mesh from which points start again, on one device."""
+
+    def __init__(self, tree: Node, coarse: DeviceMeshSurface, max_step: float) -> None:
+        self.device = coarse.device
+        self._tape = tree.tape.on(self.device)
+        kernel_for = tree.tape.instruction_set.kernel_for
+        self._project, self._mark_above = kernel_for(project_with_mesh), kernel_for(mark_above)
+        self._coarse, self._max_step = coarse, max_step
+        low, high = tree.bounds
+        self._low, self._high = wp.vec3(*low), wp.vec3(*high)
+
+    def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
+        """Write the points that Newton's method reaches, and the normals of the field there."""
+        inputs: list[Any] = [self._tape.data, self._tape.span, self._max_step, FIELD_TOLERANCE * ISO]
+        inputs += [*self._coarse.query_inputs, points]
+        launch(self._project, len(points), inputs, [positions, normals], device=self.device)
+
+    def mark_inside(self, points: Vectors, flags: Scalars) -> None:
+        """Write 1 where the field is above the iso value."""
+        inputs = [self._tape.data, self._tape.span, self._low, self._high, points]
+        launch(self._mark_above, len(points), inputs, [flags], device=self.device)
+
+
+def _max_step(tree: Node, resolution: int) -> float:
     low, high = tree.bounds
-    return STEP * float((high - low).max()) / resolution
+    return MAX_STEP * float((high - low).max()) / resolution
 
 
-def straight_onto(tree: Node, points: ArrayLike, *, device: str = "cpu") -> tuple[Floats, Floats] | None:
-    """Surface points near the points and the normals there, without making an `ImplicitSurface`.
+def project_without_mesh(
+    tree: Node, points: ArrayLike, *, device: str = "cpu"
+) -> tuple[Float32Array, Float32Array] | None:
+    """Return surface points near the points and the normals there, without an `ImplicitSurface`.
 
-    The same as that gives, but for points from which it would start again at its mesh: those go on along the
-    gradient. None where there is no point, or where one does not arrive.
+    Results equal those of `ImplicitSurface.project`, except for points that it starts again at its mesh:
+    these go on along the gradient.
+
+    Returns
+    -------
+    positions, normals : float32[n, 3]
+        None if there are no points, or if a point does not reach the surface.
     """
     positions = as_points(points).copy()
     normals = np.zeros_like(positions)
     rows = np.arange(len(positions))
-    for _ in range(ROUNDS):
-        positions[rows], normals[rows], arrived = _approached(tree, positions[rows], device)
+    for _ in range(MAX_PROJECTION_ROUNDS):
+        positions[rows], normals[rows], arrived = _approach(tree, positions[rows], device)
         rows = rows[~arrived]
     return (positions, normals) if len(positions) and not len(rows) else None
 
 
-def _approached(tree: Node, points: Floats, device: str) -> tuple[Floats, Floats, Flags]:
-    """Where Newton's method leads to, the normals there, and whether it arrived."""
+def _approach(tree: Node, points: Float32Array, device: str) -> tuple[Float32Array, Float32Array, BoolArray]:
+    """Run Newton's method; return positions, normals, and True for each point that reached the surface."""
     tape = tree.tape.on(device)
     positions: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
     normals: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
     arrived: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
-    inputs = [tape.data, tape.span, _longest_step(tree, RESOLUTION), ARRIVED * ISO, vectors(points, device)]
-    kernel = tree.tape.vocabulary.kernel(approach)
+    inputs = [
+        tape.data,
+        tape.span,
+        _max_step(tree, RESOLUTION),
+        FIELD_TOLERANCE * ISO,
+        vectors(points, device),
+    ]
+    kernel = tree.tape.instruction_set.kernel_for(project)
     launch(kernel, len(points), inputs, [positions, normals, arrived], device=device)
     return positions.numpy(), normals.numpy(), arrived.numpy() == 1

@@ -1,53 +1,72 @@
-"""A triangle mesh as a surface for decals."""
+"""`MeshSurface`: a triangle mesh, on the host and on devices, and its edges."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree.device import known_device, launch
 from blobtree.lazy import Lazy
-from decals.errors import InvalidMesh
-from decals.model import LARGEST
-from decals.surfaces.ground import asked, inside, vectors
-from decals.surfaces.mesh_ground import MeshGround
-from decals.surfaces.surface import Flags, Floats, as_points, as_rays, as_reaches, frozen
-from decals.wishes import device_or_error, whole
+from decals.errors import InvalidMesh, InvalidScattering
+from decals.model import MAX_COORDINATE
+from decals.surfaces.device_surface import Scalars, Vectors, contains_host, project_host, vectors
+from decals.surfaces.mesh_kernels import closest_faces, closest_points, first_hits, mark_inside
+from decals.surfaces.surface import as_points, as_rays, as_reaches, make_read_only
+from decals.validation import whole_number
 
-Faces = NDArray[np.int32]
+MIN_FACE_QUALITY = 1e-6
+"""Smallest ratio of a face's doubled area to its squared edges; faces below it have no usable normal.
 
-SLIVER = 1e-6
-"""A face whose doubled area is below this share of its squared edges has no usable normal and is left out
-(Warp's own mesh queries skip the same faces)."""
+Warp's mesh queries skip the same faces.
+"""
 
-EVEN_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
+R2_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the R2 sequence (Roberts 2018): powers of the inverse of the plastic number."""
 
 
 class MeshSurface:
-    """A triangle mesh: closest points, rays and containment through a bounding volume hierarchy.
+    """Triangle mesh as a `Surface`, with a bounding volume hierarchy for all queries.
 
-    Degenerate faces are tolerated; they carry no samples and nothing projects onto them. The mesh
-    contains points only where it is closed: every edge is used equally often in both directions,
-    vertices at the same place counting as one.
+    Degenerate faces are allowed, but get no samples and no projected points. A mesh contains points only if
+    it is closed: with equal vertices welded, every edge is used equally often in both directions.
 
     Parameters
     ----------
-    vertices
-        ``float[n, 3]``, finite and within ±LARGEST.
-    faces
-        ``int[m, 3]``, indices into the vertices, counter-clockwise seen from outside.
-    device
-        Warp device that answers questions of the host.
+    vertices : float[n, 3]
+        Positions in model units, finite and within ±MAX_COORDINATE (2**50).
+    faces : int[m, 3]
+        Indices into the vertices, counter-clockwise seen from outside.
+    device : str, optional
+        Warp device for queries of the host. Default "cpu".
 
     Raises
     ------
     InvalidMesh
-        For wrong shapes, NaN, infinite or huge vertices, indices out of range, no faces, no area.
+        Wrong shapes; NaN, infinite or huge vertices; indices out of range; no faces or no area.
+    InvalidDevice
+        Warp has no such device.
+
+    See Also
+    --------
+    ImplicitSurface : the surface of a BlobTree.
+
+    Examples
+    --------
+    >>> import decals
+    >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> surface = decals.surfaces.MeshSurface(square, [[0, 1, 2], [0, 2, 3]])
+    >>> surface.area, surface.closed
+    (1.0, False)
+    >>> surface.raycast([[0.5, 0.25, 2]], [[0, 0, -1]])
+    array([2.], dtype=float32)
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, device: str = "cpu") -> None:
-        self.device = device_or_error(device)
+        self.device = known_device(device)
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
         self.sound, normals, areas = _sound_faces(self.vertices, self.faces)
@@ -57,8 +76,8 @@ class MeshSurface:
         used = self.vertices[corners]
         self._bounds = used.min(axis=(0, 1)), used.max(axis=(0, 1))
         for array in (self.vertices, self.faces, *self._bounds):
-            frozen(array)
-        self._grounds: dict[str, MeshGround] = {}
+            make_read_only(array)
+        self._on_devices: dict[str, DeviceMeshSurface] = {}
 
     def __repr__(self) -> str:
         return f"MeshSurface({len(self.vertices)} vertices, {len(self.faces)} faces)"
@@ -69,13 +88,13 @@ class MeshSurface:
         return float(self._cumulative[-1])
 
     @property
-    def bounds(self) -> tuple[Floats, Floats]:
+    def bounds(self) -> tuple[Float32Array, Float32Array]:
         """Corners of the box around the faces."""
         return self._bounds
 
     @Lazy
     def closed(self) -> bool:
-        """Whether the faces bound a volume, with or without the degenerate ones."""
+        """Return True if the faces bound a volume, with or without the degenerate ones."""
         return any(_is_closed(self.vertices, faces) for faces in (self.faces, self._corners))
 
     @Lazy
@@ -85,29 +104,29 @@ class MeshSurface:
             return 0
         return -1 if _volume(self.vertices, self.faces) < 0 else 1
 
-    def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
-        """Points uniform by area, one in each ``1/count`` of it along the order of the faces.
+    def sample(self, count: int, seed: int) -> tuple[Float32Array, Float32Array]:
+        """Return positions and normals of points uniform by area, ``float32[n, 3]`` each.
 
-        Within a face they lie around a sequence of low discrepancy, so that parts of large faces get their
-        share, but what is near each is chance.
+        One point falls into each ``1/count`` of the area, in the order of the faces. Within a face, points
+        are jittered around a sequence of low discrepancy, so that all parts of large faces get their share.
         """
-        whole("count", count)
-        rng = np.random.default_rng(whole("seed", seed))
+        whole_number("count", count, 0, None, InvalidScattering)
+        rng = np.random.default_rng(whole_number("seed", seed, 0, None, InvalidScattering))
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)
-        even = rng.random(2) + np.arange(count)[:, None] * EVEN_STEPS
+        sequence = rng.random(2) + np.arange(count)[:, None] * R2_STEPS
         areas = np.diff(self._cumulative, prepend=0.0)[face]
-        apart = 1.0 / np.sqrt(np.maximum(count * areas / self.area, 1.0))
-        square = (even + apart[:, None] * rng.uniform(-1.0, 1.0, (count, 2))) % 1.0
+        spread = 1.0 / np.sqrt(np.maximum(count * areas / self.area, 1.0))
+        square = (sequence + spread[:, None] * rng.uniform(-1.0, 1.0, (count, 2))) % 1.0
         root, along = np.sqrt(square[:, :1]), square[:, 1:]
         a, b, c = np.moveaxis(self.vertices[self._corners[face]].astype(np.float64), 1, 0)
         positions = (1 - root) * a + root * ((1 - along) * b + along * c)
         return positions.astype(np.float32), self._normals[face]
 
-    def on(self, device: str) -> MeshGround:
-        """Return the mesh in the memory of a device; it is taken there once."""
-        if device not in self._grounds:
-            self._grounds[device] = MeshGround(
+    def on(self, device: str) -> "DeviceMeshSurface":
+        """Return the surface in the memory of a device; later calls return the same object."""
+        if device not in self._on_devices:
+            self._on_devices[device] = DeviceMeshSurface(
                 self.vertices,
                 self._corners,
                 self._normals,
@@ -115,16 +134,18 @@ class MeshSurface:
                 winding=lambda: self._winding,
                 device=device,
             )
-        return self._grounds[device]
+        return self._on_devices[device]
 
-    def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
-        """Closest points of the mesh and the normals of their faces."""
+    def project(
+        self, points: ArrayLike, *, within: Float32Array | None = None
+    ) -> tuple[Float32Array, Float32Array]:
+        """Return the closest points of the mesh, and the normals of their faces."""
         queries = as_points(points)
         reaches = as_reaches(within, len(queries))
-        return asked(self.on(self.device), queries, reaches, self.device)
+        return project_host(self.on(self.device), queries, reaches, self.device)
 
-    def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Rows of the faces closest to the points, and the weights of their corners there, ``[n, 3]``."""
+    def locate(self, points: ArrayLike) -> tuple[Int64Array, Float64Array]:
+        """Return rows of the closest faces, ``int64[n]``, and barycentric weights, ``float64[n, 3]``."""
         queries = as_points(points)
         faces: Any = wp.zeros(len(queries), dtype=wp.int32, device=self.device)
         weights: Any = wp.zeros(len(queries), dtype=wp.vec2, device=self.device)
@@ -133,27 +154,27 @@ class MeshSurface:
         first, second = weights.numpy().reshape(-1, 2).astype(np.float64).T
         return self.sound[faces.numpy()], np.stack([first, second, 1.0 - first - second], axis=1)
 
-    def normal(self, points: ArrayLike) -> Floats:
+    def normal(self, points: ArrayLike) -> Float32Array:
         """Return the normals of the faces closest to the points."""
         return self.project(points)[1]
 
-    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Floats:
-        """Distance to the first face that each ray meets, from either side."""
-        starts, ways = as_rays(origins, directions)
-        found: Any = wp.zeros(len(starts), dtype=wp.float32, device=self.device)
-        self.on(self.device).hit(vectors(starts, self.device), vectors(ways, self.device), found)
-        distances: Floats = found.numpy()
-        distances[~ways.any(axis=1)] = np.inf
+    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
+        """Return the distance to the first face that each ray hits, from either side."""
+        starts, headings = as_rays(origins, directions)
+        hits: Any = wp.zeros(len(starts), dtype=wp.float32, device=self.device)
+        self.on(self.device).raycast(vectors(starts, self.device), vectors(headings, self.device), hits)
+        distances: Float32Array = hits.numpy()
+        distances[~headings.any(axis=1)] = np.inf
         return distances
 
-    def contains(self, points: ArrayLike) -> Flags:
-        """Whether the mesh winds around each point; an open mesh contains nothing."""
-        return inside(self.on(self.device), as_points(points), self.device)
+    def contains(self, points: ArrayLike) -> BoolArray:
+        """Return True for each point that a closed mesh winds around, ``bool[n]``."""
+        return contains_host(self.on(self.device), as_points(points), self.device)
 
 
-def _as_vertices(vertices: ArrayLike) -> Floats:
+def _as_vertices(vertices: ArrayLike) -> Float32Array:
     try:
-        with np.errstate(over="ignore"):  # what overflows is refused below
+        with np.errstate(over="ignore"):  # infinities are refused below
             array = np.array(vertices, dtype=np.float32, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidMesh(
@@ -166,41 +187,41 @@ def _as_vertices(vertices: ArrayLike) -> Floats:
         raise InvalidMesh(
             f"vertices: expected finite numbers, got {array[row]} in row {row}; repair the mesh"
         )
-    if np.abs(array).max() > LARGEST:
+    if np.abs(array).max() > MAX_COORDINATE:
         row = int(np.abs(array).max(axis=1).argmax())
         raise InvalidMesh(
-            f"vertices: expected coordinates within ±{LARGEST:g}, got {array[row]} in row {row}; "
+            f"vertices: expected coordinates within ±{MAX_COORDINATE:g}, got {array[row]} in row {row}; "
             "rescale the model"
         )
     return array
 
 
-def _as_faces(faces: ArrayLike, vertex_count: int) -> Faces:
+def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
     try:
-        given = np.asarray(faces)
+        indices = np.asarray(faces)
     except ValueError as error:  # rows of different lengths
         raise InvalidMesh(
             "faces: expected shape [m, 3], got rows of different lengths; triangulate polygons first"
         ) from error
-    if given.ndim != 2 or given.shape[1] != 3 or len(given) == 0:
+    if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0:
         raise InvalidMesh(
-            f"faces: expected shape [m, 3] with m > 0, got {list(given.shape)}; triangulate polygons first"
+            f"faces: expected shape [m, 3] with m > 0, got {list(indices.shape)}; triangulate polygons first"
         )
-    if not np.issubdtype(given.dtype, np.integer):
-        raise InvalidMesh(f"faces: expected integers, got {given.dtype}")
-    if given.min() < 0 or given.max() >= vertex_count:
-        bad = given.min() if given.min() < 0 else given.max()
+    if not np.issubdtype(indices.dtype, np.integer):
+        raise InvalidMesh(f"faces: expected integers, got {indices.dtype}")
+    if indices.min() < 0 or indices.max() >= vertex_count:
+        bad = indices.min() if indices.min() < 0 else indices.max()
         raise InvalidMesh(f"faces: expected indices from 0 to {vertex_count - 1}, got {bad}")
-    return np.array(given, dtype=np.int32, order="C")
+    return np.array(indices, dtype=np.int32, order="C")
 
 
-def _sound_faces(vertices: Floats, faces: Faces) -> tuple[NDArray[np.int64], Floats, NDArray[np.float64]]:
-    """Rows of the faces that have a normal, with unit normals and areas."""
+def _sound_faces(vertices: Float32Array, faces: Int32Array) -> tuple[Int64Array, Float32Array, Float64Array]:
+    """Return the rows of the faces that have a normal, their unit normals and areas."""
     a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
     crosses = np.cross(b - a, c - a)
     doubled = np.linalg.norm(crosses, axis=1)
     edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
-    sound = doubled > SLIVER * edges
+    sound = doubled > MIN_FACE_QUALITY * edges
     if not sound.any():
         raise InvalidMesh(
             f"expected a mesh with area, got {len(faces)} degenerate faces; check its units and its indices"
@@ -209,8 +230,8 @@ def _sound_faces(vertices: Floats, faces: Faces) -> tuple[NDArray[np.int64], Flo
     return np.flatnonzero(sound), normals, 0.5 * doubled[sound]
 
 
-def _is_closed(vertices: Floats, faces: Faces) -> bool:
-    """Whether every edge is walked equally often in both directions, after welding equal vertices."""
+def _is_closed(vertices: Float32Array, faces: Int32Array) -> bool:
+    """Return True if every edge is used equally often in both directions, with equal vertices welded."""
     welded = np.unique(vertices + np.float32(0), axis=0, return_inverse=True)[1].reshape(-1)
     corners = welded[faces].astype(np.int64)
     start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
@@ -218,8 +239,120 @@ def _is_closed(vertices: Floats, faces: Faces) -> bool:
     return not np.bincount(edge.reshape(-1), weights=np.sign(end - start)).any()
 
 
-def _volume(vertices: Floats, faces: Faces) -> float:
-    """Signed volume: positive where the faces wind counter-clockwise seen from outside."""
+def _volume(vertices: Float32Array, faces: Int32Array) -> float:
+    """Return the signed volume: positive if faces wind counter-clockwise seen from outside."""
     wide = vertices.astype(np.float64) - vertices.mean(axis=0, dtype=np.float64)
     a, b, c = np.moveaxis(wide[faces], 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+class DeviceMeshSurface:
+    """Non-degenerate faces of a mesh, with a bounding volume hierarchy, on one device.
+
+    Parameters
+    ----------
+    vertices, corners, normals
+        ``float32[n, 3]``, ``int32[m, 3]`` and the faces' unit normals ``float32[m, 3]``.
+    bounds
+        Corners of the box around the faces.
+    winding
+        Function that returns 1 for a closed mesh that winds counter-clockwise seen from outside, -1 for a
+        clockwise one, 0 for an open one. The first call of `mark_inside` calls it.
+    device
+        Warp device.
+    """
+
+    def __init__(
+        self,
+        vertices: Float32Array,
+        corners: Int32Array,
+        normals: Float32Array,
+        *,
+        bounds: tuple[Float32Array, Float32Array],
+        winding: Callable[[], int],
+        device: str,
+    ) -> None:
+        self.device = device
+        self._winding, self._corners = winding, corners
+        self._points: Any = wp.array(vertices, dtype=wp.vec3, device=device)
+        self._normals: Any = wp.array(normals, dtype=wp.vec3, device=device)
+        indices: Any = wp.array(corners.reshape(-1), dtype=wp.int32, device=device)
+        self._mesh = wp.Mesh(points=self._points, indices=indices)
+        low, high = (corner.astype(np.float64) for corner in bounds)
+        self._low, self._high = wp.vec3(*bounds[0]), wp.vec3(*bounds[1])
+        self._ball = wp.vec3(*(0.5 * (low + high))), float(0.51 * np.linalg.norm(high - low))
+
+    @property
+    def query_inputs(self) -> list[Any]:
+        """Inputs of kernels that query the closest point: mesh, normals, centre and radius of a ball."""
+        return [self._mesh.id, self._normals, *self._ball]
+
+    def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
+        """Write the closest points and the normals of their faces."""
+        inputs = [*self.query_inputs, points, reaches]
+        launch(closest_points, len(points), inputs, [positions, normals], device=self.device)
+
+    def locate(self, points: Vectors, faces: Scalars, weights: Any) -> None:
+        """Write the closest face of each point, and the weights of its first two corners there."""
+        inputs = [self._mesh.id, *self._ball, points]
+        launch(closest_faces, len(points), inputs, [faces, weights], device=self.device)
+
+    def raycast(self, origins: Vectors, directions: Vectors, distances: Scalars) -> None:
+        """Write the distance to the first face that each ray hits, infinity for a miss."""
+        launch(first_hits, len(origins), [self._mesh.id, origins, directions], [distances], self.device)
+
+    def mark_inside(self, points: Vectors, flags: Scalars) -> None:
+        """Write 1 where the closed mesh winds around the point."""
+        if self._winding():
+            inputs = [self._winding_mesh.id, self._low, self._high, points]
+            launch(mark_inside, len(points), inputs, [flags], device=self.device)
+
+    @Lazy
+    def _winding_mesh(self) -> wp.Mesh:
+        """Mesh whose faces wind counter-clockwise, as winding numbers require."""
+        turned = np.ascontiguousarray(self._corners[:, :: self._winding()])
+        indices: Any = wp.array(turned.reshape(-1), dtype=wp.int32, device=self.device)
+        return wp.Mesh(points=self._points, indices=indices, support_winding_number=True)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Edges of the non-degenerate faces of a mesh, with equal vertices welded.
+
+    Attributes
+    ----------
+    vertices : float64[n, 3]
+        Welded vertices.
+    ends : int64[k, 2]
+        Vertices of each edge, the lower first.
+    counts : int64[k]
+        Number of faces at each edge: 1 on the boundary.
+    normals : float64[k, 2, 3]
+        Unit normals of the first and the last face at each edge.
+    apexes : int64[k]
+        Vertex of the first face that is not on the edge.
+    """
+
+    vertices: Float64Array
+    ends: Int64Array
+    counts: Int64Array
+    normals: Float64Array
+    apexes: Int64Array
+
+
+def edges_of(surface: "MeshSurface") -> Edges:
+    """Weld vertices and collect the edges that have length."""
+    vertices, welded = np.unique(surface.vertices + np.float32(0), axis=0, return_inverse=True)
+    corners = welded.reshape(-1)[surface.faces[surface.sound]].astype(np.int64)
+    wide = vertices.astype(np.float64)
+    a, b, c = np.moveaxis(wide[corners], 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    apexes = np.roll(corners, -2, axis=1).reshape(-1)
+    edges, which, counts = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(which.reshape(-1), kind="stable")
+    first, last = order[np.cumsum(counts) - counts], order[np.cumsum(counts) - 1]
+    sides = np.stack([normals[first // 3], normals[last // 3]], axis=1)
+    long = edges[:, 0] != edges[:, 1]
+    return Edges(wide, edges[long], counts[long], sides[long], apexes[first][long])

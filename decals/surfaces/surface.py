@@ -1,4 +1,4 @@
-"""What seeding needs to know of a surface, whatever the surface is made of."""
+"""`Surface`, the protocol of surfaces for scattering and editing, and checks of points and rays."""
 
 from typing import Protocol, runtime_checkable
 
@@ -13,11 +13,26 @@ Flags = NDArray[np.bool_]
 
 @runtime_checkable
 class Surface(Protocol):
-    """A surface that decals can lie on.
+    """Protocol of surfaces that decals can lie on; `MeshSurface` and `ImplicitSurface` are the built-in ones.
 
-    Points and directions are rows of ``[n, 3]`` arrays in the model's own units; what comes back is
-    float32. A normal is the unit geometric normal of the surface itself, never a smoothed one: the
-    facing rule of decals compares geometric normals. Points that are not finite raise `InvalidPoints`.
+    Points and directions are rows of ``[n, 3]`` arrays in the model's units. Results are float32. A normal is
+    the unit geometric normal of the surface, never a smoothed one, because the facing rule of decals compares
+    geometric normals.
+
+    Raises
+    ------
+    InvalidPoints
+        Any method: points or directions of another shape, or not finite.
+
+    Examples
+    --------
+    >>> import decals
+    >>> triangle = decals.surfaces.MeshSurface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> isinstance(triangle, decals.surfaces.Surface)
+    True
+    >>> positions, normals = triangle.project([[0.25, 0.25, 2]])
+    >>> positions.tolist(), normals.tolist()
+    ([[0.25, 0.25, 0.0]], [[0.0, 0.0, 1.0]])
     """
 
     @property
@@ -31,18 +46,26 @@ class Surface(Protocol):
         ...
 
     def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
-        """Positions and normals of `count` random points, uniform by area.
+        """Return positions and normals of `count` random points, uniform by area, ``float32[n, 3]`` each.
 
-        The samples are stratified: along the surface's own order, one falls into each ``1/count`` of the
-        area. The same seed gives the same bytes.
+        The samples are stratified: one falls into each ``1/count`` of the area, in the order of the surface.
+        The same seed gives the same bytes.
         """
         ...
 
     def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
-        """Positions on the surface closest to the points, and the normals there.
+        """Return the points of the surface closest to the given points, and the normals there.
 
-        Who knows that the surface is no farther than some distance from each point says so, ``float[n]``,
-        and may be answered sooner; a wrong promise costs time alone.
+        Parameters
+        ----------
+        points : float[n, 3]
+            Points in model units.
+        within : float[n], optional
+            Expected distances to the surface, which save time. Too small ones cost time, but change nothing.
+
+        Returns
+        -------
+        positions, normals : float32[n, 3]
         """
         ...
 
@@ -51,23 +74,22 @@ class Surface(Protocol):
         ...
 
     def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Floats:
-        """Distance to the first hit of each ray, ``float32[n]``; infinity for a miss.
+        """Return the distance to the first hit of each ray, ``float32[n]``; infinity for a miss.
 
-        Directions need not be unit vectors, distances are in model units all the same; a ray without
-        direction misses. Rays are meant to start outside: from within, a mesh is hit where the ray
-        leaves it, an implicit at once.
+        Distances are in model units; directions need not be unit vectors. A ray with direction zero misses.
+        A ray that starts inside hits a mesh where it leaves it, and an implicit surface at distance 0.
         """
         ...
 
     def contains(self, points: ArrayLike) -> Flags:
-        """Whether each point lies inside, ``bool[n]``; an open surface contains nothing."""
+        """Return True for each point inside, ``bool[n]``; an open surface contains nothing."""
         ...
 
 
 def as_points(points: ArrayLike, name: str = "points") -> Floats:
-    """Points as contiguous finite ``float32[n, 3]``, or `InvalidPoints`."""
+    """Return points as contiguous finite ``float32[n, 3]``, or raise `InvalidPoints`."""
     try:
-        with np.errstate(over="ignore"):  # what overflows is refused below
+        with np.errstate(over="ignore"):  # infinities are refused below
             array = np.ascontiguousarray(points, dtype=np.float32)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidPoints(
@@ -84,7 +106,7 @@ def as_points(points: ArrayLike, name: str = "points") -> Floats:
 
 
 def as_reaches(within: ArrayLike | None, count: int) -> Floats:
-    """Distances within which the surface is expected, ``float32[count]``; 0 where nobody knows."""
+    """Return expected distances to the surface, ``float32[count]``; zeros for None."""
     if within is None:
         return np.zeros(count, np.float32)
     reaches = np.asarray(within)
@@ -94,21 +116,21 @@ def as_reaches(within: ArrayLike | None, count: int) -> Floats:
 
 
 def as_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
-    """Origins and unit directions (zero where there is none) of equally many rays."""
-    starts, ways = as_points(origins, "origins"), as_points(directions, "directions")
-    if len(starts) != len(ways):
-        raise InvalidPoints(f"expected as many directions as origins, got {len(ways)} for {len(starts)}")
-    return starts, unit_rows(ways)
+    """Return origins and unit directions of rays, ``float32[n, 3]`` each; zero directions stay zero."""
+    starts, headings = as_points(origins, "origins"), as_points(directions, "directions")
+    if len(starts) != len(headings):
+        raise InvalidPoints(f"expected as many directions as origins, got {len(headings)} for {len(starts)}")
+    return starts, unit_rows(headings)
 
 
 def unit_rows(vectors: NDArray[np.floating]) -> Floats:
-    """Rows scaled to length 1; a zero row stays zero."""
+    """Scale rows to length 1; zero rows stay zero."""
     wide = vectors.astype(np.float64)
     lengths = np.linalg.norm(wide, axis=1, keepdims=True)
     units: Floats = (wide / np.where(lengths > 0, lengths, 1.0)).astype(np.float32)
     return units
 
 
-def frozen(array: NDArray[np.generic]) -> None:
-    """Make an array that a value object hands out read-only."""
+def make_read_only(array: NDArray[np.generic]) -> None:
+    """Make an array read-only."""
     array.setflags(write=False)

@@ -1,12 +1,11 @@
-"""Decals inside pyvista: ``plotter.decals``.
+"""Decals in pyvista: ``plotter.decals``.
 
-Once the package is installed pyvista finds the component by itself; importing this package registers it too.
+pyvista finds the installed component by itself. Importing this package registers it as well.
 """
 
-from decals.vtk.component import Component
+from decals.vtk.component import DecalsComponent, show
 from decals.vtk.lights import Lights
-from decals.vtk.picking import Hit
-from decals.vtk.stage import Stage
-from decals.vtk.viewer import show
+from decals.vtk.picking import PickResult
+from decals.vtk.subplot import SubplotRenderer
 
-__all__ = ["Component", "Hit", "Lights", "Stage", "show"]
+__all__ = ["DecalsComponent", "Lights", "PickResult", "SubplotRenderer", "show"]

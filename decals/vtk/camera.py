@@ -1,4 +1,4 @@
-"""VTK's camera as the renderer sees it."""
+"""VTK's cameras and actor matrices as arrays and projections."""
 
 from functools import lru_cache
 from typing import Any
@@ -6,23 +6,24 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from decals.scenes.viewpoint import Floats, Projection
+from blobtree._typing import Float64Array
+from decals.rendering.viewpoint import Projection
 
 
-def matrix_of(actor: Any) -> Floats:
-    """Give an actor's own coordinates to the world's, ``float64[4, 4]``."""
+def matrix_of(actor: Any) -> Float64Array:
+    """Return the matrix from an actor's coordinates to the world, float64, shape (4, 4)."""
     return np.asarray(pv.array_from_vtkmatrix(actor.GetMatrix()), np.float64)
 
 
-def vtk_projection(renderer: Any, model: Floats | None = None) -> Projection:
-    """Give what a vtkRenderer's camera shows: perspective or parallel, clipping planes as they are.
+def vtk_projection(renderer: Any, model: Float64Array | None = None) -> Projection:
+    """Return the projection of a vtkRenderer's camera, perspective or parallel, with its clipping planes.
 
     Parameters
     ----------
     renderer
         A vtkRenderer.
     model
-        Model to world, ``float64[4, 4]``; identity if not given.
+        Matrix from model to world, shape (4, 4). Default: identity.
     """
     camera = renderer.GetActiveCamera()
     matrix = camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
@@ -32,5 +33,5 @@ def vtk_projection(renderer: Any, model: Floats | None = None) -> Projection:
 
 @lru_cache(maxsize=8)
 def _projection(matrix: bytes) -> Projection:
-    """Give the projection of a matrix of float64; one step of a hand asks several times."""
+    """Return the projection of a float64 matrix; one step of a drag needs it several times."""
     return Projection(np.frombuffer(matrix).reshape(4, 4))

@@ -1,9 +1,10 @@
-"""``plotter.decals``: our objects and decals in a pyvista plotter."""
+"""``plotter.decals``: objects and decals in a pyvista plotter."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -11,167 +12,183 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import Node
-from decals.checks import instance, shown
 from decals.errors import InvalidScene, NoGraphics
-from decals.model import PLAIN, Decals
-from decals.render import SceneLike
+from decals.model import NO_IMAGE, Decals
+from decals.rendering import SceneLike
 from decals.scenes.camera import Camera
-from decals.scenes.scene import CLAY, Color, DecalImage, MeshObject, Scene, SceneObject, TreeObject
+from decals.scenes.objects import CLAY, Color, MeshObject, SceneObject, TreeObject
+from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.convert import Model, as_shape
+from decals.validation import describe, instance
 from decals.vtk.context import WindowContext
 from decals.vtk.lights import Lights
-from decals.vtk.modes import restore_exports, warn_of_exports
-from decals.vtk.stage import Stage
+from decals.vtk.subplot import SubplotRenderer
+from decals.vtk.unsupported import restore_exports, warn_of_exports
 
 Image = str | os.PathLike[str] | DecalImage | NDArray[np.uint8]
 """The name of a generated image, a path, an image, or ``uint8[h, w, 4]``."""
 
-NOWHERE = Camera((0.0, 0.0, 1.0))
-"""A scene wants a camera; in a plotter nobody asks for it."""
+UNUSED_CAMERA = Camera((0.0, 0.0, 1.0))
+"""Camera of a scene without its own; the plotter has another."""
 
 
 @pv.register_plotter_component("decals")
-class Component:
-    """What a plotter shows through our renderer, among its own actors.
+class DecalsComponent:
+    """Objects and decals among the actors of a plotter: ``plotter.decals``.
 
-    ::
-
-        plotter = pyvista.Plotter()
-        plotter.decals.add_implicit(tree)
-        plotter.decals.add_mesh(mesh)
-        plotter.decals.add(decals, images=["scale"])
-
-    As elsewhere in pyvista, everything goes into the subplot that is active.
+    All methods apply to the active subplot.
 
     Parameters
     ----------
-    plotter
-        The plotter; pyvista gives it.
+    plotter : pyvista.BasePlotter
+        The plotter; pyvista passes it.
+
+    Examples
+    --------
+    >>> import decals, pyvista
+    >>> from blobtree import Point
+    >>> plotter = pyvista.Plotter(off_screen=True, window_size=(80, 60))
+    >>> blob = plotter.decals.add_implicit(Point((0, 0, 0), radius=1.0))
+    >>> scattered = decals.scatter([blob.surface], count=30)
+    >>> len(plotter.decals.add(scattered, images=["scale"]))
+    30
+    >>> plotter.show()
     """
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
         self._plotter = plotter
-        self._stages: dict[int, Stage] = {}
+        self._subplots: dict[int, SubplotRenderer] = {}
         self._context: WindowContext | None = None
 
     # -- what is shown ----------------------------------------------------------------------------------
 
     @property
     def scene(self) -> Scene:
-        """Objects, decals and images of the active subplot; set it to exchange all of them.
+        """Scene of the active subplot; assign one to replace objects, decals and images.
 
         Raises
         ------
         InvalidScene
-            The subplot shows something that changes in place, such as what an `EditWindow` edits.
+            The subplot shows a document that is being edited.
         """
-        scene = self.stage.scene
+        scene = self.subplot.scene
         if scene is None:
-            return Scene(objects=(), camera=NOWHERE)
+            return Scene(objects=(), camera=UNUSED_CAMERA)
         if not isinstance(scene, Scene):
             raise InvalidScene(
                 f"expected a Scene to add to, but the subplot shows a {type(scene).__name__}; "
-                "change that itself, or give the stage another scene"
+                "edit the document, or assign another scene to the subplot"
             )
         return scene
 
     @scene.setter
     def scene(self, scene: SceneLike) -> None:
-        self.stage.scene = scene
+        self.subplot.scene = scene
 
     def add_implicit(self, tree: Node | TreeObject, *, name: str | None = None) -> TreeObject:
-        """Show a BlobTree, traced exactly.
+        """Add a BlobTree, which is ray traced.
 
         Parameters
         ----------
         tree
             A tree, or an object of a scene.
         name
-            What to call it; unique in the subplot.
+            Its name, unique in the subplot.
         """
-        thing = tree if isinstance(tree, TreeObject) else TreeObject(self._name(name), tree)
-        self._add_object(thing)
-        return thing
+        item = tree if isinstance(tree, TreeObject) else TreeObject(self._name(name), tree)
+        self._add_object(item)
+        return item
 
     def add_mesh(
-        self, mesh: pv.DataSet | MeshObject, *, color: Color | str = CLAY, name: str | None = None
+        self, mesh: Model | MeshObject, *, color: Color | str = CLAY, name: str | None = None
     ) -> MeshObject:
-        """Show a mesh under the decals, lit as our other objects are.
+        """Add a mesh, lit like the other objects.
 
-        To keep pyvista's own look of an actor, give it to `apply` instead.
+        To keep the look of an actor of pyvista, use `apply` instead.
 
         Parameters
         ----------
         mesh
-            Any dataset with a surface, or an object of a scene.
+            A pyvista dataset with a surface, any mesh with ``vertices`` and ``faces``, a tuple of such
+            arrays, the path of a mesh file, or an object of a scene.
         color
             sRGB, each channel in [0, 1], or a name that pyvista knows.
         name
-            What to call it; unique in the subplot.
+            Its name, unique in the subplot.
         """
-        if not isinstance(mesh, MeshObject):
-            mesh = MeshObject(self._name(name), *triangles(mesh), _color(color))
-        self._add_object(mesh)
-        return mesh
+        item = (
+            mesh if isinstance(mesh, MeshObject) else self._mesh_object(mesh, self._name(name), _color(color))
+        )
+        self._add_object(item)
+        return item
 
     def add(self, decals: Decals, *, images: Sequence[Image] = ()) -> Decals:
-        """Lay decals over all objects of the subplot.
+        """Add decals to all objects of the subplot.
 
         Parameters
         ----------
         decals
-            Decals whose ``images`` count the given ones.
+            The decals; their ``images`` are indices into the given images.
         images
-            Their images. Without any, they count those that are there already.
+            Names, paths, arrays or `DecalImage` objects. Without any, indices refer to the present images.
 
         Returns
         -------
         Decals
-            Those of the whole subplot, as they are now.
+            All decals of the subplot.
         """
         if not isinstance(decals, Decals):
-            raise InvalidScene(f"expected Decals to add, got {type(decals).__name__}; decals.seed makes some")
+            raise InvalidScene(
+                f"expected Decals to add, got {type(decals).__name__}; decals.scatter makes some"
+            )
         scene = self.scene
         if isinstance(images, str):
             raise InvalidScene(f"expected a list of images, got the text {images!r}; write [{images!r}]")
         if not isinstance(images, Sequence):
-            raise InvalidScene(f"expected a list of images, got {shown(images)}; put it into one")
+            raise InvalidScene(f"expected a list of images, got {describe(images)}; write a list")
         added = tuple(_image(image, number) for number, image in enumerate(images))
         if added:
-            shifted = np.where(decals.images == PLAIN, PLAIN, decals.images + len(scene.images))
+            shifted = np.where(decals.images == NO_IMAGE, NO_IMAGE, decals.images + len(scene.images))
             decals = decals.replace(images=shifted)
         together = Decals.concatenate([scene.decals, decals])
         self.scene = scene.replace(decals=together, images=(*scene.images, *added))
         return together
 
     def apply(self, actor: pv.Actor, *, follow: bool = False) -> pv.Actor:
-        """Lay the subplot's decals onto an actor of pyvista's own, whose lights, scalars and edges stay.
-
-        The same functions that colour our objects run in VTK's shader of the actor.
+        """Show the subplot's decals on an actor of pyvista, whose lights, scalars and edges stay.
 
         Parameters
         ----------
         actor
-            What ``plotter.add_mesh`` returns.
+            Result of ``plotter.add_mesh``.
         follow
-            Whether the decals are given in the actor's own coordinates and move with it; otherwise they lie
-            where they are in the world, across all actors and objects there.
+            If True, decals have the actor's coordinates and move with it. If False, they have world
+            coordinates.
 
         Raises
         ------
         InvalidScene
-            The actor is not drawn as polygons.
+            VTK does not draw the actor as polygons.
         """
-        self.stage.apply(actor, follow=follow)
+        self.subplot.apply(actor, follow=follow)
         return actor
 
     def remove(self, actor: pv.Actor) -> None:
-        """Take the decals off an actor again."""
-        self.stage.remove(actor)
+        """Remove the decals from an actor."""
+        self.subplot.remove(actor)
 
     def add_scene(self, scene: Scene, *, camera: bool = True) -> Scene:
-        """Show a scene in place of what there was; with ``camera``, from where its own camera stands."""
+        """Replace the scene of the subplot.
+
+        Parameters
+        ----------
+        scene
+            The scene.
+        camera
+            If True, the subplot gets the scene's camera.
+        """
         instance("scene", scene, Scene, InvalidScene, "decals.cover makes one; for others set `scene`")
-        instance("camera", camera, bool, InvalidScene, "whether to look from the scene's own; it has one")
+        instance("camera", camera, bool, InvalidScene, "True to use the scene's camera")
         self.scene = scene
         if camera:
             view = self._plotter.camera
@@ -187,39 +204,39 @@ class Component:
         return scene
 
     def clear(self) -> None:
-        """Show nothing any more in the active subplot."""
-        self.stage.scene = None
+        """Remove everyitem from the active subplot."""
+        self.subplot.scene = None
 
     # -- how --------------------------------------------------------------------------------------------
 
     @property
-    def stage(self) -> Stage:
-        """What draws in the active subplot."""
+    def subplot(self) -> SubplotRenderer:
+        """Renderer of the active subplot."""
         self._require_window()
         renderer = self._plotter.renderer
-        if id(renderer) not in self._stages:
-            if not self._stages:
+        if id(renderer) not in self._subplots:
+            if not self._subplots:
                 warn_of_exports(self._plotter)
-            self._stages[id(renderer)] = Stage(self._plotter, renderer, self._window_context)
-        return self._stages[id(renderer)]
+            self._subplots[id(renderer)] = SubplotRenderer(self._plotter, renderer, self._window_context)
+        return self._subplots[id(renderer)]
 
     @property
     def lights(self) -> Lights:
-        """Who lights what the active subplot shows; see `Lights`."""
-        return self.stage.lights
+        """Lights of the active subplot; see `Lights`."""
+        return self.subplot.lights
 
     @lights.setter
     def lights(self, lights: Lights | str) -> None:
-        self.stage.lights = lights
+        self.subplot.lights = lights
 
     @property
-    def stages(self) -> tuple[Stage, ...]:
-        """What draws, in all subplots that show something through us."""
-        return tuple(self._stages.values())
+    def subplots(self) -> tuple[SubplotRenderer, ...]:
+        """Renderers of all subplots with objects or decals."""
+        return tuple(self._subplots.values())
 
     def _require_window(self) -> None:
         if self._plotter.render_window is None:
-            raise NoGraphics("the plotter was closed; make another, as pyvista asks for too")
+            raise NoGraphics("the plotter was closed; make another")
 
     def _window_context(self) -> WindowContext:
         self._require_window()
@@ -230,35 +247,30 @@ class Component:
             self._context = WindowContext(self._plotter.render_window)
         return self._context
 
-    def _add_object(self, thing: SceneObject) -> None:
-        self.scene = self.scene.replace(objects=(*self.scene.objects, thing))
+    def _add_object(self, item: SceneObject) -> None:
+        self.scene = self.scene.replace(objects=(*self.scene.objects, item))
+
+    def _mesh_object(self, model: object, name: str, color: Color) -> MeshObject:
+        shape = as_shape(model, name=name, error=InvalidScene)
+        if isinstance(shape, Node):
+            raise InvalidScene(f"{name}: expected a mesh, got a BlobTree; `add_implicit` adds it")
+        return MeshObject(name, *shape, color)
 
     def _name(self, name: str | None) -> str:
         if name is not None:
             return name  # checked with the object
-        taken = {thing.name for thing in self.scene.objects}
+        taken = {item.name for item in self.scene.objects}
         return next(name for n in range(1, len(taken) + 2) if (name := f"object {n}") not in taken)
 
     def __plotter_close__(self) -> None:
-        """Give everything back while the window is still there; pyvista calls it."""
-        for stage in self._stages.values():
-            stage.release()
-        self._stages.clear()
+        """Release all resources while the window exists; pyvista calls it."""
+        for subplot in self._subplots.values():
+            subplot.release()
+        self._subplots.clear()
         restore_exports(self._plotter)
         if self._context is not None and not self._context.stale:
             self._context.release()
         self._context = None
-
-
-def triangles(mesh: pv.DataSet) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]`` of a dataset's surface."""
-    if not isinstance(mesh, pv.DataSet | pv.MultiBlock):
-        raise InvalidScene(
-            f"expected a dataset of pyvista's, got {type(mesh).__name__}; pyvista.wrap makes one"
-        )
-    surface = mesh if isinstance(mesh, pv.PolyData) else mesh.extract_surface(algorithm="dataset_surface")
-    surface = surface.triangulate()
-    return np.asarray(surface.points, np.float32), np.asarray(surface.regular_faces, np.int32)
 
 
 def _image(image: Any, number: int) -> DecalImage:
@@ -269,12 +281,12 @@ def _image(image: Any, number: int) -> DecalImage:
     try:
         pixels = np.asarray(image)
     except ValueError:
-        raise InvalidScene(f"image {number}: expected uint8[h, w, 4], got {shown(image)}") from None
+        raise InvalidScene(f"image {number}: expected uint8[h, w, 4], got {describe(image)}") from None
     return DecalImage(f"image {number}", pixels)
 
 
 def _color(color: Color | str) -> Color:
-    """Look up a name; what is none goes on as it is, to be checked with the object."""
+    """Return the channels of a colour name; other values are checked with the object."""
     if not isinstance(color, str):
         return color
     try:
@@ -284,3 +296,45 @@ def _color(color: Color | str) -> Color:
             f"expected a colour that pyvista knows, got {color!r}; give a name such as 'tomato', or #rrggbb"
         ) from error
     return red, green, blue
+
+
+REMOTE = "server"
+"""pyvista's backend that draws where Python runs. Browsers cannot draw decals."""
+SERVING = ("trame_pyvista", "ipywidgets", "nest_asyncio2")
+"""Packages that pyvista needs for this backend; the extra ``browser`` installs them."""
+
+
+def show(scene: Scene, **options: Any) -> Any:
+    """Show a scene in a window, or interactively in a notebook; `decals.edit` edits one.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    options
+        Arguments of pyvista's ``Plotter.show``.
+
+    Returns
+    -------
+    object
+        Result of ``Plotter.show``.
+
+    Raises
+    ------
+    InvalidScene
+        The argument is not a `Scene`.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
+    >>> decals.show(scene)  # doctest: +SKIP
+    """
+    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    plotter = pv.Plotter()
+    component: DecalsComponent = plotter.decals
+    component.add_scene(scene)
+    if plotter.notebook and "jupyter_backend" not in options:
+        options["jupyter_backend"] = REMOTE if all(map(find_spec, SERVING)) else "static"
+    return plotter.show(**options)

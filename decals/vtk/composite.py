@@ -1,13 +1,13 @@
-"""Our picture into VTK's frame: colour and depth with one triangle."""
+"""Composite: a picture with colour and depth into VTK's frame."""
 
 from typing import Any
 
 import moderngl
 
-from decals.render.context import Context
-from decals.render.targets import Targets
-from decals.render.tile import set_uniform
-from implicit_decals.shaders import compose
+from decals.rendering.context import Context
+from decals.rendering.targets import Targets
+from decals.rendering.tiles import set_uniform
+from decals.shaders import compose
 
 BLEND, DEPTH_TEST, CULL_FACE = 0x0BE2, 0x0B71, 0x0B44
 LESS_OR_EQUAL = 0x0203
@@ -15,9 +15,9 @@ ONE, SOURCE_ALPHA, REST_OF_ALPHA = 1, 0x0302, 0x0303
 
 
 class Composite:
-    """Draws what the renderer left on the card into the framebuffer that VTK has bound.
+    """Draws the renderer's targets into the framebuffer that VTK has bound.
 
-    Edges are blended by how much of their pixel the objects cover, so opaque actors should be there before.
+    Edges are blended by their coverage, so opaque actors must be drawn before.
     """
 
     def __init__(self, context: Context) -> None:
@@ -25,7 +25,19 @@ class Composite:
         self._arrays: dict[int, moderngl.VertexArray] = {}
 
     def draw(self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int) -> None:
-        """Fill a viewport; ``samples`` texels a pixel along each axis, or 0 for any size, magnified."""
+        """Fill a viewport.
+
+        Parameters
+        ----------
+        window
+            VTK's window.
+        viewport
+            Lower left corner and size, in pixels.
+        targets
+            Targets with the picture.
+        samples
+            Texels per pixel along each axis; 0 for a picture of any size that is magnified.
+        """
         x, y, width, height = viewport
         array, state = self._array(samples), window.GetState()
         state.Push()
@@ -50,7 +62,7 @@ class Composite:
         state.Pop()
 
     def _array(self, samples: int) -> moderngl.VertexArray:
-        """Give what draws with so many samples: a program for each number of them."""
+        """Return the vertex array, and with it the program, for a number of samples."""
         if samples not in self._arrays:
             fragment = compose("composite.frag", defines={"SAMPLES": samples})
             program = self._context.program(compose("screen.vert"), fragment)
@@ -58,7 +70,7 @@ class Composite:
         return self._arrays[samples]
 
     def release(self) -> None:
-        """Give the memory back."""
+        """Release all resources."""
         for array in self._arrays.values():
             array.release()
         self._arrays.clear()

@@ -1,4 +1,4 @@
-"""VTK's OpenGL context as a place where our renderer draws."""
+"""VTK's OpenGL context for the renderer."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ import moderngl
 from _moderngl import DefaultLoader  # type: ignore[import-untyped]
 
 from decals.errors import NoGraphics
-from decals.render.context import Context
+from decals.rendering.context import Context
 
 VIEWPORT = 0x0BA2
 """GL_VIEWPORT."""
@@ -16,7 +16,7 @@ FRAMEBUFFER = 0x8D40
 """GL_FRAMEBUFFER."""
 
 VTK_VERSION = 320
-"""OpenGL that VTK makes do with. Some drivers give just that, and do more."""
+"""OpenGL version that VTK requests. Some drivers report it although they support more."""
 
 _TRIAL = """#version 330 core
 out vec4 place;
@@ -24,18 +24,18 @@ void main() { place = vec4(0.0); gl_Position = place; }
 """
 
 _idle: dict[str, list[moderngl.Context]] = {}
-"""What windows that are gone leave behind, by driver: moderngl never gives all of its memory back."""
+"""Contexts of closed windows by driver, for reuse: moderngl does not free all of their memory."""
 
 
 def _driver(window: Any) -> str:
-    """What OpenGL's functions and limits depend on."""
+    """Return the identity of the driver, on which OpenGL's functions and limits depend."""
     state = window.GetState()
     return "; ".join([window.GetClassName(), state.GetVendor(), state.GetRenderer(), state.GetVersion()])
 
 
 def _attach(window: Any) -> moderngl.Context:
-    """Give moderngl's view of the context that is current: one for each window, while it is open."""
-    # moderngl looks at the framebuffer that is bound, and cannot describe all of VTK's.
+    """Return a moderngl context for the current OpenGL context."""
+    # moderngl inspects the bound framebuffer, and does not support all of VTK's.
     window.GetState().vtkglBindFramebuffer(FRAMEBUFFER, 0)
     idle = _idle.get(_driver(window), [])
     if not idle:
@@ -56,7 +56,7 @@ def _attach(window: Any) -> moderngl.Context:
 
 
 def _require_language(gl: moderngl.Context) -> None:
-    """Refuse a context that cannot take our shaders; its version may be no more than what VTK asked for."""
+    """Raise `NoGraphics` if the context does not compile shaders of version 3.30."""
     try:
         gl.program(vertex_shader=_TRIAL).release()
     except moderngl.Error as error:
@@ -67,19 +67,19 @@ def _require_language(gl: moderngl.Context) -> None:
 
 
 class WindowContext(Context):
-    """A render window's context; programs are compiled once for all renderers of the window.
+    """The context of a render window, shared by all its subplots.
 
-    Inside a ``with context.current():`` block OpenGL is ours; afterwards VTK finds everything as it left it.
+    A ``with context.current():`` block may change any OpenGL state; it is restored for VTK afterwards.
 
     Parameters
     ----------
     window
-        A vtkOpenGLRenderWindow that has rendered before, or is rendering: it owns the context.
+        A vtkOpenGLRenderWindow that has rendered before, or is rendering.
 
     Raises
     ------
     NoGraphics
-        The window has made no context yet, or one of a kind that cannot be shared.
+        The window has no context yet, or one that cannot be shared.
     """
 
     def __init__(self, window: Any) -> None:
@@ -96,7 +96,7 @@ class WindowContext(Context):
 
     @contextmanager
     def current(self) -> Iterator[Self]:
-        """Make the window's context current within a ``with`` block, and keep VTK's state; blocks nest."""
+        """Make the window's context current in a ``with`` block, and restore VTK's state; blocks nest."""
         if self._open:
             yield self
             return
@@ -115,10 +115,7 @@ class WindowContext(Context):
             state.Pop()
 
     def release(self) -> None:
-        """Give back the programs; the context is the window's. Calling twice is harmless.
-
-        A stale context took its programs with it.
-        """
+        """Release the programs; the window keeps its context. Calling twice is harmless."""
         if not self.stale:
             super().release()
         if self._attached:
@@ -127,11 +124,11 @@ class WindowContext(Context):
 
     @property
     def stale(self) -> bool:
-        """Whether the window has made itself another context since: what was made in this one is gone."""
+        """True if the window has a new context, so that all resources of this one are lost."""
         return bool(self._window.GetContextCreationTime() != self.created)
 
     def viewport(self) -> tuple[int, int, int, int]:
-        """Lower left corner and size of the part of the frame that VTK draws to now, in pixels."""
+        """Return lower left corner and size of the part of the frame that VTK draws to now, in pixels."""
         corner = [0, 0, 0, 0]
         self._window.GetState().vtkglGetIntegerv(VIEWPORT, corner)
         x, y, width, height = corner

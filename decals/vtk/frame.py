@@ -1,216 +1,252 @@
-"""What a stage has in its window's context: the renderer, and the last frame that it drew."""
+"""Frames of a subplot: the renderer, the shown frame, and frames in preparation."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Self
 
-from decals.field.contact import Contact
-from decals.field.mapping import Mapping
-from decals.render import Renderer, SceneLike, Size
-from decals.render.beside import Beside
-from decals.render.drawing import Drawing
-from decals.render.lamps import Lamps
-from decals.render.modes import Modes
-from decals.render.pieces import Ahead
-from decals.render.shown import Shown, same, version_of
-from decals.render.targets import Targets
-from decals.render.tile import CameraBuffer
-from decals.scenes.viewpoint import Projection
+from decals.rendering import Renderer, RenderOptions, SceneLike, Size
+from decals.rendering.dirty_regions import TargetState, decal_version, same_objects
+from decals.rendering.progressive import ProgressiveFrame
+from decals.rendering.regions import Rectangle
+from decals.rendering.targets import Targets
+from decals.rendering.tiles import CameraBuffer
+from decals.rendering.viewpoint import Projection
+from decals.rendering.warmup import WarmupPlan, WarmupThread
 from decals.vtk.composite import Composite
 from decals.vtk.context import WindowContext
-from decals.vtk.picking import texels_of
 
 SPARE_SLOT = "spare"
-"""Where a frame is drawn for the first time while its own targets hold what is shown."""
+"""Targets for a first frame while its own targets hold the shown one."""
+
+Viewport = tuple[int, int, int, int]
+"""Lower left corner and size, in pixels."""
 
 
 @dataclass(frozen=True)
-class Look:
-    """How a frame is drawn: size, samples a pixel along each axis, modes, VTK's lamps, whether magnified."""
+class FrameOptions:
+    """Options of a frame.
 
-    size: Size
-    samples: int
-    mapping: Mapping
-    contact: Contact
-    lamps: Lamps | None
+    Attributes
+    ----------
+    options
+        Options of the picture.
+    magnified
+        True if the picture is smaller than the window.
+    """
+
+    options: RenderOptions
     magnified: bool = False
 
     @property
     def slot(self) -> str:
-        """Which targets it is drawn into: small frames, and first ones of one sample, leave fine ones be."""
-        return "small" if self.magnified else "one sample" if self.samples == 1 else "several"
+        """Name of the targets: small frames and frames of one sample leave those of fine frames unchanged."""
+        return "small" if self.magnified else "one sample" if self.options.samples == 1 else "several"
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """All that a picture depends on: things that are told apart by identity, and values."""
+class FrameKey:
+    """Everything that a picture depends on.
 
-    things: tuple[object, ...]
+    Attributes
+    ----------
+    objects
+        Parts that are compared by identity.
+    values
+        Parts that are compared by value.
+    """
+
+    objects: tuple[object, ...]
     values: tuple[object, ...]
 
     @classmethod
-    def of(cls, scene: SceneLike, look: Look, viewpoint: Projection) -> Self:
-        """What a picture of a scene depends on; of that an editor alone changes, and counts its versions."""
-        things = (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
-        return cls(things, (look, viewpoint.matrix.tobytes(), version_of(scene)))
+    def of(cls, scene: SceneLike, options: FrameOptions, viewpoint: Projection) -> Self:
+        """Return the key of a picture."""
+        objects = (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
+        return cls(objects, (options, viewpoint.matrix.tobytes(), decal_version(scene)))
 
     @classmethod
-    def tried(cls, scene: SceneLike, *how: object) -> Self:
-        """What it depends on whether a scene can be drawn at all, not how it is seen and lit."""
-        return cls((scene, scene.objects, scene.images, scene.decals), (*how, version_of(scene)))
+    def of_attempt(cls, scene: SceneLike, *values: object) -> Self:
+        """Return the key of an attempt to draw a scene, without its viewpoint and lights."""
+        objects = (scene, scene.objects, scene.images, scene.decals)
+        return cls(objects, (*values, decal_version(scene)))
 
-    def same(self, other: Seen | None) -> bool:
-        """Whether two pictures are the same."""
-        return other is not None and self.values == other.values and same(self.things, other.things)
+    def same(self, other: FrameKey | None) -> bool:
+        """Return True if the pictures are the same."""
+        return other is not None and self.values == other.values and same_objects(self.objects, other.objects)
 
 
-class Frame:
-    """Draws frames; what did not change since the last one of the same look is not drawn again.
+class FrameRenderer:
+    """Draws frames; parts that did not change since the last frame with the same options are kept.
 
     Parameters
     ----------
     context
-        The window's.
+        Context of the window.
 
     Attributes
     ----------
-    share
-        Part of a whole frame's work, 0 to 1, that the last call of `draw` had to do.
+    drawn_fraction
+        Part of the last frame's work, 0 to 1, that was done.
     camera
-        The block from which VTK's shaders read the camera, where they show our decals.
+        Uniform block with the camera, for VTK's shaders that show decals.
     """
 
     def __init__(self, context: WindowContext) -> None:
         self.context = context
-        self.share = 0.0
-        self._given: Targets | None = None
-        self._given_shown: Shown | None = None
-        self._given_samples = 0
-        self._ready: set[Hashable] = set()
-        self._beside: dict[Hashable, Beside] = {}
-        self._coming: tuple[Seen, Drawing] | None = None
+        self.drawn_fraction = 0.0
+        self._composited: Targets | None = None
+        self._composited_state: TargetState | None = None
+        self._composited_samples = 0
+        self._warm: set[Hashable] = set()
+        self._warmup_threads: dict[Hashable, WarmupThread] = {}
+        self._progressive: tuple[FrameKey, ProgressiveFrame] | None = None
         with context.current():
             self.renderer = Renderer(context)
             self._composite = Composite(context)
             self.camera = CameraBuffer(context)
 
-    def draw(self, scene: SceneLike, look: Look, viewpoint: Projection, *, wait: bool) -> Targets:
-        """Draw a scene into the renderer's own targets; ``wait`` until the card has finished."""
-        drawing = self._drawing(scene, look, viewpoint, look.slot)
+    def draw(self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, *, wait: bool) -> Targets:
+        """Draw a scene into the renderer's targets; with ``wait``, until the graphics card has finished."""
+        frame = self._begin(scene, options, viewpoint, options.slot)
         with self.context.current():
-            drawing.complete()
+            frame.complete()
             self.renderer.sweep()
-            if wait and drawing.share:
+            if wait and frame.work:
                 self.context.gl.finish()
-        self.share = drawing.share
-        if self.share:
-            self._ready.add(self._ahead(scene, look).key)
-        return drawing.targets
+        self.drawn_fraction = frame.work
+        if self.drawn_fraction:
+            self._warm.add(self._warmup_plan(scene, options).key)
+        return frame.targets
 
-    def prepare(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> float | None:
-        """Draw for about so long on a frame that is to come; once it is done, `draw` has nothing to do.
-
-        Whatever changes meanwhile, it begins anew. What is shown stays. Gives the seconds that a whole frame
-        has taken, none where some of it was there already; None while it is not done.
-        """
-        seen = Seen.of(scene, look, viewpoint)
-        drawing = self._coming_of(seen, scene, look, viewpoint, look.slot)
-        if drawing.left():
+    def prepare(
+        self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, seconds: float
+    ) -> float | None:
+        """Draw a slice of a later frame, without showing it; see `SubplotRenderer.prepare`."""
+        key = FrameKey.of(scene, options, viewpoint)
+        frame = self._continue(key, scene, options, viewpoint, options.slot)
+        if self.work_fraction(scene, options, viewpoint):
             with self.context.current():
-                if not drawing.advance(seconds):
+                if not frame.advance(seconds):
                     return None
-        self._coming = None
-        self._ready.add(self._ahead(scene, look).key)
-        return drawing.seconds if drawing.share == 1.0 else 0.0
+        self._progressive = None
+        self._warm.add(self._warmup_plan(scene, options).key)
+        return frame.seconds if frame.work == 1.0 else 0.0
 
-    def ready(self, scene: SceneLike, look: Look) -> bool:
-        """Whether a frame needs nothing, such as a program, that takes long for the first time."""
-        return self._ahead(scene, look).key in self._ready
+    def is_warm(self, scene: SceneLike, options: FrameOptions) -> bool:
+        """Return True if the frame needs no warm-up, such as the compilation of shaders."""
+        return self._warmup_plan(scene, options).key in self._warm
 
-    def warm(self, scene: SceneLike, look: Look, viewpoint: Projection, seconds: float) -> str | None:
-        """Make for about so long what such a frame needs, and draw it once; what is shown stays.
+    def warm(
+        self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, seconds: float
+    ) -> str | None:
+        """Warm up for a slice, then draw the frame once without showing it.
 
-        Says how far it is; None once the frame is `ready`.
+        Returns
+        -------
+        str or None
+            Status in plain words; None once the frame is warm.
         """
-        ahead = self._ahead(scene, look)
-        if ahead.key not in self._beside:
-            self._beside[ahead.key] = Beside(ahead.pieces)
-        if not self._beside[ahead.key].done(seconds):
-            return self._beside[ahead.key].news
-        seen = Seen.of(scene, look, viewpoint)
-        free = self._held is None or self._held is not self.renderer.targets_of(look.slot)
-        drawing = self._coming_of(seen, scene, look, viewpoint, look.slot if free else SPARE_SLOT)
+        plan = self._warmup_plan(scene, options)
+        if plan.key not in self._warmup_threads:
+            self._warmup_threads[plan.key] = WarmupThread(plan.tasks)
+        thread = self._warmup_threads[plan.key]
+        if not thread.done(seconds):
+            return thread.status
+        key = FrameKey.of(scene, options, viewpoint)
+        shown = self._shown_targets
+        free = shown is None or shown is not self.renderer.targets_of(options.slot)
+        frame = self._continue(key, scene, options, viewpoint, options.slot if free else SPARE_SLOT)
         with self.context.current():
-            if not drawing.advance(seconds):
-                return drawing.news
-        self._coming = None
-        self._ready.add(ahead.key)
+            if not frame.advance(seconds):
+                return frame.status
+        self._progressive = None
+        self._warm.add(plan.key)
         return None
 
-    def _coming_of(
-        self, seen: Seen, scene: SceneLike, look: Look, viewpoint: Projection, slot: str
-    ) -> Drawing:
-        """Give the drawing that goes on, or another where something changed since."""
-        if self._coming is None or not seen.same(self._coming[0]):
-            self._coming = seen, self._drawing(scene, look, viewpoint, slot)
-        return self._coming[1]
+    def _continue(
+        self, key: FrameKey, scene: SceneLike, options: FrameOptions, viewpoint: Projection, slot: str
+    ) -> ProgressiveFrame:
+        """Return the frame in preparation, or a new one if anything changed."""
+        if self._progressive is None or not key.same(self._progressive[0]):
+            self._progressive = key, self._begin(scene, options, viewpoint, slot)
+        return self._progressive[1]
 
-    def _ahead(self, scene: SceneLike, look: Look) -> Ahead:
-        return self.renderer.ahead(scene, Modes(look.mapping, look.contact, look.lamps))
+    def _begin(
+        self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, slot: str
+    ) -> ProgressiveFrame:
+        return self.renderer.begin_frame(scene, options.options, viewpoint=viewpoint, slot=slot)
 
-    def share_of(self, scene: SceneLike, look: Look, viewpoint: Projection) -> float:
-        """Part of a whole frame's work, 0 to 1, that a frame would take now."""
-        return self._drawing(scene, look, viewpoint, look.slot).left()
+    def _warmup_plan(self, scene: SceneLike, options: FrameOptions) -> WarmupPlan:
+        return self.renderer.warmup(scene, options.options)
 
-    def _drawing(self, scene: SceneLike, look: Look, viewpoint: Projection, slot: str) -> Drawing:
-        return self.renderer.drawing(
-            scene,
-            size=look.size,
-            samples=look.samples,
-            mapping=look.mapping,
-            contact=look.contact,
-            viewpoint=viewpoint,
-            lamps=look.lamps,
-            slot=slot,
-        )
+    def work_fraction(self, scene: SceneLike, options: FrameOptions, viewpoint: Projection) -> float:
+        """Return the part of a whole frame's work, 0 to 1, that the frame would need now."""
+        return self.renderer.remaining_work(scene, options.options, viewpoint=viewpoint, slot=options.slot)
 
-    def nearest(self, x: int, y: int, size: Size) -> float:
-        """Least depth put into VTK's frame, of this size, at a pixel: 1 for nothing, 0 for not known."""
-        held = self._held
-        if held is None:
+    def least_depth(self, x: int, y: int, size: Size) -> float:
+        """Return the least depth in VTK's frame at a pixel: 1 for no object, 0 for an unknown depth."""
+        shown = self._shown_targets
+        if shown is None:
             return 0.0
-        magnified = self._given_samples == 0
+        texels = texels_of(x, y, size, shown.gbuffer.size, magnified=self._composited_samples == 0)
         with self.context.current():
-            return held.gbuffer.read_depth(texels_of(x, y, size, held.gbuffer.size, magnified=magnified))
+            return shown.gbuffer.read_depth(texels)
 
     @property
-    def _held(self) -> Targets | None:
-        """What was put into VTK's frame last, if nothing else was drawn there since."""
-        if self._given is None or self._given_shown is None or self._given.shown is not self._given_shown:
+    def _shown_targets(self) -> Targets | None:
+        """Targets with the picture in VTK's frame, if nothing else was drawn into them since."""
+        targets, state = self._composited, self._composited_state
+        if targets is None or state is None or targets.state is not state:
             return None
-        return self._given
+        return targets
 
-    def composite(
-        self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int
-    ) -> None:
-        """Put what was drawn into VTK's frame; see `Composite.draw`."""
-        self._given, self._given_shown, self._given_samples = targets, targets.shown, samples
+    def composite(self, window: Any, viewport: Viewport, targets: Targets, samples: int) -> None:
+        """Put a picture into VTK's frame; see `Composite.draw`."""
+        self._composited, self._composited_state = targets, targets.state
+        self._composited_samples = samples
         self._composite.draw(window, viewport, targets, samples)
 
-    def again(self, window: Any, viewport: tuple[int, int, int, int]) -> None:
-        """Put into VTK's frame what was there before, as far as it is still there."""
-        self.share, held = 0.0, self._held
-        if held is not None:
-            self._composite.draw(window, viewport, held, self._given_samples)
+    def composite_again(self, window: Any, viewport: Viewport) -> None:
+        """Put the shown picture into VTK's frame again, if it still exists."""
+        self.drawn_fraction, shown = 0.0, self._shown_targets
+        if shown is not None:
+            self._composite.draw(window, viewport, shown, self._composited_samples)
 
     def release(self) -> None:
-        """Give everything back."""
-        self._given = self._given_shown = self._coming = None
-        for beside in self._beside.values():
-            beside.end()
+        """Release all resources."""
+        self._composited = self._composited_state = self._progressive = None
+        for thread in self._warmup_threads.values():
+            thread.end()
         with self.context.current():
             self.renderer.release()
             self._composite.release()
             self.camera.release()
+
+
+def texels_of(x: int, y: int, pixels: Size, texels: Size, *, magnified: bool) -> Rectangle:
+    """Return the texels of a picture that contribute to a pixel of a frame.
+
+    Parameters
+    ----------
+    x, y
+        The pixel.
+    pixels, texels
+        Sizes of the frame and of the picture.
+    magnified
+        True if the picture is interpolated.
+    """
+    (left, right), (low, high) = (
+        _span(index, count, of, magnified) for index, count, of in zip((x, y), pixels, texels, strict=True)
+    )
+    return Rectangle(left, low, right - left, high - low)
+
+
+def _span(index: int, pixels: int, texels: int, magnified: bool) -> tuple[int, int]:
+    """Return the first texel of a pixel along an axis, and the one after the last."""
+    if not magnified:
+        return index * texels // pixels, -(-(index + 1) * texels // pixels)
+    begin, end = (edge * texels / pixels - 0.5 for edge in (index, index + 1))
+    return max(math.floor(begin), 0), min(math.floor(end) + 2, texels)

@@ -1,9 +1,10 @@
-"""Our decals in VTK's own shader of an actor: its lights, scalars and edges stay."""
+"""Decals in VTK's shaders of actors, whose lights, scalars and edges stay."""
 
 from __future__ import annotations
 
 import weakref
-from typing import TYPE_CHECKING, Any
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
 
 import numpy as np
 from vtkmodules.util.vtkConstants import VTK_OBJECT
@@ -11,34 +12,36 @@ from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
-from decals.field.contact import Contact
-from decals.render.decal_data import DecalData, library
-from decals.render.parts import Rectangle
-from decals.render.textures import ImageArray
-from decals.render.tile import Picture
-from decals.scenes.viewpoint import Floats
+from blobtree._typing import Float64Array
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
+from decals.rendering import Renderer, SceneLike
+from decals.rendering.decal_data import DecalData, decal_library
+from decals.rendering.regions import Rectangle
+from decals.rendering.textures import ImageArray
+from decals.rendering.tiles import CameraBuffer, PictureView
+from decals.shaders import compose
 from decals.vtk.camera import matrix_of, vtk_projection
-from decals.vtk.mapper import NORMALS, SmoothNormals, polygon_mapper
-from decals.vtk.replacements import Additions, Place
-from implicit_decals.shaders import compose
+from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper
 
-if TYPE_CHECKING:
-    from decals.vtk.stage import Stage
+POSITION, NORMAL, MODEL = "decalPositionVSOutput", "decalNormalVSOutput", "decalModel"
+"""Names of the shader variables: varyings, and the matrix from the actor to the decals."""
 
-POSITION, NORMAL, PLACE = "decalPositionVSOutput", "decalNormalVSOutput", "decalModel"
 NO_SHIFT_SCALE = 0
+"""VTK's option to upload vertices without shift and scale."""
+
 UNIT_BOX = np.zeros(3), np.ones(3)
 
 DECLARATIONS, BODY, COLOR = "//VTK::TCoord::Dec", "//VTK::TCoord::Impl", "//VTK::Color::Impl"
-"""Tags behind which our code stands: where functions are declared, in main, and where colours are known."""
+"""Tags of VTK's shader templates: declarations, the body of main, and the point where colours are known."""
 
 VERTEX_DECLARATION = f"""in vec3 decalNormalMC;
-uniform mat4 {PLACE};
+uniform mat4 {MODEL};
 out vec3 {POSITION};
 out vec3 {NORMAL};
 """
-VERTEX = f"""  {POSITION} = ({PLACE} * vertexMC).xyz;
-  {NORMAL} = transpose(inverse(mat3({PLACE}))) * decalNormalMC;
+VERTEX = f"""  {POSITION} = ({MODEL} * vertexMC).xyz;
+  {NORMAL} = transpose(inverse(mat3({MODEL}))) * decalNormalMC;
 """
 GEOMETRY_DECLARATION = "".join(
     f"in vec3 {name}[];\nout vec3 {name.replace('VSOutput', 'GSOutput')};\n" for name in (POSITION, NORMAL)
@@ -54,125 +57,153 @@ PAINT = f"""
 """
 
 
+class InjectionTarget(Protocol):
+    """What injected decals read of a subplot."""
+
+    @property
+    def vtk_renderer(self) -> Any: ...  # noqa: D102
+    @property
+    def scene(self) -> SceneLike | None: ...  # noqa: D102
+    @property
+    def renderer(self) -> Renderer: ...  # noqa: D102
+    @property
+    def camera(self) -> CameraBuffer: ...  # noqa: D102
+    @property
+    def applied(self) -> InjectedDecals: ...  # noqa: D102
+    @property
+    def mapping(self) -> ImageMapping: ...  # noqa: D102
+    @property
+    def contact(self) -> Contact: ...  # noqa: D102
+    def frame(self) -> Float64Array: ...  # noqa: D102
+    def viewport(self) -> tuple[int, int, int, int]: ...  # noqa: D102
+    def current(self) -> AbstractContextManager[None]: ...  # noqa: D102
+    def current_if_present(self) -> AbstractContextManager[None]: ...  # noqa: D102
+
+
 class Injection:
-    """Decals on one of pyvista's actors; several may share a stage's coat.
+    """The decals of a subplot in the shader of one actor.
 
     Parameters
     ----------
-    stage
-        Whose decals.
+    subplot
+        The subplot.
     actor
         An actor of polygons.
     follow
-        Whether the decals are given in the actor's own coordinates and move with it.
+        If True, decals are in the actor's coordinates and move with it.
     paint
-        GLSL that changes VTK's colours, in place of PAINT: for tests.
+        GLSL that changes VTK's colours. Default: PAINT; tests use others.
     """
 
-    def __init__(self, stage: Stage, actor: Any, *, follow: bool = False, paint: str = PAINT) -> None:
+    def __init__(
+        self, subplot: InjectionTarget, actor: Any, *, follow: bool = False, paint: str = PAINT
+    ) -> None:
         self.actor, self._follow, self._paint = actor, follow, paint
         self._mapper = polygon_mapper(actor)
         self._normals = SmoothNormals()
-        self._give_normals()
+        self._add_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
-        self._stage = weakref.ref(stage)
-        self._additions = Additions(actor)
-        self._known: tuple[Contact, bool] | None = None
-        self._code: dict[Place, str] = {}
+        self._subplot = weakref.ref(subplot)
+        self._additions = ShaderAdditions(actor)
+        self._variant: tuple[Contact, bool] | None = None
+        self._code: dict[ShaderTag, str] = {}
         self._written = False
-        me = weakref.ref(self)
+        injection = weakref.ref(self)
 
         def bind(_caller: object, _event: str, program: Any) -> None:
-            alive = me()
+            alive = injection()
             if alive is not None:
                 alive.bind(program)
 
-        bind.CallDataType = VTK_OBJECT  # type: ignore[attr-defined]  # as VTK asks for
+        bind.CallDataType = VTK_OBJECT  # type: ignore[attr-defined]  # VTK reads it
         self._tag = self._mapper.AddObserver(vtkCommand.UpdateShaderEvent, bind)
 
     # -- once a frame -----------------------------------------------------------------------------------
 
-    def prepare(self) -> None:
-        """Bring mesh and shader up to date, before VTK draws the frame."""
-        found = self._found()
-        if found is None:
+    def begin_frame(self) -> None:
+        """Update mesh and shader before VTK draws the frame."""
+        source = self._source()
+        if source is None:
             self._erase()
             return
-        self._give_normals()  # somebody may have given it other data
-        stage, data, _ = found
-        wanted = stage.contact, data.layered
-        if wanted != self._known:
-            self._known, self._code = wanted, _code(library(stage.contact, layered=data.layered), self._paint)
+        self._add_normals()  # the mapper's input may have been replaced
+        subplot, data, _ = source
+        variant = subplot.contact, data.layered
+        if variant != self._variant:
+            self._variant, self._code = (
+                variant,
+                _code(decal_library(subplot.contact, layered=data.layered), self._paint),
+            )
         self._additions.write(self._code)
         self._written = True
 
-    def _give_normals(self) -> None:
-        """Let the mesh have smooth normals, unless the injection of another stage gives them."""
+    def _add_normals(self) -> None:
+        """Add smooth normals to the mesh, unless the injection of another subplot has added them."""
         if self._normals.insert_before(self.actor.GetMapper()):
             self._mapper.MapDataArrayToVertexAttribute(
                 "decalNormalMC", NORMALS, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1
             )
 
-    def finish(self) -> None:
-        """Leave the shader to others, where other renderers draw the actor too."""
+    def end_frame(self) -> None:
+        """Restore the shader if other renderers draw the actor too."""
         if self.actor.GetNumberOfConsumers() > 1:
             self._erase()
 
     def _erase(self) -> None:
-        """Leave the shader as it was."""
+        """Restore the shader."""
         self._additions.erase()
         self._written = False
 
     # -- whenever VTK draws the actor -------------------------------------------------------------------
 
     def bind(self, program: Any) -> None:
-        """Give VTK's program what ours would have: decals, images, camera."""
-        found = self._found() if self._written else None
-        if found is None or not found[0].drawing:  # another renderer may draw the actor too
+        """Bind decals, images and camera to VTK's program."""
+        source = self._source() if self._written else None
+        if source is None or not source[0].applied.in_frame:  # another renderer may draw the actor
             return
-        stage, data, images = found
-        place = self._frame(stage)
-        self._use_camera(stage, place)
-        model = np.linalg.inv(place) @ matrix_of(self.actor)
-        program.SetUniformMatrix(PLACE, _vtk_matrix(model))
-        units = stage.applied.texture_units()
-        numbers = data.bind(units[1:])
+        subplot, data, images = source
+        frame = self._frame(subplot)
+        self._use_camera(subplot, frame)
+        model = np.linalg.inv(frame) @ matrix_of(self.actor)
+        program.SetUniformMatrix(MODEL, _vtk_matrix(model))
+        units = subplot.applied.texture_units()
+        uniforms = data.bind(units[1:])
         images.use(units[0])
-        numbers |= {"decal_images": units[0], "decal_mapping": int(stage.mapping)}
-        for name, number in numbers.items():
-            program.SetUniformi(name, number)
-        stage.vtk_renderer.GetRenderWindow().GetState().ResetGLActiveTexture()
+        uniforms |= {"decal_images": units[0], "decal_mapping": int(subplot.mapping)}
+        for name, value in uniforms.items():
+            program.SetUniformi(name, value)
+        subplot.vtk_renderer.GetRenderWindow().GetState().ResetGLActiveTexture()
 
-    def _found(self) -> tuple[Stage, DecalData, ImageArray] | None:
-        """The stage and its decals, if there are any."""
-        stage = self._stage()
-        if stage is None or stage.scene is None:
+    def _source(self) -> tuple[InjectionTarget, DecalData, ImageArray] | None:
+        """Return the subplot, its decals and its images, or None if there are no decals."""
+        subplot = self._subplot()
+        if subplot is None or subplot.scene is None:
             return None
-        data, images = stage.renderer.uploads(stage.scene)
-        return None if data is None or images is None else (stage, data, images)
+        data, images = subplot.renderer.uploads(subplot.scene)
+        return None if data is None or images is None else (subplot, data, images)
 
-    def _frame(self, stage: Stage) -> Floats:
-        """Decals' space to world."""
-        return matrix_of(self.actor) if self._follow else stage.frame()
+    def _frame(self, subplot: InjectionTarget) -> Float64Array:
+        """Return the matrix from the decals' space to the world."""
+        return matrix_of(self.actor) if self._follow else subplot.frame()
 
-    def _use_camera(self, stage: Stage, frame: Floats) -> None:
-        """Fill the camera's block for the frame that VTK is drawing, which may be larger than the window."""
-        x, y, width, height = stage.viewport()
-        view = vtk_projection(stage.vtk_renderer, frame)
-        whole = Picture.of(view, (width, height), UNIT_BOX)
-        stage.camera.use(whole.part(Rectangle(-x, -y, width, height)))
+    def _use_camera(self, subplot: InjectionTarget, frame: Float64Array) -> None:
+        """Fill the uniform block of the camera; VTK's frame may be larger than the window."""
+        x, y, width, height = subplot.viewport()
+        view = vtk_projection(subplot.vtk_renderer, frame)
+        whole = PictureView.of(view, (width, height), UNIT_BOX)
+        subplot.camera.use(whole.part(Rectangle(-x, -y, width, height)))
 
     def release(self) -> None:
-        """Leave the actor as it was."""
+        """Restore the actor."""
         self._erase()
         self._mapper.RemoveObserver(self._tag)
-        if self._normals.leave(self.actor.GetMapper()):
+        if self._normals.remove_from(self.actor.GetMapper()):
             self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
 
 
-def _code(functions: str, paint: str) -> dict[Place, str]:
-    """Our code for each stage of a shader, behind VTK's own."""
-    text = compose("inject.glsl", slots={"functions": functions}, version=None).text
+def _code(functions: str, paint: str) -> dict[ShaderTag, str]:
+    """Return our code for each tag of VTK's shader templates."""
+    text = compose("injected_decals.glsl", slots={"functions": functions}, version=None).text
     return {
         ("Vertex", DECLARATIONS): VERTEX_DECLARATION,
         ("Vertex", BODY): VERTEX,
@@ -183,8 +214,81 @@ def _code(functions: str, paint: str) -> dict[Place, str]:
     }
 
 
-def _vtk_matrix(matrix: Floats) -> vtkMatrix4x4:
-    """Lay out a matrix as VTK hands it to OpenGL: columns first."""
-    made = vtkMatrix4x4()
-    made.DeepCopy(matrix.T.ravel().tolist())
-    return made
+def _vtk_matrix(matrix: Float64Array) -> vtkMatrix4x4:
+    """Return a matrix in the layout that VTK uploads: columns first."""
+    result = vtkMatrix4x4()
+    result.DeepCopy(matrix.T.ravel().tolist())
+    return result
+
+
+INJECTED_TEXTURES = 5
+"""Texture units of an injected shader: images, records, and the three arrays of the index."""
+
+
+class InjectedDecals:
+    """The injections of one subplot, and the texture units that they share.
+
+    Parameters
+    ----------
+    subplot
+        The subplot.
+
+    Attributes
+    ----------
+    in_frame
+        True while VTK draws a frame of the subplot.
+    """
+
+    def __init__(self, subplot: InjectionTarget) -> None:
+        self._subplot = subplot
+        self._injections: list[Injection] = []
+        self._units: list[int] = []
+        self.in_frame = False
+
+    def apply(self, actor: Any, *, follow: bool) -> None:
+        """Show the decals on an actor."""
+        self.remove(actor)
+        self._injections.append(Injection(self._subplot, actor, follow=follow))
+
+    def remove(self, actor: Any) -> None:
+        """Remove the decals from an actor; an actor without decals stays as it is."""
+        self._release([item for item in self._injections if item.actor is actor])
+
+    def clear(self) -> None:
+        """Remove the decals from all actors."""
+        self._release(self._injections)
+
+    def _release(self, injections: list[Injection]) -> None:
+        if not injections:
+            return
+        with self._subplot.current_if_present():
+            for injection in injections:
+                injection.release()
+        self._injections = [item for item in self._injections if item not in injections]
+
+    def texture_units(self) -> list[int]:
+        """Return the texture units of an injected shader, reserved until the end of the frame."""
+        if not self._units:
+            self._units = [self._manager.Allocate() for _ in range(INJECTED_TEXTURES)]
+        return self._units
+
+    @property
+    def _manager(self) -> Any:
+        return self._subplot.vtk_renderer.GetRenderWindow().GetTextureUnitManager()
+
+    def begin_frame(self) -> None:
+        """Update meshes and shaders before VTK draws a frame."""
+        self.in_frame = True
+        if self._injections:
+            with self._subplot.current():
+                for injection in self._injections:
+                    injection.begin_frame()
+
+    def end_frame(self) -> None:
+        """Release the texture units after VTK has drawn a frame."""
+        self.in_frame = False
+        for unit in self._units:
+            self._manager.Free(unit)
+        self._units = []
+        for injection in self._injections:
+            injection.end_frame()

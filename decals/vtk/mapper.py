@@ -1,31 +1,98 @@
-"""The mapper with which VTK really draws an actor of polygons, and the normals that decals want there."""
+"""VTK's polygon mappers: code added to their shaders, and smooth normals added to their meshes."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkRenderingCore import vtkDataSetMapper, vtkProp, vtkRenderer
 from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
 
 from decals.errors import InvalidScene
-from decals.render.mesh import vertex_normals
+from decals.rendering.mesh import vertex_normals
 
-DRAWS_POLYGONS = "vtkOpenGLPolyDataMapper"
-"""What VTK's factory makes of a vtkPolyDataMapper; its subclasses draw points, composites and more."""
+ShaderTag = tuple[str, str]
+"""A shader stage (Vertex, Geometry or Fragment), and a tag of VTK's template for it."""
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """Text in place of a tag, at its first occurrence or everywhere."""
+
+    text: str
+    everywhere: bool = False
+
+
+class ShaderAdditions:
+    """Code after tags of VTK's shader templates; tags and the replacements of others stay.
+
+    Parameters
+    ----------
+    actor
+        A vtkActor.
+    """
+
+    def __init__(self, actor: Any) -> None:
+        self._actor = actor
+        self._ours: dict[ShaderTag, Replacement] = {}
+        self._theirs: dict[ShaderTag, Replacement | None] = {}
+
+    def write(self, code: Mapping[ShaderTag, str]) -> None:
+        """Set the added code; replacements that others made since stay."""
+        for tag, text in code.items():
+            present = self._read(tag)
+            if present is None or present != self._ours.get(tag):
+                self._theirs[tag] = present
+            theirs = self._theirs[tag] or Replacement(tag[1])
+            replacement = Replacement(f"{theirs.text}\n{text}", theirs.everywhere)
+            if present != replacement:
+                self._write(tag, replacement)
+            self._ours[tag] = replacement
+
+    def erase(self) -> None:
+        """Remove the added code; replacements of others stay."""
+        for tag, ours in self._ours.items():
+            if self._read(tag) == ours:
+                self._write(tag, self._theirs[tag])
+        self._ours.clear()
+        self._theirs.clear()
+
+    def _read(self, tag: ShaderTag) -> Replacement | None:
+        """Return the present replacement of a tag, or None."""
+        shader = self._actor.GetShaderProperty()
+        for number in range(shader.GetNumberOfShaderReplacements()):
+            name, first, text, everywhere = (reference(value) for value in ("", False, "", False))
+            shader.GetNthShaderReplacement(number, name, first, text, everywhere)
+            if first and (shader.GetNthShaderReplacementTypeAsString(number), str(name)) == tag:
+                return Replacement(str(text), bool(everywhere))
+        return None
+
+    def _write(self, tag: ShaderTag, replacement: Replacement | None) -> None:
+        (stage, name), shader = tag, self._actor.GetShaderProperty()
+        getattr(shader, f"Clear{stage}ShaderReplacement")(name, True)
+        if replacement is not None:
+            add = getattr(shader, f"Add{stage}ShaderReplacement")
+            add(name, True, replacement.text, replacement.everywhere)
+
+
+POLYGON_MAPPER = "vtkOpenGLPolyDataMapper"
+"""Class of VTK's polygon mappers; its subclasses draw points, composites and more."""
 NORMALS = "decal normals"
-"""Point data that what is drawn under decals gets: smooth unit normals, as our renderer has them."""
+"""Name of the point data with smooth unit normals, as the renderer computes them."""
 
 
 def polygon_mapper(actor: Any) -> Any:
-    """Give the vtkPolyDataMapper that draws an actor.
+    """Return the vtkPolyDataMapper that draws an actor.
 
     Raises
     ------
     InvalidScene
-        It is drawn by another kind of mapper.
+        Another kind of mapper draws the actor.
     """
     if not isinstance(actor, vtkProp) or not hasattr(actor, "GetMapper"):
         raise InvalidScene(
@@ -37,7 +104,7 @@ def polygon_mapper(actor: Any) -> Any:
         if mapper.GetPolyDataMapper() is None:
             _prepare(mapper, actor)
         mapper = mapper.GetPolyDataMapper()
-    if mapper is None or mapper.GetClassName() != DRAWS_POLYGONS:
+    if mapper is None or mapper.GetClassName() != POLYGON_MAPPER:
         raise InvalidScene(
             f"decals go onto actors that a vtkPolyDataMapper draws, got {type(actor.GetMapper()).__name__}; "
             "add the blocks of a composite, or the surface of other data, as meshes of their own"
@@ -46,7 +113,7 @@ def polygon_mapper(actor: Any) -> Any:
 
 
 def _prepare(mapper: Any, actor: Any) -> None:
-    """Let a vtkDataSetMapper make its inner mapper, as when it is first drawn: in a window that gives up."""
+    """Make a vtkDataSetMapper create its inner mapper, by a rendering that is aborted."""
     window, renderer = vtkGenericOpenGLRenderWindow(), vtkRenderer()
     window.AddRenderer(renderer)
     window.SetAbortRender(1)
@@ -54,17 +121,17 @@ def _prepare(mapper: Any, actor: Any) -> None:
 
 
 _Filter: Any = VTKPythonAlgorithmBase
-"""VTK's Python side has no types."""
+"""VTK's Python algorithms have no types."""
 
 
 class SmoothNormals(_Filter):  # type: ignore[misc]
-    """A filter before a mapper that adds point data NORMALS; whatever comes from upstream stays alive."""
+    """A filter before a mapper that adds the point data NORMALS; the pipeline before it stays."""
 
     def __init__(self) -> None:
         super().__init__(nInputPorts=1, inputType="vtkDataSet", nOutputPorts=1, outputType="vtkDataSet")
 
     def insert_before(self, mapper: Any) -> bool:
-        """Stand between a mapper and what it draws; False where one of us stands there already."""
+        """Insert the filter before a mapper, or return False if such a filter is there already."""
         connection = mapper.GetInputConnection(0, 0)
         if connection is None or isinstance(connection.GetProducer(), SmoothNormals):
             return False
@@ -72,8 +139,8 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
         mapper.SetInputConnection(self.GetOutputPort())
         return True
 
-    def leave(self, mapper: Any) -> bool:
-        """Let the mapper draw what it drew before; whether it was we who stood there."""
+    def remove_from(self, mapper: Any) -> bool:
+        """Remove the filter before a mapper, or return False if it is not there."""
         connection = mapper.GetInputConnection(0, 0)
         if connection is None or connection.GetProducer() is not self:
             return False
@@ -89,7 +156,7 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
         return 1
 
     def RequestData(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
-        """Copy, and add the normals."""
+        """Copy the input and add the normals."""
         out = self.GetOutputData(outputs, 0)
         out.ShallowCopy(self.GetInputData(inputs, 0, 0))
         normals: Any = smooth_normals(pv.wrap(out))
@@ -99,7 +166,7 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
 
 
 def smooth_normals(dataset: pv.DataSet) -> NDArray[np.float32]:
-    """Normals ``float32[n, 3]`` at the points of a dataset, as our renderer has them; zero inside a solid."""
+    """Return smooth normals at the points of a dataset, float32, shape (n, 3); zero inside a solid."""
     normals = np.zeros((dataset.n_points, 3), np.float32)
     surface, where = _surface(dataset)
     triangles = np.ascontiguousarray(surface.triangulate().regular_faces, np.int32)
@@ -109,7 +176,7 @@ def smooth_normals(dataset: pv.DataSet) -> NDArray[np.float32]:
 
 
 def _surface(dataset: pv.DataSet) -> tuple[pv.PolyData, Any]:
-    """Outer faces, and which points of the dataset theirs are."""
+    """Return the outer faces, and the indices of their points in the dataset."""
     if isinstance(dataset, pv.PolyData):
         return dataset, slice(None)
     surface = dataset.extract_surface(algorithm="dataset_surface", pass_pointid=True)

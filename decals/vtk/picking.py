@@ -1,139 +1,157 @@
-"""What lies at a place in a window, as far as nothing of VTK's hides it."""
+"""Picks: the surface point and decal at a pixel of a window, unless another actor occludes it."""
 
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from decals.checks import finite
+from blobtree._typing import Float32Array, Float64Array
 from decals.errors import InvalidPoints
-from decals.render import Size
-from decals.render.parts import Rectangle
-from decals.scenes.viewpoint import Floats
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
+from decals.rendering import Renderer, SceneLike
+from decals.rendering.options import RenderOptions
+from decals.rendering.viewpoint import Projection
+from decals.validation import finite_number
 
-if TYPE_CHECKING:
-    from decals.vtk.stage import Stage
-
-ROUNDING = 1e-6
-"""Differences of depth that tell nothing: depth buffers of 24 bits, and matrices in float32."""
+DEPTH_TOLERANCE = 1e-6
+"""Difference of equal depths: depth buffers have 24 bits, matrices are float32."""
 
 
 @dataclass(frozen=True, eq=False)
-class Hit:
-    """What lies behind a place in a window.
+class PickResult:
+    """The surface point at a pixel.
 
     Attributes
     ----------
-    object_id
+    object_id : int
         Index of the object in the scene.
-    owner
-        Number of the topmost decal there, -1 for none.
-    position, normal
-        float32[3] each, in the scene's coordinates.
-    uv
-        Place in the owner's image; zero without an owner.
-    field
+    owner : int
+        Number of the decal that shows there; −1 for none.
+    position, normal : float32, shape (3,)
+        Point and unit normal, in scene coordinates.
+    uv : (float, float)
+        Coordinates in the owner's image, from 0 to 1; zero without an owner.
+    field : float
         The owner's field after contact; zero without an owner.
-    depth
-        Depth in the window, from 0 to 1, as VTK's depth buffer counts it.
+    depth : float
+        Depth in the window, from 0 to 1, as in VTK's depth buffer.
+
+    Examples
+    --------
+    >>> import decals, pyvista
+    >>> from blobtree import Point
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=20, images=["eye"])
+    >>> plotter = pyvista.Plotter(off_screen=True, window_size=(80, 60))
+    >>> scene = plotter.decals.add_scene(scene)
+    >>> plotter.show(auto_close=False)
+    >>> pick = plotter.decals.subplot.at(40, 30)
+    >>> pick.position.shape, 0 < pick.depth < 1
+    ((3,), True)
+    >>> plotter.close()
     """
 
     object_id: int
     owner: int
-    position: NDArray[np.float32]
-    normal: NDArray[np.float32]
+    position: Float32Array
+    normal: Float32Array
     uv: tuple[float, float]
     field: float
     depth: float
 
 
-def hit_at(stage: Stage, x: float, y: float) -> Hit | None:
-    """Say what a stage shows at a place in its window; see `Stage.at`."""
-    column, row = math.floor(finite("x", x, InvalidPoints)), math.floor(finite("y", y, InvalidPoints))
-    left, low = stage.vtk_renderer.GetOrigin()
-    width, height = stage.vtk_renderer.GetSize()
+class PickableSubplot(Protocol):
+    """What picking reads of a subplot."""
+
+    @property
+    def vtk_renderer(self) -> Any: ...  # noqa: D102
+    @property
+    def scene(self) -> SceneLike | None: ...  # noqa: D102
+    @property
+    def renderer(self) -> Renderer: ...  # noqa: D102
+    @property
+    def actor(self) -> Any: ...  # noqa: D102
+    @property
+    def mapping(self) -> ImageMapping: ...  # noqa: D102
+    @property
+    def contact(self) -> Contact: ...  # noqa: D102
+    def current(self) -> AbstractContextManager[None]: ...  # noqa: D102
+    def viewpoint(self) -> Projection: ...  # noqa: D102
+    def depth_at(self, x: int, y: int) -> float: ...  # noqa: D102
+
+
+def pick_at(subplot: PickableSubplot, x: float, y: float) -> PickResult | None:
+    """Return what a subplot shows at a pixel; see `SubplotRenderer.at`."""
+    column, row = (
+        math.floor(finite_number("x", x, InvalidPoints)),
+        math.floor(finite_number("y", y, InvalidPoints)),
+    )
+    left, low = subplot.vtk_renderer.GetOrigin()
+    width, height = subplot.vtk_renderer.GetSize()
     inside = 0 <= column - left < width and 0 <= row - low < height
-    if stage.scene is None or not inside:
+    if subplot.scene is None or not inside:
         return None
-    with stage.current():
-        found = stage.renderer.buffers_at(
-            stage.scene,
+    with subplot.current():
+        buffers = subplot.renderer.buffers_at(
+            subplot.scene,
             column - left,
             row - low,
-            size=(width, height),
-            mapping=stage.mapping,
-            contact=stage.contact,
-            viewpoint=stage.viewpoint(),
+            RenderOptions(size=(width, height), mapping=subplot.mapping, contact=subplot.contact),
+            viewpoint=subplot.viewpoint(),
         )
-    position = found.position[0, 0]
-    if found.object_id[0, 0] < 0 or hidden(stage, column, row, position):
+    position = buffers.position[0, 0]
+    if buffers.object_id[0, 0] < 0 or is_occluded(subplot, column, row, position):
         return None
-    return Hit(
-        object_id=int(found.object_id[0, 0]),
-        owner=int(found.owner[0, 0]),
+    return PickResult(
+        object_id=int(buffers.object_id[0, 0]),
+        owner=int(buffers.owner[0, 0]),
         position=position,
-        normal=found.normal[0, 0],
-        uv=(float(found.uv[0, 0, 0]), float(found.uv[0, 0, 1])),
-        field=float(found.field[0, 0]),
-        depth=depth_of(stage.viewpoint().matrix, position),
+        normal=buffers.normal[0, 0],
+        uv=(float(buffers.uv[0, 0, 0]), float(buffers.uv[0, 0, 1])),
+        field=float(buffers.field[0, 0]),
+        depth=depth_of(subplot.viewpoint().matrix, position),
     )
 
 
-def depth_of(matrix: Floats, position: ArrayLike) -> float:
-    """Depth in the window, from 0 to 1, of a point that a matrix takes to clip space."""
+def depth_of(matrix: Float64Array, position: ArrayLike) -> float:
+    """Return the depth in the window, from 0 to 1, of a point; the matrix maps it to clip space."""
     clip = matrix @ np.append(np.asarray(position, np.float64), 1.0)
     return float(0.5 * clip[2] / clip[3] + 0.5)
 
 
-def hidden(stage: Stage, x: int, y: int, position: ArrayLike) -> bool:
-    """Whether an actor of VTK's hid a point of ours at a pixel of the last frame.
+def is_occluded(subplot: PickableSubplot, x: int, y: int, position: ArrayLike) -> bool:
+    """Return True if an actor of VTK hid a surface point at a pixel of the last frame.
 
-    VTK's depth there is compared with what we put into it ourselves: at a grazing angle, or in a coarse
-    frame, that may lie far before the point. Text over the picture stands at depth zero and hides nothing.
+    VTK's depth is compared with the subplot's own: at a grazing angle, or in a coarse frame, that depth may
+    be far in front of the point. Text has depth zero and occludes nothing.
     """
-    x, y = (math.floor(finite(name, place, InvalidPoints)) for name, place in (("x", x), ("y", y)))
-    if not _in_company(stage, x, y):
+    x, y = (math.floor(finite_number(name, value, InvalidPoints)) for name, value in (("x", x), ("y", y)))
+    if not _others_write_depth(subplot, x, y):
         return False
-    left, low = stage.vtk_renderer.GetOrigin()
-    own = stage.depth_at(x - left, y - low)
+    left, low = subplot.vtk_renderer.GetOrigin()
+    own = subplot.depth_at(x - left, y - low)
     if own == 0.0:
         return False
-    seen = float(stage.vtk_renderer.GetZ(x, y))
-    return 0.0 < seen < min(own, depth_of(stage.viewpoint().matrix, position)) - ROUNDING
+    depth = float(subplot.vtk_renderer.GetZ(x, y))
+    return 0.0 < depth < min(own, depth_of(subplot.viewpoint().matrix, position)) - DEPTH_TOLERANCE
 
 
-def _in_company(stage: Stage, x: int, y: int) -> bool:
-    """Whether anything but us may have left depth at a pixel; to read it, one waits for the card."""
-    ours = stage.vtk_renderer
-    return any(
-        other.GetDraw() and other.IsInViewport(x, y)
-        for other in ours.GetRenderWindow().GetRenderers()
-        if other is not ours
-    ) or any(prop is not stage.actor and _leaves_depth(prop) for prop in ours.GetViewProps())
+def _others_write_depth(subplot: PickableSubplot, x: int, y: int) -> bool:
+    """Return True if other actors may have written depth at a pixel; reading depth stalls the card."""
+    own = subplot.vtk_renderer
+    others = (other for other in own.GetRenderWindow().GetRenderers() if other is not own)
+    if any(other.GetDraw() and other.IsInViewport(x, y) for other in others):
+        return True
+    return any(prop is not subplot.actor and _writes_depth(prop) for prop in own.GetViewProps())
 
 
-def _leaves_depth(prop: Any) -> bool:
-    """Whether a prop may; text does not, nor do translucent actors."""
+def _writes_depth(prop: Any) -> bool:
+    """Return True if a prop may write depth; text and translucent actors do not."""
     if not prop.GetVisibility() or prop.IsA("vtkActor2D"):
         return False
     return not (prop.IsA("vtkActor") and prop.HasTranslucentPolygonalGeometry())
-
-
-def texels_of(x: int, y: int, pixels: Size, texels: Size, *, magnified: bool) -> Rectangle:
-    """Texels of a picture that make a pixel of a frame; where it is magnified, between them."""
-    (left, right), (low, high) = (
-        _span(place, count, of, magnified) for place, count, of in zip((x, y), pixels, texels, strict=True)
-    )
-    return Rectangle(left, low, right - left, high - low)
-
-
-def _span(place: int, pixels: int, texels: int, magnified: bool) -> tuple[int, int]:
-    """First texel along an axis, and past the last."""
-    if not magnified:
-        return place * texels // pixels, -(-(place + 1) * texels // pixels)
-    begin, end = (edge * texels / pixels - 0.5 for edge in (place, place + 1))
-    return max(math.floor(begin), 0), min(math.floor(end) + 2, texels)

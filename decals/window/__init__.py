@@ -1,10 +1,7 @@
-"""A window in which scenes are edited by hand; `decals.edit` is what happens, this is where.
-
-`view` opens one and gives the edited scene.
-"""
+"""The editing window; `decals.editing` has the edits without a window."""
 
 from decals.window.browser import browser_keys, press_key
-from decals.window.quality import Quality
-from decals.window.window import EditWindow, view
+from decals.window.frame_budget import FrameBudget
+from decals.window.window import EditWindow, edit
 
-__all__ = ["EditWindow", "Quality", "browser_keys", "press_key", "view"]
+__all__ = ["EditWindow", "FrameBudget", "browser_keys", "edit", "press_key"]

@@ -1,50 +1,70 @@
-"""Keys for a window in a browser: trame sends the mouse by itself, keys only where a page asks for them."""
+"""Keys for a window in a browser: trame forwards the mouse, but keys only where a page asks for them."""
 
 import math
 from typing import Any
 
-from decals.checks import finite, instance, shown
-from decals.edit.keys import of_browser
+from decals.editing.key_bindings import from_browser
 from decals.errors import InvalidEdit
+from decals.validation import describe, finite_number, instance
 from decals.window.window import EditWindow
 
-_HOVER = "$event.currentTarget.focus({preventScroll: true})"
-"""Keys go to what has the focus: here, what is under the pointer."""
+_FOCUS = "$event.currentTarget.focus({preventScroll: true})"
+"""Give the element under the pointer the focus, so that it receives keys."""
 
-_PLACE = (
+_RECORD_POSITION = (
     "$event.currentTarget.dataset.at = [$event.offsetX / $event.target.clientWidth, "
     "$event.offsetY / $event.target.clientHeight]"
 )
-"""trame tells of the pointer only while a button is down."""
+"""Record the pointer's position: trame sends it only while a button is down."""
 
-_KEY = (
+_KEY_ARGUMENTS = (
     "[$event.target.style.outline = 'none', ($event.ctrlKey || $event.metaKey) && $event.preventDefault(), "
     "$event.key, $event.ctrlKey || $event.metaKey, $event.shiftKey, $event.currentTarget.dataset.at || '']"
 )
-"""Browsers draw a frame around what gets keys, here over the picture."""
+"""Arguments of a key press. The first removes the frame that browsers draw around a focused element."""
 
 
 def browser_keys(window: EditWindow) -> dict[str, Any]:
-    """Attributes for the element of a trame page around the view of a window's plotter, so that keys work.
+    """Return attributes that send keys from a trame page to a window.
 
-    ::
+    Put them on the element around the view of the window's plotter::
 
         with html.Div(style="height: 100%", **browser_keys(window)):
             PyVistaRemoteView(window.plotter)
 
-    While the pointer is over the view, keys act where it points, as in a window. The command key of a Mac is
-    Ctrl. Combinations with Ctrl go to the window alone, the browser's own meaning of them does not happen.
+    Keys act at the pointer, as in a window. The command key of a Mac is Ctrl. Combinations with Ctrl go to
+    the window only, not to the browser.
+
+    Parameters
+    ----------
+    window : EditWindow
+        The window.
+
+    Returns
+    -------
+    dict
+        Attributes of a trame element.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.window import browser_keys
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=10, images=["eye"])
+    >>> with decals.window.EditWindow(scene, off_screen=True, size=(80, 60)) as window:
+    ...     sorted(browser_keys(window))
+    ['keydown', 'mouseenter', 'mousemove', 'tabindex']
     """
     instance("window", window, EditWindow, InvalidEdit, "open one with plotter=...")
 
-    def press(_outline: str, _prevented: object, key: str, ctrl: bool, shift: bool, place: str) -> None:
-        press_key(window, key, ctrl=bool(ctrl), shift=bool(shift), place=_fractions(place))
+    def press(_outline: str, _prevented: object, key: str, ctrl: bool, shift: bool, position: str) -> None:
+        press_key(window, key, ctrl=bool(ctrl), shift=bool(shift), position=_parse_position(position))
 
     return {
         "tabindex": 0,
-        "mouseenter": _HOVER,
-        "mousemove": _PLACE,
-        "keydown": (press, _KEY),
+        "mouseenter": _FOCUS,
+        "mousemove": _RECORD_POSITION,
+        "keydown": (press, _KEY_ARGUMENTS),
     }
 
 
@@ -54,55 +74,74 @@ def press_key(
     *,
     ctrl: bool = False,
     shift: bool = False,
-    place: tuple[float, float] | None = None,
+    position: tuple[float, float] | None = None,
 ) -> bool:
-    """Press a key in a window: from a button of a page, for instance.
+    """Press a key in a window, for example from a button of a page.
 
     Parameters
     ----------
-    window
-        Where to.
-    key
-        As a browser calls it (``KeyboardEvent.key``) or as VTK does: "z", "Delete", "PageUp", "[".
-    ctrl, shift
-        Whether these are down.
-    place
-        Where the pointer is, in parts of the plotter's width and of its height, from the top left corner;
-        where it was last, if not given.
+    window : EditWindow
+        The window.
+    key : str
+        Name of the key in browsers (``KeyboardEvent.key``) or VTK: "z", "Delete", "PageUp", "[".
+    ctrl, shift : bool
+        Modifiers.
+    position : (float, float), optional
+        Pointer position from the top left corner, relative to the plotter's width and height. Default: the
+        last position.
 
     Returns
     -------
     bool
-        Whether the key means something.
+        True if the key has an action.
+
+    Raises
+    ------
+    InvalidEdit
+        The window, key or position is not valid.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.window import press_key
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=10, images=["eye"])
+    >>> with decals.window.EditWindow(scene, off_screen=True, size=(80, 60)) as window:
+    ...     press_key(window, "a", ctrl=True), len(window.actions.state.selection)
+    (True, 10)
     """
     instance("window", window, EditWindow, InvalidEdit, "open one with plotter=...")
     if not isinstance(key, str):
-        raise InvalidEdit(f"key: expected its name, such as 'z', got {shown(key)}")
+        raise InvalidEdit(f"key: expected its name, such as 'z', got {describe(key)}")
     interactor = window.plotter.iren.interactor
-    if place is not None:
-        right, down = _parts(place)
+    if position is not None:
+        right, down = _checked_position(position)
         width, height = window.plotter.window_size
         interactor.SetEventPosition(int(right * width), int((1.0 - down) * height))
     x, y = interactor.GetEventPosition()
-    used = not window.elsewhere(x, y) and window.tools.key(of_browser(key), x, y, ctrl=ctrl, shift=shift)
+    if window.in_other_subplot(x, y):
+        return False
+    used = window.tools.key(from_browser(key), x, y, ctrl=ctrl, shift=shift)
     if used:
         window.redraw(whole=not window.tools.dragging)
     return used
 
 
-def _parts(place: object) -> tuple[float, float]:
-    """Two numbers, held within the window."""
+def _checked_position(position: object) -> tuple[float, float]:
+    """Return two numbers, clamped to [0, 1], or raise `InvalidEdit`."""
     try:
-        x, y = (finite("place", part, InvalidEdit) for part in place)  # type: ignore[attr-defined]
+        x, y = (finite_number("position", part, InvalidEdit) for part in position)  # type: ignore[attr-defined]
     except (TypeError, ValueError, KeyError) as error:
-        raise InvalidEdit(f"place: expected parts of width and height, got {shown(place)}") from error
+        raise InvalidEdit(
+            f"position: expected parts of width and height, got {describe(position)}"
+        ) from error
     return min(max(x, 0.0), 1.0), min(max(y, 0.0), 1.0)
 
 
-def _fractions(place: str) -> tuple[float, float] | None:
-    """Two numbers as a page writes them down, or nothing."""
+def _parse_position(position: str) -> tuple[float, float] | None:
+    """Return the two numbers of a text from a page, or None."""
     try:
-        x, y = map(float, place.split(","))
+        x, y = map(float, position.split(","))
     except ValueError:
         return None
     return (x, y) if math.isfinite(x + y) else None

@@ -1,76 +1,104 @@
-"""A window in which decals are pushed by hand."""
+"""The editing window."""
 
 import os
-import time
 from typing import Any
 
 import pyvista as pv
 
-import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
-from decals.checks import shown, whole
-from decals.edit.actions import Actions
-from decals.edit.session import EditSession
-from decals.edit.tools import Tools
+import decals.vtk  # noqa: F401  (registers `plotter.decals`)
+from blobtree._typing import Float32Array
+from decals.editing.actions import Actions
+from decals.editing.background import BackgroundJobs
+from decals.editing.document import Document
+from decals.editing.pointer_tools import PointerTools
+from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
-from decals.render.libraries import require_gl
+from decals.rendering.gl_libraries import require_gl
 from decals.scenes.scene import Scene
-from decals.surfaces.surface import Floats
-from decals.vtk.settings import MOST_SAMPLES
-from decals.vtk.weak import weakly
-from decals.window.bindings import Bindings
-from decals.window.grip import Grip
-from decals.window.home import (
-    SIZE,
+from decals.validation import describe, whole_number
+from decals.vtk.settings import MAX_SAMPLES
+from decals.vtk.subplot import SubplotRenderer
+from decals.vtk.weak_callback import weak_callback
+from decals.window.event_bindings import EventBindings
+from decals.window.frames import FrameController, FrameState
+from decals.window.handle import PrimitiveHandle
+from decals.window.host_plotter import (
+    DEFAULT_SIZE,
+    HostPlotter,
+    SubplotBackup,
     before_screenshots,
+    camera_of,
     checked_size,
-    lent_plotter,
-    new_plotter,
+    edits_at,
+    eye_and_target,
+    ray_through,
     require_screen,
 )
-from decals.window.looking import camera_of, ray_through, view_of
-from decals.window.marks import Marks
-from decals.window.quality import Quality
-from decals.window.tenancy import Tenancy, edits_at
-from decals.window.ticker import TICK, Ticker, running_loop
-from decals.window.timing import Timing
-from decals.window.waiting import NEWS, SLICE, Waiting
-
-GLANCE = 0.25
-"""Size of the very first frame, when nobody knows how fast the machine is."""
-
-REST = 0.2
-"""Seconds without any movement after which a whole frame is drawn."""
+from decals.window.overlay import Overlay
+from decals.window.scheduling import (
+    STATUS_INTERVAL,
+    TICK_MILLISECONDS,
+    AsyncTicker,
+    RateLimit,
+    Warmup,
+    running_loop,
+)
 
 
 class EditWindow:
-    """A scene in a pyvista window, edited by hand.
+    """A pyvista window in which a scene is edited.
 
-    ``window.plotter`` is an ordinary plotter: everything of pyvista can be added. `decals.view` is one call
-    over this.
+    ``window.plotter`` is an ordinary plotter, so anything of pyvista can be added. `decals.edit` opens a
+    window, waits until it is closed, and returns the edited scene.
 
     Parameters
     ----------
-    scene
-        What to edit, or a session that goes on.
-    path
-        Where to save.
-    size
-        Of the window, in pixels.
-    off_screen
-        Whether to do without a screen; events are then the caller's.
-    samples
-        Samples a pixel along each axis, at rest.
-    plotter
-        Edit in the active subplot of this one, such as pyvistaqt's or one that trame serves, in place of a
-        window of our own. It stays open, and ``size`` and ``off_screen`` are its own. A subplot that showed
-        a scene through us goes on to show the edited one; one that showed none is empty again.
+    scene : Scene or EditSession
+        What to edit.
+    path : str or path-like, optional
+        File to save to.
+    size : (int, int)
+        Width and height of the window in pixels.
+    off_screen : bool
+        If True, the window has no screen and receives no events.
+    samples : int
+        Samples per pixel along each axis, while nothing moves.
+    plotter : pyvista.BasePlotter, optional
+        Edit in the active subplot of this plotter, such as one of pyvistaqt or trame, in place of a new
+        window. The plotter stays open; ``size`` and ``off_screen`` do not apply. A subplot that showed a
+        scene of ``plotter.decals`` shows the edited scene afterwards.
+
+    Attributes
+    ----------
+    session : EditSession
+        The edited session.
+    actions : Actions
+        Selection and actions.
+    tools : PointerTools
+        Pointer, wheel and key input.
+    subplot : SubplotRenderer
+        Draws the scene.
+    frames : FrameController
+        Chooses the quality of frames.
 
     Raises
     ------
     NoGraphics
         There is no OpenGL, or no screen for a window.
     InvalidScene
-        There is no scene to edit, no pixel in the window, or no interaction in the plotter.
+        The scene, size, path, samples or plotter is not valid.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
+    >>> with decals.window.EditWindow(scene, off_screen=True, size=(160, 120)) as window:
+    ...     window.show()
+    ...     window.actions.perform("select_all", lambda: None)
+    ...     selected = len(window.actions.state.selection)
+    >>> selected
+    30
     """
 
     def __init__(
@@ -78,7 +106,7 @@ class EditWindow:
         scene: Scene | EditSession,
         *,
         path: str | os.PathLike[str] | None = None,
-        size: tuple[int, int] = SIZE,
+        size: tuple[int, int] = DEFAULT_SIZE,
         off_screen: bool = False,
         samples: int = 2,
         plotter: pv.BasePlotter | None = None,
@@ -86,217 +114,186 @@ class EditWindow:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
         size = checked_size(size)
-        whole("samples", samples, 1, MOST_SAMPLES, InvalidScene)
+        whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
         if path is not None and not isinstance(path, str | os.PathLike):
-            raise InvalidScene(f"path: expected a path to save to, got {shown(path)}")
+            raise InvalidScene(f"path: expected a path to save to, got {describe(path)}")
         require_gl()
-        self._guest = plotter is not None
-        self.plotter: Any = lent_plotter(plotter) if plotter is not None else new_plotter(off_screen, size)
+        self._host = HostPlotter(plotter, off_screen=off_screen, size=size)
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
-        self.document = self.session.document
-        self.samples, self._closed = samples, False
-        self.quality = Quality()
+        self._closed = False
+        self.subplot: SubplotRenderer = self.plotter.decals.subplot
+        self._backup = SubplotBackup(self.subplot)
+        self._host.add_scene(self.document.scene)
+        self.subplot.scene = self.document
+        self.frames = FrameController(self.subplot, samples, self.plotter.render, self._content_version)
+        self.warmup = Warmup(self.subplot, weak_callback(self._show_status), self.frames.give_up)
+        self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
         self.actions = Actions(self.session, path=path, threaded=True)
-        self.background = self.actions.background
-        self.actions.camera = lambda: camera_of(self.stage)
-        self.actions.view = lambda: view_of(self.stage)
-        self.tools = Tools(self.actions, lambda x, y: ray_through(self.stage, x, y), self._hidden)
-        self._open_stage()
-        self.marks = Marks(self.plotter)
-        self.grip = Grip(self.stage.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole))
-        self._interactor = self.plotter.iren.interactor
-        self._bindings = Bindings(self, self._interactor)
-        self._ticker = Ticker(self)
-        self._timer, self._moved, self._told = 0, 0.0, 0.0
-        self._whole: tuple[int, ...] = self._shown
-
-    def _open_stage(self) -> None:
-        self.stage = self.plotter.decals.stage
-        self._tenancy = Tenancy(self.stage)
-        self.plotter.decals.add_scene(
-            self.document.scene, camera=not (self._guest and self.plotter.renderer.camera_set)
+        self.actions.camera = lambda: camera_of(self.subplot)
+        self.actions.state.view = lambda: eye_and_target(self.subplot)
+        self.tools = PointerTools(
+            self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
         )
-        self.stage.scene = self.document
-        self.stage.measure, self.stage.samples = True, self.samples
-        self.waiting = Waiting(self.stage, weakly(self._show_status), weakly(self._give_up))
-        self._timing = Timing(self.stage, self.quality)
-        self._end_screenshots = before_screenshots(self.plotter, weakly(self.make_whole))
+        self.overlay = Overlay(self.plotter)
+        self.handle = PrimitiveHandle(
+            self.subplot.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole)
+        )
+        self._bindings = EventBindings(self, self._host.interactor)
+        self._ticker = AsyncTicker(self)
+        self._status_limit = RateLimit(STATUS_INTERVAL)
+
+    # -- state ------------------------------------------------------------------------------------------
+
+    @property
+    def plotter(self) -> Any:
+        """The pyvista plotter."""
+        return self._host.plotter
+
+    @property
+    def document(self) -> Document:
+        """The edited document."""
+        return self.session.document
+
+    @property
+    def background(self) -> BackgroundJobs:
+        """Long edits and saves."""
+        return self.actions.state.background
 
     @property
     def ticking(self) -> bool:
-        """Whether a timer calls `tick`, or a loop of asyncio's; where none does, frames are whole at once."""
-        return self._timed or running_loop() is not None
-
-    @property
-    def _timed(self) -> bool:
-        """Whether the plotter's interactor has timers: off screen nobody waits for events."""
-        return not getattr(self.plotter, "off_screen", False)
+        """True if a timer or an asyncio loop calls `tick`; otherwise every frame is whole."""
+        return self._host.has_timers or running_loop() is not None
 
     @property
     def busy(self) -> bool:
-        """Whether something goes on in the background, or a whole frame is still to be drawn."""
-        goes_on = self.background.busy or self._moved > 0.0 or self.stage.waiting
-        return not self._closed and goes_on
+        """True while background work runs, or the frame is to be refined."""
+        coarse = self.frames.state is FrameState.COARSE
+        return not self._closed and (self.background.busy or coarse or self.subplot.warming_up)
 
-    # -- what is seen -----------------------------------------------------------------------------------
-
-    def redraw(self, *, whole: bool) -> None:
-        """Show what there is: as a whole once nothing moves any more, or quickly; nothing once closed."""
-        if self._closed:
-            return
-        self.actions_shown()
-        if self.busy:
-            self._ticker.wake()
-        if not whole:
-            self._edited()
-            self.plotter.render()
-        elif not self.ticking:
-            self.rest()
-        else:
-            if self._whole != self._shown:
-                self._edited()  # `tick` draws the whole frame a little later
-            self.plotter.render()
-
-    @property
-    def _shown(self) -> tuple[int, ...]:
-        """Tells apart what the scene's pictures show."""
+    def _content_version(self) -> tuple[int, ...]:
         document = self.document
         return id(document.objects), id(document.images), document.decals.version
 
-    def actions_shown(self) -> None:
-        """Bring outlines, handle, help and status up to date."""
-        dragging = self.tools.dragging or self.grip.moving or self.background.following
+    # -- frames -----------------------------------------------------------------------------------------
+
+    def redraw(self, *, whole: bool) -> None:
+        """Show the present state; a closed window does nothing.
+
+        Parameters
+        ----------
+        whole
+            If True, the frame is whole, now or a little later. If False, it is drawn in time for a drag.
+        """
+        if self._closed:
+            return
+        self.update_overlay()
+        if self.busy:
+            self._ticker.wake()
+        if whole and not self.ticking:
+            self.draw_whole_frame()
+            return
+        if not whole or self.frames.outdated:
+            self.frames.choose_for_edit()
+            self._wake_if_coarse()
+        self.plotter.render()
+
+    def begin_motion(self) -> None:
+        """Draw the next frames at a quality that is in time for a moving camera."""
+        self.frames.choose_for_motion()
+        self._wake_if_coarse()
+
+    def _wake_if_coarse(self) -> None:
+        if self.frames.state is FrameState.COARSE:
+            self._ticker.wake()
+
+    def draw_whole_frame(self) -> None:
+        """Draw a whole frame now, however long it takes."""
+        self.frames.draw_whole()
+
+    def _before_screenshot(self) -> None:
+        if not self._closed:
+            self.frames.require_whole()
+
+    def update_overlay(self) -> None:
+        """Update outlines, handle, help and status."""
+        dragging = self.tools.dragging or self.handle.dragging or self.background.following
         if not dragging:
-            self.grip.update()
-        outlined = () if dragging else self.actions.selection  # it takes longer than the move itself
-        self.marks.outline(self.document, outlined, self.stage.contact, self.stage.mapping)
-        self.marks.show_help(self.actions.help)
-        self.marks.say(self._status())
+            self.handle.update()
+        outlined = () if dragging else self.actions.state.selection  # outlines take longer than the drag
+        self.overlay.outline(self.document, outlined, self.subplot.contact, self.subplot.mapping)
+        self.overlay.show_help(self.actions.help_visible)
+        self.overlay.show_status(self._status())
 
     def _status(self) -> str:
-        told = (self.waiting.news, self.background.progress, self.actions.message)
-        return "   ".join(filter(None, told)) or "h: help"
-
-    def _edited(self) -> None:
-        """Draw the next frame as at rest, or with fewer samples, where little of it changed; or coarsely."""
-        for samples in (self.samples, 1):
-            if self.quality.in_time(samples, self.stage.to_draw(samples)):
-                self.stage.draw_scale, self.stage.samples = 1.0, samples
-                if samples == self.samples:
-                    self._moved, self._whole = 0.0, self._shown  # nothing is left for later
-                else:
-                    self._moved = time.perf_counter()
-                return
-        self.moving()
-
-    def moving(self) -> None:
-        """Draw the next frames at the size that is done in time, all of each."""
-        self._moved = time.perf_counter()
-        self._ticker.wake()
-        if self.quality.expected(self.samples) > self.quality.target:
-            self.stage.draw_scale, self.stage.samples = self.quality.scale, 1
-
-    def rest(self) -> None:
-        """Draw a whole frame now, however long that takes."""
-        self.stage.draw_scale, self.stage.samples = 1.0, self.samples
-        self._moved, self._whole = 0.0, self._shown
-        patient, self.stage.patient = self.stage.patient, False
-        self.plotter.render()
-        self.stage.patient = patient
-
-    def make_whole(self) -> None:
-        """Draw a whole frame now, unless the last one was, or the window is closed."""
-        was = not self.stage.waiting and (self.stage.draw_scale, self.stage.samples) == (1.0, self.samples)
-        if not (was or self._closed):
-            self.rest()
-
-    def _refine(self) -> None:
-        """Draw better than now, slice by slice: first at the window's size, then with all samples."""
-        samples = 1 if self.stage.draw_scale < 1.0 else self.samples
-        if not self.quality.known or self.quality.expected(samples) > SLICE:
-            seconds = self.stage.prepare(samples, SLICE)
-            if seconds is None:
-                return
-            if seconds:
-                self.quality.saw(samples, seconds)
-        if samples == self.samples:
-            self.rest()
-        else:
-            self.stage.draw_scale, self.stage.samples = 1.0, samples
-            self.plotter.render()
-
-    # -- what goes on -----------------------------------------------------------------------------------
-
-    def tick(self) -> None:
-        """Look after the background work, and draw a whole frame once nothing moves; nothing once closed."""
-        now, dragging = time.perf_counter(), self.tools.dragging or self.grip.moving
-        if self._closed or self.waiting.go_on():
-            return
-        if self.background.look(dragging=dragging):
-            self.redraw(whole=not dragging)
-        elif self.background.busy and now - self._told > NEWS:
-            self._told = now
-            self._show_status()
-        elif self._moved and now - self._moved > REST:
-            self._refine()
-
-    def _give_up(self) -> None:
-        self._moved = 0.0  # better frames would fail alike
+        parts = (self.warmup.status, self.background.progress, self.actions.state.message)
+        return "   ".join(filter(None, parts)) or "h: help"
 
     def _show_status(self) -> None:
-        self.marks.say(self._status())
+        self.overlay.show_status(self._status())
         self.plotter.render()
 
-    def elsewhere(self, x: int, y: int) -> bool:
-        """Whether a place is in a subplot of the same plotter that another window edits."""
-        return any(edits_at(stage, x, y) for stage in self.plotter.decals.stages if stage is not self.stage)
+    # -- background work --------------------------------------------------------------------------------
 
-    def _hidden(self, x: float, y: float, position: Floats) -> bool:
-        """Whether an actor that was added to the plotter hides a point of a surface."""
-        return bool(self.stage.hidden(int(x), int(y), position))
+    def tick(self) -> None:
+        """Do the next piece of background work, and refine the frame once nothing moves."""
+        dragging = self.tools.dragging or self.handle.dragging
+        if self._closed or self.warmup.advance():
+            return
+        if self.background.poll(dragging=dragging):
+            self.redraw(whole=not dragging)
+        elif self.background.busy and self._status_limit.take():
+            self._show_status()
+        else:
+            self.frames.refine_when_due()
+
+    def in_other_subplot(self, x: int, y: int) -> bool:
+        """Return True if a pixel is in a subplot of the same plotter that another window edits."""
+        subplots = self.plotter.decals.subplots
+        return any(edits_at(subplot, x, y) for subplot in subplots if subplot is not self.subplot)
+
+    def _is_occluded(self, x: float, y: float, position: Float32Array) -> bool:
+        """Return True if another actor of the plotter hides a surface point."""
+        return bool(self.subplot.hidden(int(x), int(y), position))
 
     # -- opening and closing ----------------------------------------------------------------------------
 
     require_screen = staticmethod(require_screen)
 
     def show(self) -> None:
-        """Open the window, and stay until it is closed; off screen and in a lent plotter, draw a frame.
+        """Open the window and wait until it is closed; off screen and in a given plotter, draw one frame.
 
         Raises
         ------
         InvalidEdit
-            The window was closed.
+            The window was closed before.
         """
         self.begin()
-        if self._guest:
+        if self._host.provided:
             self.plotter.render()
             return
-        self.plotter.show(auto_close=False, interactive=self._timed)
-        if self._timed:
+        self.plotter.show(auto_close=False, interactive=self._host.has_timers)
+        if self._host.has_timers:
             self.close()
 
     def begin(self) -> None:
-        """Do what `show` does before it waits for events; the scene comes into the window with `tick`."""
+        """Start the timer and the first, coarse frame; `show` calls it."""
         if self._closed:
             raise InvalidEdit("the window was closed; open another EditWindow on its session")
-        self.actions_shown()
+        self.update_overlay()
         if self.ticking:
-            self.stage.patient = True
-            self.stage.draw_scale, self._moved = GLANCE, time.perf_counter() - REST
-        self.plotter.iren.initialize()
-        if self._timed:
-            self._timer = self._interactor.CreateRepeatingTimer(TICK)
+            self.frames.begin()
+        self._host.start_timer(TICK_MILLISECONDS)
         self._ticker.wake()
 
     def close(self) -> None:
-        """Close the window, or leave the plotter that was lent, once what goes to a file is there.
+        """Close the window, or leave the given plotter, after all saves are complete.
 
-        Twice is harmless. What else goes on is stopped.
+        Background edits are cancelled. Closing twice is harmless.
 
         Raises
         ------
         InvalidScene
-            The file could not be written; the window is closed all the same.
+            The file could not be written; the window is closed nevertheless.
         """
         if self._closed:
             return
@@ -305,26 +302,25 @@ class EditWindow:
         try:
             self.background.close()
         finally:
-            self._close()
+            self._release()
 
-    def _close(self) -> None:
-        self.session.end()
-        self.actions.release()
-        self.grip.release()
+    def _release(self) -> None:
+        self.session.end_stroke()
+        self.actions.state.close()
+        self.handle.release()
         self._bindings.release()
         self._end_screenshots()
-        if not self._guest:
+        if not self._host.provided:
             self.plotter.close()
-        elif self.plotter.render_window is not None:  # otherwise it was closed before us
-            self._leave()
+        elif self._host.open:  # else the caller closed it
+            self._leave_plotter()
 
-    def _leave(self) -> None:
-        """Take out of a lent plotter what we put there."""
-        self.marks.release()
-        if self._timer:
-            self._interactor.DestroyTimer(self._timer)
-        self._timing.release()
-        self._tenancy.end(self.document)
+    def _leave_plotter(self) -> None:
+        """Remove from the caller's plotter what the window added."""
+        self.overlay.release()
+        self._host.stop_timer()
+        self.frames.release()
+        self._backup.restore(self.document)
         self.plotter.render()
 
     def __enter__(self) -> "EditWindow":
@@ -334,15 +330,41 @@ class EditWindow:
         self.close()
 
 
-def view(
+def edit(
     scene: Scene | EditSession,
     *,
     path: str | os.PathLike[str] | None = None,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = DEFAULT_SIZE,
 ) -> Scene:
-    """Open a window, edit in it, and give the scene as it is when the window is closed.
+    """Open a window to edit a scene, and return the edited scene when the window is closed.
 
-    Arguments and errors are those of `EditWindow`.
+    Parameters
+    ----------
+    scene : Scene or EditSession
+        What to edit.
+    path : str or path-like, optional
+        File to save to with Ctrl + S.
+    size : (int, int)
+        Width and height of the window in pixels.
+
+    Returns
+    -------
+    Scene
+        The edited scene.
+
+    Raises
+    ------
+    NoGraphics
+        There is no OpenGL, or no screen for a window.
+    InvalidScene
+        The scene, path or size is not valid.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
+    >>> edited = decals.edit(scene)  # doctest: +SKIP
     """
     with EditWindow(scene, path=path, size=size) as window:
         window.show()

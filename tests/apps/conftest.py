@@ -3,11 +3,11 @@
 import pytest
 
 from decals.errors import NoGraphics
-from decals.render import Renderer
+from decals.rendering import Renderer
 
 
 @pytest.fixture(scope="module")
-def renderer() -> Renderer:
+def renderer(vtk_display: None) -> Renderer:
     try:
         return Renderer()
     except NoGraphics as error:

@@ -1,9 +1,10 @@
-"""Every example of the gallery draws, and draws what its small picture in ``tests/golden`` shows.
+"""Each example of the gallery draws the picture of its name in ``tests/golden``.
 
-After a change that is meant to be seen, write them anew with IMPLICIT_DECALS_GOLDEN=write, and look at them.
+After an intended change, write the pictures again with IMPLICIT_DECALS_GOLDEN=write and look at them.
 """
 
 import os
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -11,30 +12,31 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from decals.apps import gallery
+from decals.apps.gallery import sphere
+from decals.apps.gallery.helpers import draw, main
 from decals.errors import NoGraphics
-from decals.render import Renderer
-from implicit_decals.apps import gallery
-from implicit_decals.apps.gallery.panels import draw
+from decals.rendering import Renderer
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 SIDE = 64
 TOLERANCE = 2
 """Levels of 255 by which a pixel may differ."""
-FEW = 0.002
-"""Part of the pixels that may differ more: rounding decides there who owns them."""
-SEEDED = ("particles", "deforming", "painted", "models", "dragon")
-"""Examples that show what seeding finds: better seeding makes another picture of them."""
+MAX_DIFFERENT = 0.002
+"""Fraction of pixels that may differ more: at equal fields, rounding decides the owner."""
+SCATTERED = ("particles", "deforming", "painted", "models", "dragon")
+"""Examples that depend on scattering: better scattering changes their pictures."""
 
 
 @pytest.fixture(scope="module")
-def renderer() -> Renderer:
+def renderer(vtk_display: None) -> Renderer:
     try:
-        made = Renderer()
+        renderer = Renderer()
     except NoGraphics as error:
         pytest.skip(str(error))
-    if "llvmpipe" not in made.context.name:
-        pytest.skip(f"golden images are drawn by llvmpipe, not by {made.context.name}")
-    return made
+    if "llvmpipe" not in renderer.context.name:
+        pytest.skip(f"golden images are drawn by llvmpipe, not by {renderer.context.name}")
+    return renderer
 
 
 @pytest.mark.parametrize("name", gallery.EXAMPLES)
@@ -44,7 +46,7 @@ def test_an_example_draws_its_golden_image(renderer: Renderer, name: str) -> Non
     module = import_module(f"{gallery.__name__}.{name}")
     assert module.__doc__
     drawn = draw(renderer, module.panels(), side=SIDE, samples=2)[..., :3]
-    if name in SEEDED:
+    if name in SCATTERED:
         assert drawn.std() > 20
         return
     path = GOLDEN / f"{name}.png"
@@ -53,12 +55,21 @@ def test_an_example_draws_its_golden_image(renderer: Renderer, name: str) -> Non
     golden = np.asarray(Image.open(path).convert("RGB"))
     assert drawn.shape == golden.shape
     off = np.abs(drawn.astype(int) - golden).max(axis=-1) > TOLERANCE
-    assert off.mean() <= FEW, f"{off.sum()} pixels of {name} differ"
+    assert off.mean() <= MAX_DIFFERENT, f"{off.sum()} pixels of {name} differ"
+
+
+@pytest.mark.parametrize("name", gallery.EXAMPLES)
+def test_an_example_imports_public_names_only(name: str) -> None:
+    source = (Path(gallery.__file__).parent / f"{name}.py").read_text(encoding="utf-8")
+    imported = re.findall(r"^(?:from|import) ((?:blobtree|decals)[\w.]*)", source, re.MULTILINE)
+    deep = [name for name in imported if name.count(".") > 1 and not name.startswith("decals.apps.")]
+    assert imported
+    assert not deep
 
 
 def test_every_module_is_an_example() -> None:
     folder = Path(gallery.__file__).parent
-    modules = {path.stem for path in folder.glob("*.py")} - {"__init__", "panels", "stage"}
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__", "helpers"}
     assert modules == set(gallery.EXAMPLES)
     assert set(gallery.DOWNLOADED) <= modules
 
@@ -66,10 +77,8 @@ def test_every_module_is_an_example() -> None:
 def test_an_example_runs_by_itself(
     renderer: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from implicit_decals.apps.gallery import panels, sphere
-
     output = tmp_path / "sphere.png"
     monkeypatch.setattr("sys.argv", ["sphere", "-o", str(output), "--side", "40"])
-    panels.main(sphere.panels)
+    main(sphere.panels)
     with Image.open(output) as picture:
         assert picture.size == (84, 40)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.scenes.scene import MeshObject, SceneObject, TreeObject
-from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.models.knot import torus_knot
-from implicit_decals.apps.views import PRESETS, UPRIGHT, View, frame, parse_view
+from decals.apps.errors import UsageError
+from decals.apps.models.knot import torus_knot
+from decals.apps.views import PRESETS, UPRIGHT, View, frame, parse_view
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 
 
 def _knot(scale: float = 1.0, shift: float = 0.0) -> MeshObject:
@@ -22,9 +22,7 @@ def _ball() -> TreeObject:
 @pytest.mark.parametrize("size", [(400, 300), (300, 400), (1000, 50)])
 @pytest.mark.parametrize("text", ["three-quarter", "top", "back", "1,2,-3", "0,5,0"])
 @pytest.mark.parametrize("objects", [(_knot(),), (_knot(1e-3, 5.0),), (_knot(1e4), _ball())])
-def test_everything_is_in_the_picture_and_fills_it(
-    objects: tuple[SceneObject, ...], text: str, size: tuple[int, int]
-) -> None:
+def test_objects_fill_the_picture(objects: tuple[SceneObject, ...], text: str, size: tuple[int, int]) -> None:
     camera = frame(objects, parse_view(text, UPRIGHT["y"]), size)
     mesh = objects[0]
     assert isinstance(mesh, MeshObject)
@@ -35,7 +33,7 @@ def test_everything_is_in_the_picture_and_fills_it(
 
 
 @pytest.mark.parametrize("up", ["x", "y", "z"])
-def test_presets_stand_on_the_chosen_axis(up: str) -> None:
+def test_presets_follow_the_upward_axis(up: str) -> None:
     axes = UPRIGHT[up]
     views = {name: parse_view(name, axes) for name in PRESETS}
     assert all(view.up == axes.up for view in views.values())
@@ -46,12 +44,12 @@ def test_presets_stand_on_the_chosen_axis(up: str) -> None:
         assert np.allclose(np.add(views[one].direction, views[other].direction), 0.0)
 
 
-def test_a_direction_is_taken_as_it_is() -> None:
+def test_directions_are_parsed() -> None:
     assert parse_view("1,-2.5,3e1", UPRIGHT["z"]) == View((1.0, -2.5, 30.0), (0.0, 0.0, 1.0))
 
 
 @pytest.mark.parametrize("text", ["", "up", "1,2", "1,2,3,4", "0,0,0", "1,nan,0", "inf,0,0"])
-def test_what_is_no_camera(text: str) -> None:
+def test_invalid_cameras_are_refused(text: str) -> None:
     if text == "":
         assert parse_view(text, UPRIGHT["y"]) == parse_view("three-quarter", UPRIGHT["y"])
         return

@@ -1,11 +1,12 @@
-"""What the implicit engine costs: ``python -m tests.bench.blobtree [--json PATH] [--quick]``.
+"""Benchmark of the implicit engine: ``python -m tests.bench.blobtree [--json PATH] [--quick]``.
 
 The scene: N points of influence s = 0.6 N^(−1/3), uniform in the unit cube, summed; (R + 1)³ samples.
-Times are medians of whole pipelines in process, nodes to triangles, compiles excluded. The rival stamps
-each point's box with NumPy and contours with vtkFlyingEdges3D: it can only sum points, and it is fast.
+Times are medians of whole pipelines in process, from nodes to triangles, without compilation. The reference
+adds each point's box to a grid with NumPy and contours it with vtkFlyingEdges3D: fast, but for sums of points
+only.
 
-With `--device cuda:0` (NumPy and Warp are enough there): meshes that stay on the device, the same brought to
-the host, and what tapes and cells take of it.
+With `--device cuda:0` (needs only NumPy and Warp): meshes on the device, meshes copied to the host, and the
+parts of tapes and cells.
 """
 
 import argparse
@@ -18,6 +19,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -27,10 +29,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Union
-from blobtree.meshing.polygonize import download
-from blobtree.meshing.surface import Surface, extract_surface
-from blobtree.sparse.cells import SparseCells, build_cells
-from blobtree.sparse.grid import BRANCHING, aligned_grid
+from blobtree.cells.grid import BRANCHING, aligned_grid
+from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.meshing.device_mesh import DeviceMesh, extract_mesh
+from blobtree.meshing.mesh import download
+from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import trace
 from tests.bench.marching_cubes import marching_cubes
 
@@ -45,81 +48,86 @@ Clock = Callable[[], float]
 
 
 def centers(count: int) -> tuple[NDArray[np.float64], float]:
-    """The scene's points (n, 3) and their influence."""
+    """Return the points (n, 3) of the scene and their influence radius."""
     s = 0.6 * count ** (-1.0 / 3.0)
     rng = np.random.default_rng(1234 + count)
     return rng.uniform(0.75 * s, 1.0 - 0.75 * s, (count, 3)), s
 
 
 def blobs(count: int) -> list[Point]:
-    """The scene's points as nodes."""
-    places, s = centers(count)
-    return [Point((x, y, z), radius=s * RIM) for x, y, z in places.tolist()]
+    """Return the points of the scene as nodes."""
+    positions, s = centers(count)
+    return [Point((x, y, z), radius=s * RIM) for x, y, z in positions.tolist()]
 
 
 def mixed(count: int) -> Node:
-    """The same points under unions, Ricci blends, differences and one twist around the cube's axis."""
+    """Return the points under unions, Ricci blends, differences and a twist around the cube's axis."""
     nodes = blobs(count)
     groups = [nodes[i : i + 10] for i in range(0, count, 10)]
     parts = [(Ricci(tuple(g[:5]), exponent=3.0) | Sum(tuple(g[5:9]))) - g[9] for g in groups]
     return Union(tuple(parts)).translate((-0.5, -0.5, 0.0)).twist(20.0).translate((0.5, 0.5, 0.0))
 
 
+def tape_of(nodes: tuple[Node, ...]) -> Tape:
+    """Return the tape of a new sum."""
+    return Sum(nodes).tape
+
+
 def cells_of(tree: Node, resolution: int, device: str = "cpu") -> SparseCells:
-    """The sparse cells of the unit cube."""
+    """Return the sparse cells of the unit cube."""
     cells = build_cells(tree.tape, aligned_grid(*UNIT_BOX, 1.0 / resolution), device=device)
     wp.synchronize_device(device)
     return cells
 
 
-def surface_of(tree: Node, resolution: int, device: str = "cpu") -> Surface:
-    """The whole pipeline, up to triangles in the device's memory."""
-    surface = extract_surface(cells_of(tree, resolution, device), lambda _stage, _fraction: None)
+def surface_of(tree: Node, resolution: int, device: str = "cpu") -> DeviceMesh:
+    """Run the pipeline, up to triangles in the device's memory."""
+    surface = extract_mesh(cells_of(tree, resolution, device), lambda _stage, _fraction: None)
     wp.synchronize_device(device)
     return surface
 
 
 def mesh_of(tree: Node, resolution: int, device: str = "cpu") -> Mesh:
-    """The whole pipeline."""
+    """Run the pipeline, up to triangles on the host."""
     return download(surface_of(tree, resolution, device))
 
 
 def stamped(count: int, resolution: int) -> Any:
-    """The rival: each point's box of influence added to a dense grid, then contoured by VTK."""
+    """Run the reference: add each point's box of influence to a dense grid, and contour it by VTK."""
     import pyvista as pv
 
-    places, s = centers(count)
+    positions, s = centers(count)
     side = resolution + 1
     axis = np.linspace(0.0, 1.0, side, dtype=np.float32)
     values = np.zeros((side, side, side), np.float32)
-    for center in places:
+    for center in positions:
         low = np.maximum(np.ceil((center - s) * resolution).astype(int), 0)
         high = np.minimum(np.floor((center + s) * resolution).astype(int) + 1, side)
         x, y, z = (
             ((axis[a:b] - np.float32(c)) / np.float32(s)) ** 2
             for a, b, c in zip(low, high, center, strict=True)
         )
-        rest = np.maximum(1.0 - (x[:, None, None] + y[:, None] + z), 0.0)
-        values[low[0] : high[0], low[1] : high[1], low[2] : high[2]] += rest * rest * rest
+        falloff = np.maximum(1.0 - (x[:, None, None] + y[:, None] + z), 0.0)
+        values[low[0] : high[0], low[1] : high[1], low[2] : high[2]] += falloff * falloff * falloff
     grid = pv.ImageData(dimensions=(side, side, side), spacing=(1.0 / resolution,) * 3)
     grid["field"] = values.ravel(order="F")
     return grid.contour([0.5], scalars="field", method="flying_edges")
 
 
 def timed(work: Callable[[], object], clock: Clock = time.perf_counter) -> float:
-    """Seconds that `work` takes."""
+    """Return the seconds that `work` takes."""
     start = clock()
     work()
     return clock() - start
 
 
 def median_time(work: Callable[[], object], runs: int = RUNS, clock: Clock = time.perf_counter) -> float:
-    """Median seconds, after one run that is not counted."""
+    """Return the median seconds of some runs after one untimed run."""
     return statistics.median([timed(work, clock) for _ in range(runs + 1)][1:])
 
 
 def meshing(quick: bool) -> Figures:
-    """Times of whole pipelines, ours and the rival's, in turn."""
+    """Measure whole pipelines and the reference."""
     runs = 3 if quick else RUNS
     figures = {
         "mesh_1000_256_s": median_time(lambda: mesh_of(Sum(tuple(blobs(1000))), 256), runs),
@@ -129,38 +137,38 @@ def meshing(quick: bool) -> Figures:
     figures["mesh_over_stamp"] = figures["mesh_1000_256_s"] / figures["stamp_1000_256_s"]
     trees = Sum(tuple(blobs(1000))), mixed(1000)
     per_cell = [
-        median_time(lambda t=tree: mesh_of(t, 256), 3) / len(mesh_of(tree, 256).vertices) for tree in trees
+        median_time(partial(mesh_of, tree, 256), 3) / len(mesh_of(tree, 256).vertices) for tree in trees
     ]
     figures["mixed_over_sum"] = per_cell[1] / per_cell[0]
     return figures
 
 
-def begun(tree: Node, resolution: int, device: str) -> None:
-    """The triangles of a tree from nothing, on the device."""
+def mesh_from_scratch(tree: Node, resolution: int, device: str) -> None:
+    """Polygonize a tree on the device, without reuse."""
     Polygonizer(tree, cell_size=1.0 / resolution, device=device)
     wp.synchronize_device(device)
 
 
 def remeshing(device: str = "cpu", resolution: int = 256) -> Figures:
-    """One of 1,000 points moved, again and again: the time from the new tree to its triangles."""
+    """Measure edits: the time from a tree with one of 1,000 points moved to its triangles."""
     nodes, rng = blobs(1000), np.random.default_rng(7)
     polygonizer = Polygonizer(Sum(tuple(nodes)), cell_size=1.0 / resolution, device=device)
     edits, fresh = [], []
     for edit in range(16):
-        moved = int(rng.integers(len(nodes)))
-        x, y, z = nodes[moved].center + rng.normal(size=3) * 0.01
-        nodes[moved] = replace(nodes[moved], center=(x, y, z))
+        number = int(rng.integers(len(nodes)))
+        x, y, z = nodes[number].center + rng.normal(size=3) * 0.01
+        nodes[number] = replace(nodes[number], center=(x, y, z))
         tree = Sum(tuple(nodes))
 
-        def renewed(tree: Node = tree) -> None:
-            polygonizer.update_surface(tree)
+        def update(tree: Node = tree) -> None:
+            polygonizer.update_device_mesh(tree)
             wp.synchronize_device(device)
 
-        edits.append(timed(renewed))
+        edits.append(timed(update))
         if edit % 4 == 0:
-            again = Sum(tuple(nodes))
-            fresh.append(timed(lambda tree=again: begun(tree, resolution, device)))
-    sources = polygonizer.surface.cells.leaves.sources.numpy()
+            copy = Sum(tuple(nodes))
+            fresh.append(timed(partial(mesh_from_scratch, copy, resolution, device)))
+    sources = polygonizer.dual_mesh.cells.leaves.sources.numpy()
     return {
         "remesh_ms": 1e3 * statistics.median(edits[2:]),
         "remesh_over_fresh": statistics.median(edits[2:]) / statistics.median(fresh[1:]),
@@ -169,26 +177,26 @@ def remeshing(device: str = "cpu", resolution: int = 256) -> Figures:
 
 
 def cost_of_quality(device: str = "cpu", resolution: int = 256) -> Figures:
-    """Our triangles against plain marching cubes, in turn, on the same cells."""
+    """Measure dual polygonization over marching cubes on the same cells, in alternating runs."""
     tree = Sum(tuple(blobs(1000)))
 
-    def plain() -> None:
+    def reference() -> None:
         marching_cubes(cells_of(tree, resolution, device))
         wp.synchronize_device(device)
 
-    ours, theirs = [], []
+    dual, cubes = [], []
     for run in range(8):
-        ours.append(timed(lambda: surface_of(tree, resolution, device)))
-        theirs.append(timed(plain))
+        dual.append(timed(lambda: surface_of(tree, resolution, device)))
+        cubes.append(timed(reference))
         if run == 0:
-            ours, theirs = [], []
-    return {"quality_cost": statistics.median(ours) / statistics.median(theirs)}
+            dual, cubes = [], []
+    return {"quality_cost": statistics.median(dual) / statistics.median(cubes)}
 
 
 def curve(device: str = "cpu", *, quick: bool = False) -> Figures:
-    """Nanoseconds per cell that the surface crosses, at one overlap, over N and R.
+    """Measure nanoseconds per cell that the surface crosses, for several N and R at equal overlap.
 
-    Of the processor, all threads together, where that does the work: other programs do not bend it then.
+    On the processor this is processor time of all threads, which other programs do not affect.
     """
     clock = time.process_time if device == "cpu" else time.perf_counter
     figures = {}
@@ -196,30 +204,30 @@ def curve(device: str = "cpu", *, quick: bool = False) -> Figures:
         for resolution in (128, 256) if quick else (128, 256, 512):
             tree = Sum(tuple(blobs(count)))
             crossing = len(surface_of(tree, resolution, device).vertices)
-            seconds = median_time(lambda t=tree, r=resolution: surface_of(t, r, device), 3, clock)
+            seconds = median_time(partial(surface_of, tree, resolution, device), 3, clock)
             figures[f"crossing_{count}_{resolution}"] = float(crossing)
             figures[f"ns_per_crossing_{count}_{resolution}"] = 1e9 * seconds / crossing
     return figures
 
 
 def on_device(device: str, *, quick: bool) -> Figures:
-    """What a graphics card takes: the pipeline and its stages."""
+    """Measure the pipeline and its stages on a graphics card."""
     figures = {}
     scenes = [(1000, 256), (1000, 512)] + ([] if quick else [(10_000, 512), (100_000, 512)])
     for count, resolution in scenes:
         nodes, name = tuple(blobs(count)), f"{count}_{resolution}"
         tree = Sum(nodes)
-        figures[f"tape_{name}_ms"] = 1e3 * median_time(lambda n=nodes: Sum(n).tape, 3)
-        figures[f"cells_{name}_ms"] = 1e3 * median_time(lambda t=tree, r=resolution: cells_of(t, r, device))
+        figures[f"tape_{name}_ms"] = 1e3 * median_time(partial(tape_of, nodes), 3)
+        figures[f"cells_{name}_ms"] = 1e3 * median_time(partial(cells_of, tree, resolution, device))
         for kind, work in (("mesh", surface_of), ("host", mesh_of)):
-            seconds = median_time(lambda w=work, t=tree, r=resolution: w(t, r, device))
+            seconds = median_time(partial(work, tree, resolution, device))
             figures[f"{kind}_{name}_ms"] = 1e3 * seconds
         figures[f"vertices_{name}"] = float(len(surface_of(tree, resolution, device).vertices))
     return figures | remeshing(device) | cost_of_quality(device) | curve(device, quick=quick)
 
 
 def quality() -> Figures:
-    """How few cells and primitives are looked at, and what the triangles are like."""
+    """Measure cells per crossing, primitives per block, and the quality of triangles."""
     tree = Sum(tuple(blobs(1000)))
     cells = cells_of(tree, 256)
     mesh = mesh_of(tree, 256)
@@ -238,7 +246,7 @@ def quality() -> Figures:
 
 
 def _unpaired_edges(mesh: Mesh) -> int:
-    """Directed edges that occur more than once, or without their opposite."""
+    """Count the directed edges that occur more than once, or without their opposite."""
     faces = mesh.faces.astype(np.int64)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = len(mesh.vertices)
@@ -247,7 +255,7 @@ def _unpaired_edges(mesh: Mesh) -> int:
 
 
 def tracing() -> Figures:
-    """512×512 rays into the scene of 1,000 points, on all cores."""
+    """Measure 512×512 rays into the scene of 1,000 points, on all cores."""
     tree = Sum(tuple(blobs(1000)))
     x, y = np.meshgrid(np.linspace(-0.45, 0.45, 512), np.linspace(-0.45, 0.45, 512))
     directions = np.stack([x, y, np.full_like(x, -1.5)], axis=-1).reshape(-1, 3)
@@ -256,7 +264,7 @@ def tracing() -> Figures:
 
 
 def peak() -> Figures:
-    """Memory that meshing adds to a process that has compiled and loaded everything, in MB."""
+    """Measure the memory that meshing adds to a process with all kernels loaded, in MB."""
     result = subprocess.run(
         [sys.executable, "-m", "tests.bench.blobtree", "--peak"], check=True, capture_output=True, text=True
     )
@@ -264,28 +272,28 @@ def peak() -> Figures:
 
 
 def print_peak() -> None:
-    """What `peak` runs in a process of its own."""
+    """Print the figure of `peak`, which runs this in another process."""
     mesh_of(Sum(tuple(blobs(20))), 32)
-    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # forget the peak so far
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # resets the peak
     before = _resident("VmRSS")
     mesh_of(Sum(tuple(blobs(1000))), 256)
     print(_resident("VmHWM") - before)
 
 
 def _resident(field: str) -> float:
-    """Resident memory in MB, now (VmRSS) or at its peak (VmHWM); Linux alone tells."""
+    """Return the resident memory in MB, now (VmRSS) or at its peak (VmHWM); Linux only."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return float(status.split(f"{field}:")[1].split()[0]) / 1024.0
 
 
 def main() -> None:
-    """Measure, print a table, and write the figures."""
+    """Parse the command line, measure, print a table and write the figures."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="fewer runs; ends within a minute on two cores")
-    parser.add_argument("--device", default="cpu", help="a Warp device, say cuda:0")
+    parser.add_argument("--device", default="cpu", help="a Warp device, such as cuda:0")
     parser.add_argument("--peak", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.peak:
@@ -304,7 +312,7 @@ def main() -> None:
     for name, number in figures.items():
         print(f"  {name:28} {number:12.6g}")
     if options.device == "cpu":
-        print(f"Others, quoted: {PEERS}.")
+        print(f"Other engines, quoted: {PEERS}.")
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 

@@ -1,10 +1,10 @@
-"""How exact creases are, and what they cost over plain meshes of the same cells.
+"""Benchmark of creases: exactness, and cost over meshes of the same cells without creases.
 
     python -m tests.bench.creases                     # all cores
-    python -m tests.bench.creases --device cuda:0     # a graphics card; the host needs NumPy and Warp alone
+    python -m tests.bench.creases --device cuda:0     # a graphics card; the host needs NumPy and Warp only
 
-Two balls united, intersected and subtracted, whose crease is a known circle, in cells of three sizes; and the
-times of a bored block and of a union of 1,000 balls, medians, compiles and the first run left out.
+Exactness: union, intersection and difference of two balls, whose crease is a known circle, in cells of three
+sizes. Cost: a bored block and a union of 1,000 balls; medians without compilation and the first run.
 """
 
 import argparse
@@ -23,35 +23,35 @@ from tests.oracles.creases import circle
 CENTERS, RADII = ((0.0, 0.0, 0.0), (0.8, 0.13, 0.07)), (1.0, 0.9)
 RESOLUTIONS = (16, 40, 100)
 TIMED_RESOLUTION = 128
-FAR = 6.0
+DISTANCE = 6.0
 
 
 def errors(device: str) -> dict[str, float]:
-    """Largest distance to the circle in cells, vertices on it, and patches whose branches were not met."""
+    """Return the largest distance to the circle in cells, and counts of vertices on it and not on it."""
     first, second = (Point(center, radius=radius) for center, radius in zip(CENTERS, RADII, strict=True))
     ring = circle(CENTERS[0], RADII[0], CENTERS[1], RADII[1])
     worst, met, unmet = 0.0, 0, 0
     for tree in (first | second, first & second, first - second):
         for resolution in RESOLUTIONS:
             mesh = polygonize(tree, resolution=resolution, creases=True, device=device)
-            assert mesh.meetings is not None
+            assert mesh.sheet_counts is not None
             cell = float((tree.bounds[1] - tree.bounds[0]).max()) / resolution
-            worst = max(worst, float(ring.distances(mesh.vertices[mesh.meetings > 1]).max()) / cell)
-            met, unmet = met + int((mesh.meetings > 1).sum()), unmet + int((mesh.meetings == 0).sum())
+            worst = max(worst, float(ring.distances(mesh.vertices[mesh.sheet_counts > 1]).max()) / cell)
+            met, unmet = met + int((mesh.sheet_counts > 1).sum()), unmet + int((mesh.sheet_counts == 0).sum())
     return {"crease_error_h": worst, "met": met, "unmet": unmet}
 
 
 def block() -> Node:
-    """Six large balls make a block with two bores."""
-    ways = [sign * FAR * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
-    sides: list[Node] = [Point(tuple(way.tolist()), radius=FAR + 1.0) for way in ways]
+    """Intersect six large balls, and subtract two bores."""
+    centers = [sign * DISTANCE * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+    sides: list[Node] = [Point(tuple(center.tolist()), radius=DISTANCE + 1.0) for center in centers]
     bored = reduce(and_, sides) - Segment((0, 0, -3), (0, 0, 3), radius=0.5)
     return (bored - Segment((-3, 0, 0), (3, 0, 0), radius=0.35)).rotate((1, 2, 0), 20.0)
 
 
 def times(device: str, runs: int) -> dict[str, float]:
-    """Milliseconds without and with creases, and their ratio."""
-    figures = {}
+    """Return the times without and with creases in ms, and their ratio."""
+    figures: dict[str, float] = {}
     for name, tree in (("block", block()), ("union_1000", Union(tuple(blobs(1000))))):
         plain, sharp = (
             median_time(
@@ -71,7 +71,7 @@ def times(device: str, runs: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Read the command line and measure."""
+    """Parse the command line and measure."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.bench.creases",
         description=__doc__,

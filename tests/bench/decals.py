@@ -1,12 +1,13 @@
-"""What decals cost and how exact they are: ``python -m tests.bench.decals [--json PATH] [--quick]``.
+"""Benchmark of decals: time, memory and exactness.
 
-Every figure is measured in this one run: times as medians of three or more, ratios between runs that
-alternate, errors against the float64 oracles of the tests. Figures whose subject is missing are left out, and
-it is said. Other parts of it, each alone:
+    python -m tests.bench.decals [--json FILE] [--quick]
 
-    --only index [--device cuda:0]   building the index of 100,000 and 1,000,000 decals; no graphics needed
-    --only million                   1,000,000 decals rendered
-    --peers                          mesh-clipped decals, log maps and uv at vertices beside ours
+Times are medians of three or more runs, ratios those of alternating runs, errors those against the float64
+oracles of the tests. Other parts:
+
+    --only index [--device cuda:0]   building the index of 100,000 and 1,000,000 decals; needs no graphics
+    --only million                   rendering 1,000,000 decals
+    --peers                          mesh-clipped decals, log maps, and texture coordinates at vertices
 """
 
 import argparse
@@ -29,12 +30,12 @@ TARGETS = {
     "map_sphere": "≤ 1e-4",
     "map_cylinder": "≤ 1e-4",
 }
-"""What each figure ought to be; the mapping's are RMS errors of what is drawn, over the decal's radius, and
-``_chord`` beside them those of the paper's projection."""
+"""Targets of the figures. Those of the mapping are RMS errors of the drawn coordinates over the decal's
+radius; ``_chord`` marks those of the paper's projection."""
 
 
 def report(figures: Figures, machine: str) -> str:
-    """Lay figures out for people."""
+    """Return the figures as a readable table."""
     lines = [f"python -m tests.bench.decals {' '.join(sys.argv[1:])}".rstrip(), machine, ""]
     for name in [*TARGETS, *(name for name in figures if name not in TARGETS)]:
         value = f"{figures[name]:.4g}" if name in figures else "not measured"
@@ -43,27 +44,28 @@ def report(figures: Figures, machine: str) -> str:
 
 
 def versions(*packages: str) -> str:
-    """Versions of some packages."""
+    """Return the versions of packages."""
     return ", ".join(f"{name} {version(name)}" for name in packages)
 
 
 def graphics() -> str:
-    """Name what everything is measured on."""
-    from decals.render import Renderer
+    """Describe the processor, the graphics card and the packages."""
+    from decals.rendering import Renderer
 
     with Renderer() as renderer:
-        card = f"{renderer.context.name}, {renderer.entry} shaders"
+        card = f"{renderer.context.name}, {renderer.backend} shaders"
     processor = platform.processor() or platform.machine()
     return f"{processor}; {card}; {versions('numpy', 'warp-lang', 'moderngl')}"
 
 
-def index_alone(device: str) -> Figures:
-    """Measure the index on a device, and print."""
+def measure_index(device: str) -> Figures:
+    """Measure the index on a device, and print the figures."""
     import warp as wp
 
+    from blobtree.device import start_warp
     from tests.bench import decal_index
 
-    wp.init()
+    start_warp()
     print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}")
     print(f"{wp.get_device(device).name}; numpy {version('numpy')}, warp {wp.__version__}", flush=True)
     figures = decal_index.measure(device)
@@ -72,8 +74,8 @@ def index_alone(device: str) -> Figures:
     return figures
 
 
-def rendered_million(*, quick: bool) -> Figures:
-    """Draw a million decals, and print."""
+def measure_million(*, quick: bool) -> Figures:
+    """Render a million decals, and print the figures."""
     from tests.bench import decal_figures
 
     figures = decal_figures.million((320, 240) if quick else (800, 600))
@@ -82,15 +84,15 @@ def rendered_million(*, quick: bool) -> Figures:
     return figures
 
 
-def peers(*, quick: bool) -> Figures:
-    """Measure what one would pick instead, and print."""
+def measure_peers(*, quick: bool) -> Figures:
+    """Measure other methods, and print the figures."""
     from tests.bench import decal_peers
 
     return decal_peers.run(quick=quick)
 
 
-def everything(*, quick: bool) -> Figures:
-    """Measure all that needs graphics and the tests' oracles, and print."""
+def measure_all(*, quick: bool) -> Figures:
+    """Measure everything that needs graphics and the tests' oracles, and print the figures."""
     from tests.bench import decal_figures
 
     figures = decal_figures.measure(quick=quick)
@@ -99,22 +101,22 @@ def everything(*, quick: bool) -> Figures:
 
 
 def main() -> None:
-    """Read the command line, measure and print."""
+    """Parse the command line, measure and print."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench.decals", description=__doc__)
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
-    parser.add_argument("--only", choices=["index", "million"], help="one part alone")
-    parser.add_argument("--peers", action="store_true", help="what one would pick instead, in one run")
+    parser.add_argument("--only", choices=["index", "million"], help="measure one part")
+    parser.add_argument("--peers", action="store_true", help="measure other methods")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
     if options.only == "million":
-        figures = rendered_million(quick=options.quick)
+        figures = measure_million(quick=options.quick)
     elif options.only:
-        figures = index_alone(options.device)
+        figures = measure_index(options.device)
     elif options.peers:
-        figures = peers(quick=options.quick)
+        figures = measure_peers(quick=options.quick)
     else:
-        figures = everything(quick=options.quick)
+        figures = measure_all(quick=options.quick)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
 

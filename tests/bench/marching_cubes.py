@@ -1,9 +1,11 @@
-"""Plain marching cubes on our sparse cells: what the dual polygonizer's cost is measured against.
+"""Marching cubes on sparse cells: the reference for the cost of the dual polygonizer.
 
-Same cells, same samples, same tests of corners; then a vertex per crossed edge, by linear interpolation,
-shared by the cells around it, and up to five triangles per cell from a table (Lorensen & Cline 1987).
-Vertices stay where interpolation puts them: no Newton, no normals, no colours, as cheap as it can be.
+Cells, samples and corner tests are those of the dual polygonizer. Each crossed edge gets one vertex by linear
+interpolation, shared by the cells around it, and each cell up to five triangles from a table (Lorensen &
+Cline 1987). There are no Newton steps, normals or colours.
 """
+
+# mypy: disable-error-code="arg-type, index, no-any-return, operator, valid-type, var-annotated"
 
 from itertools import pairwise
 from typing import Any
@@ -12,24 +14,29 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.formulas.kernels import ISO
-from blobtree.kernel_options import KERNEL_OPTIONS
-from blobtree.launch import launch
-from blobtree.meshing.dual import SAMPLES, classify_cells, corner_place, corner_sample, sample_blocks
+from blobtree.cells.block_kernels import child_number, child_offset, find_block, grid_point
+from blobtree.cells.grid import BRANCHING, CHILDREN
+from blobtree.cells.scan import arange, exclusive_scan
+from blobtree.cells.sparse_cells import SparseCells
+from blobtree.device import KERNEL_OPTIONS, launch
+from blobtree.formulas.falloff import ISO
+from blobtree.meshing.dual_kernels import (
+    SAMPLES,
+    classify_cells,
+    corner_sample,
+    sample_blocks,
+    sample_index,
+)
 from blobtree.meshing.patches import EDGES, FACES
-from blobtree.sparse.blocks import child_number, child_place, find_block, grid_point
-from blobtree.sparse.cells import SparseCells
-from blobtree.sparse.grid import BRANCHING, CHILDREN
-from blobtree.sparse.scan import everything, starts_of
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-MOST_TRIANGLES = 5
+MAX_TRIANGLES = 5
 _Neighbours = wp.types.vector(length=8, dtype=wp.int32)
 
 
 def _crossed(code: int, face: tuple[int, ...]) -> list[int]:
-    """The edges of a face whose ends differ."""
+    """Return the edges of a face whose ends differ."""
     return [
         edge
         for edge, (a, b) in enumerate(EDGES)
@@ -38,7 +45,7 @@ def _crossed(code: int, face: tuple[int, ...]) -> list[int]:
 
 
 def _links(code: int) -> list[tuple[int, int]]:
-    """Pairs of edges that the surface joins across a face; on alternating faces inside corners stay apart."""
+    """Return pairs of edges that the surface joins across a face; it separates alternating inside corners."""
     links = []
     for face in FACES:
         crossed = _crossed(code, face)
@@ -52,7 +59,7 @@ def _links(code: int) -> list[tuple[int, int]]:
 
 
 def _loops(code: int) -> list[list[int]]:
-    """The crossed edges of a cell, in order around each sheet of surface."""
+    """Return the crossed edges of a cell, in order around each sheet of surface."""
     links, loops = _links(code), []
     while links:
         loop = list(links.pop())
@@ -67,7 +74,7 @@ def _loops(code: int) -> list[list[int]]:
 
 
 def _faces_outward(code: int, loop: list[int]) -> bool:
-    """Whether a loop runs counter-clockwise as seen from outside."""
+    """Return True if a loop runs counter-clockwise seen from outside."""
     corner = np.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)], float)
     points = np.array([corner[list(EDGES[edge])].mean(axis=0) for edge in loop])
     normal = np.sum(np.cross(points, np.roll(points, -1, axis=0)), axis=0)
@@ -78,8 +85,8 @@ def _faces_outward(code: int, loop: list[int]) -> bool:
 
 
 def _table() -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Per code the triangles' edges (256, 15), and the number of triangles (256)."""
-    edges, counts = np.full((256, 3 * MOST_TRIANGLES), -1, np.int8), np.zeros(256, np.int8)
+    """Return for each code the edges of the triangles (256, 15) and their number (256)."""
+    edges, counts = np.full((256, 3 * MAX_TRIANGLES), -1, np.int8), np.zeros(256, np.int8)
     for code in range(256):
         corners: list[int] = []
         for loop in _loops(code):
@@ -102,7 +109,7 @@ def _count(
     offsets: wp.array(dtype=wp.uint8),
     triangles: wp.array(dtype=wp.int32),
 ) -> None:
-    """A block's triangles, and by cell its first vertex counted from the block's."""
+    """Count the triangles of a block, and the vertices before each of its cells."""
     block = first + wp.tid()
     vertices = int(0)
     total = int(0)
@@ -126,14 +133,14 @@ def _interpolate(
     starts: wp.array(dtype=wp.int32),
     positions: wp.array(dtype=wp.vec3),
 ) -> None:
-    """The vertices on the crossed edges at the lowest corners of a block's cells."""
+    """Interpolate the vertices on the crossed edges at the lowest corners of a block's cells."""
     block = first + wp.tid()
     vertex = starts[block]
     for c in range(CHILDREN):
         code = int(codes[block * CHILDREN + c])
         if code > 0 and code < 255:
-            place = child_place(c)
-            lowest = corner_place(base + blocks[block], place[0], place[1], place[2])
+            place = child_offset(c)
+            lowest = sample_index(base + blocks[block], place[0], place[1], place[2])
             for axis in range(3):
                 if ((code ^ (code >> (1 << axis))) & 1) == 1:
                     a = values[block * SAMPLES + corner_sample(c, 0)]
@@ -184,7 +191,7 @@ def _edge_vertex(
     offsets: wp.array(dtype=wp.uint8),
     vertex_starts: wp.array(dtype=wp.int32),
 ) -> wp.int32:
-    """The vertex on an edge of a cell; it belongs to the cell whose lowest corner the edge starts at."""
+    """Return the vertex on an edge; it belongs to the cell whose lowest corner begins the edge."""
     axis = edge // 4
     low = edge % 4
     corner = int(0)
@@ -194,7 +201,7 @@ def _edge_vertex(
         corner = (low & 1) | ((low >> 1) << 2)
     else:
         corner = low
-    place = child_place(c) + wp.vec3i(corner & 1, (corner >> 1) & 1, corner >> 2)
+    place = child_offset(c) + wp.vec3i(corner & 1, (corner >> 1) & 1, corner >> 2)
     step = int(0)
     for i in range(3):
         if place[i] == BRANCHING:
@@ -213,19 +220,20 @@ def marching_cubes(cells: SparseCells) -> tuple[Any, Any]:
     """Vertices and triangles of the surface in `cells`, in the device's memory."""
     leaves, device, grid = cells.leaves, cells.device, cells.grid
     count = len(leaves)
-    listed = everything(count, device)
+    listed = arange(count, device)
     frame: list[Any] = [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
     values: Any = wp.empty(count * SAMPLES, dtype=wp.float32, device=device)
+    kernel = cells.tape.instruction_set.kernel_for(sample_blocks)
     inputs = [listed, leaves.blocks, leaves.spans, leaves.tape, *frame]
-    launch(cells.tape.vocabulary.kernel(sample_blocks), count * SAMPLES, inputs, [values], device)
+    launch(kernel, count * SAMPLES, inputs, [values], device)
     codes, offsets = (wp.empty(count * CHILDREN, dtype=wp.uint8, device=device) for _ in range(2))
     vertex_counts, triangle_counts = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
     launch(classify_cells, count, [listed, values], [codes, vertex_counts], device)
     numbers = wp.array(TRIANGLE_COUNT, dtype=wp.int8, device=device)
     edges = wp.array(TRIANGLE_EDGES.ravel(), dtype=wp.int8, device=device)
     launch(_count, count, [codes, numbers], [offsets, triangle_counts], device)
-    vertex_starts, vertices = starts_of(vertex_counts, "vertices")
-    triangle_starts, triangles = starts_of(triangle_counts, "triangles")
+    vertex_starts, vertices = exclusive_scan(vertex_counts, "vertices")
+    triangle_starts, triangles = exclusive_scan(triangle_counts, "triangles")
     positions: Any = wp.empty(vertices, dtype=wp.vec3, device=device)
     launch(_interpolate, count, [leaves.blocks, *frame, values, codes, vertex_starts], [positions], device)
     faces: Any = wp.empty(triangles, dtype=wp.vec3i, device=device)

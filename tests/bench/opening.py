@@ -1,7 +1,7 @@
-"""How long a window blocks from when it opens until a whole frame is there.
+"""Benchmark of opening a window: blocks until the first whole frame.
 
-``python -m tests.bench.opening MODEL DECALS WIDTH HEIGHT``, in a process of its own: what Python and Warp do
-once belongs to it.
+``python -m tests.bench.opening MODEL DECALS WIDTH HEIGHT`` runs in a separate process, so that it includes
+the start of Python and Warp.
 """
 
 import json
@@ -9,41 +9,42 @@ import subprocess
 import sys
 import time
 
-from decals.edit import EditSession
+from decals.editing import EditSession
 from decals.window import EditWindow
+from decals.window.frames import FrameState
 from tests.bench.scenes import bench_scene
 
 Figures = dict[str, float]
 
 
 class Ticking(EditWindow):
-    """A window without a screen whose frames come as on one: whoever drives it calls `tick`."""
+    """An off-screen window that schedules frames as on a screen: its driver calls `tick`."""
 
-    ticking = True  # type: ignore[assignment]
+    ticking = True
 
 
 def measure(name: str, size: tuple[int, int], count: int) -> Figures:
-    """Open a window on a model; VTK's own first frame, without anything of ours, is counted apart.
+    """Open a window on a model; measure VTK's first frame without decals separately.
 
-    A block is the time between two chances for the window to listen, on the clock and in processor time of
-    all threads, which other work on the machine does not lengthen; what the longest ones did is printed.
+    A block is a time in which the window handles no input, in wall time and in processor time of all threads,
+    which other programs do not affect. The longest blocks are printed with their work.
     """
     ticks, used, what, seen = [], [], [], 0.0
     session = EditSession(bench_scene(name, count, size))
     with Ticking(session, off_screen=True, size=size) as window:
         begin = time.perf_counter()
         window.begin()
-        window._end_screenshots()  # pyvista takes one of the first frame, which would be drawn whole at once
+        window._end_screenshots()  # pyvista's screenshot of the first frame would draw it whole at once
         window.plotter.show(auto_close=False, interactive=False)
         vtk = time.perf_counter() - begin
-        while window._moved or window.stage.waiting:
+        while window.frames.state is FrameState.COARSE or window.subplot.warming_up:
             at, busy = time.perf_counter(), time.process_time()
             window.tick()
             now = time.perf_counter()
             ticks.append(1e3 * (now - at))
             used.append(1e3 * (time.process_time() - busy))
-            what.append(window.waiting.news or "drawing")
-            seen = seen or (not window.stage.waiting) * (now - begin)
+            what.append(window.warmup.status or "drawing")
+            seen = seen or (not window.subplot.warming_up) * (now - begin)
         whole = time.perf_counter() - begin
     longest = sorted(zip(ticks, used, what, strict=True), reverse=True)[:4]
     prefix = f"{name}_{count}_open"
@@ -59,7 +60,7 @@ def measure(name: str, size: tuple[int, int], count: int) -> Figures:
 
 
 def opening(name: str, size: tuple[int, int], count: int) -> Figures:
-    """Measure in another process; the longest blocks are printed."""
+    """Measure in another process, and print the longest blocks."""
     run = [sys.executable, "-m", "tests.bench.opening", name, str(count), *map(str, size)]
     said, figures = subprocess.run(run, capture_output=True, text=True, check=True).stdout.splitlines()[-2:]
     print(said)

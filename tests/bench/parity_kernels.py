@@ -5,8 +5,9 @@
 import warp as wp
 
 from decals.field.contact import rim_distance
-from decals.field.ownership import NOBODY, complement_at, owner_at, uv_at
-from decals.field.sheet import sheet_at
+from decals.field.ownership import NO_OWNER, complement_at, owner_at, uv_at
+from decals.field.single_layer import single_layer_at
+from decals.index.lookup import IndexedDecals
 from tests.oracles.parallel import Members, rim_of, wide
 
 wp.set_module_options({"enable_backward": False})
@@ -153,14 +154,8 @@ def look_at_points(
     normals: wp.array(dtype=wp.vec3),
     mapping: wp.int32,
     contact: wp.int32,
-    layered: wp.bool,
     once: wp.bool,
-    decals: wp.array(dtype=wp.vec4),
-    level_count: wp.int32,
-    levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.vec4i),
-    mask: wp.int32,
-    ids: wp.array(dtype=wp.int32),
+    index: IndexedDecals,
     owners: wp.array(dtype=wp.int32),
     rims: wp.array(dtype=wp.float32),
     uv: wp.array(dtype=wp.vec2),
@@ -169,22 +164,22 @@ def look_at_points(
     i = wp.tid()
     q = points[i]
     n = wp.normalize(normals[i])
-    owner = wp.int32(NOBODY)
+    owner = wp.int32(NO_OWNER)
     e = wp.float32(0.0)
     if once:
-        found = sheet_at(q, n, contact, decals, level_count, levels, table, mask, ids)
+        found = single_layer_at(q, n, contact, index)
         owner = int(found[0])
         e = found[1]
     else:
-        owner = owner_at(q, n, contact, layered, decals, level_count, levels, table, mask, ids)
-        if owner != NOBODY:
-            e = complement_at(q, n, owner, contact, layered, decals, level_count, levels, table, mask, ids)
+        owner = owner_at(q, n, contact, index)
+        if owner != NO_OWNER:
+            e = complement_at(q, n, owner, contact, index)
     owners[i] = owner
     rims[i] = 0.0
     uv[i] = wp.vec2(0.0, 0.0)
-    if owner != NOBODY:
+    if owner != NO_OWNER:
         rims[i] = rim_distance(e)
-        uv[i] = uv_at(q, n, owner, e, mapping, decals)
+        uv[i] = uv_at(q, n, owner, e, mapping, index)
 
 
 @wp.func
@@ -220,7 +215,7 @@ def compare_points(
     counts: wp.array(dtype=wp.int32),
     worst: wp.array(dtype=wp.float64),
 ):
-    """Count and keep the worst: against neighbours within REACH, and against all neighbours (`uncut`)."""
+    """Count, and keep the worst errors: against neighbours within reach, and against all (`uncut`)."""
     i = wp.tid()
     wp.atomic_add(counts, POINTS, 1)
     if not (wp.isfinite(rims[i]) and wp.isfinite(uv[i][0]) and wp.isfinite(uv[i][1])):

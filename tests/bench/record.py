@@ -1,7 +1,7 @@
-"""Everything that one picture draws, in one file: shader texts, meshes, textures and uniforms.
+"""Record all shader texts, meshes, textures and uniforms of a picture in one file.
 
-`tests/bench/replay.py` draws it again and times it on machines that have a graphics card, moderngl and NumPy,
-but neither Warp nor VTK.
+`tests/bench/replay.py` draws and times it on machines with a graphics card, moderngl and NumPy, but without
+Warp and VTK.
 
     python -m tests.bench.record dragon --decals 10000 --size 1600x1200 dragon.npz
 """
@@ -19,84 +19,86 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.field.contact import Contact
-from decals.render import entry
-from decals.render.context import Context
-from decals.render.entry import Entry
-from decals.render.mesh import mesh_rows
-from decals.render.renderer import Renderer
-from decals.render.tile import CameraBuffer, Tile
-from decals.scenes.scene import MeshObject, Scene
-from implicit_decals.shaders import Source, compose
+from decals.record import Contact
+from decals.rendering import context as context_module
+from decals.rendering.context import Context
+from decals.rendering.mesh import mesh_rows
+from decals.rendering.options import RenderOptions
+from decals.rendering.pixel_pass import ComputePass, FragmentPass, PassBackend
+from decals.rendering.renderer import Renderer
+from decals.rendering.tiles import CameraBuffer, Tile
+from decals.scenes.objects import MeshObject
+from decals.scenes.scene import Scene
+from decals.shaders import Source, compose
 
 Arrays = dict[str, NDArray[Any]]
 Sources = dict[int, tuple[str, str]]
-"""Body and whole text of programs, by their identity."""
+"""Body and whole text of each program, by the program's identity."""
 TARGETS = ("g_position", "g_normal", "g_color", "g_paint")
-"""Textures that the picture itself fills."""
+"""Textures that the passes themselves write."""
 
 
-def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact = Contact.PAPER) -> None:
-    """Write what a picture draws: a scene of meshes, one sample a pixel, in one tile."""
+def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact = Contact.PRODUCT) -> None:
+    """Record a picture of a scene of meshes: one sample per pixel, one tile."""
     arrays: Arrays = {}
     passes: dict[str, dict[str, Any]] = {}
     for number, item in enumerate(scene.objects):
         assert isinstance(item, MeshObject)
         arrays[f"rows/{number}"], arrays[f"faces/{number}"] = mesh_rows(item), item.faces
-    for point in Entry:
+    for backend in PassBackend:
         with (
-            Context.standalone(entry=point) as context,
+            Context.standalone(backend=backend) as context,
             Renderer(context) as renderer,
-            _listening(arrays, passes.setdefault(point, {})),
+            _recording_calls(arrays, passes.setdefault(backend, {})),
         ):
-            renderer.render(scene, size=size, samples=1, contact=contact)
+            renderer.render(scene, RenderOptions(size=size, samples=1, contact=contact))
     texts = {name: compose(name).text for name in ("mesh.vert", "mesh.frag", "screen.vert")}
     settings = {"size": size, "texts": texts, "passes": passes, "layered": scene.decals.layered}
     np.savez_compressed(path, settings=np.array(json.dumps(settings)), **arrays)  # type: ignore[arg-type]
 
 
 @contextmanager
-def _listening(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
-    """Note every pass that runs, with what it reads, and the camera."""
+def _recording_calls(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
+    """Record each pass that runs with its inputs, and the camera."""
     units: dict[int, Any] = {}
     bodies: dict[str, str] = {}
     sources: Sources = {}
-    use_camera, source_of = CameraBuffer.use, entry._source
-    of_fragment, of_compute = Context.program, Context.compute_program
+    use_camera, source_of = CameraBuffer.use, context_module.pass_source
+    fragment_program, whole_program = Context.program, Context.compute_program
 
-    def composed(point: Entry, body: str, *rest: Any) -> Source:
-        source = source_of(point, body, *rest)
+    def pass_source(backend: PassBackend, body: str, *arguments: Any) -> Source:
+        source = source_of(backend, body, *arguments)
         bodies[source.text] = body
         return source
 
     def program(self: Context, vertex: Source, fragment: Source) -> moderngl.Program:
-        made = of_fragment(self, vertex, fragment)
-        sources[id(made)] = bodies.get(fragment.text, ""), fragment.text
-        return made
+        program = fragment_program(self, vertex, fragment)
+        sources[id(program)] = bodies.get(fragment.text, ""), fragment.text
+        return program
 
     def compute_program(self: Context, source: Source) -> moderngl.ComputeShader:
-        made = of_compute(self, source)
-        sources[id(made)] = bodies.get(source.text, ""), source.text
-        return made
+        program = whole_program(self, source)
+        sources[id(program)] = bodies.get(source.text, ""), source.text
+        return program
 
     def camera(self: CameraBuffer, tile: Tile) -> CameraBuffer:
         arrays["camera"] = np.frombuffer(tile.block(), np.float32)
         return use_camera(self, tile)
 
     with ExitStack() as stack:
-        for kind in (moderngl.Texture, moderngl.TextureArray):
-            stack.enter_context(patch.object(kind, "use", _noting_use(kind.use, units)))
-        for kind in (entry.FragmentPass, entry.ComputePass):
-            noting = _noting_run(kind.run, units, sources, arrays, passes)
-            stack.enter_context(patch.object(kind, "run", noting))
-        stack.enter_context(patch.object(entry, "_source", composed))
+        for texture in (moderngl.Texture, moderngl.TextureArray):
+            stack.enter_context(patch.object(texture, "use", _recording_use(texture.use, units)))
+        for pixel_pass in (FragmentPass, ComputePass):
+            recording = _recording_run(pixel_pass.run, units, sources, arrays, passes)
+            stack.enter_context(patch.object(pixel_pass, "run", recording))
+        stack.enter_context(patch.object(context_module, "pass_source", pass_source))
         stack.enter_context(patch.object(Context, "program", program))
         stack.enter_context(patch.object(Context, "compute_program", compute_program))
         stack.enter_context(patch.object(CameraBuffer, "use", camera))
         yield
 
 
-def _noting_use(original: Any, units: dict[int, Any]) -> Any:
+def _recording_use(original: Any, units: dict[int, Any]) -> Any:
     def use(self: Any, location: int = 0) -> None:
         units[location] = self
         original(self, location)
@@ -104,36 +106,36 @@ def _noting_use(original: Any, units: dict[int, Any]) -> Any:
     return use
 
 
-def _noting_run(
+def _recording_run(
     original: Any, units: dict[int, Any], sources: Sources, arrays: Arrays, passes: dict[str, Any]
 ) -> Any:
-    def run(self: Any, where: Any) -> None:
+    def run(self: Any, target: Any) -> None:
         body, text = sources[id(self.program)]
         uniforms, textures = {}, {}
         for name in self.program:
             member = self.program[name]
             if not isinstance(member, moderngl.Uniform):
                 continue
-            kind = _type(text, name)
-            if "sampler" in kind:
+            uniform_type = _type(text, name)
+            if "sampler" in uniform_type:
                 textures[name] = _texture(units[member.value], name, arrays)
-            elif "image" not in kind:
+            elif "image" not in uniform_type:
                 uniforms[name] = member.value
         passes[body] = {"text": text, "uniforms": uniforms, "textures": textures}
-        original(self, where)
+        original(self, target)
 
     return run
 
 
 def _type(text: str, uniform: str) -> str:
-    """Type of a uniform in a shader."""
+    """Return the type of a uniform in a shader."""
     declaration = re.search(rf"uniform\s+(\w+)\s+{uniform}\s*;", text)
     assert declaration, uniform
     return declaration[1]
 
 
 def _texture(texture: Any, name: str, arrays: Arrays) -> dict[str, Any]:
-    """Keep a texture's first level; how it is made again."""
+    """Record the first level of a texture; return its layout."""
     if name not in TARGETS:
         arrays[f"texture/{name}"] = np.frombuffer(texture.read(), np.uint8)
     return {
@@ -145,21 +147,23 @@ def _texture(texture: Any, name: str, arrays: Arrays) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Read the command line, make the scene and record it."""
+    """Parse the command line, make the scene and record it."""
     from tests.bench.scenes import bench_scene, in_layers
 
     parser = argparse.ArgumentParser(prog="python -m tests.bench.record", description=__doc__)
     parser.add_argument("model", help="dragon, horse or knot")
     parser.add_argument("--decals", type=int, default=10_000)
-    parser.add_argument("--seeded", action="store_true", help="decals.seed, in place of a quick even coat")
-    parser.add_argument("--contact", choices=[mode.name.lower() for mode in Contact], default="paper")
-    parser.add_argument("--layered", action="store_true", help="decals of all interactions in three layers")
+    parser.add_argument(
+        "--scattered", action="store_true", help="distribute decals by `scatter` instead of `even_decals`"
+    )
+    parser.add_argument("--contact", choices=[mode.name.lower() for mode in Contact], default="product")
+    parser.add_argument("--layered", action="store_true", help="random interactions in three layers")
     parser.add_argument("--size", default="1600x1200")
     parser.add_argument("path", type=Path)
     options = parser.parse_args()
     width, height = (int(part) for part in options.size.split("x"))
     size = width, height
-    scene = bench_scene(options.model, options.decals, size, seeded=options.seeded)
+    scene = bench_scene(options.model, options.decals, size, scattered=options.scattered)
     if options.layered:
         scene = scene.replace(decals=in_layers(scene.decals))
     record(scene, size, options.path, contact=Contact[options.contact.upper()])

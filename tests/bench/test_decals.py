@@ -1,4 +1,4 @@
-"""The benchmark of decals measures what it says, in small."""
+"""The benchmark of decals, with small samples."""
 
 import numpy as np
 
@@ -13,23 +13,23 @@ def test_errors_and_folds() -> None:
     assert figures["map_sphere"] < 1e-4 < figures["map_torus"] < figures["map_torus_chord"]
 
 
-def test_what_is_missing_is_said() -> None:
+def test_missing_figures_are_reported() -> None:
     text = decals.report({"index_100k_s": 0.25, "slope_most": 4.7}, "a machine")
     assert "index_100k_s                         0.25  ≤ 0.5" in text
     assert "frame_100k_over_100          not measured" in text
     assert "slope_most" in text
 
 
-def test_the_coats_of_the_index_leave_no_gap() -> None:
-    """Every place of the sphere lies within the rim of some decal, and of few."""
-    coat = decal_index.coat(2000)
+def test_the_decals_of_the_index_leave_no_gap() -> None:
+    """Each point of the sphere lies within the rims of one to three decals."""
+    decals = decal_index.spiral_decals(2000)
     rng = np.random.default_rng(0)
-    places = rng.normal(size=(4000, 3))
-    places /= np.linalg.norm(places, axis=1, keepdims=True)
-    near = np.linalg.norm(places[:, None] - coat.positions, axis=2) < coat.radii
+    points = rng.normal(size=(4000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    near = np.linalg.norm(points[:, None] - decals.positions, axis=2) < decals.radii
     assert near.any(axis=1).all()
     assert near.sum(axis=1).mean() < 3
-    mixed = decal_index.coat(2000, spread=0.5).radii
+    mixed = decal_index.spiral_decals(2000, spread=0.5).radii
     assert 5 < mixed.max() / mixed.min() <= 10.1
 
 

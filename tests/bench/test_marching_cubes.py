@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from blobtree import Mesh
-from blobtree.sparse.cells import build_cells
-from blobtree.sparse.grid import aligned_grid
+from blobtree.cells.grid import aligned_grid
+from blobtree.cells.sparse_cells import build_cells
 from tests.bench.marching_cubes import TRIANGLE_COUNT, marching_cubes
-from tests.blobtree.test_polygonize import BALL, assert_closed, ring, volume
+from tests.blobtree.meshing.test_polygonize import BALL, assert_closed, ring, volume
 
 
 def meshed(tree: object, cell: float) -> Mesh:

@@ -1,4 +1,4 @@
-"""The rivals of `python -m tests.bench.decals --peers` do what they are said to do."""
+"""The other methods of `python -m tests.bench.decals --peers` are implemented correctly."""
 
 from typing import Any
 
@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from decals.model import Decals
-from tests.bench import decal_peers, decal_rivals, on_meshes
-from tests.bench.mesh_decals import MeshDecals
+from tests.bench import decal_peers
+from tests.bench.clipped_decals import MeshDecals
 from tests.decals.shapes import torus
 
-FINE = on_meshes.torus_mesh(rows=120)
+TORUS = decal_peers.torus_mesh(rows=120)
 """A torus mesh of 14,400 faces."""
 
 
@@ -20,7 +20,7 @@ def areas(vertices: Any, faces: Any) -> Any:
 
 
 def on_plane(count: int, seed: int) -> tuple[MeshDecals, Decals]:
-    """A plane of 800 triangles, and decals well within it."""
+    """Return a plane of 800 triangles, and decals inside it."""
     n = 21
     x, y = np.meshgrid(np.linspace(-2, 2, n), np.linspace(-2, 2, n), indexing="ij")
     vertices = np.stack([x, y, 0.2 * x], -1).reshape(-1, 3).astype(np.float32)
@@ -28,14 +28,14 @@ def on_plane(count: int, seed: int) -> tuple[MeshDecals, Decals]:
     quads = np.stack([corner, corner + n, corner + n + 1, corner + 1], -1)
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
     rng = np.random.default_rng(seed)
-    places = rng.uniform(-1, 1, (count, 2))
-    positions = np.column_stack([places, 0.2 * places[:, 0]])
+    points = rng.uniform(-1, 1, (count, 2))
+    positions = np.column_stack([points, 0.2 * points[:, 0]])
     normals = np.tile([-0.2, 0, 1.0], (count, 1))
     decals = Decals(positions, normals, rng.normal(size=(count, 3)), rng.uniform(0.05, 0.6, count))
     return MeshDecals(vertices, faces), decals
 
 
-def test_on_a_plane_every_box_cuts_out_its_square() -> None:
+def test_each_box_cuts_a_square_out_of_a_plane() -> None:
     mesh, decals = on_plane(50, 1)
     result = mesh.clip(decals)
     area = np.bincount(result.decals, areas(result.vertices, result.faces), minlength=50)
@@ -50,7 +50,7 @@ def test_on_a_plane_every_box_cuts_out_its_square() -> None:
         np.testing.assert_allclose(result.uv[corners], uv, atol=1e-6)
 
 
-def test_clipping_keeps_what_lies_in_the_box_and_nothing_else() -> None:
+def test_clipping_keeps_exactly_the_area_in_the_box() -> None:
     """Area in each box against points spread over the mesh."""
     shape = torus(rows=60, columns=30)
     rng = np.random.default_rng(2)
@@ -67,48 +67,48 @@ def test_clipping_keeps_what_lies_in_the_box_and_nothing_else() -> None:
         assert area[decal] == pytest.approx(inside.mean() * sizes.sum(), rel=0.03)
 
 
-def test_a_decal_off_the_mesh_cuts_out_nothing() -> None:
+def test_a_decal_away_from_the_mesh_is_empty() -> None:
     mesh, decals = on_plane(1, 3)
     result = mesh.clip(decals.replace(positions=[[0, 0, 30]]))
     assert len(result.faces) == 0
 
 
-def test_values_are_linear_over_the_triangles() -> None:
+def test_values_are_interpolated_linearly() -> None:
     rng = np.random.default_rng(4)
-    face = rng.integers(0, len(FINE.faces), 500)
-    points = np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], 500), FINE.vertices[FINE.faces[face]])
-    locator = on_meshes.Locator(FINE.vertices, FINE.faces)
-    np.testing.assert_allclose(locator.interpolate(FINE.vertices, points), points, atol=1e-12)
+    face = rng.integers(0, len(TORUS.faces), 500)
+    points = np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], 500), TORUS.vertices[TORUS.faces[face]])
+    locator = decal_peers.Locator(TORUS.vertices, TORUS.faces)
+    np.testing.assert_allclose(locator.interpolate(TORUS.vertices, points), points, atol=1e-12)
 
 
 def test_discs_are_geodesic() -> None:
     """On a torus the outer equator is one: along it the log map is the angle times the radius 1.4."""
-    mesh = on_meshes.torus_mesh(rows=40)
+    mesh = decal_peers.torus_mesh(rows=40)
     points, logs = mesh.discs(np.random.default_rng(5), np.array([0]), 0.3, 50)
     assert np.linalg.norm(logs[0], axis=1).max() <= 0.3
     assert np.abs(np.hypot(np.hypot(*points[0, :, :2].T) - 1, points[0, :, 2]) - 0.4).max() < 1e-6
     assert (np.linalg.norm(logs[0], axis=1) >= np.linalg.norm(points[0] - mesh.vertices[0], axis=1)).all()
 
 
-def test_errors_of_the_rivals() -> None:
+def test_errors_of_the_methods() -> None:
     """Of decals a fifth of the tube: projection is the worst, vertices lose little on a fine mesh."""
-    mesh, rng = FINE, np.random.default_rng(6)
+    mesh, rng = TORUS, np.random.default_rng(6)
     vertex = 1234
     points, logs = mesh.discs(rng, np.array([vertex]), 0.1, 400)
-    want = logs[0] @ decal_rivals.frame_at(mesh, vertex)[:2].T
+    expected = logs[0] @ decal_peers.frame_at(mesh, vertex)[:2].T
 
     def error(offsets: Any) -> float:
-        found = offsets(mesh, vertex, points[0], 0.1)
-        return float(np.sqrt(((found - want) ** 2).sum(axis=1).mean()) / 0.1)
+        computed = offsets(mesh, vertex, points[0], 0.1)
+        return float(np.sqrt(((computed - expected) ** 2).sum(axis=1).mean()) / 0.1)
 
-    assert error(decal_rivals.drawn) < 0.002 < error(decal_rivals.planar) < 0.01
-    assert error(decal_rivals.interpolated) == pytest.approx(error(decal_rivals.drawn), abs=1e-3)
-    maps = decal_rivals.log_maps()
+    assert error(decal_peers.implicit) < 0.002 < error(decal_peers.planar) < 0.01
+    assert error(decal_peers.at_vertices) == pytest.approx(error(decal_peers.implicit), abs=1e-3)
+    maps = decal_peers.potpourri()
     if maps is not None:
         assert error(maps.offsets) < 0.003
 
 
-def test_table_and_figures_say_the_same() -> None:
+def test_table_and_figures_are_equal() -> None:
     row = decal_peers.Row("log maps (x 1)", "no contact", setup_s=2.0, decal_ms=50.0, megabytes=3.0)
     row.errors = {"torus_large": 0.01}
     text = decal_peers.table("a knot", [row, row])

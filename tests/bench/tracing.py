@@ -1,11 +1,11 @@
-"""What rays into the engine's scene cost: in Warp on any device, or in OpenGL on another machine.
+"""Time of rays into implicit models, in Warp on any device; recordings of them for OpenGL.
 
     python -m tests.bench.tracing                           # Warp, all cores
     python -m tests.bench.tracing --device cuda:0           # Warp on a graphics card
-    python -m tests.bench.tracing --record tracing.npz      # for tests/bench/replay_tracing.py
+    python -m tests.bench.tracing --record tracing.npz      # for tests/bench/replay.py
 
-The scene is that of `tests.bench.blobtree`, N points of influence 0.6 N^(−1/3) summed in the unit cube, all
-of it in view, a ray for every pixel. Times are medians; what is uploaded and compiled is not counted.
+The scene is that of `tests.bench.blobtree`, N points of influence 0.6 N^(−1/3) summed in the unit cube, with
+one ray per pixel of a view of the whole cube. Times are medians, without uploads and compilation.
 """
 
 import argparse
@@ -18,24 +18,24 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import Sum
-from blobtree.tracing.cells import tracing_cells
 from blobtree.tracing.trace import trace_arrays
+from blobtree.tracing.tree_cells import tracing_cells
 from decals.scenes.camera import Camera
 from tests.bench.blobtree import UNIT_BOX, blobs, median_time
 
 COUNTS = (100, 1_000, 10_000)
 SIZE = (1600, 1200)
 CHECKED = 8
-"""Every so many pixels along each axis, what Warp traces here is recorded, for comparison."""
+"""Interval of the pixels along each axis whose distances in Warp are recorded for comparison."""
 
 
 def camera_of(size: tuple[int, int]) -> Camera:
-    """The whole cube in view."""
+    """Return a camera that sees the whole cube."""
     return Camera.framing(UNIT_BOX, aspect=size[0] / size[1])
 
 
 def pixel_rays(size: tuple[int, int], step: int = 1) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Origins and unit directions (n, 3) of every `step`-th pixel, from the lower left one."""
+    """Return origins and unit directions (n, 3) of every `step`-th pixel, from the lower left one."""
     rays = camera_of(size).rays(*size)
     x, y = np.meshgrid(np.arange(0, size[0], step) + 0.5, np.arange(0, size[1], step) + 0.5)
     directions = rays.directions(x, y).reshape(-1, 3)
@@ -44,11 +44,11 @@ def pixel_rays(size: tuple[int, int], step: int = 1) -> tuple[NDArray[np.float32
 
 
 def warp_times(device: str, counts: tuple[int, ...], size: tuple[int, int], runs: int) -> dict[str, float]:
-    """Milliseconds for all pixels' distances, arrays being on the device already, and the share that hits."""
+    """Return the time in ms for the distances of all pixels, without uploads, and the fraction of hits."""
     figures = {}
     for count in counts:
         tree = Sum(tuple(blobs(count)))
-        rays = [wp.array(array, dtype=wp.vec3, device=device) for array in pixel_rays(size)]
+        rays: list[Any] = [wp.array(array, dtype=wp.vec3, device=device) for array in pixel_rays(size)]
 
         def work(tree: Sum = tree, rays: list[Any] = rays) -> Any:
             distances = trace_arrays(tree, *rays)[0]
@@ -61,26 +61,26 @@ def warp_times(device: str, counts: tuple[int, ...], size: tuple[int, int], runs
 
 
 def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
-    """Write shaders, textures' contents and uniforms of the scenes, and what Warp traces here."""
-    from decals.render.entry import GROUP, Entry  # Warp's times need no OpenGL
-    from decals.render.tape_shader import Kinds, tracing_shader
-    from decals.render.tile import Picture
-    from decals.render.tree import covered, tracing_uniforms
-    from implicit_decals.shaders import compose
+    """Write the shaders, textures and uniforms of the scenes, and distances traced by Warp."""
+    from decals.rendering.pixel_pass import GROUP, PassBackend  # `warp_times` needs no OpenGL
+    from decals.rendering.tape_shader import Kinds, tracing_shader
+    from decals.rendering.tiles import PictureView
+    from decals.rendering.tree import covered_rectangle, tracing_uniforms
+    from decals.shaders import compose
 
-    tile = Picture.of(camera_of(size), size, UNIT_BOX).whole()
+    tile = PictureView.of(camera_of(size), size, UNIT_BOX).whole()
     arrays: dict[str, NDArray[Any]] = {"camera": np.frombuffer(tile.block(), np.float32)}
     scenes: dict[str, dict[str, Any]] = {}
     for count in counts:
         tree = Sum(tuple(blobs(count)))
         cells = tracing_cells(tree)
         kinds = Kinds.of(tree.tape)
-        part = covered(tree.bounds, tile)
+        part = covered_rectangle(tree.bounds, tile)
         arrays[f"tape/{count}"], arrays[f"blocks/{count}"] = cells.tape, cells.blocks
         arrays[f"distances/{count}"] = tree.raycast(*pixel_rays(size, CHECKED)).distances
         scenes[str(count)] = {
-            "fragment": tracing_shader(kinds, Entry.FRAGMENT).text,
-            "compute": tracing_shader(kinds, Entry.COMPUTE).text,
+            "fragment": tracing_shader(kinds, PassBackend.FRAGMENT).text,
+            "compute": tracing_shader(kinds, PassBackend.COMPUTE).text,
             "uniforms": {
                 **tracing_uniforms(cells),
                 "box_lower": tree.bounds[0].tolist(),
@@ -101,14 +101,14 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
 
 
 def main() -> None:
-    """Read the command line; measure or record."""
+    """Parse the command line; measure or record."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.bench.tracing",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0")
-    parser.add_argument("--record", type=Path, metavar="PATH", help="write a recording in place of measuring")
+    parser.add_argument("--record", type=Path, metavar="PATH", help="write a recording instead of measuring")
     parser.add_argument("--size", default="x".join(map(str, SIZE)))
     parser.add_argument("--points", type=int, nargs="+", default=COUNTS)
     parser.add_argument("--runs", type=int, default=5)

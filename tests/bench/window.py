@@ -1,8 +1,8 @@
-"""How soon the window answers: ``python -m tests.bench.window [--json PATH] [--quick] [--only drag,turn]``.
+"""Benchmark of response times: ``python -m tests.bench.window [--json PATH] [--quick] [--only drag,turn]``.
 
-A window without a screen is driven by synthetic events among 1,000 decals; each step runs from the event to
-the finished frame. Wall time counts what else the machine does; processor time (of all threads, llvmpipe's
-too) divided by the cores is what a quiet machine would take at the least.
+Synthetic events drive an off-screen window with 1,000 decals. Each step runs from the event to the finished
+frame. Wall time includes other work of the machine. Processor time of all threads, llvmpipe's included,
+divided by the cores is a lower bound of the time on an idle machine.
 """
 
 import argparse
@@ -18,12 +18,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from decals.edit import EditSession
+from decals.editing import EditSession
 from decals.window import EditWindow
-from decals.window.window import REST
+from decals.window.frames import REFINE_DELAY, FrameState
 from tests.bench.opening import opening
 from tests.bench.scenes import bench_scene
-from tests.window.driver import Driver
+from tests.decals.window.driver import Driver
 
 Figures = dict[str, float]
 
@@ -47,21 +47,21 @@ TARGETS = {
 }
 MODELS = ("knot", "creature")
 BACKGROUND = {"scatter": "g", "relax": "x", "save": "Ctrl+s"}
-"""What goes on in the background, and its keys."""
+"""Background jobs and their keys."""
 KINDS = ("open", "whole", "rest", "drag", "turn", "primitive", *BACKGROUND)
 OPENED = (1_000, 100_000)
-"""Decals in windows that open; what is compiled stays with the driver (Mesa: MESA_SHADER_CACHE_DIR)."""
+"""Numbers of decals in opened windows; the driver caches shaders (Mesa: MESA_SHADER_CACHE_DIR)."""
 STEPS = 25
-SEEDED = 1000
-"""Decals up to which they are those of `decals.seed`."""
-EVERY = 1 / 60
-"""Seconds between two events of a hand, while something else goes on."""
-WARM = 8
-"""Steps of each kind before those that count: programs are compiled and the size of frames found."""
+MAX_SCATTERED = 1000
+"""Number of decals up to which `decals.scatter` distributes them."""
+EVENT_INTERVAL = 1 / 60
+"""Seconds between two input events during background work."""
+WARM_UP = 8
+"""Untimed first steps, which compile programs and settle the scale of frames."""
 
 
 def timed(step: Callable[[], object]) -> tuple[float, float]:
-    """Wall and processor milliseconds of one step."""
+    """Return the wall and processor time of a step in ms."""
     wall, used = time.perf_counter(), time.process_time()
     step()
     cores = os.cpu_count() or 1
@@ -69,45 +69,46 @@ def timed(step: Callable[[], object]) -> tuple[float, float]:
 
 
 def medians(name: str, times: list[tuple[float, float]]) -> Figures:
-    """Give medians of the steps that count."""
-    wall, used = np.array(times[WARM:] or times).T
+    """Return the medians of the timed steps."""
+    wall, used = np.array(times[WARM_UP:] or times).T
     return {f"{name}_ms": float(np.median(wall)), f"{name}_busy_ms": float(np.median(used))}
 
 
 def around(at: tuple[int, int], steps: int, radius: float = 30.0) -> list[tuple[int, int]]:
-    """Places on a spiral around a pixel."""
-    turns = np.linspace(0, 4 * np.pi, steps)
+    """Return pixels on a spiral around a pixel."""
+    angles = np.linspace(0, 4 * np.pi, steps)
     return [
-        (int(at[0] + radius * t / 12 * np.cos(t)), int(at[1] + radius * t / 12 * np.sin(t))) for t in turns
+        (int(at[0] + radius * t / 12 * np.cos(t)), int(at[1] + radius * t / 12 * np.sin(t))) for t in angles
     ]
 
 
 def drag(driver: Driver, name: str, steps: int) -> Figures:
-    """Drag one decal among all; steps beside the surface, which change nothing, do not count."""
+    """Drag one decal; steps beside the surface, which change nothing, do not count."""
     _, at = next(driver.visible())
     driver.click(at)
     driver.event("LeftButtonPressEvent", at)
-    stage = driver.window.stage
-    draw, drawn = stage.draw, []
-    stage.draw = lambda: drawn.append(timed(draw)[0])  # type: ignore[method-assign]
-    times, shares = [], []
-    for place in around(at, 2 * steps + WARM, radius=15.0):
+    subplot = driver.window.subplot
+    draw, drawn = subplot.draw, []
+    subplot.draw = lambda: drawn.append(timed(draw)[0])  # type: ignore[method-assign]
+    times: list[tuple[float, float]] = []
+    shares = []
+    for place in around(at, 2 * steps + WARM_UP, radius=15.0):
         before = driver.document.decals.version
         step = timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
         if driver.document.decals.version == before:
             del drawn[len(times) :]
             continue
         times.append(step)
-        shares.append(stage.drawn)
-    del stage.draw
-    scale = driver.window.stage.draw_scale
+        shares.append(subplot.drawn_fraction)
+    del subplot.draw
+    scale = driver.window.subplot.draw_scale
     driver.event("LeftButtonReleaseEvent", at)
     driver.key("z", ctrl=True)
     return medians(f"{name}_drag", times) | {
         f"{name}_drag_scale": scale,
-        f"{name}_drag_draw_ms": float(np.median(drawn[WARM:] or drawn)),
-        f"{name}_drag_share": float(np.median(shares[WARM:] or shares)),
-        f"{name}_drag_steps": len(times[WARM:] or times),
+        f"{name}_drag_draw_ms": float(np.median(drawn[WARM_UP:] or drawn)),
+        f"{name}_drag_share": float(np.median(shares[WARM_UP:] or shares)),
+        f"{name}_drag_steps": len(times[WARM_UP:] or times),
     }
 
 
@@ -115,7 +116,7 @@ def turn(driver: Driver, name: str, steps: int) -> Figures:
     """Turn the camera."""
     driver.key("Escape")
     driver.event("LeftButtonPressEvent", (4, 4))
-    places = [(4 + 5 * step, 4 + 2 * step) for step in range(steps + WARM)]
+    places = [(4 + 5 * step, 4 + 2 * step) for step in range(steps + WARM_UP)]
     times = [
         timed(lambda place=place: driver.event("MouseMoveEvent", place))  # type: ignore[misc]
         for place in places
@@ -128,24 +129,24 @@ def primitive(driver: Driver, name: str, steps: int) -> Figures:
     """Move a primitive by its handle."""
     _, at = next(driver.visible())
     driver.key("m", at)
-    grip = driver.window.grip
-    center = np.array(grip.widget.GetCenter())
+    handle = driver.window.handle
+    center = np.array(handle.widget.GetCenter())
     reach = 0.002 * float(np.linalg.norm(np.subtract(*driver.document.scene.bounds)))
 
     def move(step: int) -> None:
-        grip.widget.SetCenter(*np.add(center, (reach * step, 0, 0)).tolist())
-        grip.widget.InvokeEvent("InteractionEvent")
+        handle.widget.SetCenter(*np.add(center, (reach * step, 0, 0)).tolist())
+        handle.widget.InvokeEvent("InteractionEvent")
 
-    grip.widget.InvokeEvent("StartInteractionEvent")
-    times = [timed(lambda step=step: move(step)) for step in range(steps + WARM)]  # type: ignore[misc]
-    grip.widget.InvokeEvent("EndInteractionEvent")
+    handle.widget.InvokeEvent("StartInteractionEvent")
+    times = [timed(lambda step=step: move(step)) for step in range(steps + WARM_UP)]  # type: ignore[misc]
+    handle.widget.InvokeEvent("EndInteractionEvent")
     driver.key("z", ctrl=True)
     driver.key("m", at)
     return medians(f"{name}_primitive", times)
 
 
 def background(driver: Driver, name: str, kind: str) -> Figures:
-    """Let something go on in the background, while the window is looked after and the camera turned."""
+    """Turn the camera while a background job runs."""
     gesture = BACKGROUND[kind]
     _, at = next(driver.visible())
     begin = time.perf_counter()
@@ -155,9 +156,9 @@ def background(driver: Driver, name: str, kind: str) -> Figures:
     while driver.window.background.busy:
         place = 4 + (place + 3) % 200
         times.append(timed(lambda: driver.event("MouseMoveEvent", (place, 9)))[0])  # noqa: B023
-        driver.window._told = np.inf  # frames come by themselves
+        driver.window._status_limit._last = np.inf  # frames come by themselves
         looks.append(timed(driver.window.tick)[0])
-        time.sleep(max(0.0, EVERY - 1e-3 * (times[-1] + looks[-1])))
+        time.sleep(max(0.0, EVENT_INTERVAL - 1e-3 * (times[-1] + looks[-1])))
     driver.event("LeftButtonReleaseEvent", (4, 4))
     return {
         f"{name}_{kind}_s": time.perf_counter() - begin,
@@ -169,30 +170,30 @@ def background(driver: Driver, name: str, kind: str) -> Figures:
 
 
 def whole(window: EditWindow, name: str) -> Figures:
-    """Draw a whole frame, one sample a pixel; then leave whole frames out: they belong to rest."""
+    """Draw whole frames with one sample per pixel."""
 
     def elsewhere() -> None:
-        window.plotter.camera.Azimuth(1.0)  # what did not change is not drawn again
-        window.rest()
+        window.plotter.camera.Azimuth(1.0)  # an unchanged frame is not drawn again
+        window.draw_whole_frame()
 
     wall, used = np.median([timed(elsewhere) for _ in range(3)], axis=0)
     return {f"{name}_whole_ms": float(wall), f"{name}_whole_busy_ms": float(used)}
 
 
 def rest(window: EditWindow, name: str) -> Figures:
-    """Let everything rest after a movement, until the frame is whole, four samples a pixel.
+    """Refine the frame after a movement, until it is whole with four samples per pixel.
 
-    The longest block is the longest time between two chances for the window to listen, on the clock and in
-    processor time of all threads, which other work on the machine does not lengthen.
+    The longest block is the longest time in which the window handles no input, in wall time and in processor
+    time of all threads, which other programs do not affect.
     """
-    window.samples = 2
+    window.frames.samples = 2
     window.redraw(whole=False)
-    window._moved -= REST
+    window.frames._changed_at -= REFINE_DELAY
     begin, ticks = time.perf_counter(), []
-    while window._moved:
+    while window.frames.state is FrameState.COARSE:
         ticks.append(timed(window.tick))
     seconds = time.perf_counter() - begin
-    window.samples = 1
+    window.frames.samples = 1
     longest, used = np.max(ticks, axis=0)
     return {
         f"{name}_rest_longest_block_ms": float(longest),
@@ -205,13 +206,13 @@ def rest(window: EditWindow, name: str) -> Figures:
 def measure(
     name: str, kinds: tuple[str, ...], size: tuple[int, int], count: int, steps: int
 ) -> Iterator[Figures]:
-    """Measure one model, kind after kind of what may be done to it."""
+    """Measure a model with each kind of input."""
     if "open" in kinds:
         for decals in OPENED:
             yield opening(name, size, decals)
     if set(kinds) <= {"open"}:
         return
-    session = EditSession(bench_scene(name, count, size, seeded=count <= SEEDED))
+    session = EditSession(bench_scene(name, count, size, scattered=count <= MAX_SCATTERED))
     with (
         TemporaryDirectory() as folder,
         EditWindow(
@@ -223,33 +224,33 @@ def measure(
         for kind, resting in at_rest.items():
             if kind in kinds:
                 yield resting(window, name)
-        window.rest = window.plotter.render  # type: ignore[method-assign]
+        window.draw_whole_frame = window.plotter.render  # type: ignore[method-assign]
         driver = Driver(window)
         moving = {"drag": drag, "turn": turn}
         if name == "creature":
             moving |= {"primitive": primitive}
         for kind, step in moving.items():
             if kind in kinds:
-                window.moving()
+                window.begin_motion()
                 yield step(driver, name, steps)
         for kind in BACKGROUND:
             if kind in kinds:
-                window.moving()
+                window.begin_motion()
                 yield background(driver, name, kind)
 
 
 def machine() -> str:
-    """Say on what this runs."""
+    """Describe the machine."""
     packages = ", ".join(f"{name} {version(name)}" for name in ("vtk", "pyvista", "moderngl", "warp-lang"))
     with EditWindow(bench_scene("knot", 10, (64, 48)), off_screen=True, size=(64, 48)) as window:
         window.show()
-        card = window.stage.renderer.context.name
+        card = window.subplot.renderer.context.name
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     return f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f}; {card}; {packages}"
 
 
 def main() -> None:
-    """Measure, print, and write."""
+    """Parse the command line, measure, print and write."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,5 +1,6 @@
 """BlobTree files: they come back as they went, are written whole or not at all, and say what is wrong."""
 
+import dataclasses
 import json
 import os
 from pathlib import Path
@@ -10,7 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blobtree import InvalidFile, Node, Point, Union, from_json, load, save, to_json
-from tests.blobtree.trees import random_trees, trees
+from blobtree.io import RECORD_OF_KIND
+from blobtree.nodes.tree import NODE_KINDS
+from tests.blobtree.custom_kinds import Ring, Soft
+from tests.blobtree.trees import KINDS, random_trees, trees
 
 BALL = {"type": "point", "center": [0, 0, 0], "radius": 1, "color": [1, 1, 1]}
 
@@ -54,6 +58,23 @@ def test_a_spine_of_ten_thousand_is_no_recursion() -> None:
     for i in range(10_000):
         tree = tree - Point((0, 0, float(i)), radius=1.0)
     assert to_json(from_json(to_json(tree))) == to_json(tree)
+
+
+def test_custom_nodes_are_read_under_their_old_and_new_tags() -> None:
+    ring = Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.2)
+    tree = Soft((ring, Point((1, 0, 0), radius=0.4)), 1.0)
+    text = to_json(tree).decode()
+    assert text.count('"custom_skeleton"') == text.count('"custom_operator"') == 1
+    old = text.replace("custom_skeleton", "own skeleton").replace("custom_operator", "own operator")
+    assert from_json(old) == from_json(text) == tree
+
+
+def test_every_built_in_kind_of_node_has_a_record() -> None:
+    assert {kind.file_tag for kind in KINDS} <= set(NODE_KINDS)
+    assert set(RECORD_OF_KIND) == set(NODE_KINDS.values())
+    for kind, record in RECORD_OF_KIND.items():
+        names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
+        assert list(record.__struct_fields__) == names
 
 
 BROKEN: dict[str, tuple[str, str]] = {
@@ -117,8 +138,8 @@ BROKEN: dict[str, tuple[str, str]] = {
     "an unknown field": (document({**BALL, "colour": 1}), r"unknown field `colour` - at `\$.nodes\[0\]`"),
     "an unknown field outside": (document(BALL, author="x"), r"unknown field `author`"),
     "an unknown type": (
-        document(BALL, {**BALL, "type": "torus"}),
-        r"Invalid value 'torus' - at `\$.nodes\[1\].type`",
+        document(BALL, {**BALL, "type": "teapot"}),
+        r"Invalid value 'teapot' - at `\$.nodes\[1\].type`",
     ),
     "no type": (document({"radius": 1}), r"missing required field `type` - at `\$.nodes\[0\]`"),
     "a missing field": (

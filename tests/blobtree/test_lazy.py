@@ -1,6 +1,7 @@
 """Properties that any thread may ask for first."""
 
 import threading
+from typing import Any
 
 import pytest
 
@@ -11,16 +12,16 @@ LONG = 30.0
 
 
 class Thing:
-    def __init__(self, make):
+    def __init__(self, make: Any) -> None:
         self.make = make
 
     @Lazy
-    def value(self):
+    def value(self) -> Any:
         """What was made."""
         return self.make()
 
 
-def test_it_is_made_once():
+def test_it_is_made_once() -> None:
     made = []
     thing = Thing(lambda: made.append(1) or object())
     assert thing.value is thing.value
@@ -28,10 +29,10 @@ def test_it_is_made_once():
     assert Thing.value.__doc__ == "What was made."
 
 
-def test_an_error_is_not_kept():
+def test_an_error_is_not_kept() -> None:
     answers = [LookupError(), None]
 
-    def make():
+    def make() -> Any:
         if error := answers.pop(0):
             raise error
         return "made"
@@ -42,10 +43,10 @@ def test_an_error_is_not_kept():
     assert thing.value == "made"
 
 
-def test_nobody_waits_for_what_another_thread_makes_and_both_have_the_same():
+def test_nobody_waits_for_what_another_thread_makes_and_both_have_the_same() -> None:
     begun, go, found = threading.Event(), threading.Event(), []
 
-    def slow():
+    def slow() -> Any:
         if threading.current_thread() is not threading.main_thread():
             begun.set()
             assert go.wait(LONG)

@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from blobtree import (
+    Box,
     Cone,
     Difference,
+    Disc,
     Intersection,
     Node,
     Offset,
@@ -19,6 +21,7 @@ from blobtree import (
     Ricci,
     Segment,
     Sum,
+    Torus,
     Transform,
     Twist,
     Union,
@@ -34,16 +37,16 @@ def triple(array: NDArray[np.floating]) -> Vector:
 
 
 @dataclass(frozen=True)
-class OwnKinds:
-    """How random trees come by nodes of own kinds."""
+class MoreKinds:
+    """Sources of further kinds of nodes for random trees."""
 
     leaf: Callable[[np.random.Generator], Node]
-    combine: Callable[[np.random.Generator, list[Node]], Node]
+    combine: Callable[[np.random.Generator, list[Node]], Node] | None = None
 
 
-def random_leaf(rng: np.random.Generator, own: OwnKinds | None = None) -> Node:
-    if own and rng.random() < 0.5:
-        return own.leaf(rng)
+def random_leaf(rng: np.random.Generator, more: MoreKinds | None = None) -> Node:
+    if more and rng.random() < 0.5:
+        return more.leaf(rng)
     color = triple(rng.uniform(0.0, 1.0, 3))
     radius = float(rng.uniform(0.2, 0.7))
     start = rng.uniform(-1.0, 1.0, 3)
@@ -54,6 +57,22 @@ def random_leaf(rng: np.random.Generator, own: OwnKinds | None = None) -> Node:
         return Segment(triple(start), triple(end), radius=radius, color=color)
     end_radius = float(rng.uniform(0.2, 0.7))  # now and then one end holds the other
     return Cone(triple(start), triple(end), radius=radius, end_radius=end_radius, color=color)
+
+
+def random_solid(rng: np.random.Generator) -> Node:
+    """A torus, a disc or a box."""
+    center, axis = triple(rng.uniform(-1.0, 1.0, 3)), triple(rng.normal(size=3))
+    radius, color = float(rng.uniform(0.15, 0.5)), triple(rng.uniform(0.0, 1.0, 3))
+    breadth, kind = float(rng.uniform(0.2, 0.9)), rng.integers(0, 3)
+    if kind == 0:
+        return Torus(center, axis, breadth, radius=radius, color=color)
+    if kind == 1:
+        return Disc(center, axis, breadth, radius=radius, color=color)
+    size = triple(rng.uniform(0.0, 1.2, 3) * (rng.random(3) < 0.9))  # now and then flat
+    return Box(center, size, radius=radius, color=color)
+
+
+SOLIDS = MoreKinds(random_solid)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:
@@ -68,16 +87,16 @@ def random_transform(rng: np.random.Generator, node: Node) -> Node:
     return placed.offset(float(rng.uniform(-0.03, 0.05))) if rng.random() < 0.3 else placed
 
 
-def random_tree(rng: np.random.Generator, depth: int = 4, own: OwnKinds | None = None) -> Node:
+def random_tree(rng: np.random.Generator, depth: int = 4, more: MoreKinds | None = None) -> Node:
     """A tree of all kinds of nodes, about two units wide, at most `depth` deep."""
-    kind = rng.integers(0, 11 if own else 8) if depth else 0
+    kind = rng.integers(0, 11 if more and more.combine else 8) if depth else 0
     if kind <= 1:
-        return random_leaf(rng, own)
+        return random_leaf(rng, more)
     if kind == 2:
-        return random_transform(rng, random_tree(rng, depth - 1, own))
-    operands = [random_tree(rng, depth - 1, own) for _ in range(rng.integers(2, 5))]
-    if own and kind >= 8:
-        return own.combine(rng, operands)
+        return random_transform(rng, random_tree(rng, depth - 1, more))
+    operands = [random_tree(rng, depth - 1, more) for _ in range(rng.integers(2, 5))]
+    if more and more.combine and kind >= 8:
+        return more.combine(rng, operands)
     if kind == 3:
         return Ricci(tuple(operands), exponent=float(rng.choice([1.0, 1.5, 2.0, 4.0, 20.0])))
     if kind == 4:
@@ -86,12 +105,12 @@ def random_tree(rng: np.random.Generator, depth: int = 4, own: OwnKinds | None =
     return reduce(combine, operands)
 
 
-def random_trees(seed: int, count: int, depth: int = 4, own: OwnKinds | None = None) -> list[Node]:
+def random_trees(seed: int, count: int, depth: int = 4, more: MoreKinds | None = None) -> list[Node]:
     """Trees with at least one combination each; every kind of node occurs among two dozen of them."""
     rng = np.random.default_rng(seed)
     trees: list[Node] = []
     while len(trees) < count:
-        tree = random_tree(rng, depth, own)
+        tree = random_tree(rng, depth, more)
         if len(tree.children) > 1:
             trees.append(tree)
     return trees
@@ -109,6 +128,8 @@ def points_around(rng: np.random.Generator, tree: Node, count: int) -> NDArray[n
 
 _coordinate = st.floats(-10.0, 10.0)
 _vector = st.tuples(_coordinate, _coordinate, _coordinate)
+_direction = _vector.filter(any)
+_extents = st.tuples(*[st.floats(0.0, 10.0)] * 3)
 _radius = st.floats(1e-3, 10.0)
 _color = st.tuples(*[st.floats(0.0, 1.0)] * 3)
 _factor = st.floats(0.1, 10.0) | st.floats(-10.0, -0.1)
@@ -130,7 +151,11 @@ def _extend(children: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
 
 def trees(max_leaves: int = 12) -> st.SearchStrategy[Node]:
     """Any tree of moderate numbers."""
-    leaves = st.builds(Point, _vector, radius=_radius, color=_color) | st.builds(
-        Segment, _vector, _vector, radius=_radius, color=_color
+    leaves = st.one_of(
+        st.builds(Point, _vector, radius=_radius, color=_color),
+        st.builds(Segment, _vector, _vector, radius=_radius, color=_color),
+        st.builds(Box, _vector, _extents, radius=_radius, color=_color),
+        st.builds(Torus, _vector, _direction, _radius, radius=_radius, color=_color),
+        st.builds(Disc, _vector, _direction, _radius, radius=_radius, color=_color),
     )
     return st.recursive(leaves, _extend, max_leaves=max_leaves)

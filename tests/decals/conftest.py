@@ -5,21 +5,28 @@ from collections.abc import Iterator
 import pytest
 
 from decals.errors import NoGraphics
-from decals.render.context import Context
-from decals.render.renderer import Renderer
+from decals.rendering.context import Context
+from decals.rendering.renderer import Renderer
 
 
 @pytest.fixture(scope="session")
-def context() -> Iterator[Context]:
+def standalone_context(vtk_display: None) -> Iterator[Context]:
     try:
-        made = Context.standalone()
+        standalone = Context.standalone()
     except NoGraphics as error:
         pytest.skip(str(error))
-    with made, made.current():
-        yield made
+    with standalone:
+        yield standalone
+
+
+@pytest.fixture
+def context(standalone_context: Context) -> Iterator[Context]:
+    """Make the context current: a window of another test may have taken its place."""
+    with standalone_context.current():
+        yield standalone_context
 
 
 @pytest.fixture(scope="session")
-def renderer(context: Context) -> Iterator[Renderer]:
-    with Renderer(context) as made:
-        yield made
+def renderer(standalone_context: Context) -> Iterator[Renderer]:
+    with standalone_context.current(), Renderer(standalone_context) as renderer:
+        yield renderer

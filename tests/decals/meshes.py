@@ -1,4 +1,6 @@
-"""Small meshes for the tests of surfaces and seeds, made with NumPy alone: some run where little else is."""
+"""Small meshes for tests of surfaces and scattering, made with NumPy alone to run without other packages."""
+
+from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -6,7 +8,7 @@ from scipy.spatial import ConvexHull
 from decals.surfaces.mesh import MeshSurface
 
 
-def icosphere(level: int):
+def icosphere(level: int) -> Any:
     """Vertices and outward faces of an icosahedron on the unit ball, each face divided in four so often."""
     golden = (1 + 5**0.5) / 2
     vertices = np.array([np.roll([0, a, b * golden], k) for a in (-1, 1) for b in (-1, 1) for k in range(3)])
@@ -25,7 +27,7 @@ def icosphere(level: int):
     return vertices, faces
 
 
-def sphere(radius: float = 1.0, center=(0.0, 0.0, 0.0), level: int = 4) -> MeshSurface:
+def sphere(radius: float = 1.0, center: Any = (0.0, 0.0, 0.0), level: int = 4) -> MeshSurface:
     vertices, faces = icosphere(level)
     return MeshSurface(radius * vertices + np.asarray(center), faces)
 
@@ -37,7 +39,7 @@ def plane(size: float = 1.0) -> MeshSurface:
     return MeshSurface(corners, [[0, 1, 2], [0, 2, 3]])
 
 
-def box(size=(1.0, 1.0, 1.0), center=(0.0, 0.0, 0.0)) -> MeshSurface:
+def box(size: Any = (1.0, 1.0, 1.0), center: Any = (0.0, 0.0, 0.0)) -> MeshSurface:
     """A closed box of twelve triangles."""
     half = np.asarray(size) / 2
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from decals.model import Decals
-from decals.render.drawables import register
-from decals.render.mesh import MeshDrawable
 from decals.scenes.camera import Camera, Vector
 
 
@@ -34,9 +32,6 @@ class View:
     camera: Camera
     decals: Decals = field(default_factory=Decals.empty)
     images: tuple[Picture, ...] = ()
-
-
-register(Shape, MeshDrawable)
 
 
 def grid(rows: int, columns: int) -> np.ndarray:

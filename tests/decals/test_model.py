@@ -1,17 +1,20 @@
 """Decals as data: what is kept, what is repaired, what is refused."""
 
+from typing import Any
+
 import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from blobtree.formulas.kernels import RIM
-from decals.errors import DecalsError, InvalidDecals
-from decals.model import LARGEST, LAYERS, RECORD, SMALLEST_RADIUS, Decals, Interaction
+from blobtree.formulas.falloff import RIM
+from decals.errors import ImplicitDecalsError, InvalidDecals
+from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, RECORD, Decals, Interaction
 
 
-def some(count=5, seed=0, **changes):
+def some(count: int = 5, seed: int = 0, **changes: Any) -> Any:
     rng = np.random.default_rng(seed)
     arrays = {
         "positions": rng.normal(size=(count, 3)),
@@ -24,27 +27,27 @@ def some(count=5, seed=0, **changes):
     return Decals(**{**arrays, **changes})
 
 
-def test_frames_are_orthonormal_and_right_handed():
+def test_frames_are_orthonormal_and_right_handed() -> None:
     decals = some(200)
     frame = np.stack([decals.tangents, decals.bitangents, decals.normals], axis=1).astype(float)
     assert np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max() < 5e-7
     assert np.linalg.det(frame) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_tangent_is_projected_within_the_plane_of_itself_and_the_normal():
+def test_tangent_is_projected_within_the_plane_of_itself_and_the_normal() -> None:
     decals = Decals([[0, 0, 0]], [[0, 0, 2]], [[3, 0, 4]], [1.0])
     assert decals.tangents.tolist() == [[1, 0, 0]]
     assert decals.normals.tolist() == [[0, 0, 1]]
 
 
-def test_valid_frames_survive_bit_for_bit():
+def test_valid_frames_survive_bit_for_bit() -> None:
     decals = some(500)
     again = decals.replace()
     for name in ("positions", "normals", "tangents", "radii", "images", "spill"):
         assert np.array_equal(getattr(again, name), getattr(decals, name))
 
 
-def test_arrays_are_float32_copies_that_nobody_can_write():
+def test_arrays_are_float32_copies_that_nobody_can_write() -> None:
     mine = np.ones((1, 3), np.float32)
     decals = Decals(mine, [[0, 0, 1]], [[1, 0, 0]], [1.0])
     mine[:] = 7
@@ -57,14 +60,14 @@ def test_arrays_are_float32_copies_that_nobody_can_write():
             getattr(decals, name)[:] = 0
 
 
-def test_influence_puts_the_rim_at_the_radius():
+def test_influence_puts_the_rim_at_the_radius() -> None:
     decals = some(50)
     assert decals.influence.dtype == np.float32
     assert (1 - (decals.radii.astype(float) / decals.influence) ** 2) ** 3 == pytest.approx(0.5, abs=1e-6)
     assert decals.influence == pytest.approx(decals.radii / RIM)
 
 
-def test_slices_masks_and_index_arrays():
+def test_slices_masks_and_index_arrays() -> None:
     decals = some(6)
     assert np.array_equal(decals[2:4].positions, decals.positions[2:4])
     assert np.array_equal(decals[decals.spill].images, decals.images[decals.spill])
@@ -73,7 +76,7 @@ def test_slices_masks_and_index_arrays():
     assert np.array_equal(decals[-1].normals, decals.normals[-1:])
 
 
-def test_rows_are_the_same_bits_and_nobody_can_write_them():
+def test_rows_are_the_same_bits_and_nobody_can_write_them() -> None:
     decals = some(6)
     for part in (decals[1:4], decals[[4, 0]], Decals.concatenate([decals, decals[:2]])):
         for name in ("positions", "normals", "tangents", "radii", "images", "tints", "opacities"):
@@ -83,7 +86,7 @@ def test_rows_are_the_same_bits_and_nobody_can_write_them():
         decals[np.zeros((2, 2), int)]
 
 
-def test_concatenate_keeps_order_and_all_fields():
+def test_concatenate_keeps_order_and_all_fields() -> None:
     first, second = some(3, 1), some(4, 2)
     both = Decals.concatenate([first, second])
     assert len(both) == 7
@@ -93,27 +96,27 @@ def test_concatenate_keeps_order_and_all_fields():
     assert Decals.empty().packed().shape == (0, 4)
 
 
-def test_packed_record():
+def test_packed_record() -> None:
     decals = some(3, spill=np.array([False, True, False]))
     record = decals.packed()
     assert record.shape == (3 * RECORD, 4)
     assert record.dtype == np.float32
     assert np.array_equal(record[0::4], np.column_stack([decals.positions, decals.influence]))
     assert np.array_equal(record[1::4, :3], decals.normals)
-    rank = 4 * LAYERS + 1
+    rank = 4 * LAYER_LIMIT + 1
     assert record[1::4, 3].tolist() == [rank, rank + 0.5, rank]
     assert np.array_equal(record[2::4], np.column_stack([decals.tangents, decals.images]))
     assert record[3::4].tolist() == [[1, 1, 1, 1]] * 3
 
 
-def test_ranks_order_layers_first_and_interactions_in_them():
-    layers, kinds = np.repeat([-LAYERS, -1, 0, LAYERS - 1], 3), np.tile(list(Interaction), 4)
+def test_ranks_order_layers_first_and_interactions_in_them() -> None:
+    layers, kinds = np.repeat([-LAYER_LIMIT, -1, 0, LAYER_LIMIT - 1], 3), np.tile(list(Interaction), 4)
     decals = some(12, layers=layers, interactions=kinds, spill=np.ones(12, bool))
     assert (np.diff(decals.ranks) > 0).all()
     assert decals.packed()[1::4, 3].tolist() == (decals.ranks + 0.5).tolist()
 
 
-def test_tints_are_packed_as_linear_light():
+def test_tints_are_packed_as_linear_light() -> None:
     decals = some(2, tints=[[0, 0.5, 1], [0.04, 0.2, 0.9]], opacities=[0.25, 1])
     expected = [[0, 0.21404114, 1, 0.25], [0.0030959752, 0.033104767, 0.7874123, 1]]
     assert decals.packed()[3::4] == pytest.approx(np.array(expected), abs=1e-6)
@@ -144,15 +147,15 @@ def test_tints_are_packed_as_linear_light():
         ("spill", [0, 1], "True or False"),
         ("interactions", [0, 3], "got 3 in row 1"),
         ("interactions", [0.0, 1.0], "whole numbers"),
-        ("layers", [0, LAYERS], "in row 1"),
-        ("layers", [-LAYERS - 1, 0], "in row 0"),
+        ("layers", [0, LAYER_LIMIT], "in row 1"),
+        ("layers", [-LAYER_LIMIT - 1, 0], "in row 0"),
         ("tints", [[1, 1, 1], [1, 1, 1.1]], "divide .* 255"),
         ("tints", [1, 1], "shape"),
         ("opacities", [-0.1, 1], "from 0 to 1"),
         ("opacities", [np.nan, 1], "finite"),
     ],
 )
-def test_refuses(name, value, says):
+def test_refuses(name: str, value: Any, says: str) -> None:
     good = {
         "positions": np.zeros((2, 3)),
         "normals": [[0, 0, 1]] * 2,
@@ -161,14 +164,14 @@ def test_refuses(name, value, says):
     }
     with pytest.raises(InvalidDecals, match=says) as caught:
         Decals(**{**good, name: value})
-    assert isinstance(caught.value, DecalsError)
+    assert isinstance(caught.value, ImplicitDecalsError)
     assert isinstance(caught.value, ValueError)
     assert str(caught.value).startswith(name)
 
 
-def test_limits_are_accepted():
-    radii = [SMALLEST_RADIUS, LARGEST]
-    decals = Decals([[LARGEST] * 3, [-LARGEST] * 3], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, radii)
+def test_limits_are_accepted() -> None:
+    radii = [MIN_RADIUS, MAX_COORDINATE]
+    decals = Decals([[MAX_COORDINATE] * 3, [-MAX_COORDINATE] * 3], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, radii)
     assert decals.replace().radii.tolist() == radii
 
 
@@ -177,7 +180,9 @@ vectors = hnp.arrays(np.float64, (4, 3), elements=st.floats(-1e300, 1e300))
 
 @settings(max_examples=100, deadline=None)
 @given(normals=vectors, tangents=vectors)
-def test_any_directions_make_an_orthonormal_frame_or_a_clear_error(normals, tangents):
+def test_any_directions_make_an_orthonormal_frame_or_a_clear_error(
+    normals: NDArray[Any], tangents: Any
+) -> None:
     try:
         decals = Decals(np.zeros((4, 3)), normals, tangents, np.ones(4))
     except InvalidDecals:
@@ -188,7 +193,7 @@ def test_any_directions_make_an_orthonormal_frame_or_a_clear_error(normals, tang
     assert np.abs((n * u).sum(1)).max() < 3e-6
 
 
-def test_thousands_of_decals_are_shown_in_one_line():
+def test_thousands_of_decals_are_shown_in_one_line() -> None:
     up = np.tile(np.float32([0, 0, 1]), (5000, 1))
     many = Decals(np.zeros((5000, 3)), up, np.roll(up, 1, axis=1), np.linspace(0.1, 0.25, 5000))
     assert repr(many) == "Decals(5000, radii from 0.1 to 0.25)"

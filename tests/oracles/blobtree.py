@@ -13,24 +13,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import (
+    Box,
     Cone,
+    CustomCombination,
+    CustomPrimitive,
     Difference,
+    Disc,
     Intersection,
     Node,
     Offset,
-    OwnCombination,
-    OwnPrimitive,
     Point,
     Ricci,
     Segment,
     Sum,
+    Torus,
     Transform,
     Twist,
     Union,
 )
-from blobtree.formulas.operators import Reach
-
-from . import own_kinds
+from blobtree.formulas.operators import Support
+from tests.oracles import custom_kinds
 
 Floats = NDArray[np.float64]
 
@@ -54,11 +56,23 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return _leaf(q - np.array(center), radius, color)
         case Segment(start=start, end=end, radius=radius, color=color):
             return _leaf(q - _closest_on_segment(q, np.array(start), np.array(end)), radius, color)
-        case OwnPrimitive(radius=radius, color=color):
-            closest, clearance = own_kinds.CLOSEST[node.kind](q, **node.values)
+        case Torus(center=center, axis=axis, ring_radius=ring, radius=radius, color=color):
+            across, along = _cylindrical(q, center, axis)
+            leaf = _leaf_at(np.hypot(across - ring, along) * RIM / radius, color)
+            return replace(leaf, margin=across)  # on the axis all points of the circle are closest
+        case Disc(center=center, axis=axis, disc_radius=disc, radius=radius, color=color):
+            across, along = _cylindrical(q, center, axis)
+            return _leaf_at(np.hypot(np.maximum(across - disc, 0.0), along) * RIM / radius, color)
+        case Box(center=center, size=size, radius=radius, color=color):
+            beyond = np.maximum(np.abs(q - np.array(center)) - 0.5 * np.array(size), 0.0)
+            return _leaf(beyond, radius, color)
+        case CustomPrimitive(radius=radius, color=color):
+            closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
-        case OwnCombination():
-            return reduce(lambda a, b: _own(a, b, node), [evaluate(operand, q) for operand in node.operands])
+        case CustomCombination():
+            return reduce(
+                lambda a, b: _custom(a, b, node), [evaluate(operand, q) for operand in node.operands]
+            )
         case Cone(color=color):
             return _leaf_at(_least_ratio(q, node), color)
         case Twist(child=child, degrees=degrees):
@@ -98,11 +112,11 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
 def grown(node: Node, distance: float) -> Node:
     """`node` with every radius larger by `distance`, those of tools smaller."""
     match node:
-        case OwnCombination(operands=(solid, tool)) if node.operator.reach is Reach.LEFT:
+        case CustomCombination(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
-        case OwnCombination():
+        case CustomCombination():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
-        case Point() | Segment() | OwnPrimitive():
+        case Point() | Segment() | Torus() | Disc() | Box() | CustomPrimitive():
             return replace(node, radius=node.radius + distance)
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
@@ -123,6 +137,14 @@ def grown(node: Node, distance: float) -> Node:
 def _turned(q: Floats, angle: Floats) -> Floats:
     x, y, z = q.T
     return np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, z], axis=1)
+
+
+def _cylindrical(q: Floats, center: Any, axis: Any) -> tuple[Floats, Floats]:
+    """Distances (n,) from the line through `center` along `axis`, and heights (n,) along it."""
+    normal = np.array(axis) / np.linalg.norm(axis)
+    offsets = q - np.array(center)
+    along = offsets @ normal
+    return np.linalg.norm(offsets - along[:, None] * normal, axis=1), along
 
 
 def _least_ratio(q: Floats, cone: Cone) -> Floats:
@@ -160,8 +182,8 @@ def _closest_on_segment(q: Floats, start: Floats, end: Floats) -> Floats:
     return closest
 
 
-def _own(a: Field, b: Field, node: OwnCombination) -> Field:
-    value, by_a, by_b, kink = own_kinds.OPERATORS[node.kind](a.value, b.value, **node.values)
+def _custom(a: Field, b: Field, node: CustomCombination) -> Field:
+    value, by_a, by_b, kink = custom_kinds.OPERATORS[node.kind](a.value, b.value, **node.values)
     weights = np.abs(by_a) * a.value, np.abs(by_b) * b.value
     total = weights[0] + weights[1]
     share = np.where(total > 0.0, weights[1] / np.where(total > 0.0, total, 1.0), b.value > a.value)

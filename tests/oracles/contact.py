@@ -1,21 +1,24 @@
 """The paper's equation 5, repaired, in float64 NumPy: once as written, once where 1 − f would cancel."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 RIM = np.sqrt(1 - 0.5 ** (1 / 3))
 
 
-def falloff(distance):
+def falloff(distance: NDArray[Any]) -> Any:
     """g(d), eq. 2."""
     return np.where(distance <= 1, (1 - np.minimum(distance, 1) ** 2) ** 3, 0.0)
 
 
-def inverse_falloff(field):
+def inverse_falloff(field: Any) -> Any:
     """g⁻¹(F), eq. 3."""
     return np.sqrt(1 - np.cbrt(field))
 
 
-def contact_field(fields):
+def contact_field(fields: Any) -> Any:
     """F of rows of field values, literally: owner = highest field; NaN where the owner's field is below ½."""
     fields = np.asarray(fields, np.float64)
     owner = fields.argmax(axis=1)
@@ -29,13 +32,13 @@ def contact_field(fields):
     return np.where(highest[:, 0] >= 0.5, deformed, np.nan)
 
 
-def complements(squared):
+def complements(squared: Any) -> Any:
     """e = 1 − g of squared relative distances, without cancellation."""
     t = np.minimum(squared, 1.0)
     return t * (3 - 3 * t + t * t)
 
 
-def log_factor(e, least):
+def log_factor(e: Any, least: Any) -> Any:
     """log h_i of neighbours with complement e against owners with complement least; −∞ on a tie."""
     with np.errstate(all="ignore"):
         w = np.minimum((e - least) / (1 - 2 * least), 1)
@@ -43,7 +46,7 @@ def log_factor(e, least):
     return np.where(e == least, -np.inf, np.where(w < 1, log_h, 0.0))
 
 
-def contact_complement(e, *, strongest=False):
+def contact_complement(e: Any, *, strongest: bool = False) -> Any:
     """(owner, E = 1 − F) of rows of complements, to full relative precision; owner −1 outside all rims.
 
     strongest: the least of the factors h in place of their product.
@@ -58,7 +61,7 @@ def contact_complement(e, *, strongest=False):
     return np.where(least[:, 0] <= 0.5, owner, -1), result
 
 
-def rim_distance(complement):
+def rim_distance(complement: Any) -> Any:
     """r / r_h = g⁻¹(1 − E) / r_h, without cancellation."""
     c = np.cbrt(1 - complement)
     return np.sqrt(complement / (1 + c + c * c)) / RIM

@@ -1,31 +1,31 @@
-"""Where creases truly are, in float64, for shapes made of balls and cylinders."""
+"""Exact creases of balls and cylinders, in float64."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from blobtree._typing import Float64Array
 
 
 @dataclass(frozen=True)
 class Circle:
-    """Where two spheres meet."""
+    """The intersection of two spheres."""
 
-    center: Floats
-    axis: Floats
+    center: Float64Array
+    axis: Float64Array
     radius: float
 
-    def distances(self, points: ArrayLike) -> Floats:
-        """Of `points` (n, 3) to the circle."""
+    def distances(self, points: ArrayLike) -> Float64Array:
+        """Return the distances (n,) of `points` (n, 3) to the circle."""
         offsets = np.asarray(points, np.float64) - self.center
         heights = offsets @ self.axis
         radii = np.linalg.norm(offsets - heights[:, None] * self.axis, axis=1)
-        return np.hypot(heights, radii - self.radius)
+        return np.asarray(np.hypot(heights, radii - self.radius))
 
 
 def circle(center: ArrayLike, radius: float, other_center: ArrayLike, other_radius: float) -> Circle:
-    """The circle that two spheres have in common."""
+    """Return the circle that two spheres have in common."""
     a, b = np.asarray(center, np.float64), np.asarray(other_center, np.float64)
     distance = float(np.linalg.norm(b - a))
     along = (distance**2 + radius**2 - other_radius**2) / (2.0 * distance)
@@ -33,8 +33,8 @@ def circle(center: ArrayLike, radius: float, other_center: ArrayLike, other_radi
     return Circle(a + along * axis, axis, float(np.sqrt(radius**2 - along**2)))
 
 
-def meeting_points(centers: ArrayLike, radii: ArrayLike) -> Floats:
-    """The two points (2, 3) that three spheres have in common."""
+def sphere_intersections(centers: ArrayLike, radii: ArrayLike) -> Float64Array:
+    """Return the two points (2, 3) that three spheres have in common."""
     a, b, c = np.asarray(centers, np.float64)
     r, s, t = np.asarray(radii, np.float64)
     x = (b - a) / np.linalg.norm(b - a)
@@ -49,7 +49,7 @@ def meeting_points(centers: ArrayLike, radii: ArrayLike) -> Floats:
     return np.array([middle + height * np.cross(x, y), middle - height * np.cross(x, y)])
 
 
-def to_two_surfaces(first: Floats, second: Floats, cosines: Floats) -> Floats:
-    """Distances to the crease of two surfaces from those to the surfaces and the cosine between normals."""
+def distance_to_crease(first: Float64Array, second: Float64Array, cosines: Float64Array) -> Float64Array:
+    """Return distances to the crease of two surfaces from those to the surfaces and the normals' cosine."""
     squares = first**2 + second**2 - 2.0 * cosines * first * second
     return np.asarray(np.sqrt(squares / (1.0 - cosines**2)))

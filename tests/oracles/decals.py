@@ -5,8 +5,10 @@ Written from the paper (equations 1 to 5) and the design, not from the implement
 
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tests.oracles.contact import RIM, complements, log_factor, rim_distance
 
@@ -31,7 +33,15 @@ class Reference:
     stretch: np.ndarray
 
 
-def decals_at(decals, points, normals, *, corrected=True, reach=1.0, contact="paper"):
+def decals_at(
+    decals: Any,
+    points: NDArray[Any],
+    normals: NDArray[Any],
+    *,
+    corrected: bool = True,
+    reach: float = 1.0,
+    contact: str = "product",
+) -> Any:
     """What the topmost of `decals` (anything with their arrays) shows at points with unit normals.
 
     reach 1 is the paper; less leaves out whatever is farther than that many influence radii.
@@ -39,14 +49,22 @@ def decals_at(decals, points, normals, *, corrected=True, reach=1.0, contact="pa
     return _in_chunks(_topmost, decals, points, normals, corrected, reach, contact)
 
 
-def colors_at(decals, points, normals, color_of, *, corrected=True, contact="paper"):
+def colors_at(
+    decals: Any,
+    points: NDArray[Any],
+    normals: NDArray[Any],
+    color_of: Any,
+    *,
+    corrected: bool = True,
+    contact: str = "product",
+) -> Any:
     """Premultiplied colours of all decals over each other, from the lowest up.
 
     color_of(numbers, uv) gives the premultiplied colours of these decals at these image coordinates, within
     the disc that is an image.
     """
 
-    def composed(decals, points, normals):
+    def composed(decals: Any, points: NDArray[Any], normals: NDArray[Any]) -> Any:
         scene = _Scene(decals, points, normals, 1.0)
         color = np.zeros((len(points), 4))
         for members in reversed(_drawings(decals)):
@@ -63,7 +81,7 @@ def colors_at(decals, points, normals, color_of, *, corrected=True, contact="pap
     return _in_chunks(lambda *arrays: composed(*arrays[:3]), decals, points, normals)[0]
 
 
-def _in_chunks(function, decals, points, normals, *options):
+def _in_chunks(function: Any, decals: Any, points: NDArray[Any], normals: NDArray[Any], *options: Any) -> Any:
     points, normals = np.asarray(points, np.float64), np.asarray(normals, np.float64)
     rows = max(1, CHUNK // max(1, len(decals.radii)))
     parts = [
@@ -74,7 +92,7 @@ def _in_chunks(function, decals, points, normals, *options):
     return Reference(*columns) if function is _topmost else columns
 
 
-def _drawings(decals):
+def _drawings(decals: Any) -> Any:
     """Who is drawn together, from the top down: every sheet of contact decals, every other decal alone."""
     order = sorted(range(len(decals.radii)), key=lambda i: (decals.layers[i], decals.interactions[i], i))
     together = groupby(
@@ -84,7 +102,9 @@ def _drawings(decals):
     return [np.array(sorted(members)) for _, members in together][::-1]
 
 
-def _topmost(decals, points, normals, corrected, reach, contact):
+def _topmost(
+    decals: Any, points: NDArray[Any], normals: NDArray[Any], corrected: bool, reach: Any, contact: Any
+) -> Any:
     scene = _Scene(decals, points, normals, reach)
     count = len(points)
     owner, complement, doubt = np.full(count, -1), np.ones(count), np.full(count, 4.0)
@@ -104,7 +124,7 @@ def _topmost(decals, points, normals, corrected, reach, contact):
 class _Scene:
     """All distances between points and decals."""
 
-    def __init__(self, decals, points, normals, reach):
+    def __init__(self, decals: Any, points: NDArray[Any], normals: NDArray[Any], reach: Any) -> None:
         self.points, self.centres = points, decals.positions.astype(np.float64)
         self.radii, self.spill = decals.radii.astype(np.float64), decals.spill
         self.alone = np.asarray(decals.interactions) != 1
@@ -114,7 +134,7 @@ class _Scene:
         self.facing = self.spill | (self.cosine > FACING_LIMIT)
         self.acts = (self.squared < reach**2) & self.facing
 
-    def shown(self, members, contact):
+    def shown(self, members: Any, contact: Any) -> Any:
         """Who of a sheet, or of one other decal, shows; E = 1 − F; and the doubt about it."""
         squared, acts = self.squared[:, members], self.acts[:, members]
         if contact == "radial" and not self.alone[members[0]]:
@@ -127,7 +147,7 @@ class _Scene:
         pair, other = np.nonzero(owned[:, None] & (e + least[:, None] < 1))
         pair, other = pair[other != owner[pair]], other[other != owner[pair]]
         log_h = log_factor(e[pair, other], least[pair])
-        if contact == "smooth":
+        if contact == "min":
             together = np.zeros(count)
             np.minimum.at(together, pair, log_h)
         else:
@@ -136,7 +156,7 @@ class _Scene:
         who = np.append(members, -1)
         return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
 
-    def radial(self, members):
+    def radial(self, members: Any) -> Any:
         """Convex cells between radical planes; stacked decals over each other, the smaller uppermost."""
         centres, radii = self.centres[members], self.radii[members]
         apart = centres[None] - centres[:, None]
@@ -169,13 +189,13 @@ class _Scene:
         doubt = np.minimum((np.abs(power) / radii**2).min(axis=1), gap.min(axis=(1, 2)))
         return np.where(owned, members[owner], -1), complements(z), doubt
 
-    def facing_doubt(self):
+    def facing_doubt(self) -> Any:
         """Distance to the facing limit of a decal that reaches the point."""
         near = (self.squared < 1) & ~self.spill
         return np.where(near, np.abs(self.cosine - FACING_LIMIT), 4.0).min(axis=1, initial=4.0)
 
 
-def _tie_doubt(squared, acts):
+def _tie_doubt(squared: NDArray[Any], acts: Any) -> Any:
     """Relative distance to a tie of the two nearest, or to the rim."""
     count = len(squared)
     d = np.sqrt(np.column_stack([np.where(acts, squared, 4.0), np.full((count, 2), [RIM**2, 4.0])]))
@@ -183,7 +203,14 @@ def _tie_doubt(squared, acts):
     return np.where(d[:, 0] < 1e-30, 0.0, (d[:, 1] - d[:, 0]) / np.maximum(d[:, 0], 1e-300))
 
 
-def _image_place(decals, points, normals, owner, complement, corrected):
+def _image_place(
+    decals: Any,
+    points: NDArray[Any],
+    normals: NDArray[Any],
+    owner: NDArray[Any],
+    complement: Any,
+    corrected: bool,
+) -> Any:
     """uv, and |q − p| over the length in the tangent plane of what gives uv its direction."""
     p, n, u = (a[owner].astype(np.float64) for a in (decals.positions, decals.normals, decals.tangents))
     w = (points - p) / decals.radii[owner].astype(np.float64)[:, None]
@@ -199,7 +226,7 @@ def _image_place(decals, points, normals, owner, complement, corrected):
     return 0.5 + 0.5 * (drawn / shadow)[:, None] * xy, chord / shadow
 
 
-def _unrolled(w, n_p, n_q):
+def _unrolled(w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
     """Offset and length of the arc that starts along a surface at n_p, and ends at n_q.
 
     Of an arc of radius R and angle ψ both ends lie R (1 − cos ψ) from the tangent plane at the other. Where

@@ -1,4 +1,4 @@
-"""The polygonizer's mesh by brute force: every cell of a dense grid, the whole tape at every sample."""
+"""The polygonizer by brute force: every cell of a dense grid, and the whole tape at every sample."""
 
 from dataclasses import dataclass
 
@@ -6,25 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Mesh, Node
-from blobtree.formulas.kernels import ISO
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
+from blobtree.formulas.falloff import ISO
 from blobtree.meshing.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
-from blobtree.meshing.strays import HALVINGS
-from blobtree.tapes.evaluate import colors_at, values_at
-from blobtree.tapes.project import STALLED, project
-
-Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
+from blobtree.meshing.vertex_kernels import HALVINGS
+from blobtree.tape.evaluate import colors_at, project, values_at
+from blobtree.tape.evaluate_kernels import STALLED
 
 
 @dataclass(frozen=True)
 class _Grid:
     """Sample points cell · (first + (i, j, k)), `shape` of them."""
 
-    first: NDArray[np.float64]
+    first: Float64Array
     cell: float
     shape: tuple[int, int, int]
 
-    def points(self, indices: NDArray[np.floating | np.integer]) -> Floats:
+    def points(self, indices: NDArray[np.floating | np.integer]) -> Float32Array:
         return (self.first + indices).astype(np.float32) * np.float32(self.cell)
 
 
@@ -32,28 +30,28 @@ class _Grid:
 class _Crossings:
     """Grid edges that cross the surface, one entry for each patch that they belong to."""
 
-    vertices: Ints
-    inner: NDArray[np.float64]
+    vertices: Int32Array
+    inner: Float64Array
     """Grid coordinates (n, 3) of the corner inside, and `outer` of the one outside."""
-    outer: NDArray[np.float64]
-    places: NDArray[np.float64]
+    outer: Float64Array
+    crossing_points: Float64Array
     """Where a field that is linear along the edge crosses it, in grid coordinates (n, 3)."""
 
-    def means(self) -> NDArray[np.float64]:
+    def means(self) -> Float64Array:
         """Mean crossing (m, 3) of every patch, in grid coordinates."""
         counts = np.bincount(self.vertices)
-        sums = np.stack([np.bincount(self.vertices, axis) for axis in self.places.T], axis=1)
+        sums = np.stack([np.bincount(self.vertices, axis) for axis in self.crossing_points.T], axis=1)
         return sums / counts[:, None]
 
-    def nearest(self, tree: Node, grid: _Grid) -> Floats:
+    def nearest(self, tree: Node, grid: _Grid) -> Float32Array:
         """Of every patch the crossing (m, 3) nearest to their mean, found by halving."""
         inner, outer = self.inner.copy(), self.outer.copy()
         for _ in range(HALVINGS):
             middle = 0.5 * (inner + outer)
             inside = (values_at(tree.tape, grid.points(middle)) >= ISO)[:, None]
             inner, outer = np.where(inside, middle, inner), np.where(inside, outer, middle)
-        apart = np.linalg.norm(inner - self.means()[self.vertices], axis=1)
-        order = np.lexsort((apart, self.vertices))
+        distances = np.linalg.norm(inner - self.means()[self.vertices], axis=1)
+        order = np.lexsort((distances, self.vertices))
         _, first = np.unique(self.vertices[order], return_index=True)
         return grid.points(inner[order[first]])
 
@@ -66,9 +64,9 @@ def polygonize(tree: Node, *, cell_size: float) -> Mesh:
     starts = grid.points(crossings.means())
     positions, normals = project(tree.tape, starts, longest_step=0.5 * grid.cell)
     off = np.abs(values_at(tree.tape, positions) - ISO) > STALLED * ISO
-    strays = np.flatnonzero(off | (np.linalg.norm(positions - starts, axis=1) > grid.cell))
-    positions[strays] = crossings.nearest(tree, grid)[strays]
-    normals[strays] = project(tree.tape, positions[strays], longest_step=0.0)[1]
+    unconverged = np.flatnonzero(off | (np.linalg.norm(positions - starts, axis=1) > grid.cell))
+    positions[unconverged] = crossings.nearest(tree, grid)[unconverged]
+    normals[unconverged] = project(tree.tape, positions[unconverged], longest_step=0.0)[1]
     return Mesh(positions, _split_quads(quads, positions), normals, colors_at(tree.tape, positions))
 
 
@@ -80,7 +78,7 @@ def _make_grid(tree: Node, cell_size: float) -> _Grid:
     return _Grid(first, cell_size, (nx, ny, nz))
 
 
-def _dual_surface(values: Floats, grid: _Grid) -> tuple[_Crossings, Ints]:
+def _dual_surface(values: Float32Array, grid: _Grid) -> tuple[_Crossings, Int32Array]:
     """The crossings of every patch, which has one vertex, and one quad (m, 4) per crossed grid edge."""
     inside = values >= ISO
     codes = _rows(_cell_codes(inside))
@@ -94,7 +92,7 @@ def _dual_surface(values: Floats, grid: _Grid) -> tuple[_Crossings, Ints]:
     return crossings, np.concatenate(quads)
 
 
-def _cell_codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def _cell_codes(inside: BoolArray) -> UInt8Array:
     """Code of every cell: bit c tells whether its corner c is inside."""
     codes = np.zeros(tuple(n - 1 for n in inside.shape), np.uint8)
     for corner in range(8):
@@ -102,7 +100,7 @@ def _cell_codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
     return codes
 
 
-def _rows(codes: NDArray[np.uint8]) -> NDArray[np.int16]:
+def _rows(codes: UInt8Array) -> NDArray[np.int16]:
     """Rows of the patch tables: a cell's code, + FLIPPED where its knotted face is its neighbour's too."""
     rows = codes.astype(np.int16)
     knotted = np.pad(KNOTTED_FACE[codes], 1, constant_values=-1)
@@ -120,31 +118,34 @@ def _shifted(corner: int, shape: tuple[int, ...]) -> tuple[slice, ...]:
 
 
 def _crossings(
-    values: Floats,
+    values: Float32Array,
     shape: tuple[int, ...],
-    active: NDArray[np.int64],
+    active: Int64Array,
     codes: NDArray[np.int16],
-    first_vertex: Ints,
+    first_vertex: Int32Array,
 ) -> _Crossings:
     """All crossings of all patches."""
     cells = np.stack(np.unravel_index(active, shape), axis=1)
-    vertices, inner, outer, places = [], [], [], []
+    vertices, inner, outer, crossing_points = [], [], [], []
     for edge, (a, b) in enumerate(EDGES):
         patch = PATCH_OF_EDGE[codes, edge]
-        here = np.flatnonzero(patch >= 0)
+        members = np.flatnonzero(patch >= 0)
         ends = [
-            (cells[here] + [corner & 1, corner >> 1 & 1, corner >> 2]).astype(np.float64) for corner in (a, b)
+            (cells[members] + [corner & 1, corner >> 1 & 1, corner >> 2]).astype(np.float64)
+            for corner in (a, b)
         ]
         value_a, value_b = (values[tuple(end.astype(int).T)].astype(np.float64)[:, None] for end in ends)
-        share = (ISO - value_a) / (value_b - value_a)
-        vertices.append(first_vertex[active[here]] + patch[here])
-        places.append(ends[0] + share * (ends[1] - ends[0]))
+        t = (ISO - value_a) / (value_b - value_a)
+        vertices.append(first_vertex[active[members]] + patch[members])
+        crossing_points.append(ends[0] + t * (ends[1] - ends[0]))
         inner.append(np.where(value_a >= ISO, ends[0], ends[1]))
         outer.append(np.where(value_a >= ISO, ends[1], ends[0]))
-    return _Crossings(*(np.concatenate(parts) for parts in (vertices, inner, outer, places)))
+    return _Crossings(*(np.concatenate(parts) for parts in (vertices, inner, outer, crossing_points)))
 
 
-def _quads_along(axis: int, inside: NDArray[np.bool_], codes: NDArray[np.int16], first_vertex: Ints) -> Ints:
+def _quads_along(
+    axis: int, inside: BoolArray, codes: NDArray[np.int16], first_vertex: Int32Array
+) -> Int32Array:
     """Quads (m, 4) around the crossed grid edges along `axis`, counter-clockwise from outside."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     crossed = np.diff(inside, axis=axis)
@@ -162,12 +163,12 @@ def _quads_along(axis: int, inside: NDArray[np.bool_], codes: NDArray[np.int16],
     return np.where(leaving[:, None], quads, quads[:, ::-1])
 
 
-def _split_quads(quads: Ints, positions: Floats) -> Ints:
+def _split_quads(quads: Int32Array, positions: Float32Array) -> Int32Array:
     """Two triangles (2m, 3) per quad, along its shorter diagonal."""
     a, b, c, d = quads.T
     first = np.linalg.norm(positions[a] - positions[c], axis=1)
     second = np.linalg.norm(positions[b] - positions[d], axis=1)
     along_ac = np.stack([a, b, c, a, c, d], axis=1)
     along_bd = np.stack([b, c, d, b, d, a], axis=1)
-    chosen: Ints = np.where((first <= second)[:, None], along_ac, along_bd).reshape(-1, 3)
-    return chosen
+    triangles: Int32Array = np.where((first <= second)[:, None], along_ac, along_bd).reshape(-1, 3)
+    return triangles

@@ -28,8 +28,8 @@ KEPT_LEAST = wp.constant(wp.float64(0.21))
 TINY = wp.constant(wp.float64(1e-300))
 NEARLY = wp.constant(wp.float64(1e-3))
 UNDERFLOW = wp.constant(wp.float64(1e-36))
-CONTACT = wp.constant(1)
-SMOOTH = wp.constant(1)
+PUSH = wp.constant(1)
+MIN = wp.constant(1)
 RADIAL = wp.constant(2)
 
 
@@ -159,7 +159,7 @@ def sheet(
                 if e > own:
                     w = (e - own) / (ONE - TWO * own)
                     factor = ONE - wp.exp(log_one_plus(-w) / own)
-                kept = wp.min(kept, factor) if contact == SMOOTH else kept * factor
+                kept = wp.min(kept, factor) if contact == MIN else kept * factor
     return Answer(owner, own + (HALF - own) * (ONE - kept), wp.sqrt(second / wp.max(least, TINY)) - ONE, edge)
 
 
@@ -291,7 +291,7 @@ def topmost(
     rank = top_rank(q, n, first, these)
     if rank < 0:
         return Answer(-1, ONE, doubt_of_rims(q, n, first, these), FOUR)
-    if (rank & 3) == CONTACT:
+    if (rank & 3) == PUSH:
         if contact == RADIAL:
             return doubted(convex(q, n, first, rank, these), doubt_of_rims(q, n, first, these))
         return doubted(sheet(q, n, first, rank, contact, reach, these), doubt_of_rims(q, n, first, these))

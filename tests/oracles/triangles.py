@@ -1,11 +1,14 @@
 """Closest points and ray hits of triangles by brute force, in float64."""
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float64Array
 
 
-def closest_points(points, vertices, faces):
+def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> Float64Array:
     """Distance of each point to the nearest triangle: inside the triangle's prism, or on one of its edges."""
-    points, corners = np.asarray(points, float), np.asarray(vertices, float)[faces]
+    points, corners = np.asarray(points, float), np.asarray(vertices, float)[np.asarray(faces)]
     best = np.full(len(points), np.inf)
     for a, b, c in corners:
         normal = np.cross(b - a, c - a)
@@ -19,10 +22,12 @@ def closest_points(points, vertices, faces):
     return best
 
 
-def first_hits(origins, directions, vertices, faces):
+def first_hits(
+    origins: Float64Array, directions: Float64Array, vertices: ArrayLike, faces: ArrayLike
+) -> Float64Array:
     """Distance along unit directions to the nearest triangle, from either side; infinity for a miss."""
     best = np.full(len(origins), np.inf)
-    for a, b, c in np.asarray(vertices, float)[faces]:
+    for a, b, c in np.asarray(vertices, float)[np.asarray(faces)]:
         normal = np.cross(b - a, c - a)
         steep = directions @ normal
         with np.errstate(divide="ignore", invalid="ignore"):

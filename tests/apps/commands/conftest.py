@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 import pyvista as pv
 
-from implicit_decals.apps.cli import run
-from implicit_decals.apps.commands import coat as coat_module
-from implicit_decals.apps.commands import demo as demo_module
+from decals.apps.cli import run
+from decals.apps.commands import demo as demo_module
+from decals.apps.commands import scatter_options
 
 Capture = pytest.CaptureFixture[str]
 
@@ -27,8 +27,8 @@ def _no_work(*_arguments: object, **_options: object) -> None:
 @pytest.fixture
 def bad(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> Callable[..., str]:
     """Run a command that must fail before any work, with one line and exit code 2; gives the line."""
-    monkeypatch.setattr(coat_module, "seed_decals", _no_work)
-    monkeypatch.setattr(demo_module, "hatching", _no_work)
+    monkeypatch.setattr(scatter_options, "scatter", _no_work)
+    monkeypatch.setattr(demo_module, "nest_scene", _no_work)
     pv.Sphere().save(folder / "ball.ply")
 
     def check(*arguments: str) -> str:

@@ -2,10 +2,10 @@
 
 import pytest
 
-from decals.render import Renderer
-from implicit_decals.apps.cli import BAD_INPUT, run
-from implicit_decals.apps.commands.bench import parse_counts, parse_models
-from implicit_decals.apps.errors import UsageError
+from decals.apps.cli import BAD_INPUT, run
+from decals.apps.commands.bench import parse_counts, parse_models
+from decals.apps.errors import UsageError
+from decals.rendering import Renderer
 
 
 def test_lists_are_read() -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from implicit_decals.apps.cli import run
-from implicit_decals.apps.commands import coat as coat_module
+from decals.apps.cli import run
+from decals.apps.commands import scatter_options
 from tests.apps.commands.pictures import small
 
 Capture = pytest.CaptureFixture[str]
@@ -21,7 +21,7 @@ def test_version(capsys: Capture) -> None:
 def test_help_names_the_commands_and_their_options(capsys: Capture) -> None:
     assert run(["--help"]) == 0
     listing = capsys.readouterr().out
-    assert all(name in listing for name in ("demo", "render", "seed", "polygonize", "doctor"))
+    assert all(name in listing for name in ("demo", "render", "scatter", "polygonize", "doctor"))
     assert run(["render", "--help"]) == 0
     page = capsys.readouterr().out
     options = (
@@ -41,7 +41,7 @@ def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture
     def interrupt(*_arguments: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(coat_module, "seed_decals", interrupt)
+    monkeypatch.setattr(scatter_options, "scatter", interrupt)
     assert run([*small("knot"), "-o", "a.png"]) == 130
     err = capfd.readouterr().err
     assert "interrupted" in err

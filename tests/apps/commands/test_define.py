@@ -1,15 +1,16 @@
-"""``--define``: a user's own kinds of nodes on the command line."""
+"""``--define``: custom nodes on the command line."""
 
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista as pv
+from numpy.typing import NDArray
 
-from implicit_decals.apps.cli import run
+from decals.apps.cli import run
 
 Capture = pytest.CaptureFixture[str]
 
@@ -18,8 +19,8 @@ import warp as wp
 from blobtree import define_skeleton, save
 {imports}
 
-def far_dot(q: wp.vec3, place: wp.vec3) -> wp.vec3:
-    return place
+def far_dot(q: wp.vec3, center: wp.vec3) -> wp.vec3:
+    return center
 
 
 FarDot = define_skeleton(far_dot, convex=True)
@@ -29,48 +30,53 @@ if __name__ == "__main__":
 
 
 def alone(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    """Run Python in a process of its own: definitions live as long as theirs."""
+    """Run Python in another process, as definitions last as long as their process."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.run(
         [sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )
 
 
-CLI = ("-c", "import sys; from implicit_decals.apps.cli import run; sys.exit(run(sys.argv[1:]))")
+CLI = ("-c", "import sys; from decals.apps.cli import run; sys.exit(run(sys.argv[1:]))")
 
 
 @pytest.fixture
 def dots(folder: Path) -> Path:
-    """A folder with a definition, and a tree that uses it."""
+    """Return a folder with a definition, and a tree that uses it."""
     (folder / "dots.py").write_text(DOTS.format(imports=""), encoding="utf-8")
-    made = alone(folder, "dots.py")
-    assert made.returncode == 0, made.stderr
+    process = alone(folder, "dots.py")
+    assert process.returncode == 0, process.stderr
     return folder
 
 
-def test_a_file_or_a_module_brings_its_kinds(dots: Path) -> None:
-    wish = [*CLI, "polygonize", "dot.json", "--cells", "12", "-o", "dot.ply"]
-    lacking = alone(dots, *wish)
-    assert lacking.returncode == 2
-    assert "own kind 'far_dot' is not defined" in lacking.stderr
-    assert "--define" in lacking.stderr
-    for module in ("dots.py", "dots", str(dots / "dots.py")):
-        done = alone(dots, *wish, "--define", module)
-        assert done.returncode == 0, done.stderr
-        mesh = pv.read(dots / "dot.ply")
-        assert np.allclose(np.linalg.norm(mesh.points - [3, 0, 0], axis=1), 0.5, atol=1e-3)
-        (dots / "dot.ply").unlink()
+def test_a_missing_definition_is_named(dots: Path, capfd: Capture) -> None:
+    assert run(["polygonize", "dot.json", "-o", "dot.ply"]) == 2
+    error = capfd.readouterr().err
+    assert "'far_dot' is not defined" in error
+    assert "--define" in error
 
 
-def test_what_is_defined_can_be_seeded_and_files_may_import_their_neighbours(dots: Path) -> None:
+def scattered_distances(folder: Path, module: str) -> NDArray[np.float64]:
+    """Scatter decals over the tree with a definition; return their distances from the dot."""
+    command = ["scatter", "dot.json", "--count", "40", "--define", module, "-o", "decals.csv"]
+    process = alone(folder, *CLI, *command)
+    assert process.returncode == 0, process.stderr
+    rows = np.loadtxt(folder / "decals.csv", delimiter=",", skiprows=1)
+    distances: NDArray[np.float64] = np.linalg.norm(rows[:, :3] - [3, 0, 0], axis=1)
+    return distances
+
+
+def test_a_file_or_a_module_defines_kinds(dots: Path) -> None:
+    for module in ("dots", str(dots / "dots.py")):
+        assert np.allclose(scattered_distances(dots, module), 0.5, atol=1e-3)
+        (dots / "decals.csv").unlink()
+
+
+def test_a_file_imports_its_neighbours(dots: Path) -> None:
     (dots / "parts").mkdir()
     (dots / "parts" / "near.py").write_text("REACH = 1\n", encoding="utf-8")
     (dots / "parts" / "more.py").write_text(DOTS.format(imports="import near"), encoding="utf-8")
-    wish = ["seed", "dot.json", "--count", "40", "--define", "parts/more.py", "-o", "seeds.csv"]
-    done = alone(dots, *CLI, *wish)
-    assert done.returncode == 0, done.stderr
-    rows = np.loadtxt(dots / "seeds.csv", delimiter=",", skiprows=1)
-    assert np.allclose(np.linalg.norm(rows[:, :3] - [3, 0, 0], axis=1), 0.5, atol=1e-3)
+    assert np.allclose(scattered_distances(dots, "parts/more.py"), 0.5, atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -83,22 +89,27 @@ def test_what_is_defined_can_be_seeded_and_files_may_import_their_neighbours(dot
         ("from blobtree import define_skeleton\ndefine_skeleton(5)\n", "wrong.py:2: InvalidDefinition"),
     ],
 )
-@pytest.mark.parametrize("command", ["polygonize", "seed", "render"])
-def test_a_module_that_fails_is_named_with_file_and_line(
-    bad, folder: Path, monkeypatch: pytest.MonkeyPatch, command: str, text: str, message: str
+@pytest.mark.parametrize("command", ["polygonize", "scatter", "render"])
+def test_a_failing_module_is_named_with_file_and_line(
+    bad: Callable[..., str],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+    text: str,
+    message: str,
 ) -> None:
     monkeypatch.setattr(sys, "path", sys.path[:])
     (folder / "wrong.py").write_text(text, encoding="utf-8")
-    output = {"polygonize": "x.ply", "seed": "x.csv", "render": "x.png"}[command]
+    output = {"polygonize": "x.ply", "scatter": "x.csv", "render": "x.png"}[command]
     line = bad(command, "spheres", "--define", "wrong.py", "-o", output)
     assert "--define wrong.py: " in line
     assert message in line
     assert "wrong" not in sys.modules
 
 
-def test_what_is_not_there_is_named(folder: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_modules_are_named(folder: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", sys.path[:])
-    for module, message in (("gone.py", "found no 'gone.py'"), ("gone.away", "No module named 'gone'")):
+    for module, message in (("gone.py", "found no file 'gone.py'"), ("gone.away", "No module named 'gone'")):
         assert run(["polygonize", "spheres", "--define", module, "-o", "x.ply"]) == 2
         assert message in capfd.readouterr().err
     assert not list(folder.iterdir())

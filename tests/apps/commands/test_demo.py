@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from implicit_decals.apps.cli import run
+from decals.apps.cli import run
 from tests.apps.commands.pictures import picture
 
 Capture = pytest.CaptureFixture[str]
 
 
 def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    monkeypatch.setattr("implicit_decals.apps.models.hatching.COUNT", 120)
+    monkeypatch.setattr("decals.apps.models.demo_scenes.COUNT", 120)
     assert run(["demo", "--size", "80x60", "--samples", "1"]) == 0
     names = capsys.readouterr().out.split()
     assert names == ["out/hero.png", "out/contact.png", "out/span.png"]

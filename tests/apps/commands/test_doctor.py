@@ -5,9 +5,9 @@ import io
 import pytest
 from rich.console import Console
 
-from implicit_decals.apps.commands import doctor
-from implicit_decals.apps.machine import software
-from implicit_decals.apps.machine.finding import Finding, Status
+from decals.apps.commands import doctor
+from decals.apps.doctor import software
+from decals.apps.doctor.finding import Finding, Status
 
 
 def shown(findings: list[Finding]) -> tuple[int, str]:
@@ -16,14 +16,14 @@ def shown(findings: list[Finding]) -> tuple[int, str]:
     return code, text.getvalue()
 
 
-def test_a_note_is_no_failure() -> None:
+def test_a_note_does_not_fail() -> None:
     code, text = shown([Finding("a", "1"), Finding("b", "2", Status.NOTE, "look here")])
     assert code == 0
     assert "b: look here" in text
-    assert "Everything that drawing needs is here." in text
+    assert "Everything that drawing needs is installed." in text
 
 
-def test_what_is_missing_fails_and_is_named_last() -> None:
+def test_missing_software_fails_and_is_named_last() -> None:
     code, text = shown([Finding("a", "1"), Finding("b", "[2]", Status.MISSING, "do [this]")])
     assert code == 1
     assert "[2]" in text

@@ -11,13 +11,9 @@ from PIL import Image
 
 import blobtree
 from blobtree import Point
-from decals.field.contact import Contact
-from decals.field.mapping import Mapping
-from decals.render import Renderer
-from decals.scenes.camera import Camera
-from decals.scenes.scene import Scene, TreeObject
-from decals.scenes.scene_file import load_scene, save_scene
-from implicit_decals.apps.cli import run
+from decals import Camera, Contact, ImageMapping, Scene, TreeObject, load_scene, save_scene
+from decals.apps.cli import run
+from decals.rendering import Renderer, RenderOptions
 from tests.apps.commands.pictures import picture, small
 
 Capture = pytest.CaptureFixture[str]
@@ -36,9 +32,10 @@ def test_render_a_mesh_and_a_blob_together(folder: Path, capsys: Capture) -> Non
     assert progress.out == ""
 
 
-def test_the_same_seed_gives_the_same_picture_and_another_another(folder: Path) -> None:
+def test_pictures_depend_on_the_seed_only(folder: Path) -> None:
+    pv.Sphere().save(folder / "ball.ply")
     for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
-        assert run([*small("spheres"), "--seed", seed, "-o", f"{name}.png"]) == 0
+        assert run([*small("ball.ply"), "--seed", seed, "-o", f"{name}.png"]) == 0
     pictures = [picture(folder / f"{name}.png") for name in "abc"]
     assert np.array_equal(pictures[0], pictures[1])
     assert not np.array_equal(pictures[0], pictures[2])
@@ -58,23 +55,29 @@ def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
     assert len(written["decals"]) == 30
 
 
-def test_contact_and_mapping_are_those_of_the_renderer(folder: Path) -> None:
-    assert run([*small("spheres"), "--save", "s.json", "-o", "paper.png"]) == 0
+def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:
+    pv.Sphere().save(folder / "ball.ply")
+    assert run([*small("ball.ply"), "--save", "s.json", "-o", "product.png"]) == 0
     scene = load_scene(folder / "s.json")
     with Renderer() as renderer:
         for contact in Contact:
-            for mapping in Mapping:
-                names = ["--contact", contact.name.lower(), "--mapping", mapping.name.lower()]
-                plain = ["render", "s.json", "--size", "64x48", "--samples", "1"]
-                assert run([*plain, *names, "-o", "out.png"]) == 0
-                drawn = renderer.render(scene, size=(64, 48), samples=1, contact=contact, mapping=mapping)
+            for mapping in ImageMapping:
+                modes = ["--contact", contact.name.lower(), "--mapping", mapping.name.lower()]
+                command = ["render", "s.json", "--size", "64x48", "--samples", "1"]
+                assert run([*command, *modes, "-o", "out.png"]) == 0
+                drawn = renderer.render(
+                    scene, RenderOptions(size=(64, 48), samples=1, contact=contact, mapping=mapping)
+                )
                 assert np.array_equal(picture(folder / "out.png"), drawn)
-                usual = (contact, mapping) == (Contact.PAPER, Mapping.CORRECTED)
-                assert usual == np.array_equal(drawn, picture(folder / "paper.png"))
+                default = (contact, mapping) == (Contact.PRODUCT, ImageMapping.CORRECTED)
+                assert default == np.array_equal(drawn, picture(folder / "product.png"))
 
 
 def test_a_camera_for_a_saved_scene(folder: Path) -> None:
-    assert run([*small("spheres"), "--save", "s.json", "-o", "a.png"]) == 0
+    pv.Sphere(center=(0, 0, 3)).merge(pv.Cube()).extract_surface(algorithm="geometry").triangulate().save(
+        folder / "parts.ply"
+    )
+    assert run([*small("parts.ply"), "--save", "s.json", "-o", "a.png"]) == 0
     assert run(["render", "s.json", "--size", "64x48", "--camera", "back", "-o", "b.png"]) == 0
     assert not np.array_equal(picture(folder / "a.png"), picture(folder / "b.png"))
 
@@ -86,20 +89,21 @@ def test_cameras_see_the_model(folder: Path, camera: str) -> None:
     assert (np.abs(drawn - drawn[:, :1]).max(axis=-1) > 30).mean() > 0.1
 
 
-def test_no_decals_at_all(folder: Path) -> None:
+def test_a_picture_without_decals(folder: Path) -> None:
     assert run(["render", "spheres", "--decals", "0", "--size", "40x30", "-o", "a.jpg"]) == 0
     assert picture(folder / "a.jpg").shape == (30, 40, 3)
 
 
-def test_two_of_a_name_are_told_apart(folder: Path) -> None:
-    assert run([*small("knot", "knot"), "--save", "s.json", "-o", "a.png"]) == 0
+def test_objects_of_equal_names_are_renamed(folder: Path) -> None:
+    pv.Sphere().save(folder / "knot.ply")
+    assert run([*small("knot.ply", "knot.ply"), "--save", "s.json", "-o", "a.png"]) == 0
     assert [item["name"] for item in json.loads((folder / "s.json").read_text())["objects"]] == [
         "knot",
         "knot-2",
     ]
 
 
-def test_a_scene_brings_its_own_decals(bad: Callable[..., str], folder: Path) -> None:
+def test_a_scene_has_its_own_decals(bad: Callable[..., str], folder: Path) -> None:
     blob = TreeObject("blob", Point((0, 0, 0), radius=1))
     save_scene(Scene(objects=(blob,), camera=Camera((0, 0, 5))), folder / "s.json")
     assert "own decals" in bad("render", "s.json", "-o", "a.png", "--decals", "5")
@@ -118,16 +122,16 @@ def test_a_sample_that_cannot_be_downloaded(bad: Callable[..., str], monkeypatch
 
 
 @pytest.mark.parametrize("number", ["1.9", "1e3", "many", ""])
-def test_a_fraction_is_no_count(bad: Callable[..., str], number: str) -> None:
+def test_a_fraction_is_refused_as_a_count(bad: Callable[..., str], number: str) -> None:
     assert "whole number" in bad("render", "knot", "-o", "a.png", f"--decals={number}")
 
 
-@pytest.mark.skipif(not Path("/proc").is_dir(), reason="wants a folder that not even root can write to")
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs a folder that root cannot write to")
 def test_a_folder_that_cannot_be_written(bad: Callable[..., str]) -> None:
     assert "cannot be written" in bad("render", "ball.ply", "-o", "/proc/a.png")
 
 
-def test_files_are_replaced_not_left_half(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_writes_keep_the_old_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "a.png").write_bytes(b"old")
 
     def full(_: int) -> None:

@@ -11,14 +11,14 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import polygonize
-from decals.scenes.mesh_file import MeshArrays
-from decals.scenes.scene import MeshObject, TreeObject
-from implicit_decals.apps.errors import UsageError
-from implicit_decals.apps.models.hatching import hatching, mosaic
-from implicit_decals.apps.models.knot import torus_knot
-from implicit_decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
-from implicit_decals.apps.models.shapes import egg, rounded_box
-from implicit_decals.apps.models.spanning import spanning
+from decals.apps.errors import UsageError
+from decals.apps.gallery import spanning
+from decals.apps.models.demo_scenes import nest_scene, tile_scene
+from decals.apps.models.knot import torus_knot
+from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
+from decals.apps.models.shapes import egg, rounded_box
+from decals.scenes.objects import MeshObject, TreeObject
+from decals.surfaces.mesh_file import MeshArrays
 
 
 def _volume(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> float:
@@ -52,7 +52,7 @@ def test_the_knot_has_its_tube_everywhere() -> None:
     assert np.allclose(distances, 0.2, atol=1e-5)
 
 
-def test_sizes_are_those_asked_for() -> None:
+def test_sizes_are_those_of_the_arguments() -> None:
     vertices, _ = rounded_box((1, 0, 0), half=(1, 2, 3), rounding=0.5)
     assert np.allclose(vertices.min(axis=0), [0, -2, -3], atol=0.01)
     assert np.allclose(vertices.max(axis=0), [2, 2, 3], atol=0.01)
@@ -62,7 +62,7 @@ def test_sizes_are_those_asked_for() -> None:
     assert np.allclose([vertices[:, 1].min(), vertices[:, 1].max()], [4.3, 5.7], atol=1e-3)
 
 
-def test_every_sample_is_listed_and_the_made_ones_come_without_a_network() -> None:
+def test_all_samples_are_listed_and_generated_ones_need_no_network() -> None:
     assert SAMPLES == ("creature", "dragon", "horse", "knot", "spheres")
     for name in ("creature", "spheres"):
         made = sample(name)
@@ -74,19 +74,19 @@ def test_every_sample_is_listed_and_the_made_ones_come_without_a_network() -> No
     assert np.array_equal(knot.vertices, sample_mesh("knot")[0])
 
 
-def test_no_such_sample_mesh() -> None:
+def test_an_unknown_sample_mesh_is_refused() -> None:
     with pytest.raises(UsageError, match="dragon, horse, knot"):
         sample_mesh("spheres")
 
 
-def test_models_stand_along_y_but_the_horse() -> None:
+def test_all_models_except_the_horse_stand_along_y() -> None:
     assert axes_of("bunny.ply").up == (0.0, 1.0, 0.0)
     assert axes_of("horse").up == (0.0, 0.0, 1.0)
 
 
-def test_one_coat_runs_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("implicit_decals.apps.models.hatching.COUNT", 300)
-    scene = hatching(progress=lambda _stage, _fraction: None)
+def test_decals_run_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("decals.apps.models.demo_scenes.COUNT", 300)
+    scene = nest_scene(progress=lambda _stage, _fraction: None)
     creature, shell = (item.surface for item in scene.objects)
     distance = [
         np.linalg.norm(surface.project(scene.decals.positions)[0] - scene.decals.positions, axis=1)
@@ -95,13 +95,13 @@ def test_one_coat_runs_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) 
     radii = scene.decals.radii
     crossing = (np.maximum(*distance) < 0.8 * radii) & (np.minimum(*distance) < 1e-3)
     assert crossing.sum() >= 3
-    tiles = mosaic(scene)
+    tiles = tile_scene(scene)
     assert np.array_equal(tiles.decals.positions, scene.decals.positions)
     assert set(tiles.decals.images.tolist()) == set(range(len(tiles.images)))
 
 
-def test_the_one_decal_spans_both_surfaces() -> None:
-    scene = spanning()
+def test_one_decal_spans_both_surfaces() -> None:
+    scene = spanning.scene(fov=27.0)
     assert len(scene.decals) == 1
     center, radius = scene.decals.positions[0], scene.decals.radii[0]
     rim = center + radius * np.array([[-0.9, 0, 0], [0.9, 0, 0]], np.float32)
@@ -110,8 +110,8 @@ def test_the_one_decal_spans_both_surfaces() -> None:
     assert np.linalg.norm(blob.project(rim[1:])[0] - rim[1:]) < 0.5 * radius
 
 
-def test_a_wrong_data_folder_is_not_spoken_of_where_no_sample_is_fetched(tmp_path: Path) -> None:
-    program = "from implicit_decals.apps.models.samples import sample; sample('knot')"
+def test_a_wrong_data_folder_is_ignored_without_downloads(tmp_path: Path) -> None:
+    program = "from decals.apps.models.samples import sample; sample('knot')"
     environment = {**os.environ, "PYVISTA_DATA": str(tmp_path / "missing")}
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", program],

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decals.field.evaluate import evaluate
-from decals.field.mapping import Mapping
+from decals.field.mapping import ImageMapping
 from decals.model import Decals
 
 DECAL = 0.5
@@ -14,19 +16,19 @@ DECAL = 0.5
 AXES = np.array([1.0, 0.7, 0.45])
 
 
-def unit(v):
+def unit(v: NDArray[Any]) -> Any:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def dots(a, b):
+def dots(a: Any, b: Any) -> Any:
     return (a * b).sum(axis=1, keepdims=True)
 
 
-def tangents(rng, normals):
+def tangents(rng: np.random.Generator, normals: NDArray[Any]) -> Any:
     return unit(np.cross(normals, rng.normal(size=normals.shape)))
 
 
-def offsets(rng, count, radius):
+def offsets(rng: np.random.Generator, count: int, radius: float) -> Any:
     """Log maps in a disc, evenly spread in angle and length."""
     angle = rng.uniform(0, 2 * np.pi, count)
     return radius * rng.random((count, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -35,17 +37,17 @@ def offsets(rng, count, radius):
 # -- by formula: chords and normals of these log maps around one point, whose frame is that of the world --
 
 
-def plane(log):
+def plane(log: Any) -> Any:
     return log @ np.eye(3)[:2], np.tile([0, 0, 1.0], (len(log), 1))
 
 
-def sphere(log):
+def sphere(log: Any) -> Any:
     angle = np.linalg.norm(log, axis=1, keepdims=True)
     n_q = np.hstack([np.sin(angle) * log / np.maximum(angle, 1e-300), np.cos(angle)])
     return n_q - [0, 0, 1], n_q
 
 
-def cylinder(log):
+def cylinder(log: Any) -> Any:
     n_q = np.column_stack([np.sin(log[:, 0]), np.zeros(len(log)), np.cos(log[:, 0])])
     return np.column_stack([n_q[:, 0], log[:, 1], n_q[:, 2] - 1]), n_q
 
@@ -53,31 +55,31 @@ def cylinder(log):
 # -- by geodesics ----------------------------------------------------------------------------------------
 
 
-def torus_gradient(x):
+def torus_gradient(x: Any) -> Any:
     ring = np.hypot(x[:, 0], x[:, 1])[:, None]
     return np.column_stack([x[:, :2] * (1 - 1 / ring), x[:, 2]])
 
 
-def torus_points(rng, n):
+def torus_points(rng: np.random.Generator, n: int) -> Any:
     a, b = rng.uniform(0, 2 * np.pi, (2, n))
     ring = 1 + 0.4 * np.cos(b)
     return np.column_stack([ring * np.cos(a), ring * np.sin(a), 0.4 * np.sin(b)])
 
 
-def ellipsoid_gradient(x):
+def ellipsoid_gradient(x: Any) -> Any:
     return x / AXES**2
 
 
-def ellipsoid_points(rng, n):
+def ellipsoid_points(rng: np.random.Generator, n: int) -> Any:
     d = unit(rng.normal(size=(n, 3)))
     return d / np.linalg.norm(d / AXES, axis=1, keepdims=True)
 
 
-def walk(gradient, start, direction, length, steps=100):
+def walk(gradient: Any, start: Any, direction: Any, length: Any, steps: int = 100) -> Any:
     """End points of geodesics of the implicit surface with this gradient: Runge-Kutta of order four."""
     h = length / steps
 
-    def acceleration(x, v):
+    def acceleration(x: Any, v: NDArray[Any]) -> Any:
         g = gradient(x)
         bend = (gradient(x + 1e-5 * v) - gradient(x - 1e-5 * v)) / 2e-5
         return -dots(v, bend) / dots(g, g) * g
@@ -109,7 +111,7 @@ class Disc:
     normals: np.ndarray
     log: np.ndarray
 
-    def drawn(self, radius, mapping=Mapping.CORRECTED):
+    def drawn(self, radius: float, mapping: ImageMapping = ImageMapping.CORRECTED) -> Any:
         """Where a decal of this radius draws the points: f64[n, 2], in units of length."""
         one = Decals([self.centre], [self.normal], [self.tangent], [radius])
         uv = evaluate(one, self.points, self.normals, mapping=mapping, device="cpu").uv
@@ -119,10 +121,10 @@ class Disc:
 MakeDisc = Callable[[np.random.Generator, int, float], Disc]
 
 
-def disc_by_formula(surface) -> MakeDisc:
+def disc_by_formula(surface: Any) -> MakeDisc:
     """Discs of a surface of `plane`, `sphere` and `cylinder`, turned in space."""
 
-    def make(rng, count, radius):
+    def make(rng: np.random.Generator, count: int, radius: float) -> Any:
         log = offsets(rng, count, radius)
         turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
         u, v, _ = turn = turn * np.sign(np.linalg.det(turn))
@@ -132,10 +134,10 @@ def disc_by_formula(surface) -> MakeDisc:
     return make
 
 
-def disc_by_geodesics(points, gradient) -> MakeDisc:
+def disc_by_geodesics(points: Any, gradient: Any) -> MakeDisc:
     """Discs around random points of a surface."""
 
-    def make(rng, count, radius):
+    def make(rng: np.random.Generator, count: int, radius: float) -> Any:
         log = offsets(rng, count, radius)
         start = np.repeat(points(rng, 1), count, axis=0)
         normal = unit(gradient(start))
@@ -157,7 +159,14 @@ DISCS: dict[str, MakeDisc] = {
 }
 
 
-def drawn_error(name, radius=DECAL, mapping=Mapping.CORRECTED, *, discs=80, points=50):
+def drawn_error(
+    name: str,
+    radius: float = DECAL,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+    *,
+    discs: int = 80,
+    points: int = 50,
+) -> Any:
     """RMS error over the radius of what decals draw, against log maps up to the radius."""
     rng, errors = np.random.default_rng(3), []
     for _ in range(discs):

@@ -4,9 +4,10 @@
 
 import warp as wp
 
-from decals.field.contact import Contact, rim_distance
-from decals.field.ownership import NOBODY, complement_at, owner_at
-from decals.records import RECORD, RIM_RADIUS, xyz
+from decals.field.contact import rim_distance
+from decals.field.ownership import NO_OWNER, complement_at, owner_at
+from decals.index.lookup import IndexedDecals
+from decals.record import RECORD, RIM_RADIUS, Contact, xyz
 
 wp.set_module_options({"enable_backward": False})
 
@@ -17,22 +18,17 @@ STEPS = 6
 def rims_of_points(
     points: wp.array(dtype=wp.vec3),
     contact: wp.int32,
-    decals: wp.array(dtype=wp.vec4),
-    level_count: wp.int32,
-    levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.vec4i),
-    mask: wp.int32,
-    ids: wp.array(dtype=wp.int32),
+    index: IndexedDecals,
     owners: wp.array(dtype=wp.int32),
     rims: wp.array(dtype=wp.float32),
-):
+) -> None:
     """Owner and r/r_h of points, all normals upward."""
     i = wp.tid()
     up = wp.vec3(0.0, 0.0, 1.0)
-    owner = owner_at(points[i], up, contact, False, decals, level_count, levels, table, mask, ids)
+    owner = owner_at(points[i], up, contact, index)
     owners[i] = owner
-    if owner != NOBODY:
-        e = complement_at(points[i], up, owner, contact, False, decals, level_count, levels, table, mask, ids)
+    if owner != NO_OWNER:
+        e = complement_at(points[i], up, owner, contact, index)
         rims[i] = rim_distance(e)
 
 
@@ -40,28 +36,21 @@ def rims_of_points(
 def slopes_of_rays(
     owners: wp.array(dtype=wp.int32),
     rays: wp.array(dtype=wp.vec3),
-    decals: wp.array(dtype=wp.vec4),
-    level_count: wp.int32,
-    levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.vec4i),
-    mask: wp.int32,
-    ids: wp.array(dtype=wp.int32),
+    index: IndexedDecals,
     least: wp.array(dtype=wp.float32),
     most: wp.array(dtype=wp.float32),
-):
+) -> None:
     """Least and most change of r/r_h over x/ρ on the part of each ray from its owner's centre with r < 1."""
     i = wp.tid()
     up = wp.vec3(0.0, 0.0, 1.0)
-    ball = decals[RECORD * owners[i]]
+    ball = index.records[RECORD * owners[i]]
     last = wp.float32(0.0)
     low = wp.float32(1.0e9)
     high = wp.float32(-1.0e9)
     for step in range(1, STEPS + 1):
         x = float(step) / float(STEPS)
         q = xyz(ball) + (x * RIM_RADIUS * ball[3]) * rays[i]
-        e = complement_at(
-            q, up, owners[i], int(Contact.RADIAL), False, decals, level_count, levels, table, mask, ids
-        )
+        e = complement_at(q, up, owners[i], int(Contact.RADIAL), index)
         r = rim_distance(e)
         slope = (r - last) * float(STEPS)
         if r < 1.0:

@@ -1,22 +1,16 @@
 """Contact: the four constraints of the paper's section 3.2, and float32 against float64 where it hurts."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from decals.field.contact import (
-    NOWHERE,
-    REACH,
-    Contact,
-    add_push,
-    contact_complement,
-    contact_push,
-    contact_uv,
-    field_complement,
-    rim_distance,
-)
+from decals.field.contact import add_push, contact_complement, contact_push, contact_uv, rim_distance
+from decals.record import NEIGHBOR_REACH, NO_FIELD, Contact, field_complement
 from tests.oracles import contact as oracle
 
 wp.set_module_options({"enable_backward": False})
@@ -33,7 +27,7 @@ def contact_of_rows(
     owner: wp.array(dtype=wp.int32),
     contact: wp.int32,
     result: wp.array(dtype=wp.float32),
-):
+) -> None:
     row = wp.tid()
     k = owner[row]
     push = wp.float32(0.0)
@@ -51,9 +45,9 @@ def rims_of_points(
     contact: wp.int32,
     owners: wp.array(dtype=wp.int32),
     rims: wp.array(dtype=wp.float32),
-):
+) -> None:
     row = wp.tid()
-    least = wp.float32(NOWHERE)
+    least = wp.float32(NO_FIELD)
     owner = wp.int32(-1)
     for i in range(centres.shape[1]):
         w = points[row] - centres[row, i]
@@ -74,12 +68,12 @@ def rims_of_points(
 @wp.kernel
 def uv_of_offsets(
     offsets: wp.array(dtype=wp.vec2), rims: wp.array(dtype=wp.float32), uv: wp.array(dtype=wp.vec2)
-):
+) -> None:
     row = wp.tid()
     uv[row] = contact_uv(offsets[row], rims[row])
 
 
-def complement_of(e, contact=Contact.PAPER):
+def complement_of(e: Any, contact: Contact = Contact.PRODUCT) -> Any:
     """E of rows of complements, through Warp."""
     e = np.atleast_2d(np.asarray(e, np.float32))
     result = wp.zeros(len(e), dtype=wp.float32, device="cpu")
@@ -94,25 +88,27 @@ inside = st.floats(0.0, 0.5, width=32)
 anywhere = st.floats(0.0, 1.0, width=32)
 
 
-PUSHING = st.sampled_from([Contact.PAPER, Contact.SMOOTH])
+PUSHING = st.sampled_from([Contact.PRODUCT, Contact.MIN])
 
 
 @settings(max_examples=200, deadline=None)
 @given(owner=inside, others=st.lists(st.floats(0.5, 1.0, width=32), max_size=6), contact=PUSHING)
-def test_where_no_pair_of_fields_exceeds_one_nothing_changes(owner, others, contact):
+def test_where_no_pair_of_fields_exceeds_one_nothing_changes(
+    owner: float, others: Any, contact: Contact
+) -> None:
     far = [max(np.float32(x), np.float32(1) - np.float32(owner)) for x in others]
     assert complement_of([owner, *far], contact)[0] == np.float32(owner)
 
 
 @settings(max_examples=200, deadline=None)
 @given(others=st.lists(st.floats(2.0**-60, 1.0, width=32), max_size=6), contact=PUSHING)
-def test_the_centre_stays_in_place(others, contact):
+def test_the_centre_stays_in_place(others: Any, contact: Contact) -> None:
     assert complement_of([0.0, *others], contact)[0] == 0.0
 
 
 @settings(max_examples=200, deadline=None)
 @given(owner=inside, others=st.lists(anywhere, max_size=6), place=st.integers(0, 6), contact=PUSHING)
-def test_equal_fields_meet_at_the_rim(owner, others, place, contact):
+def test_equal_fields_meet_at_the_rim(owner: float, others: Any, place: Any, contact: Contact) -> None:
     rest = [max(x, owner) for x in others]
     e = [owner, *rest[:place], owner, *rest[place:]]
     assert complement_of(e, contact)[0] == pytest.approx(0.5, abs=1e-6)
@@ -125,7 +121,9 @@ def test_equal_fields_meet_at_the_rim(owner, others, place, contact):
     size=st.floats(0.0, 1e-3),
     contact=PUSHING,
 )
-def test_small_changes_of_the_fields_change_little(owner, others, size, contact):
+def test_small_changes_of_the_fields_change_little(
+    owner: float, others: Any, size: Any, contact: Contact
+) -> None:
     """Continuity, with the Lipschitz bound that follows from |∂φ/∂e| ≤ 4/e_k."""
     before = np.array([max(x, owner) for x, _ in others], np.float32)
     after = np.clip(before + np.float32(size) * np.float32([x for _, x in others]), owner, 1).astype(
@@ -138,13 +136,13 @@ def test_small_changes_of_the_fields_change_little(owner, others, size, contact)
 
 @settings(max_examples=200, deadline=None)
 @given(owner=inside, others=st.lists(anywhere, max_size=6))
-def test_agrees_with_the_equation_as_written(owner, others):
+def test_agrees_with_the_equation_as_written(owner: float, others: Any) -> None:
     e = np.float32([owner, *(max(x, owner) for x in others)]).astype(np.float64)
     if 1e-3 < owner < 0.5 - 1e-3:
         assert 1 - complement_of(e)[0] == pytest.approx(oracle.contact_field(1 - e[None])[0], abs=1e-5)
 
 
-def test_the_two_forms_of_the_oracle_agree():
+def test_the_two_forms_of_the_oracle_agree() -> None:
     e = np.random.default_rng(0).random((50_000, 4)) * [0.5, 1, 1, 1]
     owner, complement = oracle.contact_complement(e)
     safe = (owner >= 0) & (e.min(axis=1) > 1e-3) & (e.min(axis=1) < 0.499)
@@ -155,41 +153,43 @@ def test_the_two_forms_of_the_oracle_agree():
 # -- a million points where float32 hurts -----------------------------------------------------------
 
 
-def directions(rng, *shape):
+def directions(rng: np.random.Generator, *shape: Any) -> Any:
     v = rng.normal(size=(*shape, 3))
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def at_distances(rng, distance, influence, scale=1.0):
+def at_distances(
+    rng: np.random.Generator, distance: NDArray[Any], influence: NDArray[Any], scale: float = 1.0
+) -> Any:
     """Points, centres [m, k, 3] at the relative distances [m, k] asked for, and sizes."""
     points = rng.normal(size=(len(distance), 3)) * scale
     centres = points[:, None] + directions(rng, *distance.shape) * (distance * influence)[..., None]
     return points, centres, influence
 
 
-def unlike_sizes(rng, shape, ratio=1e3):
+def unlike_sizes(rng: np.random.Generator, shape: Any, ratio: float = 1e3) -> Any:
     return ratio ** rng.uniform(-0.5, 0.5, shape)
 
 
-def powers(rng, low, high, shape):
+def powers(rng: np.random.Generator, low: Any, high: Any, shape: Any) -> Any:
     return 10.0 ** rng.uniform(low, high, shape)
 
 
-def random_sets(rng, shape):
+def random_sets(rng: np.random.Generator, shape: Any) -> Any:
     return at_distances(rng, rng.uniform(0, 1.1, shape), rng.uniform(0.5, 2, shape))
 
 
-def unlike_sets(rng, shape):
+def unlike_sets(rng: np.random.Generator, shape: Any) -> Any:
     return at_distances(rng, rng.uniform(0, 0.7, shape), unlike_sizes(rng, shape))
 
 
-def ties(rng, shape):
+def ties(rng: np.random.Generator, shape: Any) -> Any:
     nearest = rng.uniform(0, oracle.RIM, (shape[0], 1))
     spread = powers(rng, -8, -1, shape) * (rng.random(shape) < 0.8)
     return at_distances(rng, nearest * (1 + spread), unlike_sizes(rng, shape))
 
 
-def coincident(rng, shape):
+def coincident(rng: np.random.Generator, shape: Any) -> Any:
     points, centres, influence = at_distances(rng, rng.uniform(0, 0.6, shape), rng.uniform(0.5, 2, shape))
     same = rng.random(shape[0]) < 0.5
     return (
@@ -199,17 +199,17 @@ def coincident(rng, shape):
     )
 
 
-def near_rims(rng, shape):
+def near_rims(rng: np.random.Generator, shape: Any) -> Any:
     distance = oracle.RIM * (1 + powers(rng, -8, -1, shape) * rng.choice([-1, 1], shape))
     return at_distances(rng, distance, unlike_sizes(rng, shape))
 
 
-def near_centres(rng, shape):
+def near_centres(rng: np.random.Generator, shape: Any) -> Any:
     nearest = powers(rng, -12, -0.5, (shape[0], 1))
     return at_distances(rng, nearest * powers(rng, 0, 1, shape), unlike_sizes(rng, shape), scale=0.0)
 
 
-def near_centres_with_ties(rng, shape):
+def near_centres_with_ties(rng: np.random.Generator, shape: Any) -> Any:
     nearest = powers(rng, -12, -0.5, (shape[0], 1))
     return at_distances(rng, nearest * (1 + powers(rng, -8, 0, shape)), unlike_sizes(rng, shape), scale=0.0)
 
@@ -217,7 +217,9 @@ def near_centres_with_ties(rng, shape):
 SETS = [random_sets, unlike_sets, ties, coincident, near_rims, near_centres, near_centres_with_ties]
 
 
-def rims_through_warp(points, centres, influence, contact):
+def rims_through_warp(
+    points: NDArray[Any], centres: NDArray[Any], influence: NDArray[Any], contact: Contact
+) -> Any:
     count = len(points)
     owners = wp.zeros(count, dtype=wp.int32, device="cpu")
     rims = wp.zeros(count, dtype=wp.float32, device="cpu")
@@ -230,19 +232,21 @@ def rims_through_warp(points, centres, influence, contact):
     return owners.numpy(), rims.numpy()
 
 
-def rims_in_float64(points, centres, influence, contact):
+def rims_in_float64(
+    points: NDArray[Any], centres: NDArray[Any], influence: NDArray[Any], contact: Contact
+) -> Any:
     """The oracle, from the very same float32 numbers."""
     w = points[:, None].astype(np.float64) - centres
     owner, complement = oracle.contact_complement(
         oracle.complements((w * w).sum(axis=2) / influence.astype(np.float64) ** 2),
-        strongest=contact == Contact.SMOOTH,
+        strongest=contact == Contact.MIN,
     )
     return owner, oracle.rim_distance(complement)
 
 
-@pytest.mark.parametrize("contact", [Contact.PAPER, Contact.SMOOTH])
+@pytest.mark.parametrize("contact", [Contact.PRODUCT, Contact.MIN])
 @pytest.mark.parametrize("make", SETS)
-def test_error_on_adversarial_points(make, contact, record_property):
+def test_error_on_adversarial_points(make: Any, contact: Contact, record_property: Any) -> None:
     """Seven sets of 150,000 points with up to six decals: 1,050,000 in all, in each mode."""
     rng = np.random.default_rng(SETS.index(make))
     worst, owned = 0.0, 0
@@ -257,14 +261,14 @@ def test_error_on_adversarial_points(make, contact, record_property):
         assert np.abs(seen[one] - 1).max(initial=0) < ERROR_LIMIT  # they differ on the rim itself only
         worst = max(worst, np.abs(rims - expected)[both].max())
         owned += both.sum()
-    record_property("error_over_rim", worst)
+    record_property("error_over_rim", float(worst))
     print(f"{make.__name__}: {worst:.2e} rim radii over {owned:,} owned points")
     assert owned > 20_000
     assert worst <= ERROR_LIMIT
 
 
-@pytest.mark.parametrize("contact", [Contact.PAPER, Contact.SMOOTH])
-def test_concentric_decals_push_alike_at_every_distance(contact):
+@pytest.mark.parametrize("contact", [Contact.PRODUCT, Contact.MIN])
+def test_concentric_decals_push_alike_at_every_distance(contact: Contact) -> None:
     """Twice the complement is a push of nearly 1/e, down to the smallest squares that float32 holds."""
     e = 10.0 ** np.linspace(-36.5, -1, 200)
     rows = np.float32(np.column_stack([e, 2 * e]))
@@ -274,10 +278,10 @@ def test_concentric_decals_push_alike_at_every_distance(contact):
     assert found[0] == pytest.approx(0.5 / np.e, abs=1e-6)
 
 
-def test_what_lies_beyond_reach_hardly_matters():
-    """The promise behind REACH, for one neighbour anywhere beyond it."""
+def test_what_lies_beyond_reach_hardly_matters() -> None:
+    """The promise behind NEIGHBOR_REACH, for one neighbour anywhere beyond it."""
     e_k = np.linspace(1e-6, 0.5, 2001)
-    e_i = np.full_like(e_k, oracle.complements(REACH**2))
+    e_i = np.full_like(e_k, oracle.complements(NEIGHBOR_REACH**2))
     pushed = oracle.rim_distance(oracle.contact_complement(np.column_stack([e_k, e_i]))[1])
     assert np.abs(pushed - oracle.rim_distance(e_k)).max() < 7e-5
 
@@ -285,7 +289,7 @@ def test_what_lies_beyond_reach_hardly_matters():
 # -- image coordinates ------------------------------------------------------------------------------
 
 
-def uv_of(offsets, rims):
+def uv_of(offsets: NDArray[Any], rims: Any) -> Any:
     offsets, rims = np.float32(offsets), np.float32(rims)
     uv = wp.zeros(len(offsets), dtype=wp.vec2, device="cpu")
     inputs = [wp.array(offsets, dtype=wp.vec2, device="cpu"), wp.array(rims, dtype=wp.float32, device="cpu")]
@@ -293,7 +297,7 @@ def uv_of(offsets, rims):
     return uv.numpy()
 
 
-def test_uv_keeps_the_direction_and_takes_the_length_from_the_field():
+def test_uv_keeps_the_direction_and_takes_the_length_from_the_field() -> None:
     rng = np.random.default_rng(1)
     angle, rim = rng.uniform(-np.pi, np.pi, 10_000), rng.random(10_000)
     direction = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -302,5 +306,5 @@ def test_uv_keeps_the_direction_and_takes_the_length_from_the_field():
         assert uv_of(direction * scale, rim) == pytest.approx(expected, abs=1e-6)
 
 
-def test_uv_of_the_centre_is_the_middle_of_the_image():
+def test_uv_of_the_centre_is_the_middle_of_the_image() -> None:
     assert uv_of([[0, 0], [0, 0]], [0, 1]).tolist() == [[0.5, 0.5], [0.5, 0.5]]

@@ -1,47 +1,52 @@
 """Owner, field and image coordinates against brute force in float64, on kind and hostile sets."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from decals.errors import InvalidDecals, InvalidDevice, InvalidImage, InvalidPoints, InvalidScene
-from decals.field.contact import REACH
 from decals.field.evaluate import evaluate
-from decals.field.mapping import Mapping
-from decals.grid.index import DecalIndex
+from decals.field.mapping import ImageMapping
+from decals.index.index import DecalIndex
 from decals.model import Decals
+from decals.record import NEIGHBOR_REACH
 from tests.oracles.decals import decals_at
 
 TIE = 1e-4
 """Relative distance to a tie within which float32 may choose the other owner."""
 
 CUT_ERROR = 1e-4
-"""Of uv and field: what neighbours beyond REACH would have added."""
+"""Of uv and field: what neighbours beyond NEIGHBOR_REACH would have added."""
 
 ROUNDING_ERROR = 1e-5
 """Of uv and field against the same equations without those neighbours."""
 
 
-def unit(v):
+def unit(v: NDArray[Any]) -> Any:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def dress(rng, positions, normals, radii, **more):
+def dress(
+    rng: np.random.Generator, positions: NDArray[Any], normals: NDArray[Any], radii: NDArray[Any], **more: Any
+) -> Any:
     return Decals(positions, normals, rng.normal(size=np.shape(positions)), radii, **more)
 
 
-def on_sphere(rng, count):
+def on_sphere(rng: np.random.Generator, count: int) -> Any:
     n = unit(rng.normal(size=(count, 3)))
     return n, n
 
 
-def even_sphere(rng):
+def even_sphere(rng: np.random.Generator) -> Any:
     positions, normals = on_sphere(rng, 400)
     return dress(rng, positions, normals, np.full(400, 0.12)), *on_sphere(rng, 4000)
 
 
-def unlike_sizes(rng):
+def unlike_sizes(rng: np.random.Generator) -> Any:
     positions, normals = on_sphere(rng, 2000)
     radii = np.sort(10.0 ** rng.uniform(-3, -0.3, 2000))
     points, directions = on_sphere(rng, 2000)
@@ -53,7 +58,7 @@ def unlike_sizes(rng):
     )
 
 
-def thin_plate(rng):
+def thin_plate(rng: np.random.Generator) -> Any:
     side = rng.choice([-1.0, 1.0], (300, 1))
     up = np.array([[0, 0, 1.0]])
     positions = rng.random((300, 3)) * [1, 1, 0] + 1e-3 * side * up
@@ -62,13 +67,13 @@ def thin_plate(rng):
     return decals, rng.random((3000, 3)) * [1, 1, 0] + 1e-3 * side * up, side * np.repeat(up, 3000, axis=0)
 
 
-def far_away(rng):
+def far_away(rng: np.random.Generator) -> Any:
     decals, points, normals = even_sphere(rng)
     shift = np.array([4096.0, -8192.0, 16384.0])
     return decals.replace(positions=decals.positions + shift), points + shift, normals
 
 
-def stacked(rng):
+def nested(rng: np.random.Generator) -> Any:
     """Five hundred on one point, of many sizes, and a hundred equal ones on another."""
     n = np.repeat([[0, 0, 1.0]], 600, axis=0)
     positions = np.repeat([[0, 0, 0], [0.5, 0, 0]], [500, 100], axis=0)
@@ -77,12 +82,12 @@ def stacked(rng):
     return dress(rng, positions, n, radii), points, n[:1].repeat(1500, axis=0)
 
 
-def scattered_in_space(rng):
+def scattered_in_space(rng: np.random.Generator) -> Any:
     decals = dress(rng, rng.random((300, 3)), rng.normal(size=(300, 3)), rng.uniform(0.05, 0.3, 300))
     return decals, rng.random((3000, 3)), unit(rng.normal(size=(3000, 3)))
 
 
-def small_model(rng):
+def small_model(rng: np.random.Generator) -> Any:
     decals, points, normals = even_sphere(rng)
     return (
         decals.replace(positions=decals.positions * 1e-6, radii=decals.radii * 1e-6),
@@ -91,22 +96,22 @@ def small_model(rng):
     )
 
 
-SETS = [even_sphere, unlike_sizes, thin_plate, far_away, stacked, scattered_in_space, small_model]
+SETS = [even_sphere, unlike_sizes, thin_plate, far_away, nested, scattered_in_space, small_model]
 
 
-def worst(got, want, rows):
+def worst(got: Any, want: Any, rows: Any) -> Any:
     """Larger of the errors of uv, relative to its conditioning, and of the field."""
     uv = np.abs(got.uv - want.uv).max(axis=1) / want.stretch
     return np.maximum(uv, np.abs(got.field - want.field))[rows]
 
 
-@pytest.mark.parametrize("mapping", Mapping)
+@pytest.mark.parametrize("mapping", ImageMapping)
 @pytest.mark.parametrize("make", SETS)
-def test_against_brute_force(make, mapping):
+def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:
     decals, points, normals = make(np.random.default_rng(SETS.index(make)))
     points, normals = np.float32(points), np.float32(normals)
     got = evaluate(decals, points, normals, mapping=mapping)
-    facing, corrected = unit(normals.astype(float)), mapping == Mapping.CORRECTED
+    facing, corrected = unit(normals.astype(float)), mapping == ImageMapping.CORRECTED
     want = decals_at(decals, points, facing, corrected=corrected)
     clear = want.doubt > TIE
     assert clear.mean() > 0.5
@@ -115,15 +120,15 @@ def test_against_brute_force(make, mapping):
     assert same.sum() > 100
     cut = worst(got, want, same).max()
     assert cut <= CUT_ERROR
-    errors = worst(got, decals_at(decals, points, facing, corrected=corrected, reach=REACH), same)
+    errors = worst(got, decals_at(decals, points, facing, corrected=corrected, reach=NEIGHBOR_REACH), same)
     print(f"{make.__name__}, {mapping.name}: cut {cut:.1e}, rounding {errors.max():.1e}")
     assert np.quantile(errors, 0.999) <= ROUNDING_ERROR  # a neighbour may lie on the very limit
-    nobody = got.owner < 0
-    assert not got.uv[nobody].any()
-    assert not got.field[nobody].any()
+    bare = got.owner < 0
+    assert not got.uv[bare].any()
+    assert not got.field[bare].any()
 
 
-def test_a_lone_decal_shows_its_image_undistorted():
+def test_a_lone_decal_shows_its_image_undistorted() -> None:
     decals = Decals([[1, 2, 3]], [[0, 0, 1]], [[0, 1, 0]], [2.0])
     points = [[1, 2, 3], [1, 4, 3], [-1, 2, 3], [1, 1, 3], [1, 4.01, 3]]
     samples = evaluate(decals, points, np.tile([0, 0, 1], (5, 1)))
@@ -132,7 +137,7 @@ def test_a_lone_decal_shows_its_image_undistorted():
     assert samples.field[:3] == pytest.approx(np.array([1, 0.5, 0.5]), abs=1e-6)
 
 
-def test_ties_go_to_the_lowest_number_and_show_the_rim():
+def test_ties_go_to_the_lowest_number_and_show_the_rim() -> None:
     flat = {"normals": [[0, 0, 1]] * 3, "tangents": [[1, 0, 0]] * 3}
     decals = Decals([[1, 0, 0], [-1, 0, 0], [1, 0, 0]], radii=[2, 2, 2], **flat)
     samples = evaluate(decals, [[0, 0.5, 0], [0.5, 0, 0]], [[0, 0, 1]] * 2)
@@ -141,12 +146,12 @@ def test_ties_go_to_the_lowest_number_and_show_the_rim():
 
 
 @pytest.mark.parametrize("radii", [(0.1, 2.0), (2.0, 0.1)])
-def test_ties_between_unlike_sizes_go_to_the_lowest_number_too(radii):
+def test_ties_between_unlike_sizes_go_to_the_lowest_number_too(radii: NDArray[Any]) -> None:
     decals = Decals([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, radii)
     assert evaluate(decals, [[0, 0, 0]], [[0, 0, 1]]).owner.tolist() == [0]
 
 
-def test_index_and_brute_force_agree_to_the_bit():
+def test_index_and_brute_force_agree_to_the_bit() -> None:
     """One cell that holds everything gives what the index gives: culling changes nothing."""
     rng = np.random.default_rng(11)
     positions, normals = on_sphere(rng, 300)
@@ -159,7 +164,7 @@ def test_index_and_brute_force_agree_to_the_bit():
         assert np.array_equal(getattr(culled, name), getattr(brute, name))
 
 
-def test_the_far_side_is_coloured_only_by_decals_that_spill():
+def test_the_far_side_is_coloured_only_by_decals_that_spill() -> None:
     frame = {"normals": [[0, 0, 1]], "tangents": [[1, 0, 0]], "radii": [1.0]}
     behind = [[0.1, 0, -0.01]], [[0, 0, -1]]
     assert evaluate(Decals([[0, 0, 0]], **frame), *behind).owner.tolist() == [-1]
@@ -170,7 +175,7 @@ def test_the_far_side_is_coloured_only_by_decals_that_spill():
         assert evaluate(Decals([[0, 0, 0]], **frame), [[0.1, 0, 0]], tilted).owner.tolist() == [owner]
 
 
-def test_normals_of_any_length():
+def test_normals_of_any_length() -> None:
     rng = np.random.default_rng(12)
     decals, points, normals = even_sphere(rng)
     one = evaluate(decals, points, normals)
@@ -179,7 +184,7 @@ def test_normals_of_any_length():
     assert one.uv == pytest.approx(other.uv, abs=1e-5)
 
 
-def test_nothing_and_nonsense():
+def test_nothing_and_nonsense() -> None:
     decals = Decals.empty()
     assert evaluate(decals, np.zeros((3, 3)), np.zeros((3, 3))).owner.tolist() == [-1] * 3
     assert evaluate(decals, np.zeros((0, 3)), np.zeros((0, 3))).uv.shape == (0, 2)
@@ -200,7 +205,7 @@ def test_nothing_and_nonsense():
         (np.zeros((2, 3)), [[0, 0], [1]], "normals: expected numbers"),
     ],
 )
-def test_refuses(points, normals, says):
+def test_refuses(points: NDArray[Any], normals: NDArray[Any], says: str) -> None:
     with pytest.raises(InvalidPoints, match=says):
         evaluate(Decals.empty(), points, normals)
 
@@ -208,22 +213,26 @@ def test_refuses(points, normals, says):
 @pytest.mark.parametrize(
     ("wrong", "error", "says"),
     [
-        ({"mapping": 5}, InvalidScene, "mapping: expected one of Mapping.CHORD, Mapping.CORRECTED, got 5"),
+        (
+            {"mapping": 5},
+            InvalidScene,
+            "mapping: expected one of ImageMapping.CHORD, ImageMapping.CORRECTED, got 5",
+        ),
         ({"contact": "radial"}, InvalidScene, "contact: expected one of .*Contact.RADIAL, got 'radial'"),
         ({"device": "cuda:99"}, InvalidDevice, "got 'cuda:99'"),
-        ({"images": ["scale"]}, InvalidImage, "image 0 must be .* got 'scale'"),
+        ({"images": ["scale"]}, InvalidImage, "image 0: expected uint8 pixels .* got 'scale'"),
         ({"decals": "scale"}, InvalidDecals, "expected Decals or a DecalEditor, got 'scale'"),
         ({"index": "scale"}, InvalidDecals, "index: expected the index of these 1 decals, got 'scale'"),
         ({"index": DecalIndex.build(np.zeros((9, 3)), np.ones(9))}, InvalidDecals, "got one of 9"),
     ],
 )
-def test_refuses_what_is_none(wrong, error, says):
+def test_refuses_what_is_none(wrong: Any, error: Any, says: str) -> None:
     one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
     with pytest.raises(error, match=says):
         evaluate(**{"decals": one, "points": np.zeros((1, 3)), "normals": np.eye(3)[2:]} | wrong)
 
 
-def test_a_normal_without_length_faces_every_decal():
+def test_a_normal_without_length_faces_every_decal() -> None:
     one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
     seen = evaluate(one, [[0.25, 0, 0]], [[0, 0, 0]])
     assert (seen.owner[0], seen.uv[0].tolist()) == (0, [0.625, 0.5])
@@ -242,7 +251,9 @@ direction = triple.filter(lambda v: np.linalg.norm(v) > 0.01)
     points=st.lists(triple, min_size=1, max_size=6),
     look=direction,
 )
-def test_any_small_set(centres, normal, radius, points, look):
+def test_any_small_set(
+    centres: NDArray[Any], normal: Any, radius: float, points: NDArray[Any], look: Any
+) -> None:
     tangent = np.cross(normal, [0.6, 0.8, 0] if abs(normal[2]) > 1e-3 else [0, 0, 1])
     count = len(centres)
     decals = Decals(centres, [normal] * count, [tangent] * count, [radius] * count)

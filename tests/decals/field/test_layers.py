@@ -1,12 +1,16 @@
 """Layers and interactions: who shows, and the colours of any number of decals over each other."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from decals.errors import InvalidImage
-from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
-from decals.model import Decals, Interaction, linear_light
+from decals.images.pixels import decode_srgb
+from decals.model import Decals, Interaction
+from decals.record import Contact
 from tests.oracles.contact import RIM
 from tests.oracles.decals import colors_at, decals_at
 
@@ -15,11 +19,13 @@ CUT_ERROR = 1e-4
 MODES = list(Contact)
 
 
-def unit(v):
+def unit(v: NDArray[Any]) -> Any:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def mixed(rng, count, *, radii=(0.05, 0.4), layers=3, images=3):
+def mixed(
+    rng: np.random.Generator, count: int, *, radii: Any = (0.05, 0.4), layers: int = 3, images: int = 3
+) -> Any:
     """Decals of all kinds on the unit sphere, and points there."""
     positions = unit(rng.normal(size=(count, 3)))
     decals = Decals(
@@ -41,22 +47,22 @@ def mixed(rng, count, *, radii=(0.05, 0.4), layers=3, images=3):
 IMAGES = [np.full((1, 1, 4), c, np.uint8) for c in ((255, 0, 0, 255), (10, 200, 99, 128), (7, 7, 7, 0))]
 
 
-def constant(decals):
+def constant(decals: Decals) -> Any:
     """Colours of decals whose images have one colour each."""
 
-    def color_of(numbers, uv):
+    def color_of(numbers: Any, uv: Any) -> Any:
         bytes_ = np.array([image[0, 0] for image in IMAGES] + [(255, 255, 255, 255)]) / 255.0
         srgb = bytes_[decals.images[numbers], :3]
         linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
         alpha = bytes_[decals.images[numbers], 3:] * decals.opacities[numbers, None]
-        return np.column_stack([linear * linear_light(decals.tints[numbers]) * alpha, alpha])
+        return np.column_stack([linear * decode_srgb(decals.tints[numbers].astype(float)) * alpha, alpha])
 
     return color_of
 
 
 @pytest.mark.parametrize("contact", MODES)
 @pytest.mark.parametrize("seed", range(3))
-def test_owner_place_field_and_colour_are_the_oracles(contact, seed):
+def test_owner_place_field_and_colour_are_the_oracles(contact: Contact, seed: int) -> None:
     decals, points = mixed(np.random.default_rng(seed), (60, 200, 400)[seed])
     normals = unit(points.astype(float))
     got = evaluate(decals, points, points, contact=contact, images=IMAGES)
@@ -72,15 +78,15 @@ def test_owner_place_field_and_colour_are_the_oracles(contact, seed):
     assert len(np.unique(got.owner)) > 30
 
 
-def frame(count):
+def frame(count: int) -> Any:
     return {"normals": [[0, 0, 1]] * count, "tangents": [[1, 0, 0]] * count, "radii": [1.0] * count}
 
 
 UP = [[0.0, 0.0, 1.0]]
 
 
-def test_the_stack_of_one_layer_is_independent_contact_overlap():
-    kinds = [Interaction.OVERLAP, Interaction.CONTACT, Interaction.INDEPENDENT]
+def test_the_stack_of_one_layer_is_independent_contact_overlap() -> None:
+    kinds = [Interaction.OVERLAP, Interaction.PUSH, Interaction.INDEPENDENT]
     decals = Decals([[0, 0, 0]] * 3, **frame(3), interactions=kinds)
     point = [[0.3, 0, 0]]
     assert evaluate(decals, point, UP).owner.tolist() == [0]
@@ -89,7 +95,7 @@ def test_the_stack_of_one_layer_is_independent_contact_overlap():
     assert evaluate(under, point, UP).owner.tolist() == [2]
 
 
-def test_only_contact_decals_of_one_layer_push_each_other():
+def test_only_contact_decals_of_one_layer_push_each_other() -> None:
     one = evaluate(Decals([[0, 0, 0]], **frame(1)), [[0.3, 0, 0]], UP)
     two = Decals([[0, 0, 0], [1, 0, 0]], **frame(2))
     for contact in MODES:
@@ -106,7 +112,7 @@ def test_only_contact_decals_of_one_layer_push_each_other():
 
 
 @pytest.mark.parametrize("overlap", [1.5, 2.0])
-def test_images_are_stretched_where_three_meet_in_the_papers_mode_alone(overlap):
+def test_images_are_stretched_where_three_meet_in_the_papers_mode_alone(overlap: Any) -> None:
     """From a centre of a hexagonal tiling straight to a corner: least image per way, 1 if undeformed."""
     angles = np.radians(np.arange(30, 390, 60))
     around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
@@ -120,11 +126,11 @@ def test_images_are_stretched_where_three_meet_in_the_papers_mode_alone(overlap)
         assert (samples.owner == 0).all()
         rims = 2 * np.linalg.norm(samples.uv - 0.5, axis=1)
         least[contact] = np.diff(rims).min() / (way[1] / radius)
-    assert least[Contact.PAPER] < 0.05
-    assert min(least[Contact.SMOOTH], least[Contact.RADIAL]) > 0.95
+    assert least[Contact.PRODUCT] < 0.05
+    assert min(least[Contact.MIN], least[Contact.RADIAL]) > 0.95
 
 
-def test_overlapping_decals_show_whole():
+def test_overlapping_decals_show_whole() -> None:
     """An eye on a scale: undeformed to its rim, though the scale's field is higher at places."""
     decals = Decals([[0, 0, 0], [0.8, 0, 0]], **frame(2), interactions=[1, 2]).replace(radii=[1, 0.5])
     samples = evaluate(decals, [[0.31, 0, 0], [0.29, 0, 0]], UP * 2)
@@ -132,14 +138,14 @@ def test_overlapping_decals_show_whole():
     assert samples.uv[0, 0] == pytest.approx(0.5 - 0.49, abs=1e-5)
 
 
-def test_ties_go_to_the_higher_number_on_top():
+def test_ties_go_to_the_higher_number_on_top() -> None:
     decals = Decals([[0, 0, 0]] * 4, **frame(4), interactions=[2] * 4, layers=[0, 1, 1, 0])
     assert evaluate(decals, [[0.1, 0, 0]], UP).owner.tolist() == [2]
 
 
 @pytest.mark.parametrize("count", [64, 500])
 @pytest.mark.parametrize("kind", [Interaction.OVERLAP, Interaction.INDEPENDENT])
-def test_any_number_on_one_point(count, kind):
+def test_any_number_on_one_point(count: int, kind: Any) -> None:
     """Every one of them is in the colour, in order: none fades out before the last."""
     rng = np.random.default_rng(count)
     decals = Decals(
@@ -161,7 +167,7 @@ def test_any_number_on_one_point(count, kind):
     assert (got.color[:, 3] > 0.97).all()
 
 
-def test_an_image_is_read_upright_and_smoothly():
+def test_an_image_is_read_upright_and_smoothly() -> None:
     image = np.zeros((2, 2, 4), np.uint8)
     image[..., 3] = 255
     image[0, 1, :3] = 255  # upper right
@@ -172,7 +178,7 @@ def test_an_image_is_read_upright_and_smoothly():
     assert color[:, 3] == pytest.approx(1)
 
 
-def test_one_sheet_needs_no_ranks():
+def test_one_sheet_needs_no_ranks() -> None:
     """What is left out for scenes of one layer changes nothing."""
     decals, points = mixed(np.random.default_rng(4), 200)
     plain = decals.replace(interactions=np.ones(200, int), layers=np.full(200, 7))
@@ -187,7 +193,7 @@ def test_one_sheet_needs_no_ranks():
             assert np.array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_without_images_no_colour_and_too_few_are_refused():
+def test_without_images_no_colour_and_too_few_are_refused() -> None:
     decals = Decals([[0, 0, 0]], **frame(1), images=[2])
     assert evaluate(decals, [[0, 0, 0]], UP).color is None
     with pytest.raises(InvalidImage, match="expected 3 or more, got 1"):

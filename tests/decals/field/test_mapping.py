@@ -1,15 +1,25 @@
 """What is drawn against log maps; what stays in place; normals that agree, jump or oppose each other."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
-from decals.field.mapping import Mapping, drawn_distance, in_image, tangent_coordinates, turned_back, unrolled
+from decals.field.mapping import (
+    ImageMapping,
+    image_distance,
+    in_image,
+    tangent_coordinates,
+    unroll,
+    unroll_step,
+)
 from decals.model import Decals
+from decals.record import Contact
 from tests.decals.field import log_maps
 from tests.decals.field.log_maps import DECAL, DISCS, dots, drawn_error, tangents, unit
 
@@ -22,9 +32,9 @@ def arcs_of(
     n_p: wp.array(dtype=wp.vec3),
     n_q: wp.array(dtype=wp.vec3),
     arcs: wp.array(dtype=wp.vec4),
-):
+) -> None:
     i = wp.tid()
-    arcs[i] = unrolled(w[i], n_p[i], n_q[i])
+    arcs[i] = unroll(w[i], n_p[i], n_q[i])
 
 
 @wp.kernel
@@ -33,9 +43,9 @@ def turns_of(
     n_p: wp.array(dtype=wp.vec3),
     n_q: wp.array(dtype=wp.vec3),
     turned: wp.array(dtype=wp.vec3),
-):
+) -> None:
     i = wp.tid()
-    turned[i] = turned_back(steps[i], n_p[i], n_q[i])
+    turned[i] = unroll_step(steps[i], n_p[i], n_q[i])
 
 
 @wp.kernel
@@ -44,9 +54,9 @@ def distances_of(
     chords: wp.array(dtype=wp.float32),
     lengths: wp.array(dtype=wp.float32),
     drawn: wp.array(dtype=wp.float32),
-):
+) -> None:
     i = wp.tid()
-    drawn[i] = drawn_distance(rims[i], chords[i], lengths[i])
+    drawn[i] = image_distance(rims[i], chords[i], lengths[i])
 
 
 @wp.kernel
@@ -56,13 +66,13 @@ def coordinates_of(
     u: wp.array(dtype=wp.vec3),
     xy: wp.array(dtype=wp.vec2),
     seen: wp.array(dtype=wp.bool),
-):
+) -> None:
     i = wp.tid()
     xy[i] = tangent_coordinates(m[i], n[i], u[i])
     seen[i] = in_image(xy[i])
 
 
-def rolled_out(w, n_p, n_q):
+def rolled_out(w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
     """Offset in the tangent plane, and length."""
     n_p = np.reshape(n_p, (-1, 3))
     inputs = [wp.array(np.float32(a).reshape(-1, 3), dtype=wp.vec3, device="cpu") for a in (w, n_p, n_q)]
@@ -72,13 +82,13 @@ def rolled_out(w, n_p, n_q):
     return arc[:, :3] - dots(arc[:, :3], n_p) * n_p, arc[:, 3:]
 
 
-def mapped(w, n_p, n_q):
-    """Offset's direction at the length: what is drawn where nobody pushes."""
+def mapped(w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
+    """Return the offset's direction at the length: the map where no neighbour pushes."""
     offset, length = rolled_out(w, n_p, n_q)
     return length * offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-30)
 
 
-def distances(*columns):
+def distances(*columns: Any) -> Any:
     inputs = [wp.array(np.float32(a), dtype=wp.float32, device="cpu") for a in columns]
     result = wp.zeros(len(inputs[0]), dtype=wp.float32, device="cpu")
     wp.launch(distances_of, len(result), [*inputs, result], device="cpu")
@@ -94,7 +104,7 @@ direction = vector.filter(lambda v: np.linalg.norm(v) > 1e-3).map(unit)
 
 @pytest.mark.parametrize("surface", [log_maps.plane, log_maps.sphere, log_maps.cylinder])
 @pytest.mark.parametrize("inside_out", [1, -1])
-def test_the_arc_is_exact_far_round(surface, inside_out):
+def test_the_arc_is_exact_far_round(surface: Any, inside_out: bool) -> None:
     log = log_maps.offsets(np.random.default_rng(0), 20_000, 0.9 * np.pi)
     w, n_q = surface(log)
     error = mapped(w, inside_out * np.tile([0, 0, 1.0], (len(w), 1)), inside_out * n_q)[:, :2] - log
@@ -102,7 +112,7 @@ def test_the_arc_is_exact_far_round(surface, inside_out):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-7, 1e-5, 1e-4, 1e-3, 0.05, 0.2, 0.21])
-def test_every_small_angle_on_the_sphere(angle):
+def test_every_small_angle_on_the_sphere(angle: Any) -> None:
     rng = np.random.default_rng(1)
     n_p = unit(rng.normal(size=(2000, 3)))
     u = tangents(rng, n_p)
@@ -111,8 +121,8 @@ def test_every_small_angle_on_the_sphere(angle):
 
 
 @pytest.mark.parametrize(("name", "chord"), [("torus", 0.02), ("ellipsoid", 0.02)])
-def test_what_is_drawn_on_curved_surfaces(name, chord):
-    corrected, projected = (drawn_error(name, mapping=mode) for mode in reversed(Mapping))
+def test_what_is_drawn_on_curved_surfaces(name: str, chord: Any) -> None:
+    corrected, projected = (drawn_error(name, mapping=mode) for mode in reversed(ImageMapping))
     print(f"{name}: corrected {corrected:.3%}, chord {projected:.3%} of the radius")
     assert corrected <= 0.005
     assert projected > chord
@@ -120,7 +130,7 @@ def test_what_is_drawn_on_curved_surfaces(name, chord):
 
 @pytest.mark.parametrize("name", ["plane", "sphere", "cylinder"])
 @pytest.mark.parametrize("radius", [0.05, DECAL, 1.2])
-def test_what_is_drawn_is_exact(name, radius):
+def test_what_is_drawn_is_exact(name: str, radius: float) -> None:
     error = drawn_error(name, radius, discs=20, points=500)
     print(f"{name}, radius {radius}: {error:.2e}")
     assert error <= 1e-5
@@ -129,7 +139,7 @@ def test_what_is_drawn_is_exact(name, radius):
 @pytest.mark.parametrize(
     ("name", "radius"), [("torus", DECAL), ("sphere", 1.2), ("cylinder", 1.2), ("plane", 1)]
 )
-def test_an_image_ends_at_its_radius_along_the_surface(name, radius):
+def test_an_image_ends_at_its_radius_along_the_surface(name: str, radius: float) -> None:
     """Beyond, image coordinates go on as the surface does, and colours there are those of nothing."""
     disc = DISCS[name](np.random.default_rng(5), 3000, 1.1 * radius)
     one = Decals([disc.centre], [disc.normal], [disc.tangent], [radius])
@@ -156,7 +166,7 @@ def test_an_image_ends_at_its_radius_along_the_surface(name, radius):
     along=st.floats(-0.9, 0.9),
     step=st.floats(1e-5, 1e-3),
 )
-def test_images_run_on_across_edges(angle, concave, near, along, step):
+def test_images_run_on_across_edges(angle: Any, concave: bool, near: Any, along: Any, step: int) -> None:
     """From a flat face: at the edge both normals give the projection, and beyond it nothing jumps."""
     psi = -angle if concave else angle
     up, other = np.array([[0, 0, 1.0]]), np.array([[np.sin(psi), 0, np.cos(psi)]])
@@ -169,7 +179,7 @@ def test_images_run_on_across_edges(angle, concave, near, along, step):
 
 @pytest.mark.parametrize("degrees", [20, 45, 90])
 @pytest.mark.parametrize("side", [1, -1])
-def test_an_edge_is_nearer_to_the_unfolded_faces_than_the_projection(degrees, side):
+def test_an_edge_is_nearer_to_the_unfolded_faces_than_the_projection(degrees: Any, side: Any) -> Any:
     psi, rng = side * np.radians(degrees), np.random.default_rng(6)
     flat = log_maps.offsets(rng, 4000, 1.0)
     flat = flat[flat[:, 0] > 0.3]
@@ -177,14 +187,14 @@ def test_an_edge_is_nearer_to_the_unfolded_faces_than_the_projection(degrees, si
     w = np.hstack([0.3 + t * np.cos(psi), flat[:, 1:], -t * np.sin(psi)])
     n_p, n_q = (np.tile([np.sin(a), 0, np.cos(a)], (len(w), 1)) for a in (0.0, psi))
 
-    def rms(offset):
+    def rms(offset: Any) -> Any:
         return np.sqrt(((offset[:, :2] - flat) ** 2).sum(axis=1).mean())
 
     projected = np.linalg.norm(w, axis=1, keepdims=True) * unit(w * [1, 1, 0])
     assert rms(mapped(w, n_p, n_q)) < 0.65 * rms(projected)
 
 
-def test_flat_faces_do_not_mind_normals_that_are_smoothed():
+def test_flat_faces_do_not_mind_normals_that_are_smoothed() -> None:
     rng = np.random.default_rng(7)
     w = rng.uniform(-1, 1, (1000, 3)) * [1, 1, 0]
     n_q = unit([0, 0, 1] + 0.4 * rng.normal(size=(1000, 3)))
@@ -194,14 +204,14 @@ def test_flat_faces_do_not_mind_normals_that_are_smoothed():
 # -- footprints ------------------------------------------------------------------------------------------
 
 
-def turned(step, n_p, n_q):
+def turned(step: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
     inputs = [wp.array(np.float32(a), dtype=wp.vec3, device="cpu") for a in (step, n_p, n_q)]
     result = wp.zeros(len(step), dtype=wp.vec3, device="cpu")
     wp.launch(turns_of, len(step), [*inputs, result], device="cpu")
     return result.numpy().astype(np.float64)
 
 
-def test_a_footprint_on_a_plane_stays_as_it_is():
+def test_a_footprint_on_a_plane_stays_as_it_is() -> None:
     n, step = np.tile([0, 0, 1.0], (50, 1)), np.random.default_rng(2).normal(size=(50, 3)) * [1, 1, 0]
     assert turned(step, n, n) == pytest.approx(step, abs=1e-6)
 
@@ -209,7 +219,7 @@ def test_a_footprint_on_a_plane_stays_as_it_is():
 @pytest.mark.parametrize(
     ("name", "radius", "share"), [("cylinder", 0.5, 0.01), ("cylinder", 1.4, 0.01), ("sphere", 1.4, 0.3)]
 )
-def test_a_footprint_is_that_of_the_image_rolled_out(name, radius, share):
+def test_a_footprint_is_that_of_the_image_rolled_out(name: str, radius: float, share: Any) -> None:
     """On the sphere steps across the way are ψ / sin ψ longer in the image: 1.37 at its rim."""
     rng, h = np.random.default_rng(4), 1e-3
     log, aside = log_maps.offsets(rng, 400, 0.95 * radius), log_maps.offsets(rng, 400, 1.0)
@@ -225,7 +235,9 @@ def test_a_footprint_is_that_of_the_image_rolled_out(name, radius, share):
 
 @settings(max_examples=100, deadline=None)
 @given(n_p=direction, n_q=direction, aside=direction, opposed=st.booleans(), size=st.floats(0, 1e-3))
-def test_footprints_stay_as_large_whatever_the_normals(n_p, n_q, aside, opposed, size):
+def test_footprints_stay_as_large_whatever_the_normals(
+    n_p: NDArray[Any], n_q: NDArray[Any], aside: Any, opposed: bool, size: Any
+) -> None:
     if opposed:
         n_q = unit(-n_p + size * aside)
     step = np.cross(n_q, aside)
@@ -242,7 +254,7 @@ share = st.floats(0, 1, width=32)
 
 @settings(max_examples=200, deadline=None)
 @given(chord=share, pushed=share, stretch=st.floats(1, 1.625, width=32))
-def test_distance_in_the_image(chord, pushed, stretch):
+def test_distance_in_the_image(chord: Any, pushed: Any, stretch: Any) -> None:
     rim, length = chord + pushed * (1 - chord), chord * stretch
     seen, on_contact, alone, unbent = distances(
         [rim, 1, chord, rim], [chord] * 4, [length, length, length, chord]
@@ -256,13 +268,13 @@ def test_distance_in_the_image(chord, pushed, stretch):
 
 
 @pytest.mark.parametrize("contact", Contact)
-def test_lines_of_contact_stay_in_place(contact):
+def test_lines_of_contact_stay_in_place(contact: Contact) -> None:
     """Two decals of a sphere meet half-way between their centres, at their images' rims, by any mapping."""
     apart, aside = 0.3, np.linspace(-0.3, 0.3, 41)
     centres = np.array([[np.sin(a), 0, np.cos(a)] for a in (-apart, apart)])
     decals = Decals(centres, centres, [[0, 1, 0]] * 2, [0.5, 0.5])
     line = np.column_stack([0 * aside, np.sin(aside), np.cos(aside)])
-    for mapping in Mapping:
+    for mapping in ImageMapping:
         for side in (-1e-6, 1e-6):
             q = unit(line + side * np.eye(3)[0])
             seen = evaluate(decals, q, q, mapping=mapping, contact=contact, device="cpu")
@@ -272,7 +284,7 @@ def test_lines_of_contact_stay_in_place(contact):
 
 @settings(max_examples=200, deadline=None)
 @given(steps=st.lists(st.tuples(share, share, share), min_size=2, max_size=20))
-def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(steps):
+def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(steps: int) -> None:
     """On any way along a surface chords grow by less than lengths; contact may push as it likes, outwards."""
     chord, bent, pushed = np.cumsum(steps, axis=0).T / len(steps)
     length = chord + bent
@@ -282,7 +294,7 @@ def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(steps):
 
 
 @pytest.mark.parametrize("name", ["torus", "ellipsoid", "sphere", "cylinder"])
-def test_radial_contact_does_not_fold_on_curved_surfaces(name):
+def test_radial_contact_does_not_fold_on_curved_surfaces(name: str) -> None:
     """Along geodesics from the centre of a decal among neighbours of other sizes, as long as it is drawn."""
     rng, steps, pushed = np.random.default_rng(8), 60, 0
     for _ in range(12):
@@ -305,7 +317,7 @@ def test_radial_contact_does_not_fold_on_curved_surfaces(name):
     assert pushed > 100
 
 
-def on_surface(name, disc, log):
+def on_surface(name: str, disc: Any, log: Any) -> Any:
     """Points and normals of these log maps around the centre of a disc."""
     axes = np.stack([disc.tangent, np.cross(disc.normal, disc.tangent), disc.normal])
     if name in ("sphere", "cylinder"):
@@ -323,7 +335,9 @@ def on_surface(name, disc, log):
 
 @settings(max_examples=150, deadline=None)
 @given(w=vector, n_p=direction, n_q=direction, opposed=st.booleans(), noise=vector, size=st.floats(0, 1e-3))
-def test_finite_and_bounded(w, n_p, n_q, opposed, noise, size):
+def test_finite_and_bounded(
+    w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any], opposed: bool, noise: Any, size: Any
+) -> None:
     if opposed:
         n_q = unit(-n_p + size * noise)
     offset, length = rolled_out(w, n_p, n_q)
@@ -333,14 +347,14 @@ def test_finite_and_bounded(w, n_p, n_q, opposed, noise, size):
     assert 0.999999 * chord - 1e-18 <= length[0, 0] <= 1.63 * chord + 1e-6
 
 
-def test_opposed_and_equal_normals_give_the_projection():
+def test_opposed_and_equal_normals_give_the_projection() -> None:
     n = np.array([[0, 0, 1.0]])
     w = np.array([[0.3, -0.2, 0.5]])
     for other in (n, -n):
         assert rolled_out(w, n, other)[0].tolist() == np.float32([[0.3, -0.2, 0]]).tolist()
 
 
-def test_tangent_coordinates_are_right_handed():
+def test_tangent_coordinates_are_right_handed() -> None:
     m, n, u = ([[3, 4, 5], [0.5, 0.99, 0]], [[0, 0, 1]] * 2, [[0, 1, 0], [1, 0, 0]])
     inputs = [wp.array(np.float32(a), dtype=wp.vec3, device="cpu") for a in (m, n, u)]
     xy, seen = (wp.zeros(2, dtype=dtype, device="cpu") for dtype in (wp.vec2, wp.bool))

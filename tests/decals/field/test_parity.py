@@ -3,14 +3,14 @@
 The float64 kernel that can answer so many is itself held against the NumPy oracle.
 """
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from decals.field.contact import REACH, Contact
-from decals.field.mapping import Mapping
-from tests.bench.parity import LIMITS, Chunk, parity
-from tests.bench.parity_report import worst_points
-from tests.bench.parity_worlds import make_world
+from decals.field.mapping import ImageMapping
+from decals.record import NEIGHBOR_REACH, Contact
+from tests.bench.parity import LIMITS, Chunk, make_world, parity, worst_points
 from tests.oracles.contact import rim_distance
 from tests.oracles.decals import decals_at
 
@@ -20,15 +20,15 @@ DOUBT = 1e-9
 
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
-def test_the_two_oracles_agree(contact, layered):
-    """On 17,000 points in each mode, 100,000 in all; without neighbours beyond REACH, and with all."""
+def test_the_two_oracles_agree(contact: Contact, layered: bool) -> None:
+    """On 17,000 points in each mode, 100,000 in all; with neighbours within reach, and with all."""
     world = make_world(7, layered=layered)
     chunk = Chunk(world, 17_000, 7 + contact, "cpu")
     points, normals = chunk.points.numpy(), chunk.normals.numpy().astype(float)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    mapping = Mapping.CHORD if layered else Mapping.CORRECTED
-    reach = 1.0 if contact == Contact.RADIAL else REACH
-    owner, complement, place, doubt, edge = (a.numpy() for a in chunk.wanted(contact, mapping, reach=reach))
+    mapping = ImageMapping.CHORD if layered else ImageMapping.CORRECTED
+    reach = 1.0 if contact == Contact.RADIAL else NEIGHBOR_REACH
+    owner, complement, place, doubt, edge = (a.numpy() for a in chunk.expected(contact, mapping, reach=reach))
     owned = 0
     for number, rows in by_set(chunk.sets.numpy()):
         first = number * world.members
@@ -36,7 +36,7 @@ def test_the_two_oracles_agree(contact, layered):
             world.decals[first : first + world.members],
             points[rows],
             normals[rows],
-            corrected=mapping == Mapping.CORRECTED,
+            corrected=mapping == ImageMapping.CORRECTED,
             reach=reach,
             contact=contact.name.lower(),
         )
@@ -51,14 +51,14 @@ def test_the_two_oracles_agree(contact, layered):
     assert owned > 10_000
 
 
-def by_set(sets):
+def by_set(sets: int) -> Any:
     """Rows of each set."""
     order = np.argsort(sets, kind="stable")
     starts = np.flatnonzero(np.diff(sets[order], prepend=-1))
     return zip(sets[order][starts], np.split(order, starts[1:]), strict=True)
 
 
-def check(found, samples):
+def check(found: Any, samples: int) -> None:
     print(found)
     assert found["points"] == samples
     assert found["owned"] > 0.8 * samples
@@ -69,23 +69,25 @@ def check(found, samples):
 
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
-def test_half_a_million_points_in_a_sheet_and_in_layers(contact, layered):
+def test_half_a_million_points_in_a_sheet_and_in_layers(contact: Contact, layered: bool) -> None:
     check(parity(contact, layered=layered, samples=500_000, device="cpu", chunk=125_000), 500_000)
 
 
 @pytest.mark.gpu
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
-def test_a_hundred_million_points_on_a_cuda_device(contact, layered):
+def test_a_hundred_million_points_on_a_cuda_device(contact: Contact, layered: bool) -> None:
     check(parity(contact, layered=layered, samples=100_000_000, device="cuda:0"), 100_000_000)
 
 
-def test_the_worst_points_are_described():
+def test_the_worst_points_are_described() -> None:
     """An owner that differs comes first, then the largest error."""
     world = make_world(3)
     chunk = Chunk(world, 1000, 3, "cpu")
-    found = [a.numpy().copy() for a in chunk.found(Contact.PAPER, Mapping.CORRECTED, once=True)]
-    wanted = [a.numpy() for a in chunk.wanted(Contact.PAPER, Mapping.CORRECTED, reach=REACH)]
+    found = [a.numpy().copy() for a in chunk.computed(Contact.PRODUCT, ImageMapping.CORRECTED, once=True)]
+    wanted = [
+        a.numpy() for a in chunk.expected(Contact.PRODUCT, ImageMapping.CORRECTED, reach=NEIGHBOR_REACH)
+    ]
     clear = np.flatnonzero((found[0] >= 0) & (wanted[3] > 0.01) & (wanted[4] > 0.01))
     found[0][clear[0]], found[1][clear[1]] = -1, found[1][clear[1]] - 0.5
     lines = worst_points(world, chunk.points.numpy(), chunk.sets.numpy(), found, wanted)

@@ -1,13 +1,16 @@
 """Radial contact: never folds, squeezes within limits, leaves no gap, and is what float64 says."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import warp as wp
+from numpy.typing import NDArray
 
-from decals.field.contact import Contact
 from decals.field.evaluate import evaluate
-from decals.grid.index import DecalIndex
+from decals.index.index import index_on
 from decals.model import Decals
+from decals.record import Contact
 from tests.decals.field.radial_rays import rims_of_points, slopes_of_rays
 from tests.oracles.contact import RIM
 
@@ -18,11 +21,11 @@ SETS = 2000
 MEMBERS = 9
 
 
-def unit(v):
+def unit(v: NDArray[Any]) -> Any:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def clusters(rng, *, ratio=20.0, flat=False):
+def clusters(rng: np.random.Generator, *, ratio: float = 20.0, flat: bool = False) -> Any:
     """SETS sets of a decal and 1 to 8 neighbours anywhere in its reach, sizes to 20:1; far from each other.
 
     Places that a set leaves empty hold tiny decals far away.
@@ -41,17 +44,16 @@ def clusters(rng, *, ratio=20.0, flat=False):
     return Decals(positions, *frame, radii.reshape(-1))
 
 
-def launch(kernel, count, decals, before, after):
+def launch(kernel: Any, count: int, decals: Decals, before: Any, after: Any) -> Any:
     inputs = [
-        wp.array(decals.packed(), dtype=wp.vec4, device="cpu"),
-        *DecalIndex.of(decals).on("cpu").arguments(),
+        index_on(decals, "cpu"),
     ]
     wp.launch(kernel, count, [*before, *inputs], after, device="cpu")
     return [array.numpy() for array in after]
 
 
 @pytest.mark.parametrize("flat", [False, True])
-def test_nothing_folds_on_a_million_rays(flat):
+def test_nothing_folds_on_a_million_rays(flat: bool) -> None:
     """Half of them in space and half in a plane: from every decal's own centre, past all its neighbours."""
     rng = np.random.default_rng(1 + flat)
     decals, count = clusters(rng, flat=flat), 500_000
@@ -67,7 +69,7 @@ def test_nothing_folds_on_a_million_rays(flat):
     assert (most > 1.5).mean() > 0.05
 
 
-def rims_in_float64(decals, points):
+def rims_in_float64(decals: Decals, points: NDArray[Any]) -> Any:
     """Owners, rims and doubts by brute force over each point's own set, from the same float32 numbers."""
     p = decals.positions.astype(float).reshape(SETS, MEMBERS, 3)
     rho = decals.radii.astype(float).reshape(SETS, MEMBERS)
@@ -96,7 +98,7 @@ def rims_in_float64(decals, points):
     return np.where(shows.any(axis=1), own * MEMBERS + owner, -1), rim, doubt
 
 
-def test_a_million_points_against_float64():
+def test_a_million_points_against_float64() -> None:
     rng = np.random.default_rng(3)
     decals, worst, owned, sure = clusters(rng), 0.0, 0, 0
     for _ in range(10):
@@ -127,12 +129,12 @@ def test_a_million_points_against_float64():
     assert worst <= ERROR_LIMIT
 
 
-def pair(distance, radius, other):
+def pair(distance: float, radius: float, other: Any) -> Any:
     return Decals([[0, 0, 0], [distance, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [radius, other])
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_two_decals_meet_on_their_rims_and_keep_their_centres(seed):
+def test_two_decals_meet_on_their_rims_and_keep_their_centres(seed: int) -> None:
     rng = np.random.default_rng(seed)
     radius = np.exp(rng.uniform(-2, 2))
     kept, kept_by_other = rng.uniform(0.22, 0.97, 2)  # shares of the radii up to the plane
@@ -157,7 +159,7 @@ def test_two_decals_meet_on_their_rims_and_keep_their_centres(seed):
     assert centres.field.tolist() == [1, 1]
 
 
-def test_a_small_decal_deep_in_a_large_one_lies_over_it_whole():
+def test_a_small_decal_deep_in_a_large_one_lies_over_it_whole() -> None:
     decals = pair(0.5, 1.0, 0.1)
     up = [[0, 0, 1]] * 3
     samples = evaluate(decals, [[0.5, 0.09, 0], [0.5, 0.11, 0], [0.7, 0, 0]], up, contact=Contact.RADIAL)
@@ -166,12 +168,12 @@ def test_a_small_decal_deep_in_a_large_one_lies_over_it_whole():
     assert samples.field == pytest.approx((1 - d**2) ** 3, abs=1e-6)
 
 
-def test_equal_decals_on_one_point_show_the_first():
+def test_equal_decals_on_one_point_show_the_first() -> None:
     samples = evaluate(pair(0.0, 1.0, 1.0), [[0.5, 0, 0]], [[0, 0, 1]], contact=Contact.RADIAL)
     assert samples.owner.tolist() == [0]
 
 
-def test_the_image_changes_little_between_neighbouring_points():
+def test_the_image_changes_little_between_neighbouring_points() -> None:
     """No jump anywhere inside a region of one owner: behind smaller neighbours above all."""
     rng = np.random.default_rng(9)
     decals = clusters(rng, flat=True)[: MEMBERS * 400]

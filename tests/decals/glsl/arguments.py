@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
 from decals.field.ownership import owner_at
-from decals.grid.index import DecalIndex
+from decals.index.index import DecalIndex
 from decals.model import RECORD
-from tests.blobtree.warp_functions import TypedFunction, call, element, numpy_type
+from tests.blobtree.transpile.warp_functions import TypedFunction, call, element, numpy_type
 
 Array = NDArray[Any]
 
@@ -74,16 +74,16 @@ place, ball = uniform(-2.0, 2.0, 3), beside(uniform(-2.0, 2.0, 3), uniform(0.3, 
 share, field, four = uniform(0.0, 1.0), uniform(0.0, 3.0), uniform(-3.0, 3.0, 4)
 
 BY_NAME: dict[str, Draw] = {
-    "a": field, "aim": units_or_none, "b": field, "max_a": field, "max_b": field, "slope_a": uniform(0, 5),
+    "a": field, "b": field, "max_a": field, "max_b": field, "slope_a": uniform(0, 5),
     "slope_b": uniform(0, 5),
     "at": whole(0, (TEXELS - 8) // 2, step=2), "apart": place,
     "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
     "center": place, "chord": share, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5),
     "contact": whole(0, 3),
     "decal": whole(0, DECALS),
-    "above": whole(-1, DECALS),
+    "limit": whole(-1, DECALS),
     "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
-    "p": uniform(-1.5, 1.5, 4), "slim": uniform(0.3, 2.5), "slimmest": uniform(0.3, 2.5),
+    "p": uniform(-1.5, 1.5, 4), "rate": uniform(0.1, 3.0), "min_influence": uniform(0.3, 2.5),
     "e_k": uniform(0.0, 0.5), "e_i": share,
     "exponent": among(1.5, 2, 3, 7, 20, 100), "parameter": among(1.5, 2, 3, 7, 20, 100), "f": field,
     "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3),
@@ -103,22 +103,23 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "bound_combine": {key: beside(field, uniform(-2, 5), uniform(0, 5)) for key in "ab"},
     "gradient_combine": {"a": beside(field, uniform(-3, 3, 3)), "b": beside(field, uniform(-3, 3, 3))},
     "color_combine": {"a": beside(field, uniform(0, 1, 3)), "b": beside(field, uniform(0, 1, 3))},
-    "turned_to_local": {"v": place},
-    "turned_back": {"step": place},
-    "bound_unstretch": {"f": uniform(0, 3, 3)},
-    "gradient_unstretch": {"f": four},
-    "bound_unwarp": {"f": uniform(0, 3, 3)},
-    "gradient_unwarp": {"f": uniform(-1.0, 1.0, 4), "q": uniform(-1.0, 1.0, 3)},
-    "color_unwarp": {"f": four},
-    "color_unstretch": {"f": four},
+    "direction_to_local": {"v": place},
+    "bound_leaf": {"direction": units_or_none},
+    "unroll_step": {"step": place},
+    "bound_pullback_affine": {"f": uniform(0, 3, 3)},
+    "gradient_pullback_affine": {"f": four},
+    "bound_pullback_warp": {"f": uniform(0, 3, 3)},
+    "gradient_pullback_warp": {"f": uniform(-1.0, 1.0, 4), "q": uniform(-1.0, 1.0, 3)},
+    "color_pullback_warp": {"f": four},
+    "color_pullback_affine": {"f": four},
     "power": {"radius": uniform(0.1, 2.0)},
-    "are_stacked": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
+    "balls_nested": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
     "plane_distance": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
     "apart": {"other": whole(0, DECALS)},
-    "lies_over": {"other": whole(0, DECALS)},
-    "stacked": {"other": whole(0, DECALS)},
+    "is_above": {"other": whole(0, DECALS)},
+    "are_nested": {"other": whole(0, DECALS)},
     "cell_owner": {"rank": among(1)},
-    "log_of_rest": {"w": uniform(0.0, 0.999)},
+    "log_one_minus": {"w": uniform(0.0, 0.999)},
     "cell_coordinate": {"x": uniform(-1000.0, 1000.0)},
     "cell_hash": dict.fromkeys("xyz", whole(-(2**31), 2**31)),
 } | {
@@ -146,10 +147,10 @@ class World:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        index = self.index
-        return {"decals": self.decals, "level_count": index.level_count, "layered": True,
-                "levels": index.levels, "table": index.table, "mask": index.mask,
-                "ids": index.ids}  # fmt: skip
+        return {
+            "decals": self.decals,
+            "index": self.index.on("cpu", records=self.decals, layered=True),
+        }
 
 
 @lru_cache
@@ -167,12 +168,12 @@ def world() -> World:
     return World(record.reshape(-1, 4), DecalIndex.build(centres, reach, kind), points.astype(np.float32))
 
 
-def arguments_of(typed: TypedFunction) -> dict[str, Array]:
+def arguments_of(typed: TypedFunction) -> dict[str, Any]:
     """The same seeded arguments for a function every time, in the types that it takes."""
     rng = np.random.default_rng(7)
     draws = BY_NAME | BY_FUNCTION.get(typed.name, {})
     known: dict[str, Any] = {"tape": texels(rng)}
-    if {"decals", "levels"} & set(typed.parameters):
+    if {"decals", "index"} & set(typed.parameters):
         known |= world().arguments | {"q": world().points, "n_q": world().points}
         known["level"] = rng.integers(0, world().index.level_count, COUNT)
     if "owner" in typed.parameters:
@@ -186,7 +187,7 @@ def arguments_of(typed: TypedFunction) -> dict[str, Array]:
     if typed.name == "arc_over_chord":
         angle = uniform(0.0, 0.5 * np.pi)(rng, COUNT)
         known |= {"sine_squared": np.sin(angle) ** 2, "cosine": np.cos(angle)}
-    if typed.name == "drawn_distance":
+    if typed.name == "image_distance":
         chord = draws["chord"](rng, COUNT)
         known |= {"chord": chord, "rim": chord + (1 - chord) * share(rng, COUNT)}
     if typed.name == "plane_distance":
@@ -196,15 +197,16 @@ def arguments_of(typed: TypedFunction) -> dict[str, Array]:
         opposite = (normal * other).sum(axis=1) < -0.9  # towards −1, no float32 tells the arc
         known |= {"n_p": normal, "n_q": np.where(opposite[:, None], -other, other)}
     drawn = {name: known[name] if name in known else draws[name](rng, COUNT) for name in typed.parameters}
+    index = {"index": drawn.pop("index")} if "index" in drawn else {}
     whole_names = {
         name
         for name, hint in typed.parameters.items()
-        if numpy_type(element(hint))[0] in (np.int32, np.bool_)
+        if name in drawn and numpy_type(element(hint))[0] in (np.int32, np.bool_)
     }
     arrays = {
         name: np.asarray(v, np.int32 if name in whole_names else np.float32) for name, v in drawn.items()
     }
-    return {name: np.full(COUNT, v) if v.ndim == 0 else v for name, v in arrays.items()}
+    return index | {name: np.full(COUNT, v) if v.ndim == 0 else v for name, v in arrays.items()}
 
 
 def ahead_of(ray: Array, apart: Array) -> Array:
@@ -215,5 +217,10 @@ def ahead_of(ray: Array, apart: Array) -> Array:
 
 @lru_cache
 def owners() -> Array:
-    everything: Any = {**world().arguments, "contact": 0, "q": world().points, "n_q": world().points}
+    everything: Any = {
+        "index": world().arguments["index"],
+        "contact": 0,
+        "q": world().points,
+        "n_q": world().points,
+    }
     return call(owner_at, **everything)

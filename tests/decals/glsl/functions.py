@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
-from blobtree.typed.builtins import type_name
-from decals.render.buffers import WIDTH, DataTexture
-from decals.render.context import Context
-from decals.render.tape_shader import Kinds
-from tests.blobtree.warp_functions import TypedFunction
+from blobtree.transpile.builtins import type_name
+from blobtree.transpile.glsl import uniforms_of
+from decals.rendering.context import Context
+from decals.rendering.tape_shader import Kinds
+from decals.rendering.textures import ROW_TEXELS, DataTexture
+from tests.blobtree.transpile.warp_functions import TypedFunction
 
 AGREEMENT = 1e-5
 """Largest relative difference between the two languages, or absolute one below 1."""
@@ -78,7 +79,7 @@ def run_program(
         if name in program:
             program[name] = value
     kind = "i4" if whole_numbers else "f4"
-    image = gl.texture((WIDTH, -(-count // WIDTH)), 4, dtype=kind)
+    image = gl.texture((ROW_TEXELS, -(-count // ROW_TEXELS)), 4, dtype=kind)
     target = gl.framebuffer([image])
     target.use()
     gl.enable_only(moderngl.NOTHING)
@@ -94,11 +95,26 @@ def run_program(
 
 
 def through_glsl(
-    context: Context, typed: TypedFunction, library: str, arguments: Mapping[str, NDArray[Any]], count: int
+    context: Context, typed: TypedFunction, library: str, arguments: Mapping[str, Any], count: int
 ) -> NDArray[Any]:
-    """`typed` at row i of every argument, for all i; parameters that are arrays are given whole."""
+    """Call `typed` for row i of every argument, for all i; arrays and structs are passed whole."""
     uniforms, expressions = [], []
+    textures: dict[str, NDArray[Any]] = {}
+    numbers: dict[str, Any] = {}
     for name, hint in typed.parameters.items():
+        fields = uniforms_of(hint)
+        if fields is not None:
+            for field, uniform in fields.items():
+                value = getattr(arguments[name], field)
+                uniforms.append(
+                    f"uniform {uniform.type.replace('ivec4_sampler', 'isampler2D')} {uniform.code};"
+                )
+                if isinstance(value, wp.array):
+                    textures[uniform.code] = rows(value.numpy())
+                else:
+                    numbers[uniform.code] = value
+            continue
+        textures[f"x_{name}"] = rows(arguments[name])
         glsl_type = str(type_name(hint))
         if isinstance(hint, wp.array):
             uniforms.append(f"uniform {glsl_type.replace('ivec4_sampler', 'isampler2D')} x_{name};")
@@ -114,5 +130,4 @@ def through_glsl(
     out = f"out {'ivec4' if whole else 'vec4'} result;"
     main = f"void main() {{ result = {result}; }}"
     source = "\n".join(["#version 330 core", *uniforms, out, library, main, ""])
-    textures = {f"x_{name}": rows(array) for name, array in arguments.items()}
-    return run_program(context, source, count, textures, {}, whole_numbers=whole)
+    return run_program(context, source, count, textures, numbers, whole_numbers=whole)

@@ -1,16 +1,18 @@
 """The decal functions as GLSL: the same numbers as through Warp, on fragments."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 import warp as wp
 
-from blobtree.typed.glsl import translate_library
-from decals.field.contact import contact_complement, contact_push, contact_uv, field_complement, rim_distance
-from decals.field.mapping import tangent_coordinates, unrolled
-from decals.grid.index import DecalIndex
-from decals.grid.lookup import cell_hash, cell_range
+from blobtree.transpile.glsl import translate_library
+from decals.field.contact import contact_complement, contact_push, contact_uv, rim_distance
+from decals.field.mapping import tangent_coordinates, unroll
+from decals.index.index import DecalIndex
+from decals.index.lookup import IndexedDecals, cell_hash, cell_range
+from decals.record import field_complement
 
 wp.set_module_options({"enable_backward": False})
 
@@ -22,7 +24,9 @@ void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2
 """
 FRAGMENT = """#version 330
 uniform sampler2D a; uniform sampler2D b; uniform sampler2D c;
-uniform sampler2D levels; uniform isampler2D table; uniform isampler2D ids; uniform int mask;
+uniform sampler2D decal_records; const bool decal_layered = true;
+uniform int index_level_count; uniform int index_mask;
+uniform sampler2D index_levels; uniform isampler2D index_table; uniform isampler2D index_ids;
 out vec4 result;
 {functions}
 void main() {{
@@ -34,19 +38,23 @@ void main() {{
 
 
 @pytest.fixture
-def through_glsl(context) -> Callable[..., np.ndarray]:
+def through_glsl(context: Any) -> Callable[..., np.ndarray]:
     """Run GLSL statements over rows x, y, z (float32[n, 4] each) that set `result`."""
     gl = context.gl
 
-    def run(functions, body, *rows, index=None):
+    def run(functions: Any, body: Any, *rows: Any, index: Any = None) -> Any:
         source = FRAGMENT.format(functions=translate_library(functions), body=body)
         program = gl.program(vertex_shader=VERTEX, fragment_shader=source)
         count = len(rows[0])
         images = dict(zip("abc", rows, strict=False))
         if index is not None:
-            images |= {"levels": index.levels, "table": index.table, "ids": index.ids[:, None]}
-            if "mask" in program:
-                program["mask"] = index.mask
+            images |= {
+                "index_levels": index.levels,
+                "index_table": index.table,
+                "index_ids": index.ids[:, None],
+            }
+            if "index_mask" in program:
+                program["index_mask"] = index.mask
         made = [program, gl.texture((WIDTH, height(count)), 4, dtype="f4")]
         for unit, (name, values) in enumerate(images.items()):
             if name in program:
@@ -65,11 +73,11 @@ def through_glsl(context) -> Callable[..., np.ndarray]:
     return run
 
 
-def height(count):
+def height(count: int) -> Any:
     return max(1, -(-count // WIDTH))
 
 
-def texture(gl, values):
+def texture(gl: Any, values: Any) -> Any:
     padded = np.zeros((height(len(values)) * WIDTH, values.shape[1]), values.dtype)
     padded[: len(values)] = values
     dtype = "i4" if values.dtype == np.int32 else "f4"
@@ -78,14 +86,14 @@ def texture(gl, values):
     return made
 
 
-def rows(*columns):
+def rows(*columns: Any) -> Any:
     """float32[n, 4] of up to four columns."""
     table = np.column_stack(columns).astype(np.float32)
     return np.pad(table, ((0, 0), (0, 4 - table.shape[1])))
 
 
 @wp.kernel
-def contacts(x: wp.array(dtype=wp.vec4), result: wp.array(dtype=wp.vec4)):
+def contacts(x: wp.array(dtype=wp.vec4), result: wp.array(dtype=wp.vec4)) -> None:
     i = wp.tid()
     e_k = field_complement(x[i][0])
     complement = contact_complement(e_k, contact_push(field_complement(x[i][1]), e_k))
@@ -107,22 +115,22 @@ def offsets(
     y: wp.array(dtype=wp.vec4),
     z: wp.array(dtype=wp.vec4),
     result: wp.array(dtype=wp.vec4),
-):
+) -> None:
     i = wp.tid()
     n = wp.vec3(y[i][0], y[i][1], y[i][2])
     w = wp.vec3(x[i][0], x[i][1], x[i][2])
-    m = unrolled(w, n, wp.vec3(z[i][0], z[i][1], z[i][2]))
+    m = unroll(w, n, wp.vec3(z[i][0], z[i][1], z[i][2]))
     xy = tangent_coordinates(wp.vec3(m[0], m[1], m[2]), n, w)
     result[i] = wp.vec4(xy[0], xy[1], m[2], m[3])
 
 
 OFFSETS = """
-    vec4 m = unrolled(x.xyz, y.xyz, z.xyz);
+    vec4 m = unroll(x.xyz, y.xyz, z.xyz);
     result = vec4(tangent_coordinates(m.xyz, y.xyz, x.xyz), m.zw);
 """
 
 
-def through_warp(kernel, *inputs):
+def through_warp(kernel: Any, *inputs: Any) -> Any:
     result = wp.zeros(len(inputs[0]), dtype=wp.vec4, device="cpu")
     wp.launch(
         kernel,
@@ -133,7 +141,7 @@ def through_warp(kernel, *inputs):
     return result.numpy()
 
 
-def adversarial_contacts(rng, n):
+def adversarial_contacts(rng: np.random.Generator, n: int) -> Any:
     """Squared relative distances of an owner and a neighbour: anywhere, near centre, tie and rim."""
     rim = 1 - 2 ** (-1 / 3)
     least = np.concatenate(
@@ -145,7 +153,7 @@ def adversarial_contacts(rng, n):
     return np.concatenate([rows(least, least * ratio, direction), np.float32(exact)])
 
 
-def test_contact(through_glsl):
+def test_contact(through_glsl: Any) -> None:
     x = adversarial_contacts(np.random.default_rng(0), 100_000)
     functions = [field_complement, contact_complement, contact_push, contact_uv, rim_distance]
     seen, expected = through_glsl(functions, CONTACTS, x), through_warp(contacts, x)
@@ -154,7 +162,7 @@ def test_contact(through_glsl):
     assert worst.max() <= AGREEMENT
 
 
-def test_mapping(through_glsl):
+def test_mapping(through_glsl: Any) -> None:
     rng = np.random.default_rng(1)
     n = 100_000
     n_p = rng.normal(size=(n, 3))
@@ -164,7 +172,7 @@ def test_mapping(through_glsl):
     keep = (n_p * n_q).sum(axis=1) > -0.9  # beyond, float32 hardly tells the axis
     w = rng.uniform(-1, 1, (n, 3))
     inputs = [a[keep] for a in (rows(w), rows(n_p), rows(n_q))]
-    seen = through_glsl([unrolled, tangent_coordinates], OFFSETS, *inputs)
+    seen = through_glsl([unroll, tangent_coordinates], OFFSETS, *inputs)
     worst = np.abs(seen - through_warp(offsets, *inputs)).max()
     print(worst)
     assert worst <= AGREEMENT
@@ -172,11 +180,11 @@ def test_mapping(through_glsl):
 
 LOOKUP = """
     uint h = cell_hash(int(y.x), int(y.y), int(y.z)) & 65535u;
-    result = vec4(cell_range(x.xyz, int(x.w), levels, table, mask, ids), h, 0.0);
+    result = vec4(cell_range(x.xyz, int(x.w)), h, 0.0);
 """
 
 
-def test_index(through_glsl):
+def test_index(through_glsl: Any) -> None:
     """The same lists and the same hash, bit for bit, far from the origin and over six decades of size."""
     rng = np.random.default_rng(2)
     positions = np.float32(rng.normal(size=(400, 3)) * 10.0 ** rng.uniform(-3, 6, (400, 1)))
@@ -195,21 +203,18 @@ def test_index(through_glsl):
 def lookups(
     x: wp.array(dtype=wp.vec4),
     cells: wp.array(dtype=wp.vec3i),
-    level_count: wp.int32,
-    levels: wp.array(dtype=wp.vec4),
-    table: wp.array(dtype=wp.vec4i),
-    mask: wp.int32,
-    ids: wp.array(dtype=wp.int32),
+    index: IndexedDecals,
     result: wp.array(dtype=wp.vec3),
-):
+) -> None:
     i = wp.tid()
-    span = cell_range(wp.vec3(x[i][0], x[i][1], x[i][2]), int(x[i][3]), levels, table, mask, ids)
+    span = cell_range(wp.vec3(x[i][0], x[i][1], x[i][2]), int(x[i][3]), index)
     h = cell_hash(cells[i][0], cells[i][1], cells[i][2]) & wp.uint32(65535)
     result[i] = wp.vec3(float(span[0]), float(span[1]), float(h))
 
 
-def through_warp_lookup(index, x, cells):
+def through_warp_lookup(index: DecalIndex, x: Any, cells: Any) -> Any:
     result = wp.zeros(len(x), dtype=wp.vec3, device="cpu")
     inputs = [wp.array(x, dtype=wp.vec4, device="cpu"), wp.array(cells, dtype=wp.vec3i, device="cpu")]
-    wp.launch(lookups, len(x), [*inputs, *index.on("cpu").arguments(), result], device="cpu")
+    indexed = index.on("cpu", records=np.zeros((0, 4), np.float32), layered=True)
+    wp.launch(lookups, len(x), [*inputs, indexed, result], device="cpu")
     return result.numpy()

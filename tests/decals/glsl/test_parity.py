@@ -8,44 +8,44 @@ import pytest
 
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
-from blobtree.tapes.dispatch import partials, rises, slope, warp_forward, warp_pullback, warp_stretch
-from blobtree.typed.glsl import translate_library
-from decals.render.context import Context
-from decals.render.tape_shader import _dispatch
-from tests.blobtree.warp_functions import TypedFunction, call, typed_functions
+from blobtree.tape.dispatch import is_monotone, partials, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.transpile.glsl import translate_library
+from decals.rendering.context import Context
+from decals.rendering.tape_shader import _dispatch
+from tests.blobtree.transpile.warp_functions import TypedFunction, call, typed_functions
 from tests.decals.glsl.arguments import COUNT, arguments_of
 from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, through_glsl
 
 MODULES = (
-    "blobtree.formulas.kernels",
+    "blobtree.formulas.falloff",
     "blobtree.formulas.skeletons",
     "blobtree.formulas.operators",
-    "blobtree.tapes.dispatch",
-    "blobtree.tapes.readings",
+    "blobtree.tape.dispatch",
+    "blobtree.tape.evaluators",
     "blobtree.tracing.rays",
     "blobtree.formulas.warps",
     "decals.field.contact",
     "decals.field.mapping",
-    "decals.grid.lookup",
+    "decals.index.lookup",
     "decals.field.radial",
-    "decals.records",
-    "decals.field.stack",
-    "decals.field.cells",
+    "decals.record",
+    "decals.index.draw_order",
+    "decals.field.radial",
     "decals.field.ownership",
 )
-WRITTEN_TWICE = {"closest", "slimmest", "stride", "convex", "rises"}
+WRITTEN_TWICE = {"closest", "min_influence", "stride", "is_convex", "is_monotone"}
 """Switches over the tables, written per backend."""
 
 
 def shared(module: str) -> list[TypedFunction]:
     """What both backends have from one source, save what reads a whole tape: see `test_glsl_tapes`."""
     functions = typed_functions(import_module(module))
-    whole_tapes = {"span", "blocks"}
+    whole_tapes = {"span", "cells"}
     return [f for f in functions if f.name not in WRITTEN_TWICE and not whole_tapes & set(f.parameters)]
 
 
 FUNCTIONS = {f"{module}.{typed.name}": typed for module in MODULES for typed in shared(module)}
-CHOOSERS: list[Any] = [partials, rises, slope, warp_forward, warp_pullback, warp_stretch]
+CHOOSERS: list[Any] = [partials, is_monotone, slope, warp_forward, warp_pullback, warp_stretch]
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -70,6 +70,6 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
     assert np.isfinite(expected).all()
     error = np.abs(seen - expected) / np.maximum(1.0, np.abs(expected))
     worst = np.unravel_index(error.argmax(), error.shape)[0]
-    at_worst = {key: value[worst] for key, value in arguments.items() if len(value) == count}
+    at_worst = {key: value[worst] for key, value in arguments.items() if np.shape(value)[:1] == (count,)}
     assert error.max() <= AGREEMENT, f"{error.max()}: {seen[worst]} and {expected[worst]} at {at_worst}"
     assert not typed.parameters or typed.returned is None or np.ptp(expected) > 0.0, "they never change"

@@ -4,20 +4,21 @@ import numpy as np
 import pytest
 
 from blobtree import Node, Point, Segment
-from blobtree.tapes.evaluate import bounds_along, bounds_at, colors_at, gradients_at
+from blobtree.tape.evaluate import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
-from decals.render.context import Context
-from decals.render.renderer import Renderer
-from decals.render.tape_shader import tracing_shader
+from decals.rendering.context import Context
+from decals.rendering.options import RenderOptions
+from decals.rendering.renderer import Renderer
+from decals.rendering.tape_shader import tracing_shader
 from decals.scenes.camera import Camera
-from tests.blobtree.trees import points_around, random_trees
+from tests.blobtree.trees import SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
 from tests.decals.glsl.functions import ALL_KINDS, run_program
 from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 
-TREES = random_trees(seed=31, count=24)
+TREES = random_trees(seed=31, count=24) + random_trees(seed=33, count=12, more=SOLIDS)
 
 
 def read_tape(
@@ -37,7 +38,7 @@ def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
     assert sum(tree.tape.stretched for tree in TREES) > 5
 
 
-@pytest.mark.parametrize("start", range(0, 24, 6))
+@pytest.mark.parametrize("start", range(0, len(TREES), 6))
 def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int) -> None:
     rng = np.random.default_rng(start)
     compared = 0
@@ -76,7 +77,7 @@ MODELS = {
 def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
     tree, (width, height) = MODELS[name], (160, 120)
     camera = Camera.framing(tree.bounds, direction=(0.3, 0.5, 1.0), aspect=width / height)
-    buffers = renderer.buffers(View((Model(tree),), camera), size=(width, height))
+    buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=(width, height)))
     x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
     rays = camera.rays(width, height)
     directions = rays.directions(x, y).reshape(-1, 3)

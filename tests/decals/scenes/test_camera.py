@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from decals.errors import InvalidScene
-from decals.scenes.camera import NEAR_OVER_FAR, Bounds, Camera, Vector
+from decals.scenes.camera import MIN_NEAR_OVER_FAR, Bounds, Camera, Vector
 
 coordinate = st.floats(-100, 100)
 vector = st.tuples(coordinate, coordinate, coordinate)
@@ -115,7 +115,7 @@ def test_clip_range_follows_the_scene() -> None:
     near, far = camera.clip_range(([-1, -1, -1], [1, 1, 1]))
     assert 8 < near < 9 < 11 < far < 12
     near, far = camera.clip_range(([-1, -1, -1], [1, 1, 20]))
-    assert near == pytest.approx(far * NEAR_OVER_FAR)
+    assert near == pytest.approx(far * MIN_NEAR_OVER_FAR)
     near, far = camera.clip_range(([-1, -1, 20], [1, 1, 30]))
     assert 0 < near < far
 

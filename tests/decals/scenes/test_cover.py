@@ -5,13 +5,13 @@ import pytest
 
 import decals
 from blobtree import Point
-from decals.errors import InvalidScene
+from decals.errors import InvalidInput
 from tests.decals.meshes import sphere
 
 BALL = Point((0, 0, 0), radius=1.0)
 
 
-def test_one_coat_over_a_tree_and_a_mesh() -> None:
+def test_decals_over_a_tree_and_a_mesh() -> None:
     surface = sphere(center=(1.6, 0.0, 0.0))
     mesh = decals.MeshObject("ball", surface.vertices, surface.faces)
     scene = decals.cover(BALL, mesh, count=60, images=["scale", "rock"], seed=4)
@@ -32,7 +32,7 @@ def test_the_seed_and_the_direction_decide() -> None:
 
 
 def test_the_whole_model_is_in_the_picture() -> None:
-    scene = decals.cover(BALL, count=0, view=(1, 0, 0))
+    scene = decals.cover(BALL, count=0, view_direction=(1, 0, 0))
     points = scene.objects[0].surface.sample(500, seed=9)[0]
     near, far = scene.camera.clip_range(scene.bounds)
     project = scene.camera.projection(4 / 3, near, far) @ scene.camera.view()
@@ -44,5 +44,5 @@ def test_the_whole_model_is_in_the_picture() -> None:
 
 @pytest.mark.parametrize("models", [(), ("horse",), (None,)])
 def test_what_is_no_model_is_refused(models: tuple[object, ...]) -> None:
-    with pytest.raises(InvalidScene, match="expected"):
+    with pytest.raises(InvalidInput, match="expected"):
         decals.cover(*models)  # type: ignore[arg-type]

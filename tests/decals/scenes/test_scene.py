@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blobtree import BlobTreeError, Node, Point, Segment
-from decals.errors import DecalsError, InvalidImage, InvalidMesh, InvalidScene
+from blobtree import Node, Point, Segment
+from decals.errors import ImplicitDecalsError, InvalidImage, InvalidMesh, InvalidScene
 from decals.images import generate_image
 from decals.model import Decals
 from decals.scenes.camera import Camera
-from decals.scenes.scene import DecalImage, MeshObject, Scene, TreeObject, bounds_of
+from decals.scenes.objects import MeshObject, TreeObject, bounds_of
+from decals.scenes.scene import DecalImage, Scene
 from decals.scenes.scene_file import from_json, is_scene, load_scene, save_scene, to_json
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32) * np.float32(0.1)
@@ -227,7 +228,7 @@ def _broken(change: str, value: object) -> bytes:
     ],
 )
 def test_each_wrong_field_is_named(change: str, value: object, message: str) -> None:
-    with pytest.raises((DecalsError, BlobTreeError), match=message):
+    with pytest.raises(ImplicitDecalsError, match=message):
         from_json(_broken(change, value), folder=Path())
 
 

@@ -1,31 +1,33 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
 from blobtree import Point, Segment
 from decals.errors import InvalidMesh, InvalidPoints
-from decals.surfaces.implicit import ImplicitSurface, straight_onto
+from decals.surfaces.implicit import ImplicitSurface, project_without_mesh
 from decals.surfaces.surface import Surface
 
 
-def directions(count, seed=0):
+def directions(count: int, seed: int = 0) -> Any:
     vectors = np.random.default_rng(seed).normal(size=(count, 3))
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-def ball(radius=1.0, center=(0.0, 0.0, 0.0)):
+def ball(radius: float = 1.0, center: Any = (0.0, 0.0, 0.0)) -> Any:
     return ImplicitSurface(Point(center, radius=radius), resolution=32)
 
 
-def blob():
+def blob() -> Any:
     return Segment((-1, 0, 0), (1, 0, 0), radius=0.4) + Point((0, 0.6, 0), radius=0.5)
 
 
-def test_an_implicit_is_a_surface():
+def test_an_implicit_is_a_surface() -> None:
     assert isinstance(ball(), Surface)
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
-def test_sphere_area_bounds_samples_and_normals(radius):
+def test_sphere_area_bounds_samples_and_normals(radius: float) -> None:
     surface = ball(radius)
     assert surface.area == pytest.approx(4 * np.pi * radius**2, rel=1e-2)
     assert np.allclose(surface.bounds, [[-radius] * 3, [radius] * 3], rtol=2e-2)
@@ -36,36 +38,36 @@ def test_sphere_area_bounds_samples_and_normals(radius):
 
 
 @pytest.mark.parametrize("factor", [0.3, 0.5, 0.99, 1.01, 1.5, 2.1, 5.0, 40.0])
-def test_projection_reaches_the_sphere_from_near_and_far(factor):
+def test_projection_reaches_the_sphere_from_near_and_far(factor: float) -> None:
     ways = directions(300)
     positions, normals = ball(center=(3, 0, 0)).project(factor * ways + [3, 0, 0])
     assert np.allclose(np.linalg.norm(positions - [3, 0, 0], axis=1), 1, atol=1e-4)
     assert np.allclose(normals, ways, atol=0.15)  # from afar, as near as a cell of the coarse mesh
 
 
-def test_a_point_without_gradient_gets_a_place_and_a_normal():
+def test_a_point_without_gradient_gets_a_place_and_a_normal() -> None:
     positions, normals = ball().project([[0, 0, 0]])
     assert np.linalg.norm(positions) == pytest.approx(1, abs=1e-4)
     assert np.linalg.norm(normals) == pytest.approx(1, abs=1e-4)
 
 
-def test_straight_onto_the_surface_is_the_same_without_a_mesh():
+def test_straight_onto_the_surface_is_the_same_without_a_mesh() -> None:
     tree, near = blob(), ImplicitSurface(blob()).sample(200, seed=3)[0] * 1.01
-    positions, normals = straight_onto(tree, near)
+    positions, normals = project_without_mesh(tree, near)
     expected = ImplicitSurface(tree).project(near)
     np.testing.assert_array_equal(positions, expected[0])
     np.testing.assert_array_equal(normals, expected[1])
-    far = straight_onto(tree, near * 1.15)
+    far = project_without_mesh(tree, near * 1.15)
     assert np.abs(tree(far[0]) - 0.5).max() < 1e-4
     assert np.allclose(np.linalg.norm(far[1], axis=1), 1, atol=1e-5)
 
 
-def test_what_does_not_lead_straight_onto_the_surface_is_said():
-    assert straight_onto(blob(), [[0.0, 0.6, 0.5], [9.0, 9.0, 9.0]]) is None
-    assert straight_onto(blob(), np.zeros((0, 3))) is None
+def test_what_does_not_lead_straight_onto_the_surface_is_said() -> None:
+    assert project_without_mesh(blob(), [[0.0, 0.6, 0.5], [9.0, 9.0, 9.0]]) is None
+    assert project_without_mesh(blob(), np.zeros((0, 3))) is None
 
 
-def test_samples_of_a_blend_lie_on_it_with_the_normal_of_the_field():
+def test_samples_of_a_blend_lie_on_it_with_the_normal_of_the_field() -> None:
     tree = blob()
     surface = ImplicitSurface(tree, resolution=32)
     positions, normals = surface.sample(1000, seed=2)
@@ -78,14 +80,14 @@ def test_samples_of_a_blend_lie_on_it_with_the_normal_of_the_field():
     assert first == again != other
 
 
-def test_rays_meet_the_sphere():
+def test_rays_meet_the_sphere() -> None:
     ways = directions(200)
     assert np.allclose(ball(2.0).raycast(6 * ways, -5 * ways), 4.0, atol=1e-3)
     assert np.isinf(ball().raycast([[0, 0, 3], [0, 0, 3]], [[0, 0, 1], [0, 0, 0]])).all()
     assert ball().raycast(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
 
 
-def test_it_contains_its_inside():
+def test_it_contains_its_inside() -> None:
     ways = directions(200)
     surface = ball(center=(0, 5, 0))
     assert surface.contains(0.99 * ways + [0, 5, 0]).all()
@@ -93,12 +95,12 @@ def test_it_contains_its_inside():
     assert not surface.contains([[100, 0, 0]]).any()
 
 
-def test_a_tree_without_surface_is_refused():
+def test_a_tree_without_surface_is_refused() -> None:
     nothing = Point((0, 0, 0), radius=1.0) - Point((0, 0, 0), radius=3.0)
     with pytest.raises(InvalidMesh, match="tree with a surface"):
         ImplicitSurface(nothing, resolution=16)
 
 
-def test_what_are_no_points_is_refused():
+def test_what_are_no_points_is_refused() -> None:
     with pytest.raises(InvalidPoints):
         ball().project([[np.nan, 0, 0]])

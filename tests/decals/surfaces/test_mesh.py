@@ -1,7 +1,10 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces.mesh import MeshSurface
@@ -10,23 +13,23 @@ from tests.decals.meshes import box, plane, sphere
 from tests.oracles.triangles import closest_points, first_hits
 
 
-def directions(count, seed=0):
+def directions(count: int, seed: int = 0) -> Any:
     vectors = np.random.default_rng(seed).normal(size=(count, 3))
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-def triangle_soup(seed, count=30):
+def triangle_soup(seed: int, count: int = 30) -> Any:
     rng = np.random.default_rng(seed)
     vertices = rng.uniform(-1, 1, (3 * count, 3)).astype(np.float32)
     return vertices, np.arange(3 * count).reshape(-1, 3)
 
 
-def test_a_mesh_is_a_surface():
+def test_a_mesh_is_a_surface() -> None:
     assert isinstance(plane(), Surface)
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
-def test_sphere_area_bounds_and_samples(radius):
+def test_sphere_area_bounds_and_samples(radius: float) -> None:
     ball = sphere(radius)
     assert ball.area == pytest.approx(4 * np.pi * radius**2, rel=5e-3)
     assert np.allclose(ball.bounds, [[-radius] * 3, [radius] * 3], rtol=1e-2)
@@ -37,7 +40,7 @@ def test_sphere_area_bounds_and_samples(radius):
     assert np.abs(positions.mean(axis=0)).max() < 0.02 * radius
 
 
-def test_samples_are_uniform_by_area():
+def test_samples_are_uniform_by_area() -> None:
     slab = box((4.0, 1.0, 1.0))
     positions, normals = slab.sample(18_000, seed=0)
     on_top = normals[:, 2] > 0.5
@@ -46,7 +49,7 @@ def test_samples_are_uniform_by_area():
     assert np.abs(counts - 500).max() < 5 * np.sqrt(500)
 
 
-def test_samples_repeat_for_a_seed_and_differ_for_another():
+def test_samples_repeat_for_a_seed_and_differ_for_another() -> None:
     ball = sphere()
     first, again, other = (ball.sample(100, seed=seed)[0].tobytes() for seed in (5, 5, 6))
     assert first == again != other
@@ -55,7 +58,7 @@ def test_samples_repeat_for_a_seed_and_differ_for_another():
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("seed", range(3))
-def test_projection_finds_the_closest_point(seed, scale):
+def test_projection_finds_the_closest_point(seed: int, scale: float) -> None:
     vertices, faces = triangle_soup(seed)
     soup = MeshSurface(vertices * scale, faces)
     points = np.random.default_rng(seed + 100).uniform(-3, 3, (200, 3)) * scale
@@ -67,14 +70,14 @@ def test_projection_finds_the_closest_point(seed, scale):
     assert np.array_equal(soup.normal(points), normals)
 
 
-def test_normals_follow_the_winding_of_the_faces():
+def test_normals_follow_the_winding_of_the_faces() -> None:
     assert np.allclose(plane().normal([[0.1, 0.2, 3.0], [0.1, 0.2, -3.0]]), [0, 0, 1])
     turned = MeshSurface(plane().vertices, plane().faces[:, ::-1])
     assert np.allclose(turned.normal([[0.1, 0.2, 3.0]]), [0, 0, -1])
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_rays_hit_the_first_triangle(seed):
+def test_rays_hit_the_first_triangle(seed: int) -> None:
     vertices, faces = triangle_soup(seed)
     soup = MeshSurface(vertices, faces)
     origins, ways = directions(300, seed) * 3, directions(300, seed + 50)
@@ -86,7 +89,7 @@ def test_rays_hit_the_first_triangle(seed):
     assert np.allclose(found[both], expected[both], rtol=1e-4)
 
 
-def test_rays_toward_a_sphere_know_its_size():
+def test_rays_toward_a_sphere_know_its_size() -> None:
     ways = directions(500)
     distances = sphere(2.0, center=(5, 0, 0)).raycast(ways * 7 + [5, 0, 0], -ways)
     assert np.allclose(distances, 5.0, atol=0.02)
@@ -94,7 +97,7 @@ def test_rays_toward_a_sphere_know_its_size():
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_closed_mesh_contains_its_inside_however_it_winds(turned):
+def test_a_closed_mesh_contains_its_inside_however_it_winds(turned: bool) -> None:
     ball = sphere(center=(3, 0, 0))
     if turned:
         ball = MeshSurface(ball.vertices, ball.faces[:, ::-1])
@@ -105,7 +108,7 @@ def test_a_closed_mesh_contains_its_inside_however_it_winds(turned):
     assert not ball.contains(center + 1.01 * ways).any()
 
 
-def test_unwelded_closed_mesh_is_closed_and_open_ones_contain_nothing():
+def test_unwelded_closed_mesh_is_closed_and_open_ones_contain_nothing() -> None:
     cube = box()
     split = MeshSurface(cube.vertices[cube.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))
     assert split.closed
@@ -117,7 +120,7 @@ def test_unwelded_closed_mesh_is_closed_and_open_ones_contain_nothing():
         assert not surface.contains([[0, 0, 0]]).any()
 
 
-def test_degenerate_faces_are_tolerated():
+def test_degenerate_faces_are_tolerated() -> None:
     good = sphere()
     n = len(good.vertices)
     extra = [[0, 0, 1], [2, 2, 2], [n, n + 1, n + 2]]
@@ -150,24 +153,24 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], float)
         (SQUARE * [1, 0, 1], [[0, 1, 2]], "mesh with area"),
     ],
 )
-def test_what_is_no_mesh_is_refused(vertices, faces, says):
+def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, says: str) -> None:
     with np.errstate(all="ignore"), pytest.raises(InvalidMesh, match=says):
         MeshSurface(vertices, faces)
 
 
 @pytest.mark.parametrize("points", [[[0, 0]], [0, 0, 0], [[np.nan, 0, 0]], [[np.inf, 0, 0]], "points"])
-def test_what_are_no_points_is_refused(points):
+def test_what_are_no_points_is_refused(points: NDArray[Any]) -> None:
     for ask in (plane().project, plane().normal, plane().contains):
         with pytest.raises(InvalidPoints, match="points: expected"):
             ask(points)
 
 
-def test_rays_need_as_many_origins_as_directions():
+def test_rays_need_as_many_origins_as_directions() -> None:
     with pytest.raises(InvalidPoints, match="as many directions"):
         plane().raycast([[0, 0, 1]], [[0, 0, 1], [0, 0, 1]])
 
 
-def test_no_points_give_no_answers():
+def test_no_points_give_no_answers() -> None:
     none = np.zeros((0, 3))
     assert plane().project(none)[0].shape == (0, 3)
     assert plane().raycast(none, none).shape == plane().contains(none).shape == (0,)
@@ -175,7 +178,7 @@ def test_no_points_give_no_answers():
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.floats(1e-3, 1e3), st.floats(-100, 100))
-def test_samples_lie_on_the_surface_at_any_scale_and_place(seed, scale, shift):
+def test_samples_lie_on_the_surface_at_any_scale_and_place(seed: int, scale: float, shift: Any) -> None:
     vertices, faces = triangle_soup(seed, count=5)
     soup = MeshSurface(vertices * scale + shift, faces)
     positions, normals = soup.sample(20, seed)
@@ -184,7 +187,7 @@ def test_samples_lie_on_the_surface_at_any_scale_and_place(seed, scale, shift):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_parts_of_large_faces_get_their_share_and_neighbours_are_chance(seed):
+def test_parts_of_large_faces_get_their_share_and_neighbours_are_chance(seed: int) -> None:
     square = plane(2.0)
     positions, _ = square.sample(4096, seed)
     cells = np.floor((positions[:, :2] + 1.0) * 2.0).clip(0, 3).astype(int) @ [4, 1]

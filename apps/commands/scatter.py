@@ -1,0 +1,147 @@
+"""``implicit-decals scatter``: scattered decals as a scene, or as a table."""
+
+import colorsys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+
+from blobtree.io import write_atomically
+from decals import DecalImage, Decals, Scene, Sizing, save_scene
+from decals import scatter as scatter_decals
+from decals.apps.commands.options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, Whole, check_count
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
+from decals.apps.errors import UsageError
+from decals.apps.models.definitions import import_definitions
+from decals.apps.models.loading import load_models
+from decals.apps.models.samples import axes_of
+from decals.apps.output import check_output
+from decals.apps.views import frame, parse_view
+from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
+
+COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
+SUFFIXES = (".json", ".csv")
+MAX_IMAGES = 256
+ASPECT = (4, 3)
+"""Width and height of the picture that the camera of a written scene fits, in any unit."""
+GOLDEN_RATIO = 0.618034
+
+
+def scatter(
+    model: Annotated[list[str], Parameter(negative=())],
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    count: OptionalWhole = None,
+    spacing: Annotated[float | None, Parameter(show_default=False)] = None,
+    sizing: Sizing = Sizing.COVERING,
+    factor: float = 1.0,
+    along: Annotated[Orientation | None, Parameter(show_default=False)] = None,
+    images: Whole = 1,
+    choice: ImageChoice = ImageChoice.RANDOM,
+    painted: Annotated[Path | None, Parameter(show_default=False)] = None,
+    painted_along: Literal["x", "y", "z"] = "z",
+    black: float = 0.1,
+    regularity: float = 1.0,
+    seed: Whole = 0,
+    define: Definitions = None,
+) -> None:
+    """Scatter decals over models and write them to a file.
+
+    All models share one coordinate system. Decals of different models push each other where the models touch.
+
+    Parameters
+    ----------
+    model
+        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, or samples (creature, dragon, horse, knot,
+        spheres).
+    output
+        The output file: json, a scene that render and edit can open, or csv, a row for each decal.
+    count
+        Number of decals. Default: 500.
+    spacing
+        Distance of neighbours in the models' units, instead of --count.
+    sizing
+        Rule for the radii: covering (no gaps), touching (no overlaps), or delaunay (the paper's rule).
+    factor
+        Factor on all radii.
+    along
+        Orientation of images: curvature, or cross (a smooth field with fourfold symmetry). Default: random.
+    images
+        Number of images, from 1 to 256.
+    choice
+        Rule that assigns images: random, or by the decals' size or the surface's curvature.
+    painted
+        An image file, projected onto the models, that sets the density of decals: highest where it is white.
+    painted_along
+        Axis of that projection.
+    black
+        Density where the image is black, as a fraction of that where it is white.
+    regularity
+        From 0 (random positions) to 1 (as even as possible).
+    seed
+        Seed of the random numbers: equal seeds give equal decals.
+    define
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+    """
+    if count is not None and spacing is not None:
+        raise UsageError("expected --count or --spacing, got both; leave one of them out")
+    if count is None and spacing is None:
+        count = 500
+    if count is not None:
+        check_count("--count", count, 0, MAX_DECALS)
+    check_count("--images", images, 1, MAX_IMAGES)
+    check_count("--seed", seed, 0, MAX_SEED)
+    check_output(output, SUFFIXES)
+    import_definitions(define)
+    objects = load_models(model)
+    if isinstance(objects, Scene):
+        raise UsageError("a saved scene has its own decals; give its models instead")
+    with progress_bars() as progress:
+        progress(PREPARING, 0.0)
+        surfaces = [item.surface for item in objects]
+        density = None
+        if painted is not None:
+            density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
+        decals = scatter_decals(
+            surfaces,
+            count=count,
+            spacing=spacing,
+            density=density,
+            regularity=regularity,
+            sizing=sizing,
+            factor=factor,
+            direction=along,
+            images=images,
+            choice=choice,
+            seed=seed,
+            progress=progress,
+        )
+    if output.suffix.lower() == ".csv":
+        write_table(decals, output)
+        return
+    camera = frame(objects, parse_view(None, axes_of(model[0])), ASPECT)
+    scene = Scene(objects=tuple(objects), camera=camera, images=scale_images(images), decals=decals)
+    save_scene(scene, output)
+
+
+def write_table(decals: Decals, path: Path) -> None:
+    """Write decals as comma-separated values: one row per decal, headed by `COLUMNS`."""
+    columns = (
+        decals.positions,
+        decals.normals,
+        decals.tangents,
+        decals.radii[:, None],
+        decals.images[:, None],
+    )
+    rows = np.hstack([column.astype(object) for column in columns])
+    lines = [",".join(COLUMNS), *(",".join(map(str, row)) for row in rows)]
+    write_atomically(path, ("\n".join(lines) + "\n").encode())
+
+
+def scale_images(count: int) -> tuple[DecalImage, ...]:
+    """Return images of scales for a scene: the first in the default colour, the others in various hues."""
+    hues = (colorsys.hsv_to_rgb(GOLDEN_RATIO * number % 1.0, 0.55, 0.65) for number in range(1, count))
+    colors = ["".join(f"{round(255 * channel):02x}" for channel in hue) for hue in hues]
+    return tuple(DecalImage.load(source) for source in ["scale", *(f"scale#{color}" for color in colors)])

@@ -1,0 +1,1 @@
+"""Checks of the software and hardware that the project needs."""

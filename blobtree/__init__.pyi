@@ -1,0 +1,74 @@
+from ._version import __version__
+from .custom.operator import CustomCombination, define_operator
+from .custom.skeleton import CustomPrimitive, define_skeleton
+from .errors import (
+    Cancelled,
+    ImplicitDecalsError,
+    InvalidDefinition,
+    InvalidDevice,
+    InvalidFile,
+    InvalidNode,
+    InvalidPoints,
+    InvalidResolution,
+    MissingPackage,
+    UnknownKind,
+    UntranslatableFunction,
+)
+from .formulas.falloff import ISO, RIM
+from .io import from_json, load, save, to_json
+from .meshing.creases import split_creases
+from .meshing.mesh import Mesh
+from .meshing.polygonize import Polygonizer, polygonize
+from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
+from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
+from .progress import Cancel, Progress
+from .tape.tape import Tape
+from .tracing.trace import Hits
+
+__all__ = [
+    "ISO",
+    "RIM",
+    "Box",
+    "Cancel",
+    "Cancelled",
+    "Cone",
+    "CustomCombination",
+    "CustomPrimitive",
+    "Difference",
+    "Disc",
+    "Hits",
+    "ImplicitDecalsError",
+    "Intersection",
+    "InvalidDefinition",
+    "InvalidDevice",
+    "InvalidFile",
+    "InvalidNode",
+    "InvalidPoints",
+    "InvalidResolution",
+    "Mesh",
+    "MissingPackage",
+    "Node",
+    "Offset",
+    "Point",
+    "Polygonizer",
+    "Progress",
+    "Ricci",
+    "Segment",
+    "Sum",
+    "Tape",
+    "Torus",
+    "Transform",
+    "Twist",
+    "Union",
+    "UnknownKind",
+    "UntranslatableFunction",
+    "__version__",
+    "define_operator",
+    "define_skeleton",
+    "from_json",
+    "load",
+    "polygonize",
+    "save",
+    "split_creases",
+    "to_json",
+]

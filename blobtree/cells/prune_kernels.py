@@ -1,0 +1,324 @@
+"""Pruning: the interpreter's loop over intervals, which writes the part of a tape that acts in a cube.
+
+Over a cube each primitive has a smallest and a largest value, and each operator a range of results. Often a
+result depends on one operand alone (`Operator.choice`). `prune` copies the instructions that matter to a new
+tape and drops those that a later choice makes irrelevant. At every point of the cube, the pruned tape gives
+the same value, gradient and colour as the whole one.
+"""
+
+import warp as wp
+
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import falloff_range
+from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
+from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
+from blobtree.tape.dispatch import closest, min_influence, stride, warp_forward, warp_stretch
+from blobtree.tape.evaluators import to_local
+from blobtree.tape.tape import POP_SWAPPED, PREFIX, PUSH, REGISTERS, STRETCHED, UNWARP, WARP, WARP_REGISTERS
+from blobtree.transpile.specialize import unrolled
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+SUM_CODE = wp.constant(OPERATORS.index(SUM))
+
+RANGE_MARGIN = wp.constant(2e-6)
+"""Widening of ranges, so that float32 rounds no value out of them."""
+
+_Ranges = wp.types.matrix(shape=(REGISTERS, 2), dtype=wp.float32)
+_Starts = wp.types.vector(length=REGISTERS, dtype=wp.int32)
+_Points = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
+_Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
+_OuterStarts = wp.types.vector(length=WARP_REGISTERS, dtype=wp.int32)
+
+
+@wp.func
+def widened(r: wp.vec2) -> wp.vec2:
+    """Return a range widened for rounding; 0 stays 0."""
+    if r[1] <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    return wp.vec2(wp.max(r[0] - RANGE_MARGIN, 0.0), r[1] + RANGE_MARGIN)
+
+
+@unrolled
+def primitive_range(
+    kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Return the range of a primitive over the cube center ± half."""
+    distances = wp.vec2()
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            distances = wp.static(SKELETONS[code].box_distances)(center, half, tape, at)
+    return widened(falloff_range(distances[0], distances[1]))
+
+
+@wp.func
+def range_in_ball(
+    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Return the range of a primitive over a ball."""
+    c = closest(kind, center, tape, at)
+    distances = squared_distances_to_ball(center, radius, c, min_influence(kind, tape, at))
+    return widened(falloff_range(distances[0], distances[1]))
+
+
+@unrolled
+def operator_range(operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
+    """Return the range of an operator's result."""
+    result = wp.vec2()
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = wp.static(OPERATORS[code].range)(a, b, parameter)
+    return result
+
+
+@unrolled
+def operator_choice(operator: wp.int32, a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """Return the operands on which an operator's result depends, as KEEP_…."""
+    result = int(KEEP_BOTH)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = wp.static(OPERATORS[code].choice)(a, b)
+    return result
+
+
+@unrolled
+def first_operator(operator: wp.int32) -> wp.int32:
+    """Return the operator that folds a first operand into the empty field: `operator` itself if it can."""
+    result = int(SUM_CODE)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code and wp.static(OPERATORS[code].starts_from_zero):
+            result = operator
+    return result
+
+
+@wp.func
+def range_anywhere(
+    kind: wp.int32,
+    stretched: wp.bool,
+    warped: wp.bool,
+    point: wp.vec3,
+    half: wp.float32,
+    ball: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
+) -> wp.vec2:
+    """Return the range of a primitive over the cube point ± half, or over the ball if that is all known.
+
+    A map or a warp takes the cube to a shape that only the ball around it bounds.
+    """
+    if stretched:
+        return range_in_ball(kind, to_local(point, tape, at), ball * tape[at + 3][0], tape, at + PREFIX)
+    if warped:
+        return range_in_ball(kind, point, ball, tape, at)
+    return primitive_range(kind, point, half, tape, at)
+
+
+@wp.func
+def copy_texels(
+    source: wp.array(dtype=wp.vec4),
+    first: wp.int32,
+    count: wp.int32,
+    target: wp.array(dtype=wp.vec4),
+    at: wp.int32,
+) -> None:
+    """Copy texels source[first : first + count] to target[at :], in ascending order."""
+    for k in range(count):
+        target[at + k] = source[first + k]
+
+
+@wp.func
+def fold_range(
+    header: wp.vec4,
+    r: wp.vec2,
+    accumulator: wp.vec2,
+    accumulator_start: wp.int32,
+    end: wp.int32,
+    run_at: wp.int32,
+    run: wp.vec4,
+) -> tuple[wp.vec2, wp.int32, wp.int32, wp.vec4, wp.bool]:
+    """Fold a primitive of range `r` into the accumulator.
+
+    Return (accumulator, end, run_at, run) after that, see `prune`, and True if the primitive matters.
+    """
+    operator = int(header[1])
+    choice = operator_choice(operator, accumulator, r)
+    if choice == KEEP_NONE:
+        return wp.vec2(0.0, 0.0), accumulator_start, -1, run, False
+    if choice == KEEP_LEFT:
+        return accumulator, end, run_at, run, False
+    result = r
+    first = wp.vec4(header[0], header[1], 1.0, header[3])  # header of a run of this primitive alone
+    if choice == KEEP_RIGHT:
+        first[1] = float(first_operator(operator))
+        if first_operator(operator) != operator:
+            first[3] = 0.0
+        return result, accumulator_start + 1, accumulator_start, first, True
+    result = operator_range(operator, accumulator, r, header[3])
+    if run_at >= 0 and run[1] == first[1] and run[0] == first[0] and run[3] == first[3]:
+        return result, end, run_at, wp.vec4(run[0], run[1], run[2] + 1.0, run[3]), True
+    return result, end + 1, end, first, True
+
+
+@wp.func
+def pop_range(
+    header: wp.vec4,
+    left: wp.vec2,
+    left_start: wp.int32,
+    accumulator: wp.vec2,
+    accumulator_start: wp.int32,
+    end: wp.int32,
+    out: wp.array(dtype=wp.vec4),
+    start: wp.int32,
+    write: wp.bool,
+) -> tuple[wp.vec2, wp.int32]:
+    """Combine the range `left` of a register, computed from texel `left_start` on, with the accumulator.
+
+    Return (accumulator, end) after that, see `prune`.
+    """
+    operator = int(header[1])
+    swapped = int(header[0]) == POP_SWAPPED
+    a = left
+    b = accumulator
+    if swapped:
+        a = accumulator
+        b = left
+    choice = operator_choice(operator, a, b)
+    if choice == KEEP_NONE:
+        return wp.vec2(0.0, 0.0), left_start
+    if (choice == KEEP_LEFT and not swapped) or (choice == KEEP_RIGHT and swapped):
+        return left, accumulator_start - 1
+    if choice == KEEP_BOTH:
+        if write:
+            out[start + end] = header
+        return operator_range(operator, a, b, header[3]), end + 1
+    if write:
+        copy_texels(out, start + accumulator_start, end - accumulator_start, out, start + left_start)
+    return accumulator, left_start + end - accumulator_start
+
+
+@wp.func
+def prune(
+    center: wp.vec3,
+    half: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.vec4),
+    start: wp.int32,
+    write: wp.bool,
+) -> wp.vec4:
+    """Prune tape[span] to the cube center ± half.
+
+    Return (smallest, largest field over the cube, texels that writing needs, texels of the result). Write the
+    result to `out` from `start` on if `write` is true, else nothing. Texels of the result are counted from
+    `start`. The state is in variables, because a struct of them makes the loop slower.
+    """
+    accumulator = wp.vec2(0.0, 0.0)  # its range
+    accumulator_start = int(0)  # first texel of the instructions that compute it
+    ranges = _Ranges()
+    starts = _Starts()
+    end = int(0)  # texels so far
+    peak = int(0)  # most texels at any time, for later choices drop instructions again
+    run_at = int(-1)  # header of the run that the next primitive may extend, −1 if there is none
+    run = wp.vec4()
+    point = center
+    ball = half * HALF_DIAGONAL  # radius around `point`
+    warped = int(0)
+    points = _Points()
+    balls = _Balls()
+    outer_starts = _OuterStarts()
+    at = span[0]
+    while at < span[1]:
+        header = tape[at]
+        code = int(header[0])
+        operator = int(header[1])
+        count = int(header[2])
+        at += 1
+        if code >= 0:
+            stretched = code >= STRETCHED
+            kind = code
+            size = int(0)
+            if stretched:
+                kind = code - STRETCHED
+                size = PREFIX
+            size += stride(kind)
+            for _i in range(count):
+                r = range_anywhere(kind, stretched, warped > 0, point, half, ball, tape, at)
+                accumulator, end, run_at, run, needed = fold_range(
+                    header, r, accumulator, accumulator_start, end, run_at, run
+                )
+                if needed:
+                    if write:
+                        out[start + run_at] = run
+                        copy_texels(tape, at, size, out, start + end)
+                    end += size
+                    peak = wp.max(peak, end)
+                at += size
+        elif code == PUSH:
+            ranges[count] = accumulator
+            starts[count] = accumulator_start
+            if write:
+                out[start + end] = header
+            end += 1
+            peak = wp.max(peak, end)
+            accumulator = wp.vec2(0.0, 0.0)
+            accumulator_start = end
+            run_at = -1
+        elif code == WARP:
+            p = tape[at + 3]
+            local = to_local(point, tape, at)
+            reach = ball * p[0]
+            points[count] = point
+            balls[count] = ball
+            outer_starts[count] = accumulator_start
+            point = warp_forward(operator, local, p)
+            ball = reach * warp_stretch(operator, local, reach, p)
+            warped += 1
+            if write:
+                copy_texels(tape, at - 1, PREFIX + 1, out, start + end)
+            end += PREFIX + 1
+            peak = wp.max(peak, end)
+            accumulator_start = end
+            run_at = -1
+            at += PREFIX
+        elif code == UNWARP:
+            point = points[count]
+            ball = balls[count]
+            warped -= 1
+            accumulator_start = outer_starts[count]
+            if accumulator[1] <= 0.0:
+                end = accumulator_start
+            else:
+                if write:
+                    copy_texels(tape, at - 1, PREFIX + 1, out, start + end)
+                end += PREFIX + 1
+                peak = wp.max(peak, end)
+            run_at = -1
+            at += PREFIX
+        else:
+            accumulator, end = pop_range(
+                header,
+                ranges[count],
+                starts[count],
+                accumulator,
+                accumulator_start,
+                end,
+                out,
+                start,
+                write,
+            )
+            peak = wp.max(peak, end)
+            accumulator_start = starts[count]
+            run_at = -1
+    return wp.vec4(accumulator[0], accumulator[1], float(peak), float(end))
+
+
+@wp.kernel
+def measure_range(
+    center: wp.vec3,
+    half: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.vec4),
+) -> None:
+    """Write the range of the field over the cube center ± half, as the first two components."""
+    out[0] = prune(center, half, tape, span, tape, 0, False)

@@ -1,0 +1,291 @@
+"""Sparse cells: the blocks that the surface may cross, each with the part of the tape that acts in it.
+
+Blocks of 4³ cells form a tree of branching 4³. From level to level a block's tape is pruned to its children.
+Children that are surely outside or surely inside end there. For a sum of many points, the finest level has a
+handful of primitives per block, and a handful of cells per cell that the surface crosses. The polygonizer
+samples these blocks, the tracer steps through them, and an edit rebuilds the blocks that it changes.
+
+The field in a block depends on the block's coordinates and its pruned tape alone. A block whose pruned tape
+is the same as before, bit for bit, is therefore unchanged, and so are all blocks inside. A primitive is on
+the tapes of the blocks that its influence reaches and on no others. So an edit changes blocks where the
+edited node has or had influence, whatever maps, warps and operators are above it in the tree.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import Int32Array
+from blobtree.cells.block_kernels import CellBlocks, ChildGrid, LevelBlocks
+from blobtree.cells.cull import pieces_to_cull
+from blobtree.cells.cull_kernels import count_reaching, write_reached_children, write_reaching
+from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
+from blobtree.cells.refine_kernels import (
+    copy_children,
+    count_child_texels,
+    inherit_child_texels,
+    match_children,
+    write_children,
+)
+from blobtree.cells.scan import DeviceArray, arange, exclusive_scan, where_negative
+from blobtree.device import demand_memory, known_device, launch
+from blobtree.errors import InvalidNode, InvalidResolution
+from blobtree.progress import Progress
+from blobtree.tape.instruction_set import InstructionSet
+from blobtree.tape.tape import Tape
+
+MAX_BLOCKS = 1 << 21
+"""Most blocks of a level: those of a ball 3000 cells wide, whose mesh takes a few gigabytes."""
+
+TEXEL_BYTES = 16
+
+MAX_TEXELS = 1 << 24
+"""Most texels of a tape: float32 counts no further."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The blocks of one level that the surface may cross, in key order.
+
+    `tape` holds the pruned tape of every block, each behind a texel (its length, 0, 0, 0).
+    """
+
+    blocks: "wp.array[wp.vec3i]"
+    """Coordinates (n, 3), in blocks of this level from the root's lowest one."""
+    keys: "wp.array[wp.int64]"
+    """Their keys (n), by which they are ordered and found."""
+    spans: "wp.array[wp.vec2i]"
+    """First texel, and one past the last, of each block's tape in `tape` (n, 2)."""
+    tape: "wp.array[wp.vec4]"
+    children: "wp.array[wp.int32]"
+    """For each child of the level above its index in this one, or SURELY_OUTSIDE, SURELY_INSIDE."""
+    sources: "wp.array[wp.int32]"
+    """For each block its index in the same level before the edit, −1 if it has changed."""
+
+    def __len__(self) -> int:
+        return len(self.blocks)
+
+    @property
+    def arrays(self) -> Any:
+        """The blocks and their tapes as an argument of kernels."""
+        arrays: Any = LevelBlocks()
+        arrays.blocks, arrays.keys, arrays.spans, arrays.tape = self.blocks, self.keys, self.spans, self.tape
+        return arrays
+
+
+@dataclass(frozen=True, eq=False)
+class SparseCells:
+    """The cells of a grid, in the blocks that the surface may cross alone."""
+
+    grid: Grid
+    levels: tuple[Level, ...]
+    """From the root, which is one block, to the finest."""
+    device: str
+    tape: Tape
+
+    @property
+    def leaves(self) -> Level:
+        """The finest level."""
+        return self.levels[-1]
+
+    @property
+    def arrays(self) -> Any:
+        """The finest blocks, their lattice and the whole tape as an argument of kernels."""
+        arrays: Any = CellBlocks()
+        leaves, grid = self.leaves, self.grid
+        arrays.blocks, arrays.keys = leaves.blocks, leaves.keys
+        arrays.spans, arrays.tape = leaves.spans, leaves.tape
+        arrays.base, arrays.corner = wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner)
+        arrays.cell = grid.cell_size
+        arrays.whole = self.tape.on(self.device).data
+        return arrays
+
+
+def build_cells(
+    tape: Tape,
+    grid: Grid,
+    *,
+    device: str | None = None,
+    previous: SparseCells | None = None,
+    report: Progress = lambda _stage, _fraction: None,
+) -> SparseCells:
+    """Build the sparse cells of a tape, level by level; copy the blocks that are unchanged since `previous`.
+
+    Raises
+    ------
+    InvalidResolution
+        The surface crosses more than MAX_BLOCKS blocks of a level, or the tapes do not fit into memory.
+    InvalidNode
+        The tape is longer than MAX_TEXELS.
+    """
+    if len(tape.data) > MAX_TEXELS:
+        raise InvalidNode(
+            f"tree: expected a tape of at most {MAX_TEXELS:,} texels, got {len(tape.data):,}; split the model"
+        )
+    device = known_device(device)
+    if previous is not None and not _comparable(previous, tape, grid, device):
+        previous = None
+    levels = [_root(tape, grid, previous, device)]
+    for number in range(1, grid.depth + 1):
+        report("finding the surface", (number - 1) / grid.depth)
+        step = _Refinement(levels[-1], number, grid, previous, device, tape.instruction_set)
+        levels.append(step.level(pieces_to_cull(tape, device) if number == 1 else None))
+    report("finding the surface", 1.0)
+    return SparseCells(grid, tuple(levels), device, tape)
+
+
+def _comparable(previous: SparseCells, tape: Tape, grid: Grid, device: str) -> bool:
+    """Return True if two sets of cells can share blocks: same lattice, device and meaning of codes."""
+    other = previous.grid
+    same_cells = (grid.cell_size, grid.corner, device) == (other.cell_size, other.corner, previous.device)
+    return same_cells and tape.instruction_set == previous.tape.instruction_set
+
+
+def _root(tape: Tape, grid: Grid, previous: SparseCells | None, device: str) -> Level:
+    """Return the level of the root block."""
+    uploaded = tape.on(device)
+    same = previous is not None and previous.grid == grid and _same_bits(previous.tape, tape)
+    return Level(
+        wp.zeros(1, dtype=wp.vec3i, device=device),
+        wp.zeros(1, dtype=wp.int64, device=device),
+        wp.array([uploaded.span], dtype=wp.vec2i, device=device),
+        uploaded.data,
+        wp.zeros(0, dtype=wp.int32, device=device),
+        wp.array([0 if same else -1], dtype=wp.int32, device=device),
+    )
+
+
+def _same_bits(first: Tape, second: Tape) -> bool:
+    """Return True if two tapes are the same bit for bit, so that −0 differs from 0."""
+    return np.array_equal(first.data.view(np.int32), second.data.view(np.int32))
+
+
+class _Refinement:
+    """The step from one level to the next."""
+
+    def __init__(
+        self,
+        above: Level,
+        number: int,
+        grid: Grid,
+        previous: SparseCells | None,
+        device: str,
+        instruction_set: InstructionSet,
+    ) -> None:
+        self._above, self._device = above, device
+        self._kernel = instruction_set.kernel_for
+        self._grid = _child_grid(grid, number)
+        self._old, self._shift = _old_level(previous, grid, number)
+        if self._old is not None and previous is not None and previous.grid.pad == grid.pad:
+            self._changed = where_negative(above.sources)
+            self._unchanged = where_negative(above.sources, negative=False)
+        else:
+            self._changed, self._unchanged = arange(len(above), device), arange(0, device)
+
+    def level(self, pieces: Int32Array | None) -> Level:
+        """Return the level below; `pieces` are those of the root's tape, if it is to be culled."""
+        if pieces is not None and len(self._changed):
+            return self._culled(wp.array(pieces, dtype=wp.vec4i, device=self._device))
+        count = len(self._above) * CHILDREN
+        children: DeviceArray = wp.empty(count, dtype=wp.int32, device=self._device)
+        flags, texels = self._counts(count), self._counts(count)
+        self._count_texels([children, flags, texels])
+        slots, blocks = exclusive_scan(flags, "blocks")
+        starts, total = exclusive_scan(texels, "texels of the blocks' tapes")
+        if blocks > MAX_BLOCKS:
+            raise InvalidResolution(
+                f"expected a surface that crosses at most {MAX_BLOCKS:,} blocks of {BRANCHING}³ cells, got "
+                f"{blocks:,}; take larger cells"
+            )
+        level = _empty_level(blocks, total, children, self._device)
+        self._write(level, slots, starts)
+        return level
+
+    def _counts(self, count: int) -> DeviceArray:
+        """Return `count` zeros, and one more for the total."""
+        return wp.zeros(count + 1, dtype=wp.int32, device=self._device)
+
+    def _culled(self, pieces: DeviceArray) -> Level:
+        """Return the root's children that primitives reach."""
+        count = CHILDREN * len(pieces)
+        children: DeviceArray = wp.empty(CHILDREN, dtype=wp.int32, device=self._device)
+        flags, texels = self._counts(CHILDREN), self._counts(count)
+        inputs = [pieces, self._above.tape, self._grid]
+        launch(self._kernel(count_reaching), count, inputs, [flags, texels], self._device)
+        slots, blocks = exclusive_scan(flags, "blocks")
+        starts, total = exclusive_scan(texels, "texels of the blocks' tapes")
+        level = _empty_level(blocks, total, children, self._device)
+        launch(self._kernel(write_reaching), count, [*inputs, starts], [level.tape], self._device)
+        outputs = [children, level.arrays]
+        launch(write_reached_children, CHILDREN, [len(pieces), slots, starts], outputs, self._device)
+        self._match(level, slots)
+        return level
+
+    def _count_texels(self, outputs: list[DeviceArray]) -> None:
+        """Count the texels of each child, and flag the children to keep."""
+        inputs = [self._changed, self._above.arrays, self._grid]
+        count = len(self._changed) * CHILDREN
+        launch(self._kernel(count_child_texels), count, inputs, outputs, self._device)
+        if self._old is not None and len(self._unchanged):
+            inputs = [self._unchanged, self._above.sources, self._old.children, self._old.arrays]
+            count = len(self._unchanged) * CHILDREN
+            launch(inherit_child_texels, count, inputs, outputs, self._device)
+
+    def _write(self, level: Level, slots: DeviceArray, starts: DeviceArray) -> None:
+        """Write the blocks that are kept, their tapes and their sources."""
+        above, outputs = self._above.arrays, [level.children, level.arrays]
+        inputs = [self._changed, above, self._grid, slots, starts]
+        count = len(self._changed) * CHILDREN
+        launch(self._kernel(write_children), count, inputs, outputs, self._device)
+        if self._old is None:
+            return
+        self._match(level, slots)
+        inputs = [self._unchanged, self._above.sources, above, self._old.children, self._old.arrays]
+        inputs += [slots, starts]
+        count = len(self._unchanged) * CHILDREN
+        launch(copy_children, count, inputs, [*outputs, level.sources], self._device)
+
+    def _match(self, level: Level, slots: DeviceArray) -> None:
+        """Find the sources of rebuilt blocks that are the same as before."""
+        old = self._old
+        if old is None:
+            return
+        inputs = [self._changed, slots, level.arrays, level.tape.view(wp.vec4i)]
+        inputs += [wp.vec3i(*self._shift), old.arrays, old.tape.view(wp.vec4i)]
+        launch(match_children, len(self._changed) * CHILDREN, inputs, [level.sources], self._device)
+
+
+def _child_grid(grid: Grid, number: int) -> Any:
+    """Return the lattice of the blocks of a level as an argument of kernels."""
+    lattice: Any = ChildGrid()
+    lattice.base, lattice.corner = wp.vec3i(*grid.base_of(number)), wp.vec3(*grid.corner)
+    lattice.size, lattice.pad = grid.cell_size * grid.cells_along(number), grid.pad
+    return lattice
+
+
+def _old_level(
+    previous: SparseCells | None, grid: Grid, number: int
+) -> tuple[Level | None, tuple[int, int, int]]:
+    """Return the old level with blocks of the same size, and the shift from new coordinates to old ones."""
+    if previous is None:
+        return None, (0, 0, 0)
+    old_number = previous.grid.depth - grid.depth + number
+    if old_number < 1:
+        return None, (0, 0, 0)
+    x, y, z = (a - b for a, b in zip(grid.base_of(number), previous.grid.base_of(old_number), strict=True))
+    return previous.levels[old_number], (x, y, z)
+
+
+def _empty_level(blocks: int, texels: int, children: DeviceArray, device: str) -> Level:
+    """Return a level whose arrays are not written yet."""
+    demand_memory(TEXEL_BYTES * texels, device, f"the tapes of {blocks:,} blocks")
+    return Level(
+        wp.empty(blocks, dtype=wp.vec3i, device=device),
+        wp.empty(blocks, dtype=wp.int64, device=device),
+        wp.empty(blocks, dtype=wp.vec2i, device=device),
+        wp.empty(texels, dtype=wp.vec4, device=device),
+        children,
+        wp.full(blocks, -1, dtype=wp.int32, device=device),
+    )

@@ -1,0 +1,1 @@
+"""Custom kinds of nodes, each defined by one typed function."""

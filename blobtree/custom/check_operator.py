@@ -1,0 +1,225 @@
+"""Checks of a custom operator: samples in double precision that may contradict a claim."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree.custom.check_skeleton import SEED, result_of
+from blobtree.custom.definition import trial_value
+from blobtree.custom.source import CustomSource
+from blobtree.nodes.parameters import Parameter
+from blobtree.transpile.python import Precision
+
+Floats = NDArray[np.float64]
+
+SETTINGS = 6
+"""Number of values of the parameter that are sampled."""
+
+SAMPLES = 150
+STEP = 1e-5
+"""Step of the operands in finite differences."""
+
+SLOPE_TOLERANCE = 1e-4
+VALUE_TOLERANCE = 1e-6
+MAX_KINK_SHARE = 0.2
+"""Share of the samples that may lie on kinks, where finite differences are useless."""
+
+
+@dataclass(frozen=True)
+class Claims:
+    """The claims of a definition about its operator."""
+
+    steepest: float | CustomSource
+    like: str | None
+    monotone: bool
+    order_free: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """An operator with one value of its parameter."""
+
+    source: CustomSource
+    parameters: tuple[float, ...]
+    steepest: Callable[..., Any]
+    precision: Precision = np.float64
+
+    @cached_property
+    def function(self) -> Callable[..., Any]:
+        return self.source.reference(self.precision)
+
+    def at(self, a: float, b: float) -> Floats:
+        """Return (F, ∂F/∂a, ∂F/∂b)."""
+        arguments = [self.precision(x) for x in (a, b, *self.parameters)]
+        return result_of(self.source, self.function, arguments, self.call(a, b), 3)
+
+    def value(self, a: float, b: float) -> float:
+        return float(self.at(a, b)[0])
+
+    def bounds(self, max_a: float, max_b: float) -> Floats:
+        """Return the claimed bounds of |∂F/∂a| and |∂F/∂b| for operands up to these."""
+        arguments = [np.float64(x) for x in (max_a, max_b, *self.parameters)]
+        where = f"steepest of {self.call(max_a, max_b)}"
+        return result_of(self.source, self.steepest, arguments, where, 2)
+
+    def call(self, *operands: float) -> str:
+        return f"F({', '.join(f'{float(x):.6g}' for x in (*operands, *self.parameters))})"
+
+    def require(self, holds: bool, reason: str) -> None:
+        if not holds:
+            raise self.source.refusal(reason)
+
+
+def check_operator(source: CustomSource, parameters: tuple[Parameter, ...], claims: Claims) -> None:
+    """Raise `InvalidDefinition` if sampled operands contradict a claim."""
+    rng = np.random.default_rng(SEED)
+    steepest = _steepest(claims.steepest)
+    for setting in range(SETTINGS if parameters else 1):
+        values = tuple(float(trial_value(parameter, rng, setting)) for parameter in parameters)
+        trial = _Trial(source, values, steepest)
+        operands = _operands(rng)
+        _try_values(trial, operands, claims)
+        _try_partials(trial, operands)
+        _try_continuity(trial, operands, rng)
+        _try_single_precision(trial)
+        if claims.monotone:
+            _try_monotone(trial, rng, falls_with_b=claims.like == "difference")
+        if claims.order_free:
+            _try_order(trial, rng)
+
+
+def _operands(rng: np.random.Generator) -> Floats:
+    """Return pairs of operands, most of them in the usual range of fields."""
+    scale = rng.choice([0.05, 1.0, 1.0, 4.0], (SAMPLES, 1))
+    operands: Floats = rng.uniform(0.0, 1.0, (SAMPLES, 2)) * scale + 2.0 * STEP
+    return operands
+
+
+def _near(a: float, b: float) -> bool:
+    return abs(a - b) <= VALUE_TOLERANCE * (1.0 + abs(b))
+
+
+def _try_values(trial: _Trial, operands: Floats, claims: Claims) -> None:
+    """Check that F ≥ 0, and its value where an operand is absent."""
+    for a, b in [*operands.tolist(), [0.0, 0.5], [0.5, 0.0], [1.0, 1.0], [0.5, 0.5]]:
+        value = trial.value(a, b)
+        trial.require(
+            value >= 0.0,
+            f"{trial.call(a, b)} = {value:.6g} is negative, and a field is not; write wp.max(…, 0.0)",
+        )
+    if claims.like is None:
+        value = trial.value(0.0, 0.0)
+        trial.require(
+            value == 0.0, f"{trial.call(0, 0)} = {value:.6g}; where both operands are absent it must be 0"
+        )
+        return
+    for x in np.abs(operands[:, 0]).tolist():
+        with_left = x if claims.like in ("blend", "difference") else 0.0
+        with_right = x if claims.like == "blend" else 0.0
+        for pair, expected in (((x, 0.0), with_left), ((0.0, x), with_right)):
+            value = trial.value(*pair)
+            trial.require(
+                _near(value, expected),
+                f"{trial.call(*pair)} = {value:.6g}, but like={claims.like!r} says {expected:.6g}",
+            )
+
+
+def _try_partials(trial: _Trial, operands: Floats) -> None:
+    """Check that the partial derivatives are those of F, and within the claimed bounds."""
+    kinks = 0
+    for a, b in operands.tolist():
+        f, *partials = trial.at(a, b).tolist()
+        sides = [
+            (trial.value(a + s * da * STEP, b + s * db * STEP) - f) / (s * STEP)
+            for da, db in ((1.0, 0.0), (0.0, 1.0))
+            for s in (1.0, -1.0)
+        ]
+        for number, name in enumerate(("a", "b")):
+            right, left = sides[2 * number : 2 * number + 2]
+            scale = SLOPE_TOLERANCE * (1.0 + abs(partials[number]))
+            smooth = abs(right - left) <= 10.0 * scale
+            kinks += not smooth
+            trial.require(
+                not smooth or abs(partials[number] - 0.5 * (right + left)) <= scale,
+                f"∂F/∂{name} of {trial.call(a, b)} is {0.5 * (right + left):.6g} by differences, "
+                f"but {partials[number]:.6g} is returned",
+            )
+        _try_steepness(trial, a, b, partials)
+    trial.require(
+        kinks <= MAX_KINK_SHARE * 2 * len(operands),
+        f"F has kinks at {kinks} of {2 * len(operands)} samples, so its derivatives cannot be tried",
+    )
+
+
+def _try_continuity(trial: _Trial, operands: Floats, rng: np.random.Generator) -> None:
+    """Check that F changes no faster between operands than `steepest` says, so that it does not jump."""
+    steps = rng.uniform(-1.0, 1.0, operands.shape) * 10.0 ** rng.uniform(-3.0, 0.0, (len(operands), 1))
+    for one, other in zip(operands, np.abs(operands + steps), strict=True):
+        bounds = trial.bounds(*np.maximum(one, other).tolist())
+        change = abs(trial.value(*one) - trial.value(*other))
+        trial.require(
+            change <= float(bounds @ np.abs(one - other)) + VALUE_TOLERANCE * (1.0 + change),
+            f"{trial.call(*one)} and {trial.call(*other)} are {change:.6g}, farther apart than "
+            f"steepest = {bounds.tolist()} allows; F must be continuous and its partial derivatives right",
+        )
+
+
+def _steepest(claim: float | CustomSource) -> Callable[..., Any]:
+    if isinstance(claim, float):
+        return lambda *_operands: (claim, claim)
+    return claim.reference()
+
+
+def _try_steepness(trial: _Trial, a: float, b: float, partials: list[float]) -> None:
+    bounds = trial.bounds(a, b).tolist()
+    for name, partial, bound in zip("ab", partials, bounds, strict=True):
+        trial.require(
+            abs(partial) <= bound * (1.0 + VALUE_TOLERANCE),
+            f"|∂F/∂{name}| of {trial.call(a, b)} is {abs(partial):.6g}, more than steepest = {bound:.6g}",
+        )
+
+
+def _try_single_precision(trial: _Trial) -> None:
+    """Check tiny operands in single precision, where products underflow."""
+    single = replace(trial, precision=np.float32)
+    for a, b in product((1e-38, 1e-30, 1e-19, 1e-9, 0.5), repeat=2):
+        f, *partials = single.at(a, b).tolist()
+        trial.require(
+            _near(f, trial.value(a, b)),
+            f"{trial.call(a, b)} is {f:.6g} in single precision, {trial.value(a, b):.6g} in double",
+        )
+        _try_steepness(trial, a, b, partials)
+
+
+def _try_monotone(trial: _Trial, rng: np.random.Generator, *, falls_with_b: bool) -> None:
+    for a, b, more in (rng.uniform(0.0, 1.0, (SAMPLES, 3)) * rng.choice([1.0, 3.0], (SAMPLES, 1))).tolist():
+        least, with_a, with_b = trial.value(a, b), trial.value(a + more, b), trial.value(a, b + more)
+        slack = VALUE_TOLERANCE * (1.0 + least)
+        trial.require(
+            with_a >= least - slack,
+            f"monotone: {trial.call(a, b)} = {least:.6g} but {trial.call(a + more, b)} = {with_a:.6g}",
+        )
+        trial.require(
+            with_b <= least + slack if falls_with_b else with_b >= least - slack,
+            f"monotone: {trial.call(a, b)} = {least:.6g} but {trial.call(a, b + more)} = {with_b:.6g}",
+        )
+
+
+def _try_order(trial: _Trial, rng: np.random.Generator) -> None:
+    for a, b, c in rng.uniform(0.0, 1.5, (SAMPLES, 3)).tolist():
+        one, other = trial.value(a, b), trial.value(b, a)
+        trial.require(
+            _near(one, other),
+            f"order_free: {trial.call(a, b)} = {one:.6g} but {trial.call(b, a)} = {other:.6g}",
+        )
+        left, right = trial.value(one, c), trial.value(a, trial.value(b, c))
+        trial.require(
+            _near(left, right),
+            f"order_free: with a, b, c = {a:.6g}, {b:.6g}, {c:.6g}, F(F(a, b), c) = {left:.6g} but "
+            f"F(a, F(b, c)) = {right:.6g}",
+        )

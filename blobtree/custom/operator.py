@@ -1,0 +1,281 @@
+"""Custom operators: a combination from one typed function that returns a value and its derivatives.
+
+    @wp.func
+    def soft(a: wp.float32, b: wp.float32, hardness: wp.float32) -> wp.vec3:
+        ...
+        return wp.vec3(f, df_da, df_db)
+
+    Soft = define_operator(soft, steepest=1.0, like="blend", monotone=True, limits={"hardness": (0.0, 1.0)})
+    model = Soft((Point((0, 0, 0), radius=1.0), Point((1, 0, 0), radius=1.0)), 0.3)
+
+The engine excludes cells by the claims of a definition, so checks look for samples that contradict a claim.
+A missing claim costs speed only: fewer cells are pruned.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast, get_args
+
+import warp as wp
+
+from blobtree.custom.check_operator import Claims, check_operator
+from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.operator_kernels import (
+    difference_like_choice,
+    intersection_like_choice,
+    unclaimed_choice,
+    widened_range,
+)
+from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.errors import InvalidNode
+from blobtree.formulas.operators import Operator, Support, blend_choice
+from blobtree.nodes.parameters import Parameter
+from blobtree.nodes.tree import AssociativeCombination, Node
+from blobtree.validation import finite_number
+
+Like = Literal["blend", "intersection", "difference"]
+
+
+class CustomCombination(AssociativeCombination, metaclass=CustomKind):
+    """A combination by a custom operator: the base of the classes that `define_operator` returns.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import CustomCombination, Point, define_operator
+    >>> @wp.func
+    ... def mean(a: wp.float32, b: wp.float32) -> wp.vec3:
+    ...     return wp.vec3(0.5 * (a + b), 0.5, 0.5)
+    >>> Mean = define_operator(mean, steepest=0.5)
+    >>> issubclass(Mean, CustomCombination)
+    True
+    >>> Mean((Point((0, 0, 0), radius=1), Point((1, 0, 0), radius=1))).kind
+    'mean'
+    """
+
+    kind: ClassVar[str]
+    digest: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, operands: tuple[Node, ...], *parameter: float, **named: float) -> None: ...
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.operator.commutes and len(self.operands) != 2:
+            raise InvalidNode(
+                f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
+                "claim that operands may come in any order (order_free=True), so nest it"
+            )
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The operator's parameter by name, if it has one."""
+        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
+
+    @property
+    def operator_parameter(self) -> float:
+        """The number that the operator takes besides its operands."""
+        return float(sum(self.values.values()))
+
+
+def define_operator(
+    function: Any,
+    *,
+    steepest: Any,
+    like: Like | None = None,
+    monotone: bool = False,
+    order_free: bool = False,
+    name: str | None = None,
+    limits: Mapping[str, Limits] | None = None,
+) -> type[CustomCombination]:
+    """Return a class of combinations from a function that returns F(a, b), ∂F/∂a and ∂F/∂b.
+
+    Parameters
+    ----------
+    function
+        ``(a: wp.float32, b: wp.float32) -> wp.vec3``, or with one wp.float32 more, its parameter; with or
+        without ``@wp.func``. F must be continuous, nowhere negative, and 0 where both operands are.
+    steepest
+        Upper bound of ``abs(∂F/∂a)`` and ``abs(∂F/∂b)`` for all operands; or a typed function
+        ``(max_a, max_b, parameter if any) -> wp.vec2`` of the largest values that the operands may have.
+    like
+        What F is where an operand is absent (0): with "blend" it is the other operand, with "intersection" 0,
+        with "difference" a where b is absent and 0 where a is. Cells and boxes are pruned by it.
+    monotone
+        F never falls as an operand grows; with ``like="difference"``, never falls with a nor rises with b.
+    order_free
+        F(a, b) = F(b, a) and F(F(a, b), c) = F(a, F(b, c)): it takes any number of operands.
+    name
+        Name of the kind in files; by default the function's name. The class has the same name in CamelCase.
+    limits
+        ``{parameter: (smallest or None, largest or None)}``.
+
+    Returns
+    -------
+    type[CustomCombination]
+        A node class: a tuple of operands, then the parameter by position or name.
+
+    Raises
+    ------
+    InvalidDefinition
+        The function has no types or no source, or sampled operands contradict a claim. Nothing has been
+        compiled by then.
+    UntranslatableFunction
+        The function leaves the shared subset; the message names file and line.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import define_operator
+    >>> @wp.func
+    ... def average(a: wp.float32, b: wp.float32) -> wp.vec3:
+    ...     return wp.vec3(0.5 * (a + b), 0.5, 0.5)
+    >>> Average = define_operator(average, steepest=0.5)  # doctest: +SKIP
+    """
+    source = custom_source(function, returns=wp.vec3)
+    parameters = _parameters(source, limits)
+    if like is not None and like not in get_args(Like):
+        known_likes = ", ".join(map(repr, get_args(Like)))
+        raise source.refusal(f"like: expected one of {known_likes} or None, got {like!r}")
+    if order_free and like == "difference":
+        raise source.refusal("order_free: a difference depends on the order of its operands")
+    bound = _steepness(source, steepest)
+    kind = kind_name(source, name)
+    bound_digest = bound if isinstance(bound, float) else bound.digest
+    digest = source.digest_with(kind, parameters, bound_digest, like, monotone, order_free)
+    known = registered(kind)
+    if known is not None and issubclass(known, CustomCombination) and known.digest == digest:
+        return known
+    claims = Claims(bound, like, monotone, order_free)
+    check_operator(source, parameters, claims)
+    fields: list[Any] = [(parameter.name, Annotated[float, parameter]) for parameter in parameters]
+    namespace = {
+        "__doc__": source.python.__doc__ or f"A combination by the operator {kind!r}.",
+        "kind": kind,
+        "digest": digest,
+        "parameters": parameters,
+        "operator": _row(kind, digest, source, claims),
+    }
+    node: type[CustomCombination] = node_class(kind, source, fields, CustomCombination, namespace)
+    register(node)
+    return node
+
+
+def _parameters(source: CustomSource, limits: Mapping[str, Limits] | None) -> tuple[Parameter, ...]:
+    """Return the parameter beside the two operands, if any."""
+    names = list(source.parameters)
+    floats = all(hint in (wp.float32, float) for hint in source.parameters.values())
+    if not floats or len(names) not in (2, 3):
+        raise source.refusal("expected (a: wp.float32, b: wp.float32), and at most one wp.float32 more")
+    return custom_parameters(source, names[2:], limits, CustomCombination)
+
+
+def _steepness(source: CustomSource, steepest: Any) -> "float | CustomSource":
+    """Return the bound on the partial derivatives, a number or a function."""
+    if not callable(steepest):
+        number = finite_number("steepest", steepest)
+        if number <= 0.0:
+            raise source.refusal(f"steepest: expected a number above 0 or a typed function, got {steepest!r}")
+        return number
+    bound = custom_source(steepest, returns=wp.vec2)
+    if list(bound.parameters.values()) != list(source.parameters.values()):
+        raise bound.refusal(f"expected (max_a, max_b, ...) of the same types as {source.name}")
+    return bound
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What a claim `like` implies."""
+
+    absent: str
+    """Lines that return the exact result where an operand is absent."""
+    choice: Any
+    support: Support
+    corners: tuple[str, str] = ("a[0], b[0]", "a[1], b[1]")
+    """Operands of the smallest and of the largest F, where it is monotone."""
+
+
+_KEEP_A = "    if b <= 0.0:\n        return wp.vec3(a, 1.0, 0.0)\n"
+_KEEP_B = "    if a <= 0.0:\n        return wp.vec3(b, 0.0, 1.0)\n"
+_NOTHING = "    if {}:\n        return wp.vec3(0.0, 0.0, 0.0)\n"
+_SHAPES: dict[str | None, _Shape] = {
+    "blend": _Shape(_KEEP_A + _KEEP_B, blend_choice, Support.EITHER),
+    "intersection": _Shape(_NOTHING.format("a <= 0.0 or b <= 0.0"), intersection_like_choice, Support.COMMON),
+    "difference": _Shape(
+        _NOTHING.format("a <= 0.0") + _KEEP_A,
+        difference_like_choice,
+        Support.LEFT,
+        ("a[0], b[1]", "a[1], b[0]"),
+    ),
+    None: _Shape(_NOTHING.format("a <= 0.0 and b <= 0.0"), unclaimed_choice, Support.EITHER),
+}
+
+_PARTIALS = '''\
+def {name}(a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
+    """The user's operator, exact where an operand is absent."""
+{absent}    return {function}(a, b{parameter})
+'''
+
+_SLOPE = '''\
+def {name}(
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, parameter: wp.float32
+) -> wp.float32:
+    """|F'| ≤ |∂F/∂a| |a'| + |∂F/∂b| |b'|; an operand that falls makes no F rise that rises with it."""
+    k = {steepest}
+    return k[0] * wp.max(slope_a, 0.0) + k[1] * wp.max(slope_b, 0.0)
+'''
+
+_MONOTONE_RANGE = '''\
+def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
+    """F is monotone, so its extremes lie at corners."""
+    return widened_range({partials}({low}, parameter)[0], {partials}({high}, parameter)[0])
+'''
+
+_RANGE = '''\
+def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
+    """From the middle of the operands' ranges F changes no faster than `steepest` says."""
+    max_a = a[1]
+    max_b = b[1]
+    k = {steepest}
+    middle = {partials}(0.5 * (a[0] + a[1]), 0.5 * (b[0] + b[1]), parameter)[0]
+    change = 0.5 * (k[0] * (a[1] - a[0]) + k[1] * (b[1] - b[0]))
+    return widened_range(middle - change, middle + change)
+'''
+
+
+def _row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operator:
+    """Return the row of the table, with functions generated around the user's."""
+    shape, bound = _SHAPES[claims.like], claims.steepest
+    extra = ", parameter" if len(source.parameters) == 3 else ""
+    names = {part: f"custom_{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
+    if isinstance(bound, float):
+        steepest = f"wp.vec2({bound!r}, {bound!r})"
+        scope: dict[str, Any] = {}
+    else:
+        steepest = f"{bound.function.key}(max_a, max_b{extra})"
+        scope = {bound.function.key: bound.function}
+    function = source.function
+    text = _PARTIALS.format(
+        name=names["partials"], absent=shape.absent, function=function.key, parameter=extra
+    )
+    partials = generated(names["partials"], text, {function.key: function})
+    slope = generated(names["slope"], _SLOPE.format(name=names["slope"], steepest=steepest), scope)
+    low, high = shape.corners
+    text = (_MONOTONE_RANGE if claims.monotone else _RANGE).format(
+        name=names["range"], partials=names["partials"], low=low, high=high, steepest=steepest
+    )
+    scope = {**scope, names["partials"]: partials, "widened_range": widened_range}
+    return Operator(
+        kind,
+        partials,
+        slope,
+        generated(names["range"], text, scope),
+        cast("wp.Function", shape.choice),
+        commutes=claims.order_free,
+        starts_from_zero=claims.like == "blend",
+        monotone=claims.monotone and claims.like != "difference",
+        support=shape.support,
+        digest=digest,
+    )

@@ -1,0 +1,229 @@
+"""Custom skeletons: a primitive from one typed function that returns the closest point of the skeleton.
+
+    @wp.func
+    def ring(q: wp.vec3, center: wp.vec3, axis: wp.vec3, size: wp.float32) -> wp.vec3:
+        ...
+        return closest_point
+
+    Ring = define_skeleton(ring, limits={"size": (0.0, None)})
+    model = Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.2) + Point((1, 0, 0), radius=0.5)
+
+The engine derives the rest from the function. The distance to a closest point changes by at most 1 per unit,
+so balls bound the field over a cell and along a ray. Closest points seen from far away bound the skeleton
+itself (`bounds_kernels`). Maps do not fold into the parameters, whose meaning is unknown: a primitive under
+a map carries that map on the tape. Offsets change its radius.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, field, replace
+from itertools import product
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree.custom.bounds_kernels import skeleton_boxes
+from blobtree.custom.check_skeleton import check_skeleton
+from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.errors import InvalidNode
+from blobtree.formulas.skeletons import (
+    HALF_DIAGONAL,
+    Skeleton,
+    min_influence_of_one,
+    squared_distances_to_ball,
+)
+from blobtree.nodes.parameters import Color, Parameter, Radius
+from blobtree.nodes.primitives import DEFAULT_COLOR, INFLUENCE_SLOT, Primitive
+from blobtree.tape.program import ProgramPrimitive
+from blobtree.validation import Vector
+
+Floats = NDArray[np.float64]
+
+
+class CustomPrimitive(Primitive, metaclass=CustomKind):
+    """A primitive around a custom skeleton: the base of the classes that `define_skeleton` returns.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import CustomPrimitive, define_skeleton
+    >>> @wp.func
+    ... def bar(q: wp.vec3, half: wp.float32) -> wp.vec3:
+    ...     return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
+    >>> Bar = define_skeleton(bar, convex=True, limits={"half": (0.0, None)})
+    >>> issubclass(Bar, CustomPrimitive)
+    True
+    >>> Bar(1.0, radius=0.2).values
+    {'half': 1.0}
+    """
+
+    kind: ClassVar[str]
+    digest: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *parameters: Any, radius: float, color: Vector = ..., **named: Any) -> None: ...
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The skeleton's parameters by name."""
+        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
+
+    @classmethod
+    def hulls(cls, primitives: Sequence[ProgramPrimitive]) -> Floats:
+        """Return the corners (n, 8, 3) of boxes that hold the skeletons."""
+        texels = cls.packed(primitives, np.ones((len(primitives), 1)), None)
+        numbers = np.delete(texels.reshape(len(texels), -1), INFLUENCE_SLOT, axis=1)
+        sizes = np.abs(numbers).max(axis=1, initial=0.0)
+        lower, upper = skeleton_boxes(cls.skeleton, texels, sizes)
+        unbounded = ~np.isfinite(lower).all(axis=1) | ~np.isfinite(upper).all(axis=1)
+        if unbounded.any():
+            raise InvalidNode(
+                f"{primitives[int(np.argmax(unbounded))]!r}: its skeleton is unbounded or too large for "
+                "float32, or a closest point is not finite; a skeleton must be bounded"
+            )
+        boxes = np.stack([lower, upper])
+        corners = [boxes[list(sides), :, range(3)].T for sides in product((0, 1), repeat=3)]
+        return np.stack(corners, axis=1)
+
+
+def define_skeleton(
+    function: Any,
+    *,
+    convex: bool = False,
+    name: str | None = None,
+    limits: Mapping[str, Limits] | None = None,
+) -> type[CustomPrimitive]:
+    """Return a class of primitives whose skeleton is defined by a closest-point function.
+
+    Parameters
+    ----------
+    function
+        ``(q: wp.vec3, parameters...) -> wp.vec3``, parameters being wp.float32, wp.int32, wp.vec2, wp.vec3 or
+        wp.vec4; with or without ``@wp.func``. Of the constructs of Python it may use those that Warp and GLSL
+        share (see `blobtree.transpile.glsl`).
+    convex
+        Straight lines between points of the skeleton stay in it; rays then take longer steps.
+    name
+        Name of the kind in files; by default the function's name. The class has the same name in CamelCase.
+    limits
+        By parameter (smallest or None, largest or None): of a number, or of the length of a vector.
+
+    Returns
+    -------
+    type[CustomPrimitive]
+        A node class: the function's parameters in order, then the keywords `radius` and `color`.
+
+    Raises
+    ------
+    InvalidDefinition
+        The function has no types or no source, or samples within the limits show that it does not return the
+        closest point of any set. Nothing has been compiled by then.
+    UntranslatableFunction
+        The function leaves the shared subset; the message names file and line.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import define_skeleton
+    >>> @wp.func
+    ... def rod(q: wp.vec3, half: wp.float32) -> wp.vec3:
+    ...     return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
+    >>> Rod = define_skeleton(rod, convex=True, limits={"half": (0.0, None)})  # doctest: +SKIP
+    >>> Rod(1.0, radius=0.2)([[1.2, 0.0, 0.0]])  # doctest: +SKIP
+    array([0.5], dtype=float32)
+    """
+    source = custom_source(function, returns=wp.vec3)
+    first, *names = list(source.parameters) or [""]
+    if source.parameters.get(first) is not wp.vec3:
+        raise source.refusal("expected the query point `q: wp.vec3` as its first parameter")
+    parameters = custom_parameters(source, names, limits, CustomPrimitive)
+    kind = kind_name(source, name)
+    digest = source.digest_with(kind, parameters, convex)
+    known = registered(kind)
+    if known is not None and issubclass(known, CustomPrimitive) and known.digest == digest:
+        return known
+    check_skeleton(source, parameters, convex=convex)
+    node = _node_class(kind, digest, source, parameters, convex)
+    register(node)
+    return node
+
+
+def _node_class(
+    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], convex: bool
+) -> type[CustomPrimitive]:
+    fields: list[Any] = [(parameter.name, Annotated[Any, parameter]) for parameter in parameters]
+    fields += [("_", KW_ONLY), ("radius", Radius), ("color", Color, field(default=DEFAULT_COLOR))]
+    namespace = {
+        "__doc__": source.python.__doc__ or f"A primitive around the skeleton {kind!r}.",
+        "kind": kind,
+        "digest": digest,
+        "parameters": parameters,
+        "skeleton": replace(_row(kind, digest, source, parameters), convex=convex),
+    }
+    node_type: type[CustomPrimitive] = node_class(kind, source, fields, CustomPrimitive, namespace)
+    return node_type
+
+
+def _row(kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...]) -> Skeleton:
+    """Return the row of the table, with functions generated around the user's."""
+    texels = max(1, -(-(1 + sum(parameter.size for parameter in parameters)) // 4))
+    closest_name = f"custom_{kind}_closest_{digest}"
+    closest = generated(
+        closest_name,
+        _CLOSEST.format(
+            name=closest_name,
+            texels="".join(f"    t{i} = tape[at + {i}]\n" for i in range(texels)),
+            call=f"{source.function.key}({', '.join(['q', *_readings(parameters)])})",
+            influence=INFLUENCE_SLOT,
+        ),
+        {source.function.key: source.function},
+    )
+    box_name = f"custom_{kind}_box_{digest}"
+    box = generated(
+        box_name,
+        _BOX.format(name=box_name, closest=closest_name),
+        {
+            closest_name: closest,
+            "HALF_DIAGONAL": HALF_DIAGONAL,
+            "min_influence_of_one": min_influence_of_one,
+            "squared_distances_to_ball": squared_distances_to_ball,
+        },
+    )
+    return Skeleton(
+        kind, closest, cast(wp.Function, min_influence_of_one), box, texels, folds_maps=False, digest=digest
+    )
+
+
+_CLOSEST = '''\
+def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """The user's closest point, and the influence."""
+{texels}    c = {call}
+    return wp.vec4(c[0], c[1], c[2], t0[{influence}])
+'''
+
+_BOX = '''\
+def {name}(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − skeleton| / influence)² over the ball around the cube center ± half."""
+    c = {closest}(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+'''
+
+
+def _readings(parameters: tuple[Parameter, ...]) -> list[str]:
+    """Return the expressions that read each parameter from the texels t0, t1 and so on."""
+    readings, place = [], 0
+    for parameter in parameters:
+        components = []
+        for _ in range(parameter.size):
+            place += place == INFLUENCE_SLOT
+            components.append(f"t{place // 4}[{place % 4}]")
+            place += 1
+        if parameter.size > 1:
+            readings.append(f"wp.vec{parameter.size}({', '.join(components)})")
+        else:
+            readings.append(f"int({components[0]})" if parameter.whole else components[0])
+    return readings

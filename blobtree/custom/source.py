@@ -1,0 +1,216 @@
+"""The source of a custom kind: a user's typed function, its parameters, and a unique name for it.
+
+Two definitions may use the same names, and a shader has one namespace for all functions. Hence a user's
+function and all functions that it calls are copied under names that carry a digest of their sources.
+"""
+
+import ast
+import hashlib
+import inspect
+import linecache
+import re
+import textwrap
+from dataclasses import dataclass, make_dataclass
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree.errors import InvalidDefinition
+from blobtree.nodes.tree import Node
+from blobtree.transpile.glsl import translate_library
+from blobtree.transpile.python import Precision, find_changed_constants, plain_python
+from blobtree.transpile.specialize import rebind, referenced_values, warp_function
+
+PLAIN_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
+"""Names that are valid in C++, GLSL and JSON."""
+
+
+@dataclass(frozen=True, eq=False)
+class CustomSource:
+    """A user's function under a unique name."""
+
+    name: str
+    parameters: dict[str, Any]
+    """Types by name, in order."""
+    function: wp.Function
+    python: FunctionType
+    digest: str
+    """Digest of its source, of the functions that it calls, and of their constants."""
+
+    def digest_with(self, *claims: object) -> str:
+        """Return a digest of the function and the claims about it, the same in every process."""
+        return hashlib.sha256(repr((self.digest, *claims)).encode()).hexdigest()[:12]
+
+    @property
+    def location(self) -> str:
+        """File and line of the function."""
+        return f"{self.python.__code__.co_filename}:{self.python.__code__.co_firstlineno}"
+
+    def refusal(self, reason: str) -> InvalidDefinition:
+        """Return the error that states the function's location and a reason."""
+        return InvalidDefinition(f"{self.location}: {self.name}: {reason}")
+
+    def reference(self, precision: Precision = np.float64) -> FunctionType:
+        """Return the function as plain Python, in a floating-point type."""
+        return plain_python(self.python, precision)
+
+
+def custom_source(function: Any, *, returns: Any) -> CustomSource:
+    """Read a user's function without compiling it.
+
+    Raises
+    ------
+    InvalidDefinition
+        It is not a function with a source and a type for every parameter, or it calls itself.
+    UntranslatableFunction
+        It leaves the subset of Python that Warp and GLSL share; the message names file and line.
+    """
+    python = _python_function(function)
+    _require_source(python)
+    hints = _hints(python)
+    location = f"{python.__code__.co_filename}:{python.__code__.co_firstlineno}"
+    names = list(inspect.signature(python).parameters)
+    missing = [name for name in names if name not in hints]
+    if missing:
+        raise InvalidDefinition(f"{location}: {python.__name__}: parameter {missing[0]!r} lacks its type")
+    if hints.get("return") not in (returns, None) or "return" not in hints:
+        raise InvalidDefinition(
+            f"{location}: {python.__name__}: expected it to return wp.{returns.__name__}, "
+            f"got {_spelled(hints.get('return'))}; annotate it `-> wp.{returns.__name__}`"
+        )
+    _require_plain_names(python)
+    digest = hashlib.sha256("\n".join(_sources(python, ())).encode()).hexdigest()[:12]
+    function_copy = _renamed(python, digest, {})
+    translate_library([function_copy])
+    _require_variables(python)
+    return CustomSource(python.__name__, {name: hints[name] for name in names}, function_copy, python, digest)
+
+
+def kind_name(source: CustomSource, name: str | None) -> str:
+    """Return the name of a kind in files: `name`, or that of its function."""
+    kind = source.name if name is None else name
+    if not isinstance(kind, str) or not PLAIN_NAME.fullmatch(kind):
+        raise source.refusal(f"name: expected letters, digits and single underscores, got {kind!r}")
+    return kind
+
+
+def class_name(kind: str) -> str:
+    """Return the name of a kind's class: `super_ellipse` → `SuperEllipse`."""
+    return "".join(word[:1].upper() + word[1:] for word in kind.split("_"))
+
+
+def node_class(
+    kind: str, source: CustomSource, fields: list[Any], base: type[Node], namespace: dict[str, Any]
+) -> Any:
+    """Return a node class with these fields, in the module of the function."""
+    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False}
+    node_type = make_dataclass(class_name(kind), fields, bases=(base,), namespace=namespace, **options)
+    node_type.__module__ = source.python.__module__
+    return node_type
+
+
+def generated(name: str, source: str, scope: dict[str, Any]) -> wp.Function:
+    """Return the typed function `name` of a generated source, which Warp and GLSL read from `linecache`."""
+    file = f"<blobtree {name}>"
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    namespace: dict[str, Any] = {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}
+    exec(compile(source, file, "exec"), namespace)
+    return warp_function(namespace[name])
+
+
+def _python_function(function: Any) -> FunctionType:
+    python = function.func if isinstance(function, wp.Function) else function
+    if not isinstance(python, FunctionType):
+        raise InvalidDefinition(f"expected a typed function, got {function!r}; write it with `def`")
+    if python.__name__ == "<lambda>":
+        raise InvalidDefinition(
+            f"{python.__code__.co_filename}:{python.__code__.co_firstlineno}: a lambda has no types; "
+            "write a typed function with `def`"
+        )
+    return python
+
+
+def _require_source(python: FunctionType) -> None:
+    try:
+        inspect.getsource(python)
+    except (OSError, TypeError):
+        raise InvalidDefinition(
+            f"{python.__name__}: its source cannot be read, so it cannot be compiled; "
+            "define it in a file or a notebook, not through exec() or at the plain prompt"
+        ) from None
+
+
+def _hints(python: FunctionType) -> dict[str, Any]:
+    """Return the annotations; those written as text are evaluated."""
+    try:
+        return inspect.get_annotations(python, eval_str=True)
+    except Exception as error:  # annotations in quotes are evaluated: they may raise anything
+        raise InvalidDefinition(f"{python.__name__}: its annotations cannot be read: {error}") from error
+
+
+def _spelled(hint: Any) -> str:
+    return "no annotation" if hint is None else getattr(hint, "__name__", repr(hint))
+
+
+def _require_plain_names(python: FunctionType) -> None:
+    for name in (*python.__code__.co_varnames, python.__name__):
+        if not PLAIN_NAME.fullmatch(name.strip("_") or "x") or name.startswith("gl_"):
+            raise InvalidDefinition(
+                f"{python.__code__.co_filename}:{python.__code__.co_firstlineno}: {python.__name__}: "
+                f"the name {name!r} does not exist in GLSL; use plain letters, digits and single underscores"
+            )
+
+
+def _require_variables(python: FunctionType) -> None:
+    """Raise `InvalidDefinition` if a loop here, or in a called function, changes a constant of Warp's."""
+    lines, first = inspect.getsourcelines(python)
+    (definition,) = ast.parse(textwrap.dedent("".join(lines))).body
+    assert isinstance(definition, ast.FunctionDef)
+    for name, line in find_changed_constants(definition):
+        raise InvalidDefinition(
+            f"{python.__code__.co_filename}:{first + line - 1}: {python.__name__}: a loop changes {name!r}, "
+            f"which Warp takes for a constant; write `{name} = float(...)` or `int(...)` before the loop"
+        )
+    for callee in _typed_callees(python).values():
+        assert isinstance(callee.func, FunctionType)
+        _require_variables(callee.func)
+
+
+def _typed_callees(python: FunctionType) -> dict[str, wp.Function]:
+    return {
+        name: value
+        for name, value in referenced_values(python).items()
+        if isinstance(value, wp.Function) and isinstance(value.func, FunctionType)
+    }
+
+
+def _sources(python: FunctionType, callers: tuple[FunctionType, ...]) -> list[str]:
+    """Return the sources of a function and of the functions that it calls, with their constants."""
+    if python in callers:
+        raise InvalidDefinition(f"{python.__name__}: it calls itself, which no shader can; write a loop")
+    numbers = {
+        name: value for name, value in referenced_values(python).items() if isinstance(value, int | float)
+    }
+    sources = [inspect.getsource(python), repr(numbers)]
+    for callee in _typed_callees(python).values():
+        assert isinstance(callee.func, FunctionType)
+        sources += _sources(callee.func, (*callers, python))
+    return sources
+
+
+def _renamed(python: FunctionType, digest: str, renamed: dict[FunctionType, wp.Function]) -> wp.Function:
+    """Return `python` as a typed function whose name, and those of its callees, end in `digest`."""
+    if python not in renamed:
+        callees = {
+            name: _renamed(callee.func, digest, renamed)
+            for name, callee in _typed_callees(python).items()
+            if isinstance(callee.func, FunctionType)
+        }
+        name = re.sub(r"[^A-Za-z0-9]+", "_", python.__name__).strip("_")
+        qualname = f"custom_{name}_{len(renamed)}_{digest}"
+        copy = rebind(python, callees, module=f"blobtree.custom.{qualname}", qualname=qualname)
+        copy.__annotations__ = _hints(python)
+        renamed[python] = warp_function(copy)
+    return renamed[python]

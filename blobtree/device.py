@@ -1,0 +1,223 @@
+"""Warp devices: start of Warp, kernel options, launches on every core, and memory.
+
+Warp runs a CPU launch on one thread, but runs several launches at once. `launch` therefore divides the
+indices of a launch into slices, and runs these on a pool of threads.
+"""
+
+import os
+import re
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree.errors import InvalidDevice, InvalidResolution
+
+wp.config.log_level = wp.LOG_WARNING  # no banner when Warp starts, no line per compiled module
+
+KERNEL_OPTIONS: dict[str, Any] = {"enable_backward": False, "max_unroll": 4}
+"""Options for `wp.set_module_options`: no adjoint code, and no unrolling of long loops.
+
+Kernels that call whole formulas in unrolled loops compile several times as long, and run no faster."""
+
+SLICES_PER_THREAD = 4
+"""Slices of a launch per thread; several of them even out slices of unequal cost."""
+
+REPORTED_SLICES_PER_THREAD = 32
+"""Slices per thread of a launch with reports, so that reports come often and a cancelled launch ends soon."""
+
+MIN_SLICE = 256
+"""Fewest indices of a slice."""
+
+PAGE_BYTES = 4096
+"""Size of a page of memory on most machines."""
+
+MIN_PREFAULTED_PAGES = 1024
+"""Size of an array from which several threads touch its pages."""
+
+NO_DRIVER_WARNING = "Could not find or load the NVIDIA CUDA driver"
+
+MEMINFO = Path("/proc/meminfo")
+"""File in which Linux reports free memory."""
+
+GIGABYTE = 1e9
+
+
+# -- Warp and its devices -------------------------------------------------------------------------------
+
+
+@cache
+def start_warp() -> None:
+    """Initialise Warp without its warning that there is no CUDA driver, which no setting turns off.
+
+    All kernels also run without CUDA. Other lines that Warp writes to stderr are repeated.
+    """
+    try:
+        stderr = os.dup(2)
+    except OSError:  # the process has no stderr
+        wp.init()
+        return
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    with tempfile.TemporaryFile() as captured:
+        os.dup2(captured.fileno(), 2)
+        try:
+            wp.init()
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+        captured.seek(0)
+        lines = captured.read().decode(errors="replace").splitlines(keepends=True)
+    if sys.stderr is not None:
+        sys.stderr.write("".join(line for line in lines if NO_DRIVER_WARNING not in line))
+
+
+def known_device(device: Any = None) -> str:
+    """Return the name of a Warp device, by default the current one.
+
+    Raises
+    ------
+    InvalidDevice
+        There is no such device.
+    """
+    start_warp()
+    try:
+        return str(wp.get_device(device))
+    except (TypeError, ValueError):
+        names = ", ".join(repr(str(known)) for known in wp.get_devices())
+        raise InvalidDevice(f"device: expected a Warp device ({names}), got {device!r}") from None
+
+
+# -- threads and launches -------------------------------------------------------------------------------
+
+
+class _ThreadSettings(threading.local):
+    """Settings of the launches of one thread."""
+
+    leaves_core_free = False
+
+
+_settings = _ThreadSettings()
+
+
+@contextmanager
+def core_left_free() -> Iterator[None]:
+    """Within a ``with`` block, run the launches of this thread on one core less, in a pool of their own.
+
+    Use it in background threads. A window then keeps a core, and its launches do not queue behind the others.
+    """
+    before, _settings.leaves_core_free = _settings.leaves_core_free, True
+    try:
+        yield
+    finally:
+        _settings.leaves_core_free = before
+
+
+@cache
+def _core_count() -> int:
+    """Return the number of cores; asking the system takes as long as a small launch."""
+    return os.cpu_count() or 1
+
+
+def _thread_count() -> int:
+    """Return the number of threads for a launch of this thread."""
+    return max(1, _core_count() - _settings.leaves_core_free)
+
+
+def _thread_pool() -> ThreadPoolExecutor:
+    """Return the threads for a launch of this thread."""
+    return _cached_pool(_thread_count(), _settings.leaves_core_free)
+
+
+@cache
+def _cached_pool(workers: int, leaves_core_free: bool) -> ThreadPoolExecutor:
+    name = "blobtree, one core left free" if leaves_core_free else "blobtree"
+    return ThreadPoolExecutor(max_workers=workers, thread_name_prefix=name)
+
+
+def launch(
+    kernel: wp.Kernel,
+    count: int,
+    inputs: Sequence[Any],
+    outputs: Sequence[Any],
+    device: str,
+    *,
+    step: Callable[[float], None] | None = None,
+) -> None:
+    """Run `kernel` for the indices below `count`, on the CPU in slices on every core.
+
+    The first parameter of the kernel is the first index of the slice; `inputs` and `outputs` follow. `step`
+    is called with the fraction done. An exception in `step` ends the launch once the running slices are done.
+    """
+    if count == 0:
+        return
+    start_warp()
+    if not wp.get_device(device).is_cpu:
+        wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
+        return
+    per_thread = SLICES_PER_THREAD if step is None else REPORTED_SLICES_PER_THREAD
+    slices = min(_thread_count() * per_thread, -(-count // MIN_SLICE))
+    bounds = [count * i // slices for i in range(slices + 1)]
+    wp.load_module(kernel.module, device=device)
+
+    def run(first: int, last: int) -> None:
+        wp.launch(kernel, dim=last - first, inputs=[first, *inputs], outputs=[*outputs], device=device)
+
+    if slices == 1:
+        run(0, count)
+        return
+    results = _thread_pool().map(run, bounds[:-1], bounds[1:])
+    for number, _ in enumerate(results, 1):
+        if step is not None:
+            step(number / slices)
+
+
+# -- memory ---------------------------------------------------------------------------------------------
+
+
+def prefaulted_array(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """Return an uninitialised array whose pages all threads have touched.
+
+    A copy into memory that was never touched is slow: it waits for the system page after page.
+    """
+    array = np.empty(shape, dtype)
+    pages = array.reshape(-1).view(np.uint8)[::PAGE_BYTES]
+    if len(pages) > MIN_PREFAULTED_PAGES:
+        list(_thread_pool().map(lambda part: part.fill(0), np.array_split(pages, _thread_count())))
+    return array
+
+
+def available_memory(device: str) -> float | None:
+    """Return the free bytes of a Warp device, or None if the system does not report them."""
+    warp_device = wp.get_device(device)
+    if warp_device.is_cuda:
+        return float(warp_device.free_memory)
+    if not MEMINFO.exists():
+        return None
+    match = re.search(r"MemAvailable:\s+(\d+) kB", MEMINFO.read_text(encoding="ascii"))
+    return 1024.0 * float(match[1]) if match else None
+
+
+def demand_memory(size: float, device: str, noun: str) -> None:
+    """Raise an error that names `noun` if fewer than `size` bytes are free.
+
+    Raises
+    ------
+    InvalidResolution
+        The device has less free memory, as far as it is known.
+    """
+    free = available_memory(device)
+    if free is not None and size > free:
+        raise InvalidResolution(
+            f"{noun} would take {size / GIGABYTE:.3g} GB, {free / GIGABYTE:.3g} GB are free on {device}; "
+            "take larger cells"
+        )

@@ -1,0 +1,202 @@
+"""Kernels of the dual surface's vertices: one per patch of every cell, projected onto the surface.
+
+A patch is identified by (index of its block in the list · CHILDREN + cell) · MAX_PATCHES + patch.
+"""
+
+import warp as wp
+
+from blobtree.cells.block_kernels import CellBlocks, child_offset, grid_point
+from blobtree.cells.grid import CHILDREN
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import ISO
+from blobtree.meshing.dual_kernels import SAMPLES, CellPatches, corner_sample, sample_index
+from blobtree.meshing.patches import EDGES, MAX_PATCHES
+from blobtree.tape.evaluate_kernels import STALLED, project_to_surface
+from blobtree.tape.interpreter import field_color, field_gradient, field_value
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+HALVINGS = 30
+"""Bisection steps along an edge: more than float32 can resolve."""
+
+EDGE_FIRST = wp.types.vector(length=12, dtype=wp.int32)(*(a for a, _ in EDGES))
+EDGE_LAST = wp.types.vector(length=12, dtype=wp.int32)(*(b for _, b in EDGES))
+
+
+@wp.struct
+class VertexArrays:
+    """The vertices of a mesh."""
+
+    positions: wp.array(dtype=wp.vec3)
+    normals: wp.array(dtype=wp.vec3)
+    colors: wp.array(dtype=wp.vec3)
+
+
+@wp.struct
+class Patch:
+    """A patch of a cell of a listed block."""
+
+    number: wp.int32
+    """In its cell."""
+    cell: wp.int32
+    """In its block."""
+    slot: wp.int32
+    """Index of its block in the list."""
+    block: wp.int32
+    row: wp.int32
+    vertex: wp.int32
+
+
+@wp.kernel
+def list_patches(
+    first: wp.int32,
+    listed: wp.array(dtype=wp.int32),
+    rows: wp.array(dtype=wp.int16),
+    patch_count: wp.array(dtype=wp.int8),
+    starts: wp.array(dtype=wp.int32),
+    patches: wp.array(dtype=wp.int32),
+) -> None:
+    """Write the identifier of every patch of the listed blocks."""
+    slot = first + wp.tid()
+    block = listed[slot]
+    at = starts[slot]
+    for c in range(CHILDREN):
+        for patch in range(int(patch_count[int(rows[block * CHILDREN + c])])):
+            patches[at] = (slot * CHILDREN + c) * MAX_PATCHES + patch
+            at += 1
+
+
+@wp.func
+def patch_of(identifier: wp.int32, listed: wp.array(dtype=wp.int32), patches: CellPatches) -> Patch:
+    """Return the patch of an identifier."""
+    patch = Patch()
+    patch.number = identifier % MAX_PATCHES
+    patch.cell = (identifier // MAX_PATCHES) % CHILDREN
+    patch.slot = identifier // (MAX_PATCHES * CHILDREN)
+    patch.block = listed[patch.slot]
+    cell = patch.block * CHILDREN + patch.cell
+    patch.row = int(patches.rows[cell])
+    patch.vertex = patches.vertex_starts[patch.block] + int(patches.offsets[cell]) + patch.number
+    return patch
+
+
+@wp.func
+def block_corner(block: wp.int32, cells: CellBlocks) -> wp.vec3:
+    """Return the lowest corner of a block."""
+    return grid_point(sample_index(cells.base + cells.blocks[block], 0, 0, 0), cells.corner, cells.cell)
+
+
+@wp.func
+def write_vertex(vertices: VertexArrays, vertex: wp.int32, p: wp.vec3, f: wp.vec4, color: wp.vec4) -> None:
+    """Write a vertex at p, where the field and its gradient are `f`, and the colour is color[1:]."""
+    vertices.positions[vertex] = p
+    vertices.normals[vertex] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+    vertices.colors[vertex] = wp.vec3(color[1], color[2], color[3])
+
+
+@wp.kernel
+def place_vertices(
+    first: wp.int32,
+    identifiers: wp.array(dtype=wp.int32),
+    listed: wp.array(dtype=wp.int32),
+    cells: CellBlocks,
+    values: wp.array(dtype=wp.float32),
+    patches: CellPatches,
+    vertices: VertexArrays,
+    unconverged: wp.array(dtype=wp.int32),
+) -> None:
+    """Project the mean of each patch's edge crossings onto the surface, and count the unconverged."""
+    patch = patch_of(identifiers[first + wp.tid()], listed, patches)
+    span = cells.spans[patch.block]
+    start = block_corner(patch.block, cells) + crossing_mean(patch, values, patches) * cells.cell
+    p, f = project_to_surface(start, 0.5 * cells.cell, cells.tape, span)
+    if is_unconverged(f[0], p, start, cells.cell):
+        wp.atomic_add(unconverged, 0, 1)
+    write_vertex(vertices, patch.vertex, p, f, field_color(p, cells.tape, span))
+
+
+@wp.kernel
+def bisect_unconverged(
+    first: wp.int32,
+    identifiers: wp.array(dtype=wp.int32),
+    listed: wp.array(dtype=wp.int32),
+    cells: CellBlocks,
+    values: wp.array(dtype=wp.float32),
+    patches: CellPatches,
+    vertices: VertexArrays,
+) -> None:
+    """Move each unconverged vertex to the edge crossing of its patch nearest to the mean of these."""
+    patch = patch_of(identifiers[first + wp.tid()], listed, patches)
+    span = cells.spans[patch.block]
+    corner = block_corner(patch.block, cells)
+    mean = crossing_mean(patch, values, patches)
+    position = vertices.positions[patch.vertex]
+    value = field_value(position, cells.tape, span)
+    if not is_unconverged(value, position, corner + mean * cells.cell, cells.cell):
+        return
+    nearest = float(wp.inf)
+    best = wp.vec3(0.0, 0.0, 0.0)
+    for edge in range(12):
+        if int(patches.patch_of_edge[patch.row * 12 + edge]) == patch.number:
+            crossing = bisect_edge(patch, edge, corner, cells, values)
+            distance = wp.length(crossing - mean)
+            if distance < nearest:
+                nearest = distance
+                best = crossing
+    p = corner + best * cells.cell
+    f = field_gradient(p, cells.tape, span)
+    write_vertex(vertices, patch.vertex, p, f, field_color(p, cells.tape, span))
+
+
+@wp.func
+def is_unconverged(value: wp.float32, p: wp.vec3, start: wp.vec3, cell: wp.float32) -> wp.bool:
+    """Return True if Newton's method missed the surface, or left the cells in which the tape is valid."""
+    return wp.abs(value - ISO) > STALLED * ISO or wp.length(p - start) > cell
+
+
+@wp.func
+def crossing_mean(patch: Patch, values: wp.array(dtype=wp.float32), patches: CellPatches) -> wp.vec3:
+    """Return the mean of a patch's edge crossings, in cells from the block's corner.
+
+    The field is taken to be linear along the edges.
+    """
+    total = wp.vec3(0.0, 0.0, 0.0)
+    crossings = float(0.0)
+    for edge in range(12):
+        if int(patches.patch_of_edge[patch.row * 12 + edge]) == patch.number:
+            a = EDGE_FIRST[edge]
+            b = EDGE_LAST[edge]
+            value_a = values[patch.slot * SAMPLES + corner_sample(patch.cell, a)]
+            value_b = values[patch.slot * SAMPLES + corner_sample(patch.cell, b)]
+            t = (ISO - value_a) / (value_b - value_a)
+            total += corner_offset(patch.cell, a) * (1.0 - t) + corner_offset(patch.cell, b) * t
+            crossings += 1.0
+    return total / crossings
+
+
+@wp.func
+def bisect_edge(
+    patch: Patch, edge: wp.int32, corner: wp.vec3, cells: CellBlocks, values: wp.array(dtype=wp.float32)
+) -> wp.vec3:
+    """Return the inner end of the interval where an edge crosses the surface, in cells from `corner`."""
+    a = EDGE_FIRST[edge]
+    inner = corner_offset(patch.cell, a)
+    outer = corner_offset(patch.cell, EDGE_LAST[edge])
+    if values[patch.slot * SAMPLES + corner_sample(patch.cell, a)] < ISO:
+        inner, outer = outer, inner
+    for _halving in range(HALVINGS):
+        middle = 0.5 * (inner + outer)
+        if field_value(corner + middle * cells.cell, cells.tape, cells.spans[patch.block]) >= ISO:
+            inner = middle
+        else:
+            outer = middle
+    return inner
+
+
+@wp.func
+def corner_offset(cell: wp.int32, corner: wp.int32) -> wp.vec3:
+    """Return a cell's corner, in cells from its block's lowest one."""
+    offset = child_offset(cell)
+    x = float(offset[0] + (corner & 1))
+    y = float(offset[1] + ((corner >> 1) & 1))
+    return wp.vec3(x, y, float(offset[2] + (corner >> 2)))

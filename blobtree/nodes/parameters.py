@@ -1,0 +1,257 @@
+"""Parameters of nodes: each field of a node class declares here what it means.
+
+A node class annotates a field with its `Parameter`::
+
+    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the ball")]
+
+Validation, the documentation of the class, the file format, edits of a tree and the layout on the tape all
+follow from this declaration. Fields without one hold operands.
+"""
+
+import inspect
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, fields, replace
+from enum import Enum
+from functools import partial
+from itertools import chain
+from operator import attrgetter
+from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from blobtree._typing import Float64Array
+from blobtree.errors import InvalidNode
+from blobtree.validation import (
+    Vector,
+    affine_matrix,
+    color_triple,
+    finite_number,
+    finite_vector,
+    non_negative_vector,
+    nonzero_vector,
+    positive_number,
+)
+
+LARGEST_INTEGER = 1 << 24
+"""Largest whole number up to which float32 holds every whole number."""
+
+
+class Quantity(Enum):
+    """Meaning of a parameter: how it is checked, and how maps and edits change it."""
+
+    POINT = "point"
+    """A point (3,) in the node's space; it moves with the node."""
+    DIRECTION = "direction"
+    """A vector (3,) of any length above 0; rotations turn it."""
+    EXTENTS = "extents"
+    """Lengths (3,) along the axes of the node's space, 0 or more."""
+    LENGTH = "length"
+    """A length above 0; it scales with the node."""
+    RADIUS = "radius"
+    """Visible radius around the skeleton, above 0; offsets and resizing change it."""
+    DISTANCE = "distance"
+    """A signed length."""
+    ANGLE = "angle"
+    """An angle or a rate of turning, in degrees."""
+    FACTOR = "factor"
+    """A number without unit."""
+    COLOR = "color"
+    """Red, green and blue (3,) from 0 to 1."""
+    MATRIX = "matrix"
+    """An invertible affine map, three rows of four numbers."""
+    NUMBERS = "numbers"
+    """One to four numbers of a custom kind, whose meaning is unknown; no edit changes them."""
+
+
+UNITS = {
+    Quantity.POINT: "model units",
+    Quantity.EXTENTS: "model units",
+    Quantity.LENGTH: "model units",
+    Quantity.RADIUS: "model units",
+    Quantity.DISTANCE: "model units",
+}
+"""Units of quantities that have one."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a node class.
+
+    Attributes
+    ----------
+    quantity
+        Its meaning.
+    doc
+        Its description, a noun phrase.
+    low, high
+        Range of the number; of the length of a vector in a custom kind.
+    hint
+        What to do about a value out of range.
+    name
+        Name of the field; filled in by `parameters_of`.
+    size
+        Number of components of `Quantity.NUMBERS`: 1 is a number, more a vector.
+    whole
+        `Quantity.NUMBERS` holds whole numbers.
+    """
+
+    quantity: Quantity
+    doc: str = ""
+    _: KW_ONLY
+    low: float = -math.inf
+    high: float = math.inf
+    hint: str = ""
+    name: str = ""
+    size: int = 1
+    whole: bool = False
+
+    @property
+    def check(self) -> Callable[[Any], Any]:
+        """A function that returns the checked value, or raises `InvalidNode`."""
+        if self.quantity is Quantity.NUMBERS:
+            return self._checked_numbers
+        return self._checked_in_range if self.is_bounded else partial(CHECKS[self.quantity], self.name)
+
+    def _checked_in_range(self, value: Any) -> Any:
+        result = CHECKS[self.quantity](self.name, value)
+        if self.low <= result <= self.high:
+            return result
+        raise InvalidNode(f"{self.name}: expected {self.low:g} to {self.high:g}, got {result!r}; {self.hint}")
+
+    @property
+    def is_bounded(self) -> bool:
+        """True if the declaration states a range of its own."""
+        return self.low > -math.inf or self.high < math.inf
+
+    @property
+    def range(self) -> str:
+        """The range in words."""
+        if self.high == math.inf:
+            return f"from {self.low:g}"
+        return f"from {self.low:g} to {self.high:g}" if self.low > -math.inf else f"up to {self.high:g}"
+
+    def components(self, value: Any) -> tuple[float, ...]:
+        """Return a checked value as floats."""
+        return tuple(value) if isinstance(value, tuple) else (float(value),)
+
+    def _checked_numbers(self, value: Any) -> Any:
+        """Return `value` as a float, an int or a tuple of floats."""
+        result: float | tuple[float, ...]
+        if self.size == 1:
+            number = finite_number(self.name, value)
+            if self.whole and (number != int(number) or abs(number) > LARGEST_INTEGER):
+                raise InvalidNode(f"{self.name}: expected a whole number, got {value!r}")
+            measure, result = number, int(number) if self.whole else number
+        else:
+            try:
+                components = tuple(finite_number(self.name, component) for component in value)
+            except TypeError:
+                components = ()
+            if len(components) != self.size:
+                raise InvalidNode(f"{self.name}: expected {self.size} finite numbers, got {value!r}")
+            measure, result = math.hypot(*components), components
+        if not self.low <= measure <= self.high:
+            noun = "a number" if self.size == 1 else "a vector of length"
+            raise InvalidNode(f"{self.name}: expected {noun} {self.range}, got {value!r}")
+        return result
+
+
+CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
+    Quantity.POINT: finite_vector,
+    Quantity.DIRECTION: nonzero_vector,
+    Quantity.EXTENTS: non_negative_vector,
+    Quantity.LENGTH: positive_number,
+    Quantity.RADIUS: positive_number,
+    Quantity.DISTANCE: finite_number,
+    Quantity.ANGLE: finite_number,
+    Quantity.FACTOR: finite_number,
+    Quantity.COLOR: lambda _name, value: color_triple(value),
+    Quantity.MATRIX: lambda _name, value: affine_matrix(value),
+}
+"""Functions (name, value) that return the checked value of each quantity."""
+
+Radius: TypeAlias = Annotated[float, Parameter(Quantity.RADIUS, "visible radius around the skeleton")]
+Color: TypeAlias = Annotated[Vector, Parameter(Quantity.COLOR, "red, green and blue from 0 to 1")]
+
+
+_PARAMETERS: dict[type, dict[str, Parameter]] = {}
+
+
+def parameters_of(kind: type) -> dict[str, Parameter]:
+    """Return the parameters that a node class declares, by name and in order; operands are left out."""
+    if kind not in _PARAMETERS:
+        hints = get_type_hints(kind, include_extras=True)
+        declared = {field.name: _declared(hints[field.name]) for field in fields(kind)}
+        _PARAMETERS[kind] = {name: replace(p, name=name) for name, p in declared.items() if p is not None}
+    return _PARAMETERS[kind]
+
+
+def _declared(hint: Any) -> Parameter | None:
+    """Return the `Parameter` in an annotation."""
+    extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    return next((extra for extra in extras if isinstance(extra, Parameter)), None)
+
+
+def columns_of(nodes: Sequence[Any], parameter: Parameter) -> Float64Array:
+    """Return the values (n, size) of one parameter of n nodes of a kind."""
+    first = getattr(nodes[0], parameter.name)
+    values = map(attrgetter(parameter.name), nodes)
+    numbers = chain.from_iterable(values) if isinstance(first, tuple) else values
+    size = len(parameter.components(first))
+    return np.fromiter(numbers, np.float64, size * len(nodes)).reshape(-1, size)
+
+
+def unit_vectors(vectors: Float64Array) -> Float64Array:
+    """Return vectors (n, 3) of any length above 0 at length 1; squares of tiny numbers would vanish."""
+    scaled = vectors / np.abs(vectors).max(axis=1, keepdims=True)
+    result: Float64Array = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    return result
+
+
+def mapped(quantity: Quantity, values: Float64Array, matrices: Float64Array | None) -> Float64Array:
+    """Return values (n, size) of a quantity under similarity maps (n, 4, 4), or under none."""
+    if quantity is Quantity.DIRECTION:
+        directions = unit_vectors(values)
+        if matrices is None:
+            return directions
+        return unit_vectors(np.einsum("nij,nj->ni", matrices[:, :3, :3], directions))
+    if matrices is None:
+        return values
+    if quantity is Quantity.POINT:
+        placed: Float64Array = np.einsum("nij,nj->ni", matrices[:, :3, :3], values) + matrices[:, :3, 3]
+        return placed
+    if quantity is Quantity.LENGTH:
+        scaled: Float64Array = values * np.linalg.norm(matrices[:, :3, 0], axis=1)[:, None]
+        return scaled
+    return values
+
+
+def documented(doc: str, kind: type) -> str:
+    """Return the docstring of a node class with a Parameters section of its declarations."""
+    lines: list[str] = []
+    for name, hint in inspect.get_annotations(kind).items():
+        parameter = _declared(hint)
+        if parameter is not None and parameter.doc:
+            lines += [f"{name} : {_type_name(hint)}", f"    {describe(parameter)}"]
+    if not lines or "Parameters\n" in doc:
+        return doc
+    head, mark, tail = doc.partition("\n    Examples\n")
+    section = "\n".join(f"    {line}" for line in ["Parameters", "----------", *lines])
+    return f"{head.rstrip()}\n\n{section}\n{mark}{tail}" if mark else f"{head.rstrip()}\n\n{section}\n    "
+
+
+def describe(parameter: Parameter) -> str:
+    """Return the description of a parameter as a sentence with its unit and range."""
+    unit = UNITS.get(parameter.quantity)
+    parts = [parameter.doc[:1].upper() + parameter.doc[1:]]
+    if unit:
+        parts.append(f"in {unit}")
+    if parameter.is_bounded:
+        parts.append(parameter.range)
+    return ", ".join(parts) + "."
+
+
+def _type_name(hint: Any) -> str:
+    inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    return {float: "float", Vector: "(x, y, z)"}.get(inner, "array-like")

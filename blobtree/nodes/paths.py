@@ -1,0 +1,164 @@
+"""Paths through a tree: find nodes by path, place them in the world, move, resize and replace them."""
+
+import reprlib
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array
+from blobtree.errors import InvalidNode
+from blobtree.nodes.parameters import Quantity, parameters_of
+from blobtree.nodes.primitives import Primitive
+from blobtree.nodes.tree import Combination, Node, Transform
+from blobtree.tape.model import checked_tree
+from blobtree.validation import finite_vector
+
+Path = tuple[int, ...]
+"""Indices of children, from the root down."""
+
+
+def primitive_paths(tree: Node) -> list[Path]:
+    """Return the paths of all primitives, from left to right."""
+    checked_tree(tree)
+    paths: list[Path] = []
+    pending: list[tuple[Path, Node]] = [((), tree)]
+    while pending:
+        path, node = pending.pop()
+        if isinstance(node, Primitive):
+            paths.append(path)
+        pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
+    return paths
+
+
+def nodes_along(tree: Node, path: Path) -> Iterator[Node]:
+    """Yield the nodes from the root to the end of a path; raise `InvalidNode` where a child is missing."""
+    node = tree
+    yield node
+    if not isinstance(path, Sequence):
+        raise InvalidNode(f"expected a path through the tree, such as (0, 1), got {reprlib.repr(path)}")
+    for step in path:
+        if not isinstance(step, int | np.integer) or not 0 <= step < len(node.children):
+            raise InvalidNode(f"expected a path through the tree, got {path}; {step} is no child there")
+        node = node.children[step]
+        yield node
+
+
+def node_at(tree: Node, path: Path) -> Node:
+    """Return the node at the end of a path; raise `InvalidNode` if the tree has no such path."""
+    *_, node = nodes_along(tree, path)
+    return node
+
+
+def primitive_at(tree: Node, path: Path) -> Primitive:
+    """Return the primitive at the end of a path, below any maps there; raise `InvalidNode` otherwise."""
+    node = node_at(tree, primitive_path(tree, path))
+    assert isinstance(node, Primitive)
+    return node
+
+
+def primitive_path(tree: Node, path: Path) -> Path:
+    """Lengthen a path through maps to the primitive below them; raise `InvalidNode` otherwise."""
+    node = node_at(tree, path)
+    while isinstance(node, Transform):
+        path, node = (*path, 0), node.child
+    if not isinstance(node, Primitive):
+        raise InvalidNode(f"expected the path of a primitive, {path} leads to a {type(node).__name__}")
+    return path
+
+
+def primitive_near(tree: Node, point: ArrayLike) -> Path:
+    """Return the path of the primitive with the highest field at `point` (3,), the first of equal ones."""
+    points: Float32Array = np.array([finite_vector("point", point)], np.float32)
+    return max(primitives_around(tree, points), key=lambda path: float(node_in_world(tree, path)(points)[0]))
+
+
+def primitives_around(tree: Node, point: Float32Array) -> list[Path]:
+    """Return the paths of the primitives whose boxes hold a point float32[1, 3]; of all if no box does."""
+    paths = primitive_paths(tree)
+    return [path for path in paths if inside_bounds(point, node_in_world(tree, path))[0]] or paths
+
+
+def with_node(tree: Node, path: Path, node: Node) -> Node:
+    """Return the tree with `node` in place of the node at the end of a path."""
+    above = list(nodes_along(tree, path))[:-1]
+    for parent, step in zip(reversed(above), reversed(path), strict=True):
+        node = _with_child(parent, step, node)
+    return node
+
+
+def _with_child(parent: Node, step: int, child: Node) -> Node:
+    """Return `parent` with `child` in place of its child number `step`."""
+    first = 0
+    for field in fields(parent):  # type: ignore[arg-type]  # every node is a dataclass
+        value = getattr(parent, field.name)
+        operands = value if isinstance(value, tuple) else (value,)
+        if not operands or not isinstance(operands[0], Node):
+            continue
+        if step < first + len(operands):
+            replaced = (*operands[: step - first], child, *operands[step - first + 1 :])
+            return replace(parent, **{field.name: replaced if isinstance(value, tuple) else child})  # type: ignore[type-var]  # every node is a dataclass
+        first += len(operands)
+    raise InvalidNode(f"a {type(parent).__name__} has no child {step}")
+
+
+def node_in_world(tree: Node, path: Path) -> Node:
+    """Return the node at a path under the maps, offsets and warps above it, without what it combines with."""
+    nodes = list(nodes_along(tree, path))
+    result = nodes[-1]
+    for parent, step in zip(reversed(nodes[:-1]), reversed(path), strict=True):
+        if not isinstance(parent, Combination):
+            result = _with_child(parent, step, result)
+    return result
+
+
+def inside_bounds(points: Float32Array, *nodes: Node) -> BoolArray:
+    """Return True for each of the points (n, 3) that lies in the box of influence of one of the nodes."""
+    inside = np.zeros(len(points), np.bool_)
+    for node in nodes:
+        lower, upper = node.bounds
+        inside |= ((points >= lower) & (points <= upper)).all(axis=1)
+    return inside
+
+
+def world_matrix(tree: Node, path: Path) -> Float64Array:
+    """Return the linear part, float64[3, 3], of the map from a node's own space to the world.
+
+    Raises
+    ------
+    InvalidNode
+        The node lies below a warp, where the map differs from point to point.
+    """
+    matrix = np.eye(3)
+    for node in list(nodes_along(tree, path))[:-1]:
+        if isinstance(node, Transform):
+            matrix = matrix @ np.asarray(node.matrix, np.float64)[:3, :3]
+        elif node.warp is not None:
+            raise InvalidNode(f"the primitive lies below a {type(node).__name__}; move that as a whole")
+    return matrix
+
+
+def moved(node: Node, offset: ArrayLike) -> Node:
+    """Return a node moved by `offset` (3,) in its own space; a primitive with points stays of its kind."""
+    shift = np.asarray(offset, np.float64)
+    if isinstance(node, Transform):
+        matrix = np.array(node.matrix, np.float64)
+        matrix[:3, 3] += shift
+        return node.child.transform(matrix)
+    points = {
+        name: tuple((np.asarray(getattr(node, name)) + shift).tolist())
+        for name, parameter in parameters_of(type(node)).items()
+        if parameter.quantity is Quantity.POINT
+    }
+    return replace(node, **points) if points else node.translate(shift)  # type: ignore[type-var]  # every node is a dataclass
+
+
+def resized(primitive: Primitive, factor: float) -> Primitive:
+    """Return a primitive whose visible radii are larger by a factor."""
+    radii = {
+        name: factor * getattr(primitive, name)
+        for name, parameter in parameters_of(type(primitive)).items()
+        if parameter.quantity is Quantity.RADIUS
+    }
+    return replace(primitive, **radii)  # type: ignore[type-var]  # every node is a dataclass

@@ -1,0 +1,243 @@
+"""Surgery on trees: add, remove, duplicate and join branches, each step a new tree.
+
+A branch is a node that is an operand of a combination, with the maps above it; a `Path` leads to it.
+"""
+
+from dataclasses import replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array
+from blobtree.errors import InvalidNode
+from blobtree.nodes.paths import (
+    Path,
+    moved,
+    node_at,
+    nodes_along,
+    primitive_at,
+    primitives_around,
+    resized,
+    with_node,
+    world_matrix,
+)
+from blobtree.nodes.tree import (
+    Combination,
+    Difference,
+    Intersection,
+    Node,
+    Ricci,
+    Sum,
+    Transform,
+    Union,
+)
+from blobtree.validation import finite_vector
+
+SOFTNESS = 3.0
+"""Exponent of the Ricci blend that `Join.SOFT` makes: about half way from a sum to a union."""
+
+GROWTH = 1e-3
+"""Part of its radius by which a primitive grows in `dominant_primitive`."""
+
+
+class Join(Enum):
+    """How a branch joins the nodes beside it."""
+
+    BLEND = "blend"
+    SOFT = "soft union"
+    UNION = "union"
+    INTERSECTION = "intersection"
+    DIFFERENCE = "difference"
+
+
+JOIN_OF_KIND: dict[type[Node], Join] = {
+    Sum: Join.BLEND,
+    Ricci: Join.SOFT,
+    Union: Join.UNION,
+    Intersection: Join.INTERSECTION,
+    Difference: Join.DIFFERENCE,
+}
+
+
+def combine(join: Join, first: Node, second: Node) -> Node:
+    """Return two nodes as one; a difference takes the second away from the first."""
+    match join:
+        case Join.BLEND:
+            return Sum((first, second))
+        case Join.SOFT:
+            return Ricci((first, second), exponent=SOFTNESS)
+        case Join.UNION:
+            return Union((first, second))
+        case Join.INTERSECTION:
+            return Intersection((first, second))
+        case Join.DIFFERENCE:
+            return Difference(first, second)
+
+
+def add_node(tree: Node, path: Path, node: Node, join: Join) -> tuple[Node, Path]:
+    """Join a new node to the branch at a path; the node is given in the space of that branch.
+
+    Returns
+    -------
+    tuple[Node, Path]
+        The new tree, and the path of the new node in it. A combination of the kind of `join` at the path, or
+        just above it, takes the node as its last operand.
+    """
+    *above, _ = nodes_along(tree, path)
+    if above and _takes_operand(above[-1], join):
+        return add_operand(tree, path[:-1], node)
+    return _join_at(tree, path, node, join)
+
+
+def add_operand(tree: Node, path: Path, node: Node) -> tuple[Node, Path]:
+    """Give the combination at a path one more operand, the last; return the tree and the operand's path."""
+    parent: Any = node_at(tree, path)
+    extended = replace(parent, operands=(*parent.operands, node))
+    return with_node(tree, path, extended), (*path, len(parent.operands))
+
+
+def remove_branch(tree: Node, path: Path) -> Node:
+    """Return a tree without the branch at a path.
+
+    A combination that keeps one operand becomes that operand. A difference without its solid and a map
+    without its child are removed too.
+
+    Raises
+    ------
+    InvalidNode
+        Nothing would be left.
+    """
+    *above, _ = nodes_along(tree, path)
+    while above:
+        parent, step, path = above.pop(), path[-1], path[:-1]
+        if isinstance(parent, Combination) and not (isinstance(parent, Difference) and step == 0):
+            others = _without_child(parent, step)
+            if others is not None:
+                return with_node(tree, path, others)
+    raise InvalidNode("path: expected a part of a tree, got its last visible part; remove the object instead")
+
+
+def duplicate_branch(tree: Node, path: Path, offset: ArrayLike) -> tuple[Node, Path]:
+    """Add a copy of the branch at a path, moved by `offset` (3,) in the world.
+
+    The copy joins as the original does. A copy of a difference's solid or tool, or of an intersection's
+    operand, is blended with the original, so that it is cut, or cuts, too.
+
+    Returns
+    -------
+    tuple[Node, Path]
+        The new tree, and the path of the copy in it.
+    """
+    local_offset = np.linalg.solve(world_matrix(tree, path), finite_vector("offset", offset))
+    *above, node = nodes_along(tree, path)
+    copy = moved(node, local_offset)
+    if above and isinstance(above[-1], Sum | Ricci | Union):
+        return add_operand(tree, path[:-1], copy)
+    return _join_at(tree, path, copy, Join.BLEND)
+
+
+def rejoin_branch(tree: Node, path: Path, join: Join) -> tuple[Node, Path]:
+    """Join the branch at a path to the nodes beside it in another way.
+
+    The other nodes stay joined as they are. A difference takes the branch away from them.
+
+    Returns
+    -------
+    tuple[Node, Path]
+        The new tree, and the path in it that leads to the same node as before.
+
+    Raises
+    ------
+    InvalidNode
+        The branch has no nodes beside it.
+    """
+    branch = branch_path(tree, path)
+    node = node_at(tree, branch)
+    others = _without_child(node_at(tree, branch[:-1]), branch[-1]) if branch else None
+    if others is None:
+        raise InvalidNode("path: expected a branch with others beside it, got one that is alone in its tree")
+    joined, new_path = _join_at(with_node(tree, branch[:-1], others), branch[:-1], node, join)
+    return joined, (*new_path, *path[len(branch) :])
+
+
+def branch_path(tree: Node, path: Path) -> Path:
+    """Shorten a path to the operand of a combination: the maps above a primitive belong to its branch."""
+    *above, _ = nodes_along(tree, path)
+    while above and not isinstance(above.pop(), Combination):
+        path = path[:-1]
+    return path
+
+
+def world_space_path(tree: Node, path: Path) -> Path:
+    """Shorten a path to its first node that is no combination: that node lies in the world's space."""
+    for depth, node in enumerate(nodes_along(tree, path)):
+        if not isinstance(node, Combination):
+            return path[:depth]
+    return path
+
+
+def join_of(tree: Node, path: Path) -> Join | None:
+    """Return how the branch at a path joins the nodes beside it, None if no `Join` says it.
+
+    In a difference the tool joins, the solid does not.
+    """
+    path = branch_path(tree, path)
+    if not path or (join := JOIN_OF_KIND.get(type(node_at(tree, path[:-1])))) is None:
+        return None
+    return None if join is Join.DIFFERENCE and path[-1] == 0 else join
+
+
+def dominant_primitive(tree: Node, point: ArrayLike) -> Path:
+    """Return the path of the primitive whose growth would change the field most at a surface point (3,).
+
+    In a hole that is the tool of a difference, although its field is not the highest there.
+    """
+    points: Float32Array = np.array([finite_vector("point", point)], np.float32)
+    value = float(tree(points)[0])
+
+    def sensitivity(path: Path) -> float:
+        grown = with_node(tree, path, resized(primitive_at(tree, path), 1.0 + GROWTH))
+        return abs(float(grown(points)[0]) - value)
+
+    return max(primitives_around(tree, points), key=sensitivity)
+
+
+def same_structure(first: Node, second: Node) -> bool:
+    """Return True if paths lead to the same parts of two trees; `Transform` nodes do not count."""
+    return _structure(first) == _structure(second)
+
+
+def _structure(tree: Node) -> list[tuple[type[Node], int]]:
+    """Kinds of nodes and their numbers of children, from the root down."""
+    kinds: list[tuple[type[Node], int]] = []
+    pending = [tree]
+    while pending:
+        node = pending.pop()
+        if not isinstance(node, Transform):
+            kinds.append((type(node), len(node.children)))
+        pending.extend(reversed(node.children))
+    return kinds
+
+
+def _join_at(tree: Node, path: Path, node: Node, join: Join) -> tuple[Node, Path]:
+    """Join a node to the one at a path; a combination of that kind takes it as its last operand."""
+    first = node_at(tree, path)
+    if _takes_operand(first, join):
+        return add_operand(tree, path, node)
+    return with_node(tree, path, combine(join, first, node)), (*path, 1)
+
+
+def _takes_operand(node: Node, join: Join) -> bool:
+    """Return True if one more operand of `node` is joined by `join`."""
+    alike = not isinstance(node, Ricci) or node.exponent == SOFTNESS
+    return join is not Join.DIFFERENCE and JOIN_OF_KIND.get(type(node)) is join and alike
+
+
+def _without_child(parent: Node, step: int) -> Node | None:
+    """Return a combination without one of its children, None if it had no other."""
+    others = (*parent.children[:step], *parent.children[step + 1 :])
+    if len(others) > 1:
+        return replace(parent, operands=others)  # type: ignore[type-var]  # every node is a dataclass
+    return others[0] if others else None

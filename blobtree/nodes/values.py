@@ -1,0 +1,150 @@
+"""Nodes as values: equality, hash, `repr` and pickling without recursion, for trees of any depth.
+
+The methods that dataclasses generate recurse once per level, so they fail some hundred levels down. These
+functions walk the tree with a list. A shared subtree is compared, hashed and pickled once.
+"""
+
+from dataclasses import fields
+from typing import Any
+
+from blobtree.tape.program import ProgramNode
+from blobtree.traversal import postorder
+
+HASH = "_hash"
+"""Attribute that caches a node's hash; it is not part of the value."""
+
+References = dict[str, int | tuple[int, ...]]
+Record = tuple[type[ProgramNode], dict[str, Any], References]
+"""A node's type, its parameters, and the indices of the records of its operands."""
+
+
+def parameter_values(node: ProgramNode) -> dict[str, Any]:
+    """Return the fields of `node` that hold no other nodes, in order."""
+    children = set(map(id, node.children))
+    return {name: value for name, value in _fields(node).items() if not _holds_nodes(value, children)}
+
+
+def equal(first: ProgramNode, second: ProgramNode) -> bool:
+    """Return True if two trees have the same types, parameters and structure."""
+    pending = [(first, second)]
+    seen: set[tuple[int, int]] = set()
+    while pending:
+        a, b = pending.pop()
+        if a is b or (id(a), id(b)) in seen:
+            continue
+        seen.add((id(a), id(b)))
+        if type(a) is not type(b) or len(a.children) != len(b.children):
+            return False
+        if len({vars(node)[HASH] for node in (a, b) if HASH in vars(node)}) == 2:
+            return False
+        if parameter_values(a) != parameter_values(b):
+            return False
+        pending.extend(zip(a.children, b.children, strict=True))
+    return True
+
+
+def hash_of(root: ProgramNode) -> int:
+    """Return the hash of a tree; every node caches its values, so a larger tree costs little."""
+    for node in postorder(root, into=lambda node: HASH not in vars(node)):
+        if HASH not in vars(node):
+            below = tuple(vars(child)[HASH] for child in node.children)
+            value = hash((type(node).__qualname__, tuple(parameter_values(node).values()), below))
+            object.__setattr__(node, HASH, value)
+    result: int = vars(root)[HASH]
+    return result
+
+
+def text_of(root: ProgramNode) -> str:
+    """Return a tree as the Python expression that constructs it."""
+    pieces: list[str] = []
+    pending: list[ProgramNode | str] = [root]
+    while pending:
+        item = pending.pop()
+        if isinstance(item, str):
+            pieces.append(item)
+        else:
+            pending.extend(reversed(_tokens(item)))
+    return "".join(pieces)
+
+
+def to_records(root: ProgramNode) -> list[Record]:
+    """Return a tree as flat records, each behind those of its operands; the last is the root."""
+    order = postorder(root)
+    indices = {id(node): place for place, node in enumerate(order)}
+    records: list[Record] = []
+    for node in order:
+        values = parameter_values(node)
+        references: References = {}
+        for name, value in _fields(node).items():
+            if name not in values:
+                references[name] = (
+                    tuple(indices[id(item)] for item in value)
+                    if isinstance(value, tuple)
+                    else indices[id(value)]
+                )
+        records.append((type(node), values, references))
+    return records
+
+
+def from_records(records: list[Record]) -> ProgramNode:
+    """Return the tree of records from `to_records`."""
+    nodes: list[ProgramNode] = []
+    for kind, values, references in records:
+        operands = {
+            name: nodes[indices] if isinstance(indices, int) else tuple(nodes[place] for place in indices)
+            for name, indices in references.items()
+        }
+        nodes.append(kind(**values, **operands))
+    return nodes[-1]
+
+
+def _fields(node: ProgramNode) -> dict[str, Any]:
+    return {field.name: getattr(node, field.name) for field in fields(node)}  # type: ignore[arg-type]  # every kind of node is a dataclass
+
+
+def _holds_nodes(value: Any, children: set[int]) -> bool:
+    return id(value) in children or (isinstance(value, tuple) and any(id(item) in children for item in value))
+
+
+def _tokens(node: ProgramNode) -> list[ProgramNode | str]:
+    """Return the text of one node in order, with its operands in place of their texts."""
+    values = parameter_values(node)
+    tokens: list[ProgramNode | str] = [f"{type(node).__qualname__}("]
+    for number, (name, value) in enumerate(_fields(node).items()):
+        tokens.append(f"{', ' if number else ''}{name}=")
+        if name in values:
+            tokens.append(repr(value))
+        elif isinstance(value, tuple):
+            tokens.append("(")
+            for item in value:
+                tokens += [item, ", "]
+            tokens[-1] = ",)" if len(value) == 1 else ")"
+        else:
+            tokens.append(value)
+    return [*tokens, ")"]
+
+
+DEEPEST_INDENT = 32
+"""Levels that indentation shows; deeper levels are numbered, to limit the text of deep trees."""
+
+
+def outline(root: ProgramNode) -> str:
+    """Return one line per node, operands indented below their operator."""
+    lines: list[str] = []
+    pending: list[tuple[ProgramNode, int]] = [(root, 0)]
+    while pending:
+        node, depth = pending.pop()
+        lines.append(_indent(depth) + _line(node))
+        pending.extend((child, depth + 1) for child in reversed(node.children))
+    return "\n".join(lines)
+
+
+def _indent(depth: int) -> str:
+    """Return the indentation of a node `depth` levels below the root."""
+    return "  " * min(depth, DEEPEST_INDENT) + (f"[{depth}] " if depth > DEEPEST_INDENT else "")
+
+
+def _line(node: ProgramNode) -> str:
+    """Return the node's name and its parameters, without its operands."""
+    parts = [f"{name}={value!r}" for name, value in parameter_values(node).items()]
+    return f"{type(node).__name__}({', '.join(parts)})"

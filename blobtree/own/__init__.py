@@ -1,1 +1,0 @@
-"""Kinds of nodes of one's own, each from one typed function."""

@@ -1,1 +1,0 @@
-"""Sparse blocks of cells, each with the part of the tape that matters there."""

@@ -1,0 +1,96 @@
+"""Boxes outside of which a tree's field is exactly 0."""
+
+from itertools import product
+
+import numpy as np
+
+from blobtree import affine
+from blobtree._typing import Box, Float32Array
+from blobtree.formulas.operators import Operator, Support
+from blobtree.tape.program import (
+    EnterWarp,
+    Instruction,
+    LeaveWarp,
+    PlacedPrimitive,
+    Pop,
+    Push,
+    Run,
+    distinct_placements,
+    influence_radii,
+)
+
+EMPTY: Box = (np.full(3, np.inf), np.full(3, -np.inf))
+
+
+def influence_bounds(program: list[Instruction]) -> tuple[Float32Array, Float32Array]:
+    """Return lower and upper corner (3,) of the box of influence of a tree, rounded outward.
+
+    The program runs over boxes in place of numbers. A tree that is empty everywhere has the box of its first
+    primitive, so that views always have a box to frame.
+    """
+    box = EMPTY
+    registers: dict[int, Box] = {}
+    fallback: Box | None = None
+    for step in program:
+        match step:
+            case Push(register):
+                registers[register], box = box, EMPTY
+            case Pop(register, operator, _, swapped):
+                left, right = (box, registers[register]) if swapped else (registers[register], box)
+                box = _combine(operator, left, right)
+            case Run(primitives=primitives, operator=operator):
+                boxes = primitive_boxes(primitives)
+                fallback = fallback or (boxes[0][0], boxes[1][0])
+                box = _combine_all(operator, box, boxes)
+            case LeaveWarp(entry):
+                box = _warped(box, entry)
+                fallback = fallback and _warped(fallback, entry)
+    if np.any(box[0] > box[1]) and fallback is not None:
+        box = fallback
+    lower, upper = (corner.astype(np.float32) for corner in box)
+    return np.nextafter(lower, np.float32(-np.inf)), np.nextafter(upper, np.float32(np.inf))
+
+
+def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
+    """Return boxes (n, 3), (n, 3) of balls swept over the primitives' skeletons, under their maps.
+
+    Raises
+    ------
+    InvalidNode
+        An offset leaves nothing of a primitive.
+    """
+    points = primitives[0].primitive.hulls([placed.primitive for placed in primitives])
+    placements, placed_by = distinct_placements(primitives)
+    matrices = np.array([placement.matrix for placement in placements])[placed_by]
+    influences = influence_radii(primitives).max(axis=1)
+    placed_points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
+    margins = influences[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)
+    return placed_points.min(axis=1) - margins, placed_points.max(axis=1) + margins
+
+
+def _combine_all(operator: Operator, box: Box, boxes: Box) -> Box:
+    """Return a box combined with many, one after the other."""
+    if operator.support is Support.LEFT:
+        return box
+    if operator.support is Support.COMMON:
+        return _combine(operator, box, (boxes[0].max(axis=0), boxes[1].min(axis=0)))
+    return _combine(operator, box, (boxes[0].min(axis=0), boxes[1].max(axis=0)))
+
+
+def _warped(box: Box, entry: EnterWarp) -> Box:
+    """Return the outer box around a box below a warp; an empty box stays empty."""
+    if np.any(box[0] > box[1]):
+        return box
+    lower, upper = entry.warp.box(*box, entry.parameters)
+    corners = np.array(list(product(*zip(lower, upper, strict=True))))
+    placed = affine.apply(entry.placement.matrix, corners)
+    return placed.min(axis=0), placed.max(axis=0)
+
+
+def _combine(operator: Operator, left: Box, right: Box) -> Box:
+    """Return the box in which the combination of two fields can differ from 0."""
+    if operator.support is Support.LEFT:
+        return left
+    if operator.support is Support.COMMON:
+        return np.maximum(left[0], right[0]), np.minimum(left[1], right[1])
+    return np.minimum(left[0], right[0]), np.maximum(left[1], right[1])

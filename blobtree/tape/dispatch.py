@@ -1,0 +1,121 @@
+"""Dispatch by a code on the tape: functions that call the functions of one row of a table.
+
+`decals/rendering/tape_shader.py` writes the same dispatch in GLSL, over the kinds in use alone.
+"""
+
+import warp as wp
+
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.operators import OPERATORS
+from blobtree.formulas.skeletons import SKELETONS
+from blobtree.formulas.warps import WARPS
+from blobtree.transpile.specialize import unrolled
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+
+@unrolled
+def closest(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return the closest point of a skeleton, and its influence there."""
+    result = wp.vec4()
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            result = wp.static(SKELETONS[code].closest)(q, tape, at)
+    return result
+
+
+@unrolled
+def min_influence(kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return the smallest influence on a skeleton."""
+    result = float(0.0)
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            result = wp.static(SKELETONS[code].min_influence)(tape, at)
+    return result
+
+
+@unrolled
+def stride(kind: wp.int32) -> wp.int32:
+    """Return the number of texels of a primitive: its parameters and its colour."""
+    result = int(0)
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            result = wp.static(SKELETONS[code].parameters + 1)
+    return result
+
+
+@unrolled
+def is_convex(kind: wp.int32) -> wp.bool:
+    """Return `Skeleton.convex`."""
+    result = bool(False)
+    for code in range(wp.static(len(SKELETONS))):
+        if kind == code:
+            result = bool(wp.static(SKELETONS[code].convex))
+    return result
+
+
+@unrolled
+def is_monotone(operator: wp.int32) -> wp.bool:
+    """Return `Operator.monotone`."""
+    result = bool(False)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = bool(wp.static(OPERATORS[code].monotone))
+    return result
+
+
+@unrolled
+def partials(operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
+    """Return the value and the partial derivatives of an operator."""
+    result = wp.vec3()
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = wp.static(OPERATORS[code].partials)(a, b, parameter)
+    return result
+
+
+@unrolled
+def slope(
+    operator: wp.int32,
+    slope_a: wp.float32,
+    slope_b: wp.float32,
+    max_a: wp.float32,
+    max_b: wp.float32,
+    parameter: wp.float32,
+) -> wp.float32:
+    """Return the slope bound of an operator."""
+    result = float(0.0)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = wp.static(OPERATORS[code].slope)(slope_a, slope_b, max_a, max_b, parameter)
+    return result
+
+
+@unrolled
+def warp_forward(kind: wp.int32, q: wp.vec3, p: wp.vec4) -> wp.vec3:
+    """Return T(q) of a warp."""
+    result = wp.vec3()
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].forward)(q, p)
+    return result
+
+
+@unrolled
+def warp_pullback(kind: wp.int32, q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
+    """Return Jᵀ g of a warp."""
+    result = wp.vec3()
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].pullback)(q, g, p)
+    return result
+
+
+@unrolled
+def warp_stretch(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
+    """Return a bound on ‖J‖ of a warp over a ball."""
+    result = float(1.0)
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].stretch)(q, reach, p)
+    return result

@@ -1,0 +1,114 @@
+"""Kernels of `evaluate`, and the projection of a point onto the surface."""
+
+import warp as wp
+
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import ISO
+from blobtree.tape.interpreter import field_bound, field_color, field_gradient, field_value
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+NEWTON_STEPS = 8
+
+CONVERGED = 1e-6
+"""Field error, in units of ISO, at which a point is on the surface as exactly as float32 can tell."""
+
+STALLED = 1e-4
+"""Field error, in units of ISO, below which a step that does not halve it has met float32's rounding."""
+
+
+@wp.func
+def project_to_surface(
+    p: wp.vec3, longest_step: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+) -> tuple[wp.vec3, wp.vec4]:
+    """Return the point that Newton's method for f = ISO reaches from p, and (f, ∇f) there.
+
+    No step is longer than `longest_step`. A point where the field is flat (its gradient 0) stays there.
+    """
+    best = p
+    f_best = field_gradient(p, tape, span)
+    gap = ISO - f_best[0]
+    q = p
+    f = f_best
+    for _step in range(NEWTON_STEPS):
+        g = wp.vec3(f[1], f[2], f[3])
+        steepness = wp.length(g)
+        if wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
+            break
+        q += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
+        f = field_gradient(q, tape, span)
+        stalled = wp.abs(gap) <= STALLED * ISO and wp.abs(ISO - f[0]) > 0.5 * wp.abs(gap)
+        gap = ISO - f[0]
+        if stalled and wp.abs(gap) > wp.abs(ISO - f_best[0]):
+            break
+        best = q
+        f_best = f
+        if stalled:
+            break
+    return best, f_best
+
+
+@wp.kernel
+def evaluate_values(
+    points: wp.array(dtype=wp.vec3),
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.float32),
+) -> None:
+    """Write `field_value` at each point."""
+    i = wp.tid()
+    out[i] = field_value(points[i], tape, span)
+
+
+@wp.kernel
+def evaluate_gradients(
+    points: wp.array(dtype=wp.vec3),
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.vec4),
+) -> None:
+    """Write `field_gradient` at each point."""
+    i = wp.tid()
+    out[i] = field_gradient(points[i], tape, span)
+
+
+@wp.kernel
+def evaluate_bounds(
+    points: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    reach: wp.array(dtype=wp.float32),
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.vec3),
+) -> None:
+    """Write `field_bound` at each point."""
+    i = wp.tid()
+    out[i] = field_bound(points[i], directions[i], reach[i], tape, span)
+
+
+@wp.kernel
+def evaluate_colors(
+    points: wp.array(dtype=wp.vec3),
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    out: wp.array(dtype=wp.vec4),
+) -> None:
+    """Write `field_color` at each point."""
+    i = wp.tid()
+    out[i] = field_color(points[i], tape, span)
+
+
+@wp.kernel
+def project_points(
+    points: wp.array(dtype=wp.vec3),
+    longest_step: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+) -> None:
+    """Write the projection of each point onto the surface, and the outward unit normal there."""
+    i = wp.tid()
+    p, f = project_to_surface(points[i], longest_step, tape, span)
+    positions[i] = p
+    normals[i] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))

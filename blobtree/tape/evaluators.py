@@ -1,0 +1,320 @@
+"""Evaluators of a tape: its value, slope bound, gradient or colour.
+
+Each evaluator is the set of functions over which the interpreter's loop is closed:
+
+* `leaf(q, c, color, direction, reach, rate)`: the contribution of a primitive at q. c is its closest point
+  and the influence there; `rate` bounds how fast |q − c| / influence changes;
+* `pullback_affine(f, tape, at)`: a result behind the map at tape[at], seen in front of it;
+* `pullback_warp(kind, f, q, tape, at)`: a subtree's result behind a warp and the map at tape[at], seen in
+  front;
+* `scale_speed(kind, q, speed, reach, p)`: a bound on the speed behind a warp of a point that moves at most at
+  `speed` in front of it;
+* `combine(operator, a, b, reach, parameter)`, and the `empty` field.
+
+Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): along q + u ·
+direction for u from 0 to `reach`, per unit of u. Behind an affine map the ray is still a line, along the
+mapped `direction`. Behind a warp the ray is bent, and for a skeleton that is not convex a line gives no
+bound. There `direction` is 0, and bounds follow from `speed` alone: a point moves at most that fast. With a
+direction of 0 from the start, bounds hold in all directions.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import (
+    falloff,
+    falloff_derivative,
+    falloff_shallowest,
+    falloff_slope_bound,
+    falloff_steepest,
+)
+from blobtree.tape.dispatch import is_monotone, partials, slope, warp_pullback, warp_stretch
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+
+@wp.func
+def to_local(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Return a point in the space behind the map at tape[at]."""
+    x = wp.vec4(q[0], q[1], q[2], 1.0)
+    return wp.vec3(wp.dot(tape[at], x), wp.dot(tape[at + 1], x), wp.dot(tape[at + 2], x))
+
+
+@wp.func
+def direction_to_local(v: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Return a direction in the space behind the map at tape[at]."""
+    x = wp.vec4(v[0], v[1], v[2], 0.0)
+    return wp.vec3(wp.dot(tape[at], x), wp.dot(tape[at + 1], x), wp.dot(tape[at + 2], x))
+
+
+@wp.func
+def squared_distance(q: wp.vec3, c: wp.vec4) -> wp.float32:
+    """Return (|q − c| / influence)² for c = (closest point, influence)."""
+    w = q - wp.vec3(c[0], c[1], c[2])
+    return wp.dot(w, w) / (c[3] * c[3])
+
+
+@wp.func
+def constant_speed(
+    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, p: wp.vec4
+) -> wp.float32:
+    """Return `speed`: results at a point alone do not depend on it."""
+    return speed
+
+
+# -- value ----------------------------------------------------------------------------------------------
+
+
+@wp.func
+def value_empty() -> wp.float32:
+    """Return the value of the empty field."""
+    return 0.0
+
+
+@wp.func
+def value_leaf(
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
+) -> wp.float32:
+    """Return the field of one primitive."""
+    return falloff(squared_distance(q, c))
+
+
+@wp.func
+def value_pullback_affine(f: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return `f`: values are the same in every space."""
+    return f
+
+
+@wp.func
+def value_pullback_warp(
+    kind: wp.int32, f: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.float32:
+    """Return `f`: values are the same in every space."""
+    return f
+
+
+@wp.func
+def value_combine(
+    operator: wp.int32, a: wp.float32, b: wp.float32, reach: wp.float32, parameter: wp.float32
+) -> wp.float32:
+    """Return F(a, b)."""
+    return partials(operator, a, b, parameter)[0]
+
+
+# -- slope bound ----------------------------------------------------------------------------------------
+
+
+@wp.func
+def bound_empty() -> wp.vec3:
+    """Return the bounds of the empty field, which is 0 and flat."""
+    return wp.vec3(0.0, 0.0, 0.0)
+
+
+@wp.func
+def bound_leaf(
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
+) -> wp.vec3:
+    """Return (value at q, bound on the rise of the field ahead, bound on its fall) of one primitive.
+
+    The distance d from a convex skeleton is a convex function along a line: nowhere ahead does it grow more
+    slowly, or shrink faster, than at q. Where it shrinks, this bounds the rise of the field and the smallest
+    distance ahead. Where it grows, the field falls, and the bound on its rise is not above 0.
+    """
+    z = squared_distance(q, c)
+    d = wp.sqrt(z)
+    if wp.dot(direction, direction) == 0.0:
+        either = rate * falloff_slope_bound(d, reach * rate)
+        return wp.vec3(falloff(z), either, either)
+    growth = rate
+    if d > 0.0:
+        w = q - wp.vec3(c[0], c[1], c[2])
+        growth = wp.dot(w, direction) / (d * c[3] * c[3])
+    nearest = wp.max(d + wp.min(growth, 0.0) * reach, 0.0)
+    farthest = d + rate * reach
+    rise = -growth * falloff_steepest(nearest, d)
+    if growth > 0.0:
+        rise = -growth * falloff_shallowest(d, farthest)
+    return wp.vec3(falloff(z), rise, rate * falloff_steepest(nearest, farthest))
+
+
+@wp.func
+def bound_pullback_affine(f: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Return `f`: slopes along the ray are the same in every space."""
+    return f
+
+
+@wp.func
+def bound_pullback_warp(
+    kind: wp.int32, f: wp.vec3, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Return `f`: slopes along the ray are the same in every space."""
+    return f
+
+
+@wp.func
+def bound_scale_speed(
+    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, p: wp.vec4
+) -> wp.float32:
+    """Return `speed` times the warp's largest stretch in the ball within reach."""
+    return speed * warp_stretch(kind, q, reach * speed, p)
+
+
+@wp.func
+def bound_combine(
+    operator: wp.int32, a: wp.vec3, b: wp.vec3, reach: wp.float32, parameter: wp.float32
+) -> wp.vec3:
+    """Return the bounds of F(a, b).
+
+    Ahead, an operand exceeds its value at q by at most reach · its rise. The rise of a monotone operator is
+    bounded by its `slope` at the operands' rises, its fall by its `slope` at their falls.
+    """
+    value = partials(operator, a[0], b[0], parameter)[0]
+    max_a = a[0] + reach * wp.max(a[1], 0.0)
+    max_b = b[0] + reach * wp.max(b[1], 0.0)
+    if is_monotone(operator):
+        rise = slope(operator, a[1], b[1], max_a, max_b, parameter)
+        return wp.vec3(value, rise, slope(operator, a[2], b[2], max_a, max_b, parameter))
+    either = slope(operator, wp.max(a[1], a[2]), wp.max(b[1], b[2]), max_a, max_b, parameter)
+    return wp.vec3(value, either, either)
+
+
+# -- gradient -------------------------------------------------------------------------------------------
+
+
+@wp.func
+def vector_empty() -> wp.vec4:
+    """Return the empty field with its gradient, or with its colour."""
+    return wp.vec4(0.0, 0.0, 0.0, 0.0)
+
+
+@wp.func
+def gradient_leaf(
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
+) -> wp.vec4:
+    """Return (value, ∇f) of one primitive."""
+    z = squared_distance(q, c)
+    g = (q - wp.vec3(c[0], c[1], c[2])) * (2.0 * falloff_derivative(z) / (c[3] * c[3]))
+    return wp.vec4(falloff(z), g[0], g[1], g[2])
+
+
+@wp.func
+def gradient_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (value, ∇f) pulled back by the transposed map."""
+    g = tape[at] * f[1] + tape[at + 1] * f[2] + tape[at + 2] * f[3]
+    return wp.vec4(f[0], g[0], g[1], g[2])
+
+
+@wp.func
+def gradient_pullback_warp(
+    kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec4:
+    """Return (value, ∇f) pulled back by the warp's transposed Jacobian, then by the transposed map."""
+    p = tape[at + 3]
+    g = warp_pullback(kind, to_local(q, tape, at), wp.vec3(f[1], f[2], f[3]), p)
+    return gradient_pullback_affine(wp.vec4(f[0], g[0], g[1], g[2]), tape, at)
+
+
+@wp.func
+def gradient_combine(
+    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32
+) -> wp.vec4:
+    """Return (F, ∇F) by the chain rule."""
+    p = partials(operator, a[0], b[0], parameter)
+    g = a * p[1] + b * p[2]
+    return wp.vec4(p[0], g[1], g[2], g[3])
+
+
+# -- colour ---------------------------------------------------------------------------------------------
+
+
+@wp.func
+def color_leaf(
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
+) -> wp.vec4:
+    """Return (value, red, green, blue) of one primitive."""
+    return wp.vec4(falloff(squared_distance(q, c)), color[0], color[1], color[2])
+
+
+@wp.func
+def color_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return `f`: colours are the same in every space."""
+    return f
+
+
+@wp.func
+def color_pullback_warp(
+    kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec4:
+    """Return `f`: colours are the same in every space."""
+    return f
+
+
+@wp.func
+def color_combine(
+    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32
+) -> wp.vec4:
+    """Return F and the colours weighted by |∂F/∂a|·a and |∂F/∂b|·b; the stronger operand's if both are 0."""
+    p = partials(operator, a[0], b[0], parameter)
+    weight_a = wp.abs(p[1]) * a[0]
+    weight_b = wp.abs(p[2]) * b[0]
+    t = float(0.0)
+    if b[0] > a[0]:
+        t = 1.0
+    if weight_a + weight_b > 0.0:
+        t = weight_b / (weight_a + weight_b)
+    mixed = a * (1.0 - t) + b * t
+    return wp.vec4(p[0], mixed[1], mixed[2], mixed[3])
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """The functions over which the interpreter's loop is closed, and the type of their results."""
+
+    leaf: wp.Function
+    pullback_affine: wp.Function
+    pullback_warp: wp.Function
+    scale_speed: wp.Function
+    combine: wp.Function
+    empty: wp.Function
+    type: Any
+
+
+VALUE = Evaluator(
+    value_leaf,
+    value_pullback_affine,
+    value_pullback_warp,
+    constant_speed,
+    value_combine,
+    value_empty,
+    wp.float32,
+)
+BOUND = Evaluator(
+    bound_leaf,
+    bound_pullback_affine,
+    bound_pullback_warp,
+    bound_scale_speed,
+    bound_combine,
+    bound_empty,
+    wp.vec3,
+)
+GRADIENT = Evaluator(
+    gradient_leaf,
+    gradient_pullback_affine,
+    gradient_pullback_warp,
+    constant_speed,
+    gradient_combine,
+    vector_empty,
+    wp.vec4,
+)
+COLOR = Evaluator(
+    color_leaf,
+    color_pullback_affine,
+    color_pullback_warp,
+    constant_speed,
+    color_combine,
+    vector_empty,
+    wp.vec4,
+)

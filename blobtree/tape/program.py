@@ -1,0 +1,404 @@
+"""Tree → program: the order in which one accumulator and a few registers evaluate a tree.
+
+A run folds primitives of one kind into the accumulator. A subtree that cannot be folded in directly gets an
+accumulator of its own (push) and is combined afterwards (pop). The subtree that needs most registers goes
+first (Sethi & Ullman 1970): a tree of n leaves needs at most log₂ n registers, a spine of any length none.
+Affine maps and offsets fold into the primitives below them.
+
+The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state what it reads of a node.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple, cast
+
+import numpy as np
+
+from blobtree import affine
+from blobtree._typing import Float64Array, IndexArray
+from blobtree.errors import InvalidNode
+from blobtree.formulas.falloff import RIM
+from blobtree.formulas.operators import RICCI, SUM, Operator, Support
+from blobtree.formulas.skeletons import Skeleton
+from blobtree.formulas.warps import SpaceWarp
+from blobtree.lazy import Lazy
+from blobtree.traversal import branches
+from blobtree.validation import Vector
+
+MAX_PRIMITIVES = 1 << 24
+"""Beyond it a float32 cannot count the primitives of a run."""
+
+SIMPLE = -1
+"""Weight of a node that folds into the accumulator without one of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """What the nodes above a node do to it."""
+
+    matrix: Float64Array
+    """Map from the node's space to the world, or to the space of the warp around it."""
+    growth: float = 0.0
+    """Sum of the offsets of its radii, in its own units."""
+
+    @Lazy
+    def uniform_scale(self) -> float | None:
+        """Return the factor by which the map scales all lengths, None if directions differ."""
+        return affine.uniform_scale(self.matrix)
+
+    def folds_into(self, skeleton: Skeleton) -> bool:
+        """Return True if the map folds into the parameters of a skeleton; else primitives carry it."""
+        if skeleton.folds_maps:
+            return self.uniform_scale is not None
+        return np.array_equal(self.matrix, WORLD.matrix)
+
+
+WORLD = Placement(np.eye(4))
+
+
+class ProgramNode:
+    """A node of a tree, as the compiler of programs reads it.
+
+    A primitive has a `skeleton`, a combination an `operator` and a deformation a `warp`. A node without any
+    of them has one child, and `child_placement` says what it does to that child.
+    """
+
+    skeleton: ClassVar[Skeleton | None] = None
+    operator: ClassVar[Operator | None] = None
+    warp: ClassVar[SpaceWarp | None] = None
+
+    @property
+    def children(self) -> tuple["ProgramNode", ...]:
+        """The operands of this node, from left to right; empty for a primitive."""
+        return ()
+
+    @property
+    def operator_parameter(self) -> float:
+        """The number that the operator takes besides its operands."""
+        return 0.0
+
+    @property
+    def warp_parameters(self) -> tuple[float, ...]:
+        """The numbers that the warp takes, at most three."""
+        return ()
+
+    def child_placement(self, placement: Placement) -> Placement:
+        """Return the placement of the child of a node that itself has `placement`."""
+        return placement
+
+
+class ProgramPrimitive(ProgramNode):
+    """A leaf of a tree, as the compiler of programs reads it."""
+
+    skeleton: ClassVar[Skeleton]
+    color: Vector
+
+    @classmethod
+    def radii(cls, primitives: Sequence["ProgramPrimitive"]) -> Float64Array:
+        """Return the visible radii (n, k) of n primitives of this kind."""
+        raise NotImplementedError
+
+    @classmethod
+    def hulls(cls, primitives: Sequence["ProgramPrimitive"]) -> Float64Array:
+        """Return points (n, k, 3) whose convex hulls hold the skeletons of n primitives of this kind."""
+        raise NotImplementedError
+
+    @classmethod
+    def packed(
+        cls,
+        primitives: Sequence["ProgramPrimitive"],
+        influences: Float64Array,
+        matrices: Float64Array | None,
+    ) -> Float64Array:
+        """Return the parameters (n, ·, 4) on the tape of n primitives of this kind."""
+        raise NotImplementedError
+
+
+class PlacedPrimitive(NamedTuple):
+    """A primitive and its placement."""
+
+    primitive: ProgramPrimitive
+    placement: Placement
+
+
+_PlacedNode = tuple[ProgramNode, Placement]
+"""Another node and its placement."""
+
+
+def distinct_placements(primitives: list[PlacedPrimitive]) -> tuple[list[Placement], IndexArray]:
+    """Return the placements of primitives, each object once, and the index of each primitive's own."""
+    identities = np.fromiter((id(placed.placement) for placed in primitives), np.int64, len(primitives))
+    if (identities == identities[0]).all():
+        return [primitives[0].placement], np.zeros(len(primitives), np.intp)
+    _, first, placed_by = np.unique(identities, return_index=True, return_inverse=True)
+    placements = [primitives[i].placement for i in first]
+    return placements, placed_by
+
+
+def influence_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
+    """Return the influence radii (n, k) of n primitives of a kind: radius / RIM, offsets included.
+
+    Raises
+    ------
+    InvalidNode
+        An offset leaves nothing of a primitive.
+    """
+    radii = primitives[0].primitive.radii([placed.primitive for placed in primitives])
+    placements, placed_by = distinct_placements(primitives)
+    growth = np.array([placement.growth for placement in placements])[placed_by]
+    influences: Float64Array = radii / RIM + (growth / RIM)[:, None]
+    if (influences <= 0.0).any():
+        vanished = primitives[int(np.argmin(influences.min(axis=1)))]
+        raise InvalidNode(f"offset: {vanished.placement.growth:g} leaves nothing of {vanished.primitive!r}")
+    return influences
+
+
+@dataclass(frozen=True)
+class Run:
+    """Instruction: fold `primitives`, one after the other, into the accumulator."""
+
+    skeleton: Skeleton
+    stretched: bool
+    """True if maps do not fold into the parameters, so that each primitive carries its inverse map."""
+    operator: Operator
+    parameter: float
+    primitives: list[PlacedPrimitive] = field(default_factory=list)
+
+    def accepts(self, other: "Run") -> bool:
+        """Return True if `other` only continues this run."""
+        key = (self.skeleton, self.stretched, self.operator, self.parameter)
+        return key == (other.skeleton, other.stretched, other.operator, other.parameter)
+
+
+@dataclass(frozen=True)
+class Push:
+    """Instruction: store the accumulator in `register`, and start again from the empty field."""
+
+    register: int
+
+
+@dataclass(frozen=True)
+class Pop:
+    """Instruction: combine `register` (left operand) with the accumulator; `swapped` exchanges them."""
+
+    register: int
+    operator: Operator
+    parameter: float
+    swapped: bool = False
+
+
+@dataclass(frozen=True)
+class EnterWarp:
+    """Instruction: map the point through a map and a warp until `LeaveWarp`; `register` keeps the point."""
+
+    warp: SpaceWarp
+    parameters: tuple[float, ...]
+    placement: Placement
+    register: int
+
+
+@dataclass(frozen=True)
+class LeaveWarp:
+    """Instruction: restore the point that `entry` kept, and pull the accumulator back through the warp."""
+
+    entry: EnterWarp
+
+
+Instruction = Run | Push | Pop | EnterWarp | LeaveWarp
+
+
+@dataclass(frozen=True)
+class _Emit:
+    """Pending step: fold `node` into the accumulator; registers from `register` on are free."""
+
+    node: ProgramNode
+    placement: Placement
+    register: int = 0
+    warp_register: int = 0
+
+    def into(self, node: ProgramNode, placement: Placement, *, deeper: int = 0) -> "_Emit":
+        """Return the step for a node below, with `deeper` more registers in use."""
+        return replace(self, node=node, placement=placement, register=self.register + deeper)
+
+
+def compile_program(root: ProgramNode) -> list[Instruction]:
+    """Return the instructions that leave the value of `root` in the accumulator, which starts at 0.
+
+    Raises
+    ------
+    InvalidNode
+        Shared subtrees, counted as often as they are used, hold too many primitives.
+    """
+    weights = _weights(root)
+    program: list[Instruction] = []
+    pending: list[_Emit | Instruction] = [_Emit(root, WORLD)]
+    while pending:
+        step = pending.pop()
+        if isinstance(step, _Emit):
+            pending.extend(reversed(list(_expand(step, weights))))
+        elif isinstance(step, Run) and program and isinstance(program[-1], Run) and program[-1].accepts(step):
+            program[-1].primitives.extend(step.primitives)
+        else:
+            program.append(step)
+    return program
+
+
+def registers_needed(program: list[Instruction]) -> int:
+    """Return the number of registers that a program uses."""
+    return max((step.register + 1 for step in program if isinstance(step, Push)), default=0)
+
+
+def warp_registers_needed(program: list[Instruction]) -> int:
+    """Return the depth to which warps nest in a program."""
+    return max((step.register + 1 for step in program if isinstance(step, EnterWarp)), default=0)
+
+
+def _weights(root: ProgramNode) -> dict[int, int]:
+    """Return the weight of every node with children; raise `InvalidNode` for too many primitives."""
+    weights: dict[int, int] = {}
+    counts: dict[int, int] = {}
+    for node in branches(root):
+        children = [id(child) for child in node.children]
+        counts[id(node)] = sum([counts.get(child, 1) for child in children])
+        weights[id(node)] = _weight(node, [weights.get(child, SIMPLE) for child in children])
+    if counts.get(id(root), 1) > MAX_PRIMITIVES:
+        raise InvalidNode(
+            f"tree: its subtrees, counted as often as they are used, exceed {MAX_PRIMITIVES:,} primitives"
+        )
+    return weights
+
+
+def _weight(node: ProgramNode, child_weights: list[int]) -> int:
+    """Return the registers that a node with children needs, SIMPLE if it folds without an accumulator."""
+    if node.warp is not None:
+        return max(0, child_weights[0])
+    if len(child_weights) == 1:
+        return child_weights[0]
+    heaviest, *others = sorted(child_weights, reverse=True)
+    return max([0, heaviest, *(weight + 1 for weight in others)])
+
+
+def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
+    """Yield smaller steps for a step that starts from an empty accumulator."""
+    node, placement = _strip(step.node, step.placement)
+    if isinstance(node, ProgramPrimitive):
+        yield from _runs([PlacedPrimitive(node, placement)], SUM, 0.0)
+    elif node.warp is not None:
+        yield from _expand_warp(replace(step, node=node, placement=placement), node, node.warp)
+    elif node.operator is not None:
+        expand = _expand_commutative if node.operator.commutes else _expand_ordered
+        yield from expand(replace(step, node=node, placement=placement), node, weights)
+
+
+def _expand_warp(step: _Emit, node: ProgramNode, warp: SpaceWarp) -> Iterator[_Emit | Instruction]:
+    """Yield the steps of a warp: its child in a space of its own."""
+    outer = Placement(step.placement.matrix)
+    entry = EnterWarp(warp, node.warp_parameters, outer, step.warp_register)
+    (child,) = node.children
+    inner = _Emit(child, Placement(np.eye(4), step.placement.growth), step.register, step.warp_register + 1)
+    yield from (entry, inner, LeaveWarp(entry))
+
+
+def _expand_commutative(
+    step: _Emit, node: ProgramNode, weights: dict[int, int]
+) -> Iterator[_Emit | Instruction]:
+    """Yield the heaviest operand first; primitives fold in at the end, kind by kind."""
+    operator, parameter = _operation(node)
+    subtrees: list[_PlacedNode] = []
+    primitives: list[PlacedPrimitive] = []
+    for placed in _flatten(node, step.placement):
+        if isinstance(placed, PlacedPrimitive):
+            primitives.append(placed)
+        else:
+            subtrees.append(placed)
+    subtrees.sort(key=lambda subtree: -weights[id(subtree[0])])
+    for number, (operand, placement) in enumerate(subtrees):
+        if number == 0:
+            yield step.into(operand, placement)
+        else:
+            yield Push(step.register)
+            yield step.into(operand, placement, deeper=1)
+            yield Pop(step.register, operator, parameter)
+    if not subtrees and not operator.starts_from_zero:
+        first, *primitives = primitives
+        yield from _runs([first], SUM, 0.0)
+    yield from _runs(primitives, operator, parameter)
+
+
+def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
+    """Yield the left operand first, unless the right one needs more registers."""
+    operator, parameter = _operation(node)
+    left, right = node.children
+    left_placement = step.placement
+    cuts = operator.support is Support.LEFT
+    right_placement = replace(left_placement, growth=-left_placement.growth) if cuts else left_placement
+    if weights.get(id(right), SIMPLE) == SIMPLE:
+        leaf, placement = _strip(right, right_placement)
+        assert isinstance(leaf, ProgramPrimitive)
+        yield step.into(left, left_placement)
+        yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameter)
+        return
+    swapped = weights[id(right)] > weights.get(id(left), SIMPLE)
+    operands = [(left, left_placement), (right, right_placement)]
+    first, second = reversed(operands) if swapped else operands
+    yield step.into(*first)
+    yield Push(step.register)
+    yield step.into(*second, deeper=1)
+    yield Pop(step.register, operator, parameter, swapped)
+
+
+def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
+    """Yield one run per kind of primitive, in the order in which the kinds first occur."""
+    runs: dict[tuple[Skeleton, bool], Run] = {}
+    run: Run | None = None
+    placement: Placement | None = None
+    for placed in primitives:
+        skeleton = placed.primitive.skeleton
+        if run is None or placed.placement is not placement or skeleton is not run.skeleton:
+            placement = placed.placement
+            key = skeleton, not placement.folds_into(skeleton)
+            run = runs.setdefault(key, Run(*key, operator, parameter))
+        run.primitives.append(placed)
+    yield from runs.values()
+
+
+def _operation(node: ProgramNode) -> tuple[Operator, float]:
+    """Return operator and parameter; a Ricci blend of exponent 1 is the sum (GLSL has no pow(0, 0))."""
+    assert node.operator is not None
+    if node.operator is RICCI and node.operator_parameter == 1.0:
+        return SUM, 0.0
+    return node.operator, node.operator_parameter
+
+
+def _strip(node: ProgramNode, placement: Placement) -> tuple[ProgramNode, Placement]:
+    """Return the node below maps, offsets and one-operand combinations, and its placement."""
+    while len(node.children) == 1 and node.warp is None:
+        placement = node.child_placement(placement)
+        (node,) = node.children
+    return node, placement
+
+
+def _flatten(root: ProgramNode, placement: Placement) -> Iterator[PlacedPrimitive | _PlacedNode]:
+    """Yield the operands of `root`; nested combinations by the same operator yield theirs."""
+    operation = _operation(root)
+    pending = _placed(root.children, placement)
+    while pending:
+        placed = pending.pop()
+        if isinstance(placed, PlacedPrimitive):
+            yield placed
+            continue
+        node, node_placement = _strip(*placed)
+        if node.operator is not None and _operation(node) == operation:
+            pending.extend(_placed(node.children, node_placement))
+        elif node.children:
+            yield node, node_placement
+        else:
+            yield PlacedPrimitive(cast(ProgramPrimitive, node), node_placement)
+
+
+def _placed(nodes: tuple[ProgramNode, ...], placement: Placement) -> list[PlacedPrimitive | _PlacedNode]:
+    """Return nodes and their placements, the last one first."""
+    return [
+        (node, placement) if node.children else PlacedPrimitive(cast(ProgramPrimitive, node), placement)
+        for node in reversed(nodes)
+    ]

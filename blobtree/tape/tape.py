@@ -1,0 +1,205 @@
+"""Program → tape: one flat array that Warp and GLSL read alike, and that an edit overwrites in place.
+
+Layout, in texels (vec4 of float32):
+
+    header     (code, operator, count, parameter)
+      code ≥ 0     a run of `count` primitives of the instruction set's skeletons[code], behind the header:
+                   parameters, then a texel of colour
+      code ≥ STRETCHED  the same for skeletons[code − STRETCHED], each behind PREFIX texels: the rows of its
+                   world → local map, then (largest stretch of that map, 0, 0, 0)
+      PUSH         register[count] = accumulator; accumulator = 0
+      POP          accumulator = operator(register[count], accumulator)
+      POP_SWAPPED  accumulator = operator(accumulator, register[count])
+      WARP         before PREFIX texels: the rows of a world → local map, then (its largest stretch, and the
+                   warp's parameters); `operator` is the warp's code, `count` the register for the point
+      UNWARP       the same; ends what WARP began
+
+All texels of a primitive are adjacent, so a slice of a tape is a tape.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import chain
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree.device import known_device
+from blobtree.errors import InvalidNode
+from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, instruction_set_for
+from blobtree.tape.program import (
+    EnterWarp,
+    Instruction,
+    LeaveWarp,
+    PlacedPrimitive,
+    Pop,
+    Push,
+    Run,
+    distinct_placements,
+    influence_radii,
+    registers_needed,
+    warp_registers_needed,
+)
+
+PUSH = -1
+POP = -2
+POP_SWAPPED = -3
+WARP = -4
+UNWARP = -5
+STRETCHED = 1024
+PREFIX = 4
+REGISTERS = 24
+"""Registers that the interpreters hold: enough for any tree of 2²⁴ leaves."""
+
+WARP_REGISTERS = 8
+"""How deep warps may nest."""
+
+
+@dataclass(frozen=True)
+class DeviceTape:
+    """A tape in the memory of one Warp device: its texels, and the span of texels to read."""
+
+    data: "wp.array[wp.vec4]"
+    span: wp.vec2i
+
+
+@dataclass(frozen=True, eq=False)
+class Tape:
+    """Flat form of a tree, which every evaluator reads.
+
+    Attributes
+    ----------
+    data
+        float32[m, 4]: the texels.
+    registers, warp_registers
+        Numbers of registers that an evaluation needs.
+    skeletons, operators, warps
+        Codes of the kinds in use, to which shaders are specialised.
+    stretched
+        True if a primitive carries its own map.
+    instruction_set
+        The kinds that the codes stand for.
+    headers
+        int64[k]: indices in `data` where the instructions begin.
+
+    Examples
+    --------
+    >>> from blobtree import Point
+    >>> (Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=1.0)).tape.data.shape
+    (5, 4)
+    """
+
+    data: NDArray[np.float32]
+    registers: int
+    skeletons: tuple[int, ...]
+    operators: tuple[int, ...]
+    stretched: bool
+    warps: tuple[int, ...] = ()
+    warp_registers: int = 0
+    instruction_set: InstructionSet = BUILT_IN
+    headers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def on(self, device: str | None = None) -> DeviceTape:
+        """Return this tape on a Warp device, by default the current one."""
+        return _upload(self, known_device(device))
+
+
+@lru_cache(maxsize=64)
+def _upload(tape: Tape, device: str) -> DeviceTape:
+    return DeviceTape(wp.array(tape.data, dtype=wp.vec4, device=device), wp.vec2i(0, len(tape.data)))
+
+
+def compile_tape(program: list[Instruction]) -> Tape:
+    """Return the tape of a tree's program.
+
+    Raises
+    ------
+    InvalidNode
+        The program needs too many registers, its warps nest too deeply, or an offset leaves nothing of a
+        primitive.
+    """
+    registers, warp_registers = registers_needed(program), warp_registers_needed(program)
+    if registers > REGISTERS:
+        raise InvalidNode(
+            f"tree: needs {registers} registers, at most {REGISTERS} exist; group its operands otherwise"
+        )
+    if warp_registers > WARP_REGISTERS:
+        raise InvalidNode(f"tree: warps nest {warp_registers} deep, at most {WARP_REGISTERS} may")
+    runs = [step for step in program if isinstance(step, Run)]
+    skeletons = {run.skeleton for run in runs}
+    warps = {step.warp for step in program if isinstance(step, EnterWarp)}
+    operators = {step.operator for step in program if isinstance(step, Run | Pop)}
+    instruction_set = instruction_set_for(skeletons, operators)
+    texels = [np.concatenate(list(_texels(step, instruction_set))) for step in program]
+    ends = np.cumsum([len(part) for part in texels])
+    return Tape(
+        data=np.concatenate(texels).astype(np.float32),
+        registers=registers,
+        skeletons=tuple(sorted(map(instruction_set.skeletons.index, skeletons))),
+        operators=tuple(sorted(map(instruction_set.operators.index, operators))),
+        stretched=any(run.stretched for run in runs),
+        warps=tuple(sorted(map(instruction_set.warps.index, warps))),
+        warp_registers=warp_registers,
+        instruction_set=instruction_set,
+        headers=np.concatenate([[0], ends[:-1]]).astype(np.int64),
+    )
+
+
+def _texels(step: Instruction, instruction_set: InstructionSet) -> Iterator[NDArray[np.float64]]:
+    """Yield the texels (·, 4) of one instruction."""
+    match step:
+        case Push(register):
+            yield np.array([[PUSH, 0.0, register, 0.0]])
+        case Pop(register, operator, parameter, swapped):
+            code = POP_SWAPPED if swapped else POP
+            yield np.array([[code, instruction_set.operators.index(operator), register, parameter]])
+        case EnterWarp():
+            yield _warp_texels(WARP, step, instruction_set)
+        case LeaveWarp(entry):
+            yield _warp_texels(UNWARP, entry, instruction_set)
+        case Run(skeleton, stretched, operator, parameter, primitives):
+            code = instruction_set.skeletons.index(skeleton) + (STRETCHED if stretched else 0)
+            yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
+            yield _primitive_texels(primitives, stretched=stretched)
+
+
+def _warp_texels(code: int, entry: EnterWarp, instruction_set: InstructionSet) -> NDArray[np.float64]:
+    """Return header, map and parameters of a warp."""
+    parameters = (*entry.parameters, 0.0, 0.0, 0.0)[:3]
+    header = [code, instruction_set.warps.index(entry.warp), entry.register, 0.0]
+    prefix = _map_texels(entry.placement.matrix)
+    prefix[-1, 1:] = parameters
+    return np.vstack([header, prefix])
+
+
+def _map_texels(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return PREFIX texels: the rows of the inverse of `matrix`, then (its largest stretch, 0, 0, 0)."""
+    inverse = np.linalg.inv(matrix)
+    stretch = np.linalg.svd(inverse[:3, :3], compute_uv=False)[0]
+    return np.vstack([inverse[:3], [stretch, 0.0, 0.0, 0.0]])
+
+
+def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> NDArray[np.float64]:
+    """Return parameters and colours of a run's primitives, all at once, for there may be a million.
+
+    Similarity maps fold into the parameters. Under other maps each primitive carries its map, and points are
+    taken to the primitive's own space.
+    """
+    nodes = [placed.primitive for placed in primitives]
+    placements, placed_by = distinct_placements(primitives)
+    grown = influence_radii(primitives)
+    matrices = None
+    if not stretched:
+        matrices = np.array([placement.matrix for placement in placements])[placed_by]
+        scales = np.array([placement.uniform_scale for placement in placements])[placed_by]
+        grown = grown * scales[:, None]
+    parameters = nodes[0].packed(nodes, grown, matrices)
+    colors = np.ones((len(nodes), 1, 4))
+    components = chain.from_iterable(node.color for node in nodes)
+    colors[:, 0, :3] = np.fromiter(components, np.float64, 3 * len(nodes)).reshape(-1, 3)
+    parts = [parameters, colors]
+    if stretched:
+        parts.insert(0, np.array([_map_texels(placement.matrix) for placement in placements])[placed_by])
+    return np.concatenate(parts, axis=1).reshape(-1, 4)

@@ -1,0 +1,171 @@
+"""Tracing cells: the table of blocks that rays read, and the pruned tapes of blocks with surface."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array
+from blobtree.cells.grid import BRANCHING, grid_from
+from blobtree.cells.refine_kernels import SURELY_OUTSIDE
+from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.device import known_device
+from blobtree.tape.instruction_set import InstructionSet
+from blobtree.tape.model import ImplicitModel
+from blobtree.tape.tape import Tape
+from blobtree.tracing.rays import EMPTY, RayCells
+
+RELATIVE_TOLERANCE = 1e-5
+"""Distance to the surface at which a ray hits, over the diagonal of the model's box."""
+
+BLOCKS_ALONG = 64
+"""Finest blocks along the longest side of a model's box."""
+
+MAX_LAYERS = 16
+"""Most layers of empty blocks that a ray skips at once."""
+
+Corner: TypeAlias = tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class TracingCells:
+    """The sparse cells of a model as arrays that rays read.
+
+    Attributes
+    ----------
+    tape
+        float32[m, 4]: the whole tape and the blocks' pruned ones, each behind a texel with its length.
+    blocks
+        int32[nx ny nz], the last axis fastest: for each block the texel in front of its tape, SURELY_INSIDE,
+        or the number of empty layers around it (see `rays.EMPTY`).
+    lower, block_size, counts
+        The grid: lowest corner (3,), side of the blocks, number of blocks along each axis.
+    tolerance
+        Distance to the surface at which a ray hits.
+    instruction_set
+        The meaning of the codes on the tape.
+    """
+
+    tape: Float32Array
+    blocks: Int32Array
+    lower: Float32Array
+    block_size: float
+    counts: tuple[int, int, int]
+    tolerance: float
+    instruction_set: InstructionSet
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceCells:
+    """`TracingCells` in the memory of a Warp device."""
+
+    tape: "wp.array[wp.vec4]"
+    arrays: Any
+    """`rays.RayCells`, the argument of kernels."""
+    instruction_set: InstructionSet
+
+
+def tracing_cells(tree: ImplicitModel, *, device: str | None = None) -> TracingCells:
+    """Return the cells for rays through `tree`, with BLOCKS_ALONG finest blocks along its longest side.
+
+    `device` is the Warp device that builds them, by default the current one.
+    """
+    return _tracing_cells(tree.tape, *_corners(tree), known_device(device))
+
+
+def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCells:
+    """Return the cells for rays through `tree` in a device's memory."""
+    return _device_cells(tree.tape, *_corners(tree), known_device(device))
+
+
+def trace_tolerance(bounds: tuple[Float32Array, Float32Array]) -> float:
+    """Return the distance to the surface at which a ray hits a model of these bounds."""
+    return RELATIVE_TOLERANCE * float(np.linalg.norm(bounds[1] - bounds[0]))
+
+
+def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
+    lower, upper = tree.bounds
+    return tuple(lower.tolist()), tuple(upper.tolist())
+
+
+@lru_cache(maxsize=16)
+def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> TracingCells:
+    bounds = np.array(lower, np.float32), np.array(upper, np.float32)
+    cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
+    cells = build_cells(tape, grid_from(*bounds, cell_size), device=device)
+    whole = np.array([[len(tape.data), 0.0, 0.0, 0.0]], np.float32)
+    first_texels = cells.leaves.spans.numpy()[:, 0] + len(tape.data)
+    block_size = cell_size * BRANCHING
+    blocks = _table(cells, first_texels, np.ceil((bounds[1] - bounds[0]) / block_size).astype(int))
+    return TracingCells(
+        tape=np.concatenate([whole, tape.data, cells.leaves.tape.numpy()]),
+        blocks=blocks.ravel(),
+        lower=cells.grid.origin.astype(np.float32),
+        block_size=block_size,
+        counts=blocks.shape,
+        tolerance=trace_tolerance(bounds),
+        instruction_set=tape.instruction_set,
+    )
+
+
+def _table(cells: SparseCells, first_texels: Int32Array, counts: IndexArray) -> Int32Array:
+    """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz)."""
+    known = np.zeros((1, 1, 1), np.int32)
+    for level in cells.levels[1:]:
+        known = _refined(known, level.children.numpy())
+    x, y, z = np.maximum(counts, 1)
+    known = known[:x, :y, :z]
+    blocks = np.where(known >= 0, np.append(first_texels, 0)[known], known)
+    empty = known == SURELY_OUTSIDE
+    return np.where(empty, EMPTY - _layers(empty), blocks).astype(np.int32)
+
+
+def _refined(known: Int32Array, children: Int32Array) -> Int32Array:
+    """Return the entries of all children (4n, 4n, 4n) of the blocks with entries `known` (n, n, n).
+
+    An entry is the index of a block in its level, or the reason why it has none.
+    """
+    side = len(known)
+    families = children.reshape(-1, BRANCHING, BRANCHING, BRANCHING)
+    below = known.repeat(BRANCHING, 0).repeat(BRANCHING, 1).repeat(BRANCHING, 2)
+    of_parents = below.reshape(side, BRANCHING, side, BRANCHING, side, BRANCHING).transpose(0, 2, 4, 1, 3, 5)
+    of_parents[known >= 0] = families[known[known >= 0]]
+    return below
+
+
+def _layers(empty: BoolArray) -> Int32Array:
+    """Return the number of layers of empty blocks around each empty one (nx, ny, nz), MAX_LAYERS at most.
+
+    The blocks of a column are the bits of one word, 64 at most. Blocks beyond the grid are empty.
+    """
+    columns = np.ones((*empty.shape[:2], BLOCKS_ALONG), np.bool_)
+    columns[..., : empty.shape[2]] = empty
+    words = np.packbits(columns, axis=2, bitorder="little").view("<u8")[..., 0]
+    lowest, highest = np.uint64(1), np.uint64(1 << 63)
+    layers = np.zeros(empty.shape, np.uint8)
+    for _ in range(MAX_LAYERS):
+        words = words & ((words << lowest) | lowest) & ((words >> lowest) | highest)
+        for axis in (0, 1):
+            along = np.moveaxis(words, axis, 0)
+            eroded = along.copy()
+            eroded[1:] &= along[:-1]
+            eroded[:-1] &= along[1:]
+            words = np.moveaxis(eroded, 0, axis)
+        if not words.any():
+            break
+        bits = np.ascontiguousarray(words)[..., None].view(np.uint8)
+        layers += np.unpackbits(bits, axis=2, bitorder="little")[..., : empty.shape[2]]
+    return layers.astype(np.int32)
+
+
+@lru_cache(maxsize=16)
+def _device_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> DeviceCells:
+    cells = _tracing_cells(tape, lower, upper, device)
+    arrays: Any = RayCells()
+    arrays.lower, arrays.counts = wp.vec3(*cells.lower.tolist()), wp.vec3i(*cells.counts)
+    arrays.block_size, arrays.tolerance = cells.block_size, cells.tolerance
+    arrays.tape = wp.array(cells.tape, dtype=wp.vec4, device=device)
+    arrays.blocks = wp.array(cells.blocks, dtype=wp.int32, device=device)
+    return DeviceCells(arrays.tape, arrays, cells.instruction_set)

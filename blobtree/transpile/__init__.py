@@ -1,0 +1,1 @@
+"""Translation of typed functions: to GLSL, to plain Python, and to other tables."""

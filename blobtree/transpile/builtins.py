@@ -1,0 +1,119 @@
+"""GLSL of Warp's types, casts and built-in functions."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import warp as wp
+
+
+class Expression(NamedTuple):
+    """GLSL of an expression, with its type."""
+
+    code: str
+    type: str
+
+
+_TYPES: dict[object, str] = {
+    float: "float",
+    int: "int",
+    bool: "bool",
+    wp.float32: "float",
+    wp.int32: "int",
+    wp.uint32: "uint",
+    wp.bool: "bool",
+    wp.vec2: "vec2",
+    wp.vec3: "vec3",
+    wp.vec4: "vec4",
+    wp.vec2i: "ivec2",
+    wp.vec3i: "ivec3",
+    wp.vec4i: "ivec4",
+}
+_ARRAYS: dict[object, str] = {wp.vec4: "sampler2D", wp.int32: "isampler2D", wp.vec4i: "ivec4_sampler"}
+
+CASTS = {"float": "float", "int": "int", "bool": "bool"}
+
+RESERVED_WORDS = frozenset(
+    """
+    active attribute buffer cast centroid class common const default discard do double enum extern external
+    filter fixed flat goto half highp image in inline inout input interface invariant layout long lowp mat2
+    mat3 mat4 mediump namespace noinline noise noperspective out output packed partition patch precision
+    public resource row_major sample sampler2D shared short sizeof smooth static struct subroutine superp
+    switch template texture this true typedef uniform union unsigned using varying void volatile
+    abs acos all any asin atan ceil clamp cos cross degrees distance dot exp floor fract inverse length log
+    matrixCompMult max min mix mod normalize not pow radians reflect refract round sign sin smoothstep sqrt
+    step tan transpose trunc
+    """.split()  # noqa: SIM905  (a list of words reads best as words)
+)
+"""Names that no variable may have in GLSL: words of the language, and functions that it would hide."""
+
+HELPERS = """\
+vec2 wp_normalize(vec2 v) { float l = length(v); return l > 0.0 ? v / l : vec2(0.0); }
+vec3 wp_normalize(vec3 v) { float l = length(v); return l > 0.0 ? v / l : vec3(0.0); }
+vec4 wp_normalize(vec4 v) { float l = length(v); return l > 0.0 ? v / l : vec4(0.0); }
+#define ivec4_sampler isampler2D
+
+"""
+"""GLSL above every library.
+
+Warp normalises the zero vector to zero, where `normalize` of GLSL is undefined. Textures of integers have one
+type in GLSL and two names here, because their elements are an int or an ivec4.
+"""
+
+
+def type_name(hint: object) -> str | None:
+    """Return the GLSL type of a Warp annotation, or None if GLSL has no such type."""
+    if isinstance(hint, wp.array):
+        return _ARRAYS.get(hint.dtype)
+    try:
+        return _TYPES.get(hint)
+    except TypeError:  # unhashable, so not one of these types
+        return None
+
+
+def _same(name: str) -> Callable[..., Expression]:
+    """Return the emitter of a function of this name whose result has the type of its first argument."""
+
+    def emit(*arguments: Expression) -> Expression:
+        return Expression(f"{name}({', '.join(a.code for a in arguments)})", arguments[0].type)
+
+    return emit
+
+
+def _scalar(name: str) -> Callable[..., Expression]:
+    """Return the emitter of a function of this name whose result is a float."""
+
+    def emit(*arguments: Expression) -> Expression:
+        return Expression(f"{name}({', '.join(a.code for a in arguments)})", "float")
+
+    return emit
+
+
+def _template(pattern: str, result: str | None = None) -> Callable[..., Expression]:
+    """Return the emitter of a function that is spelled otherwise in GLSL."""
+
+    def emit(*arguments: Expression) -> Expression:
+        code = pattern.format(*(argument.code for argument in arguments))
+        return Expression(code, result or arguments[0].type)
+
+    return emit
+
+
+BUILTINS: dict[str, Callable[..., Expression]] = {
+    **{name: _same(name) for name in ("abs", "ceil", "clamp", "cross", "exp", "floor", "log", "max", "min")},
+    **{name: _same(name) for name in ("acos", "asin", "cos", "pow", "sin", "sqrt", "tan", "trunc")},
+    **{name: _scalar(name) for name in ("dot", "length")},
+    "atan": _same("atan"),
+    "atan2": _same("atan"),
+    "lerp": _same("mix"),
+    "normalize": _same("wp_normalize"),
+    "length_sq": _template("dot({0}, {0})", "float"),
+    "cw_mul": _template("({0} * {1})"),
+    "cw_div": _template("({0} / {1})"),
+    "sign": _template("({0} < 0.0 ? -1.0 : 1.0)"),
+    "where": lambda condition, chosen, other: Expression(
+        f"({condition.code} ? {chosen.code} : {other.code})", chosen.type
+    ),
+    "float32": _template("float({0})", "float"),
+    "int32": _template("int({0})", "int"),
+    "uint32": _template("uint({0})", "uint"),
+}

@@ -1,0 +1,427 @@
+"""Translation of typed functions (`@wp.func`) to GLSL, so that every formula of the project is written once.
+
+The subset: typed scalars and vectors, arithmetic, comparisons, `if`, `for … in range`, `while`, Warp's
+maths, and calls of other such functions. An array becomes a 2D texture, 4096 texels wide, that is read with
+`texelFetch`. A struct of uniforms (`uniform_struct`) becomes the uniforms themselves. Everything else is
+refused with file and line.
+"""
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import warp as wp
+
+from blobtree.errors import UntranslatableFunction
+from blobtree.transpile.builtins import BUILTINS, CASTS, HELPERS, RESERVED_WORDS, Expression, type_name
+
+TEXTURE_WIDTH_BITS = 12
+"""Data textures are 1 << 12 = 4096 texels wide: room for an index of millions."""
+
+_INFIX = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+_BITWISE = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}
+_COMPARISON = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_COMPONENTS = {
+    "vec2": "float",
+    "vec3": "float",
+    "vec4": "float",
+    "ivec2": "int",
+    "ivec3": "int",
+    "ivec4": "int",
+}
+_SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x"), "ivec4_sampler": ("ivec4", "")}
+_UNIFORM_STRUCTS: dict[Any, dict[str, Expression]] = {}
+
+
+def uniform_struct(**uniforms: str) -> Callable[[type], Any]:
+    """Declare a `wp.struct` whose fields are uniforms or constants of the shader.
+
+    A function that takes such a struct has no parameter for it in GLSL, and a field is the uniform itself:
+    with ``@uniform_struct(table="index_table")``, ``index.table[i]`` becomes a fetch from ``index_table``.
+    A shader must declare these names above the translated library.
+
+    Parameters
+    ----------
+    uniforms
+        Name of the uniform for each field of the class.
+
+    Raises
+    ------
+    UntranslatableFunction
+        The names are not those of the fields, or a field has no type in GLSL.
+    """
+
+    def declare(cls: type) -> Any:
+        fields = {name: type_name(hint) for name, hint in cls.__annotations__.items()}
+        if fields.keys() != uniforms.keys():
+            raise UntranslatableFunction(
+                f"{cls.__name__}: expected a uniform for each of the fields {', '.join(fields)}, "
+                f"got {', '.join(uniforms)}; name one for each"
+            )
+        for name, glsl_type in fields.items():
+            if glsl_type is None:
+                raise UntranslatableFunction(f"{cls.__name__}: field {name!r} has no type that GLSL knows")
+        struct = wp.struct(cls)
+        _UNIFORM_STRUCTS[struct] = {
+            name: Expression(uniforms[name], str(glsl_type)) for name, glsl_type in fields.items()
+        }
+        return struct
+
+    return declare
+
+
+def uniforms_of(hint: object) -> Mapping[str, Expression] | None:
+    """Return the uniforms of a struct by its fields; None for a type that is no struct of uniforms."""
+    try:
+        return _UNIFORM_STRUCTS.get(hint)
+    except TypeError:  # unhashable
+        return None
+
+
+def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ()) -> str:
+    """Return GLSL of `functions` and of all their callees, each once, callees first.
+
+    Parameters
+    ----------
+    functions
+        Typed functions (`wp.Function`).
+    provided
+        Functions that the shader defines by hand, under the same names. The library only declares them.
+
+    Raises
+    ------
+    UntranslatableFunction
+        A function leaves the shared subset; the message names file and line.
+    """
+    declarations = {function.key: _Translator(function).signature() + ";" for function in provided}
+    translated: dict[str, str] = {}
+    for function in functions:
+        _collect(function, translated, frozenset(declarations))
+    return HELPERS + "\n".join([*declarations.values(), "", *translated.values()])
+
+
+def translate_choice(chooser: Any, choices: Mapping[int, Any]) -> str:
+    """Return GLSL of `chooser`: a call of the function whose code is the first argument, with the others.
+
+    The last function of `choices` takes all codes that are left.
+    """
+    translator = _Translator(chooser)
+    signature = translator.signature()
+    selector, *arguments = (spell(name) for name in translator.types)
+    calls = {code: f"{choice.key}({', '.join(arguments)})" for code, choice in choices.items()}
+    last = list(calls)[-1]
+    tests = [
+        f"    if ({selector} == {code}) {{ return {call}; }}" for code, call in calls.items() if code != last
+    ]
+    return "\n".join([signature + " {", *tests, f"    return {calls[last]};", "}", ""])
+
+
+def _collect(function: wp.Function, translated: dict[str, str], provided: frozenset[str]) -> None:
+    if function.key in translated or function.key in provided:
+        return
+    translator = _Translator(function)
+    source = translator.source()
+    for callee in translator.callees:
+        _collect(callee, translated, provided)
+    translated[function.key] = source
+
+
+@dataclass
+class _Translator:
+    """Translation of one function, with the types of its variables and the functions that it calls."""
+
+    function: wp.Function
+    types: dict[str, str] = field(default_factory=dict)
+    structs: dict[str, Any] = field(default_factory=dict)
+    returned: str = ""
+    callees: list[wp.Function] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        python_function = self.function.func
+        assert python_function is not None, f"{self.function.key} is built in"
+        lines, self.first_line = inspect.getsourcelines(python_function)
+        self.hints = python_function.__annotations__
+        self.file = inspect.getsourcefile(python_function)
+        self.scope: dict[str, Any] = {
+            **python_function.__globals__,
+            **inspect.getclosurevars(python_function).nonlocals,
+        }
+        definition = ast.parse(textwrap.dedent("".join(lines))).body[0]
+        assert isinstance(definition, ast.FunctionDef)
+        self.definition = definition
+
+    def signature(self) -> str:
+        """Return the declaration: type of the result, name, parameters; structs of uniforms are left out."""
+        self.structs = {name: hint for name, hint in self.hints.items() if uniforms_of(hint) is not None}
+        annotations = {name: type_name(hint) for name, hint in self.hints.items() if name not in self.structs}
+        returned = annotations.pop("return", None)
+        if returned is None:
+            raise self.refusal(self.definition, "it does not say what it returns")
+        for name, glsl_type in annotations.items():
+            if glsl_type is None:
+                raise self.refusal(self.definition, f"parameter {name!r} has no type that GLSL knows")
+        if len(annotations) + len(self.structs) != len(self.definition.args.args):
+            raise self.refusal(self.definition, "a parameter lacks its type")
+        self.returned = returned
+        self.types = {name: str(glsl_type) for name, glsl_type in annotations.items()}
+        parameters = ", ".join(f"{glsl_type} {spell(name)}" for name, glsl_type in self.types.items())
+        return f"{returned} {self.function.key}({parameters})"
+
+    def source(self) -> str:
+        """Return the definition."""
+        signature = self.signature()
+        parameters = set(self.types)
+        body = [line for statement in self.definition.body for line in self.statement(statement)]
+        variables = [
+            f"    {glsl_type} {spell(name)};"
+            for name, glsl_type in self.types.items()
+            if name not in parameters
+        ]
+        return "\n".join([signature + " {", *variables, *body, "}", ""])
+
+    def refusal(self, node: ast.AST, reason: str) -> UntranslatableFunction:
+        line = self.first_line + getattr(node, "lineno", 1) - 1
+        return UntranslatableFunction(
+            f"{self.file}:{line}: {self.function.key}: {reason}; "
+            "stay within the subset that Warp and GLSL share (see blobtree/transpile/glsl.py)"
+        )
+
+    # -- statements ---------------------------------------------------------------------------------
+
+    def statement(self, node: ast.stmt) -> Iterator[str]:
+        match node:
+            case ast.Expr(value=ast.Constant()) | ast.Pass():
+                return
+            case ast.Return(value=value) if value is not None:
+                result = self.expression(value)
+                if result.type != self.returned:
+                    raise self.refusal(node, f"it returns {result.type}, not {self.returned}")
+                yield f"    return {result.code};"
+            case ast.Assign(targets=[target], value=value):
+                yield self.assignment(target, self.expression(value))
+            case ast.AnnAssign(target=target, value=value) if value is not None:
+                yield self.assignment(target, self.expression(value))
+            case ast.AugAssign(target=target, op=operator, value=value):
+                yield self.assignment(
+                    target, self.binary(node, operator, self.expression(target), self.expression(value))
+                )
+            case ast.If():
+                yield from self.branch(node)
+            case ast.While(test=test, orelse=[]):
+                yield f"    while ({self.expression(test).code}) {{"
+                yield from self.block(node.body)
+                yield "    }"
+            case ast.For(
+                target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range")) as span, orelse=[]
+            ):
+                yield from self.counted_loop(name, span, node.body)
+            case ast.Break():
+                yield "    break;"
+            case ast.Continue():
+                yield "    continue;"
+            case _:
+                raise self.refusal(node, f"{type(node).__name__} statement")
+
+    def block(self, statements: list[ast.stmt]) -> Iterator[str]:
+        for statement in statements:
+            for line in self.statement(statement):
+                yield "    " + line
+
+    def assignment(self, target: ast.expr, value: Expression) -> str:
+        match target:
+            case ast.Name(id=name):
+                known = self.types.setdefault(name, value.type)
+                if known != value.type:
+                    raise self.refusal(target, f"{name!r} changes its type from {known} to {value.type}")
+                return f"    {spell(name)} = {value.code};"
+            case ast.Subscript(value=base) | ast.Attribute(value=base):
+                if self.is_uniform(base) or self.is_uniform(target):
+                    raise self.refusal(target, f"assignment to {ast.unparse(target)}, which is read-only")
+                return f"    {self.expression(target).code} = {value.code};"
+            case _:
+                raise self.refusal(target, f"assignment to {type(target).__name__}")
+
+    def is_uniform(self, node: ast.expr) -> bool:
+        """Return True for a field of a struct of uniforms, and for an array."""
+        match node:
+            case ast.Attribute(value=ast.Name(id=name)) if name in self.structs:
+                return True
+            case ast.Name(id=name):
+                return self.types.get(name) in _SAMPLED
+        return False
+
+    def branch(self, node: ast.If) -> Iterator[str]:
+        yield f"    if ({self.expression(node.test).code}) {{"
+        yield from self.block(node.body)
+        if node.orelse:
+            yield "    } else {"
+            yield from self.block(node.orelse)
+        yield "    }"
+
+    def counted_loop(self, name: str, span: ast.Call, body: list[ast.stmt]) -> Iterator[str]:
+        bounds = [self.expression(argument).code for argument in span.args]
+        start, stop, step = {1: ["0", *bounds, "1"], 2: [*bounds, "1"], 3: bounds}[len(bounds)]
+        self.types.setdefault(name, "int")
+        counter, order = spell(name), ">" if step.lstrip("(").startswith("-") else "<"
+        yield f"    for ({counter} = {start}; {counter} {order} {stop}; {counter} += {step}) {{"
+        yield from self.block(body)
+        yield "    }"
+
+    # -- expressions --------------------------------------------------------------------------------
+
+    def expression(self, node: ast.expr) -> Expression:
+        match node:
+            case ast.Constant(value=value):
+                return self.literal(node, value)
+            case ast.Name(id=name) if name in self.types:
+                return Expression(spell(name), self.types[name])
+            case ast.Name(id=name) if name in self.structs:
+                raise self.refusal(node, f"struct {name!r} as a value; read one of its fields")
+            case ast.Attribute(value=ast.Name(id=name), attr=attribute) if name in self.structs:
+                return self.uniform(node, name, attribute)
+            case ast.Name(id=name) if name in self.scope:
+                return self.literal(node, self.scope[name])
+            case ast.BinOp(left=left, op=operator, right=right):
+                return self.binary(node, operator, self.expression(left), self.expression(right))
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                negated = self.expression(operand)
+                return Expression(f"(-{negated.code})", negated.type)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return Expression(f"(!{self.expression(operand).code})", "bool")
+            case ast.BoolOp(op=operator, values=values):
+                joint = " && " if isinstance(operator, ast.And) else " || "
+                return Expression(
+                    "(" + joint.join(self.expression(value).code for value in values) + ")", "bool"
+                )
+            case ast.Compare(left=left, ops=[operator], comparators=[right]) if type(operator) in _COMPARISON:
+                symbol = _COMPARISON[type(operator)]
+                return Expression(
+                    f"({self.expression(left).code} {symbol} {self.expression(right).code})", "bool"
+                )
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                chosen, other = self.expression(body), self.expression(orelse)
+                if chosen.type != other.type:
+                    raise self.refusal(node, f"{chosen.type} and {other.type} do not mix")
+                return Expression(
+                    f"({self.expression(test).code} ? {chosen.code} : {other.code})", chosen.type
+                )
+            case ast.Subscript(value=value, slice=index):
+                return self.element(node, self.expression(value), self.expression(index))
+            case ast.Attribute(value=value, attr=component) if component in "xyzw":
+                vector = self.expression(value)
+                return Expression(f"{vector.code}.{component}", _COMPONENTS[vector.type])
+            case ast.Attribute() | ast.Name():
+                return self.literal(node, self.resolve(node))
+            case ast.Call():
+                return self.call(node)
+            case _:
+                raise self.refusal(node, f"{type(node).__name__} expression")
+
+    def uniform(self, node: ast.Attribute, struct: str, name: str) -> Expression:
+        fields = uniforms_of(self.structs[struct]) or {}
+        if name not in fields:
+            raise self.refusal(node, f"{ast.unparse(node)} is not known; fields are {', '.join(fields)}")
+        return fields[name]
+
+    def literal(self, node: ast.expr, value: object) -> Expression:
+        match value:
+            case bool():
+                return Expression(str(value).lower(), "bool")
+            case int():
+                return Expression(str(value), "int")
+            case float():
+                return Expression(repr(value), "float")
+            case wp.uint32():
+                return Expression(f"{value.value}u", "uint")
+            case _:
+                raise self.refusal(node, f"{ast.unparse(node)} is no number")
+
+    def resolve(self, node: ast.expr) -> object:
+        match node:
+            case ast.Name(id=name) if name in self.scope:
+                return self.scope[name]
+            case ast.Name(id=name) if name in CASTS:
+                return name
+            case ast.Attribute(value=value, attr=name):
+                owner = self.resolve(value)
+                if hasattr(owner, name):
+                    return getattr(owner, name)
+        raise self.refusal(node, f"{ast.unparse(node)} is not known")
+
+    def binary(
+        self, node: ast.AST, operator: ast.operator, left: Expression, right: Expression
+    ) -> Expression:
+        kind = type(operator)
+        if kind in _BITWISE:
+            return Expression(f"({left.code} {_BITWISE[kind]} {right.code})", left.type)
+        if kind is ast.Mod:
+            whole = (
+                f"trunc({left.code} / {right.code})"
+                if left.type == "float"
+                else f"({left.code} / {right.code})"
+            )
+            return Expression(f"({left.code} - {right.code} * {whole})", left.type)
+        vectors = left.type in _COMPONENTS and right.type in _COMPONENTS
+        if kind not in _INFIX or (vectors and kind in (ast.Mult, ast.Div)):
+            raise self.refusal(node, f"{kind.__name__} of {left.type} and {right.type}")
+        scalar_pair = left.type not in _COMPONENTS and right.type not in _COMPONENTS
+        if left.type != right.type and (vectors or scalar_pair):
+            raise self.refusal(node, f"{left.type} and {right.type} do not mix")
+        result = left.type if left.type in _COMPONENTS else right.type
+        return Expression(f"({left.code} {_INFIX[kind]} {right.code})", result)
+
+    def element(self, node: ast.Subscript, value: Expression, index: Expression) -> Expression:
+        if value.type in _SAMPLED:
+            element_type, swizzle = _SAMPLED[value.type]
+            mask = (1 << TEXTURE_WIDTH_BITS) - 1
+            texel = f"ivec2({index.code} & {mask}, {index.code} >> {TEXTURE_WIDTH_BITS})"
+            return Expression(f"texelFetch({value.code}, {texel}, 0){swizzle}", element_type)
+        if value.type in _COMPONENTS:
+            return Expression(f"{value.code}[{index.code}]", _COMPONENTS[value.type])
+        raise self.refusal(node, f"{value.type} has no elements")
+
+    def call(self, node: ast.Call) -> Expression:
+        if node.keywords:
+            raise self.refusal(node, "keyword arguments")
+        callee = self.resolve(node.func)
+        hints = dict(getattr(getattr(callee, "func", None), "__annotations__", {}))
+        returned = type_name(hints.pop("return", None))
+        arguments = [self.expression(argument) for argument in self.passed(node, list(hints.values()))]
+        codes = ", ".join(argument.code for argument in arguments)
+        constructor = CASTS[callee] if isinstance(callee, str) else type_name(callee)
+        if constructor is not None:
+            return Expression(f"{constructor}({codes or '0.0'})", constructor)
+        if not isinstance(callee, wp.Function):
+            raise self.refusal(node, f"{ast.unparse(node.func)} is not a typed function")
+        if callee.is_builtin():
+            if callee.key not in BUILTINS:
+                raise self.refusal(node, f"wp.{callee.key} has no twin in GLSL")
+            return BUILTINS[callee.key](*arguments)
+        if callee not in self.callees:
+            self.callees.append(callee)
+        if returned is None:
+            raise self.refusal(node, f"{callee.key} does not say what it returns")
+        expected = [type_name(hint) for hint in hints.values() if uniforms_of(hint) is None]
+        types = [argument.type for argument in arguments]
+        if expected != types:
+            raise self.refusal(
+                node, f"{callee.key} takes {', '.join(map(str, expected))}, got {', '.join(types)}"
+            )
+        return Expression(f"{callee.key}({codes})", returned)
+
+    def passed(self, node: ast.Call, hints: list[Any]) -> Iterator[ast.expr]:
+        """Yield the arguments that a call has in GLSL: all but the structs of uniforms, which must fit."""
+        for number, argument in enumerate(node.args):
+            hint = hints[number] if number < len(hints) else None
+            if uniforms_of(hint) is None:
+                yield argument
+            elif not (isinstance(argument, ast.Name) and self.structs.get(argument.id) is hint):
+                raise self.refusal(node, f"{ast.unparse(argument)} is not the struct of uniforms expected")
+
+
+def spell(name: str) -> str:
+    """Return `name`, with an underscore if GLSL reserves it."""
+    return name + "_" if name in RESERVED_WORDS else name

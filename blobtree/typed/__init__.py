@@ -1,1 +1,0 @@
-"""Typed functions as source: to GLSL, to plain Python, made anew for other tables."""

@@ -1,1 +1,0 @@
-"""Meshes and slices as pyvista objects."""

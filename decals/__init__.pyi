@@ -1,0 +1,58 @@
+from . import editing, errors, field, images, index, rendering, scattering, scenes, surfaces, vtk, window
+from ._version import __version__
+from .errors import ImplicitDecalsError
+from .field.evaluate import evaluate
+from .field.mapping import ImageMapping
+from .images import load_image
+from .model import NO_IMAGE, Decals, Interaction
+from .record import Contact
+from .scattering.relaxation import Relaxation
+from .scattering.scatter import scatter
+from .scattering.sizing import Sizing
+from .scenes.camera import Camera
+from .scenes.cover import cover
+from .scenes.load import load_model
+from .scenes.objects import MeshObject, TreeObject
+from .scenes.render import render
+from .scenes.scene import DecalImage, Scene
+from .scenes.scene_file import load_scene, save_scene
+from .vtk import show
+from .window import edit
+
+__all__ = [
+    "NO_IMAGE",
+    "Camera",
+    "Contact",
+    "DecalImage",
+    "Decals",
+    "ImageMapping",
+    "ImplicitDecalsError",
+    "Interaction",
+    "MeshObject",
+    "Relaxation",
+    "Scene",
+    "Sizing",
+    "TreeObject",
+    "__version__",
+    "cover",
+    "edit",
+    "editing",
+    "errors",
+    "evaluate",
+    "field",
+    "images",
+    "index",
+    "load_image",
+    "load_model",
+    "load_scene",
+    "render",
+    "rendering",
+    "save_scene",
+    "scatter",
+    "scattering",
+    "scenes",
+    "show",
+    "surfaces",
+    "vtk",
+    "window",
+]

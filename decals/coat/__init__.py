@@ -1,1 +1,0 @@
-"""Particles to decals: sizes, tangents, images, disorder."""

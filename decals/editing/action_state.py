@@ -1,0 +1,172 @@
+"""State that the actions of one window share: selection, messages, strokes and background jobs."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array, Int64Array
+from blobtree.nodes.paths import Path
+from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
+from decals.editing.edit import Edit
+from decals.editing.queries import SurfacePick
+from decals.editing.session import Command, EditSession
+from decals.editing.tree_commands import same_structure
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.validation import instance
+
+Cursor = Callable[[], SurfacePick | None]
+"""Returns the surface point under the cursor, or None."""
+
+
+def require_pick(cursor: Cursor) -> SurfacePick:
+    """Return the surface point under the cursor, or raise `InvalidEdit`."""
+    pick = cursor()
+    if pick is None:
+        raise InvalidEdit("no surface under the cursor; point at one")
+    return pick
+
+
+class ActionState:
+    """Selection, message, strokes and background jobs of one window.
+
+    Parameters
+    ----------
+    session
+        The edited session.
+    threaded
+        If True, long edits run in threads, and the owner calls ``background.poll`` regularly.
+
+    Attributes
+    ----------
+    selection
+        Numbers of the selected decals, in the order of their selection.
+    primitive
+        Object and path of the selected primitive, if any.
+    handle_offset
+        Offset of the primitive's handle from the middle of its box, shape (3,).
+    message
+        Result of the last action, in plain words.
+    view
+        Returns the eye and its target. Default: the document camera's.
+    background
+        Long edits and saves.
+    """
+
+    def __init__(self, session: EditSession, *, threaded: bool = False) -> None:
+        self.session = instance("session", session, EditSession, InvalidEdit, "EditSession(scene) makes one")
+        self.selection: tuple[int, ...] = ()
+        self.primitive: tuple[int, Path] | None = None
+        self.handle_offset: Float32Array = np.zeros(3, np.float32)
+        self.message = ""
+        self.view: Callable[[], tuple[ArrayLike, ArrayLike]] = self._document_view
+        self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
+        self._series: tuple[str, object] | None = None
+        self._stroke = object()
+        self._unsubscribe = session.subscribe(self._drop_deleted)
+
+    def close(self) -> None:
+        """Unsubscribe from the session, which may outlive the window."""
+        self._unsubscribe()
+
+    def show(self, message: str) -> None:
+        """Set the message."""
+        self.message = message
+
+    # -- selection --------------------------------------------------------------------------------------
+
+    @property
+    def selected_numbers(self) -> Int64Array:
+        """Numbers of the selected decals; `InvalidEdit` if there are none."""
+        if not self.selection:
+            raise InvalidEdit("no decal is selected; click on one")
+        return np.array(self.selection, np.int64)
+
+    @property
+    def primitive_is_subject(self) -> bool:
+        """True if duplicate and delete apply to the primitive: one is selected, and no decal is."""
+        return self.primitive is not None and not self.selection
+
+    def select_primitive(self, number: int, path: Path, handle_offset: Float32Array | None) -> None:
+        """Select a primitive and deselect all decals; None keeps the offset of the handle."""
+        self.primitive, self.selection = (number, path), ()
+        if handle_offset is not None:
+            self.handle_offset = handle_offset
+
+    def _drop_deleted(self, edit: Edit) -> None:
+        """Deselect decals that an edit deleted, and the primitive if its path leads elsewhere now."""
+        before, after = edit.parts_before.objects, edit.parts_after.objects
+        if self.primitive is not None and before is not None:
+            number = self.primitive[0]
+            exists = number < min(len(before), len(after))
+            if not exists or not same_structure(before[number], after[number]):
+                self.primitive = None
+        exist = self.session.document.decals.has(np.array(self.selection, np.int64))
+        self.selection = tuple(n for n, kept in zip(self.selection, exist, strict=True) if kept)
+
+    def _document_view(self) -> tuple[ArrayLike, ArrayLike]:
+        camera = self.session.document.camera
+        return camera.position, camera.target
+
+    # -- strokes ----------------------------------------------------------------------------------------
+
+    def begin_stroke(self, label: str) -> None:
+        """End the open stroke, and collect all following edits in one undo entry until `end_stroke`."""
+        self.end_stroke()
+        self._stroke = object()
+        self.session.begin_stroke(label)
+
+    def end_stroke(self) -> None:
+        """End the open stroke once all its background edits are adopted."""
+        self._series, self._stroke = None, object()
+        stroke = self._stroke
+        self.background.when_followed(lambda: self._end(stroke))
+
+    def _end(self, stroke: object) -> None:
+        """End a stroke, unless another one has begun since."""
+        if stroke is self._stroke:
+            self.session.end_stroke()
+
+    def begin_series(self, series: tuple[str, object] | None, label: str) -> None:
+        """Continue the open stroke for a repetition of the last action, or begin another stroke.
+
+        Parameters
+        ----------
+        series
+            Name of the action, and the selection; None for actions that do not repeat.
+        label
+            Name of the undo entry.
+        """
+        if series == self._series:
+            return
+        self._stroke = object()
+        self.session.end_stroke()
+        if series is not None:
+            self.session.begin_stroke(label)
+        self._series = series
+
+    # -- commands ---------------------------------------------------------------------------------------
+
+    def run(self, command: Command, done: Callable[[], None] | None = None) -> None:
+        """Carry out a command, in the background if it takes long, then call ``done``."""
+        if takes_long(command):
+            self.background.edit(command.label, step_of(command), done)
+            return
+        self.session.do(command)
+        self.message = command.label
+        if done is not None:
+            done()
+
+    def run_latest(self, command: Command) -> None:
+        """Carry out a command of a drag; errors become the message."""
+        self.run_latest_step(command.label, step_of(command), long=takes_long(command))
+
+    def run_latest_step(self, label: str, step: Step, *, long: bool) -> None:
+        """Carry out a step of a drag, in the background if it is long; errors become the message."""
+        try:
+            if long:
+                self.background.edit_latest(label, step)
+            else:
+                self.message = step(self.session)
+        except ImplicitDecalsError as error:
+            self.message = str(error)

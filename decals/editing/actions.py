@@ -1,0 +1,237 @@
+"""Actions of the editing window by name: selection, history, file, and those on decals and trees.
+
+To add an action, write a method with the `action` decorator in `DecalActions`, `TreeActions` or `Actions`.
+The key table and the help follow from it.
+"""
+
+from collections.abc import Callable
+from os import PathLike
+
+from decals.editing.action_state import ActionState, Cursor
+from decals.editing.background import are_many
+from decals.editing.commands import DeleteDecals, DuplicateDecals
+from decals.editing.decal_actions import DecalActions
+from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, action, registered_actions
+from decals.editing.session import EditSession, UndoEntry
+from decals.editing.tree_actions import TreeActions
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.scenes.camera import Camera
+from decals.validation import describe
+
+
+class Actions:
+    """Carries out the actions of the key table on an edit session.
+
+    Parameters
+    ----------
+    session
+        The edited session.
+    path
+        File to save to, if any.
+    threaded
+        If True, long edits run in threads, and the owner calls ``state.background.poll`` regularly.
+
+    Attributes
+    ----------
+    state : ActionState
+        Selection, message and background jobs.
+    decals : DecalActions
+        Actions on decals.
+    trees : TreeActions
+        Actions on objects and primitives.
+    path
+        File to save to.
+    help_visible
+        True while the window shows the help.
+    camera
+        Returns the camera to save with the scene; None for the document's.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import Actions
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=20, images=["eye"])
+    >>> actions = Actions(decals.editing.EditSession(scene))
+    >>> actions.perform("select_all", lambda: None)
+    >>> actions.perform("larger", lambda: None)
+    >>> actions.state.message
+    'scale'
+    """
+
+    def __init__(
+        self,
+        session: EditSession,
+        *,
+        path: str | PathLike[str] | None = None,
+        threaded: bool = False,
+    ) -> None:
+        self.state = ActionState(session, threaded=threaded)
+        self.decals = DecalActions(self.state)
+        self.trees = TreeActions(self.state)
+        self.path = path
+        self.help_visible = False
+        self.camera: Callable[[], Camera | None] = lambda: None
+        self._actions = {
+            name: (binding, method.__get__(owner))
+            for owner in (self, self.decals, self.trees)
+            for name, (binding, method) in registered_actions(type(owner)).items()
+        }
+
+    def perform(self, name: str, cursor: Cursor) -> None:
+        """Carry out an action; if that is impossible, nothing changes and ``state.message`` says why.
+
+        Parameters
+        ----------
+        name
+            Name of the action in the key table.
+        cursor
+            Returns the surface point under the cursor, or None.
+
+        Raises
+        ------
+        InvalidEdit
+            There is no such action.
+        """
+        if not isinstance(name, str) or name not in self._actions:
+            raise InvalidEdit(f"action: expected one of the key table, such as 'undo', got {describe(name)}")
+        binding, method = self._actions[name]
+        self.state.begin_series((name, self.state.selection) if binding.repeats else None, binding.summary)
+        try:
+            method(cursor)
+        except ImplicitDecalsError as error:
+            self.state.message = str(error)
+
+    # -- selection --------------------------------------------------------------------------------------
+
+    @action("select", "Click", summary="select the decal under the cursor", group=Group.SELECTION)
+    def select(self, cursor: Cursor) -> None:
+        """Select the decal under the cursor, or none."""
+        pick = cursor()
+        self.state.selection = () if pick is None or pick.owner < 0 else (pick.owner,)
+        self.state.message = f"decal {pick.owner}" if pick is not None and self.state.selection else ""
+
+    @action(
+        "select_also", "Shift+Click", summary="add it to the selection, or remove it", group=Group.SELECTION
+    )
+    def select_also(self, cursor: Cursor) -> None:
+        """Add the decal under the cursor to the selection, or remove it."""
+        pick = cursor()
+        if pick is None or pick.owner < 0:
+            return
+        selection = self.state.selection
+        others = tuple(number for number in selection if number != pick.owner)
+        self.state.selection = others if pick.owner in selection else (*others, pick.owner)
+        self.state.message = f"{len(self.state.selection)} decals"
+
+    @action("select_all", "Ctrl+a", summary="select all decals", group=Group.SELECTION)
+    def select_all(self, _cursor: Cursor) -> None:
+        """Select all decals."""
+        self.state.selection = tuple(self.state.session.document.decals.numbers.tolist())
+        self.state.message = f"{len(self.state.selection)} decals"
+
+    @action(
+        "deselect",
+        "Escape",
+        summary="deselect all; revert a drag; cancel a background edit",
+        group=Group.SELECTION,
+    )
+    def deselect(self, _cursor: Cursor) -> None:
+        """Deselect all decals, revert the drag, and cancel the background edit."""
+        self.state.selection, self.state.message = (), ""
+        self.state.background.cancel()
+        self.state.session.cancel_stroke()
+
+    @action(
+        "duplicate",
+        "d",
+        summary="duplicate the selected decals, else the selected primitive",
+        group=Group.SELECTION,
+    )
+    def duplicate(self, _cursor: Cursor) -> None:
+        """Duplicate the selected decals and select the copies, or duplicate the selected primitive."""
+        state = self.state
+        if state.primitive_is_subject:
+            self.trees.duplicate_selected()
+            return
+        count = len(state.selection)
+
+        def select() -> None:
+            end = state.session.document.decals.next_number
+            state.selection = tuple(range(end - count, end))
+
+        state.run(DuplicateDecals(state.selected_numbers), select)
+
+    @action(
+        "delete",
+        "Delete",
+        "BackSpace",
+        summary="delete the selected decals, else the selected primitive",
+        group=Group.SELECTION,
+    )
+    def delete(self, _cursor: Cursor) -> None:
+        """Delete the selected decals, or the selected primitive."""
+        if self.state.primitive_is_subject:
+            self.trees.delete_selected()
+        else:
+            self.state.run(DeleteDecals(self.state.selected_numbers))
+
+    # -- scene ------------------------------------------------------------------------------------------
+
+    @action("undo", "Ctrl+z", summary="undo", group=Group.SCENE)
+    def undo(self, _cursor: Cursor) -> None:
+        """Undo the last entry."""
+        self._step_through_history(self.state.session.next_undo, "undo", _undo)
+
+    @action("redo", "Ctrl+y", "Ctrl+Shift+z", summary="redo", group=Group.SCENE)
+    def redo(self, _cursor: Cursor) -> None:
+        """Redo the entry that was undone last."""
+        self._step_through_history(self.state.session.next_redo, "redo", _redo)
+
+    def _step_through_history(
+        self, entry: UndoEntry | None, name: str, step: Callable[[EditSession, UndoEntry], str]
+    ) -> None:
+        """Undo or redo an entry, in the background if it changes many decals."""
+        state = self.state
+        state.background.require_idle(computing=False)
+        if entry is None:
+            state.message = f"nothing to {name}"
+        elif are_many(entry.edit.after.numbers):
+            state.background.edit(name, lambda session: step(session, entry))
+        else:
+            state.message = step(state.session, entry)
+
+    @action("save", "Ctrl+s", summary="save", group=Group.SCENE)
+    def save(self, _cursor: Cursor) -> None:
+        """Save the scene."""
+        if self.path is None:
+            raise InvalidEdit("no file to save to; give path= when you open the window")
+        self.state.background.save(self.path, self.camera())
+
+    @action("help", "h", "F1", summary="show or hide this help", group=Group.SCENE)
+    def toggle_help(self, _cursor: Cursor) -> None:
+        """Show or hide the help."""
+        self.help_visible = not self.help_visible
+
+
+def _undo(session: EditSession, entry: UndoEntry) -> str:
+    if session.next_undo is not entry:
+        raise InvalidEdit("another edit was made meanwhile; undo again")
+    return f"undid: {session.undo()}"
+
+
+def _redo(session: EditSession, entry: UndoEntry) -> str:
+    if session.next_redo is not entry:
+        raise InvalidEdit("another edit was made meanwhile; there is nothing to redo")
+    return f"redid: {session.redo()}"
+
+
+KEYS = KeyTable(
+    [
+        *(binding for binding, _ in registered_actions(Actions).values()),
+        *(binding for binding, _ in registered_actions(DecalActions).values()),
+        *(binding for binding, _ in registered_actions(TreeActions).values()),
+        *UNREGISTERED,
+    ]
+)
+"""The key table."""

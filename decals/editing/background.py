@@ -1,0 +1,350 @@
+"""Long edits and saves in the background of a window.
+
+A long edit is done to a fork of the session, in a thread. The session then adopts the fork, which takes the
+same time however much was changed. If the session was edited meanwhile, the long edit is repeated on a new
+fork, so no edit is lost.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+
+from blobtree._typing import Int64Array
+from blobtree.progress import Cancel, Progress
+from decals.editing.commands import DecalCommand
+from decals.editing.scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
+from decals.editing.session import Command, EditSession, SaveJob
+from decals.editing.tree_commands import PrimitiveCommand
+from decals.editing.worker import Completion, Job, Worker
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.scenes.camera import Camera
+
+MAX_IMMEDIATE_DECALS = 500
+"""Commands for more decals than this run in the background."""
+
+LONG_COMMANDS = (AddObject, PrimitiveCommand, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals)
+"""Commands that query surfaces at many points, or build surfaces."""
+
+CLOSE_TIMEOUT = 5.0
+"""Seconds for which `BackgroundJobs.close` waits for a cancelled edit."""
+
+BUSY = "another edit is running; wait for it, or press Escape to cancel it"
+
+Step = Callable[[EditSession], str]
+"""Edits a session, and returns a message for the user (empty for none)."""
+
+
+def are_many(numbers: Int64Array) -> bool:
+    """Return True if an edit of these decals belongs in the background."""
+    return len(numbers) > MAX_IMMEDIATE_DECALS
+
+
+def takes_long(command: Command) -> bool:
+    """Return True if a command belongs in the background: it queries surfaces, or edits many decals."""
+    if isinstance(command, DecalCommand):
+        return are_many(command.numbers)
+    return isinstance(command, LONG_COMMANDS)
+
+
+def step_of(command: Command) -> Step:
+    """Return the step that carries out a command."""
+
+    def step(session: EditSession) -> str:
+        session.do(command)
+        return command.label
+
+    return step
+
+
+@dataclass(frozen=True, eq=False)
+class _Request:
+    """An edit to make: its label, the step, and a callback for the moment at which it is visible."""
+
+    label: str
+    step: Step
+    done: Callable[[], None] | None = None
+
+
+class BackgroundJobs:
+    """Runs at most one edit and one save of a session in threads.
+
+    Parameters
+    ----------
+    session
+        The edited session.
+    show
+        Shows a message to the user.
+    end_stroke
+        Ends the open stroke; called before a background edit becomes an undo entry of its own.
+    threaded
+        If False, everything runs at once, in the caller's thread. If True, the owner calls `poll` regularly.
+    """
+
+    def __init__(
+        self,
+        session: EditSession,
+        show: Callable[[str], None],
+        end_stroke: Callable[[], None],
+        *,
+        threaded: bool,
+    ) -> None:
+        self._session, self._show, self._end_stroke = session, show, end_stroke
+        self._threaded = threaded
+        self._edits, self._saves = Worker(), Worker(finish_at_exit=True)
+        self._latest: _Request | None = None
+        self._next_save: Job | None = None
+        self._computing = self._following = False
+        self._when_idle: list[Callable[[], None]] = []
+
+    # -- edits ------------------------------------------------------------------------------------------
+
+    def edit(self, label: str, step: Step, done: Callable[[], None] | None = None) -> None:
+        """Edit the session in the background.
+
+        Parameters
+        ----------
+        label
+            What the edit does, in a few words.
+        step
+            The edit. It may run several times, each time on a new fork.
+        done
+            Called once the session has adopted the edit.
+
+        Raises
+        ------
+        InvalidEdit
+            Another edit is running.
+        """
+        if not self._threaded:
+            self._adopted(step(self._session), done)
+            return
+        self.require_idle()
+        self._edits.start(self._fork_job(_Request(label, step, done)))
+
+    def _adopted(self, message: str, done: Callable[[], None] | None) -> None:
+        """Call the callback of an edit that the session has adopted, and show its message."""
+        if done is not None:
+            done()
+        if message:
+            self._show(message)
+
+    def compute(self, label: str, work: Callable[[Progress, Cancel], Command]) -> None:
+        """Compute a command in the background without the session, then carry it out.
+
+        Raises
+        ------
+        InvalidEdit
+            Another edit is running.
+        """
+        if not self._threaded:
+            self.edit(label, step_of(work(lambda _stage, _fraction: None, lambda: False)))
+            return
+
+        def run(progress: Progress, cancel: Cancel) -> Completion:
+            command = work(progress, cancel)
+
+            def complete() -> Job:
+                self._computing = False
+                self._end_stroke()
+                return self._fork_job(_Request(label, step_of(command)))
+
+            return complete
+
+        self.require_idle()
+        self._computing = self._edits.start(Job(label, run))
+
+    def edit_latest(self, label: str, step: Step) -> None:
+        """Edit the session repeatedly, as in a drag: while one step runs, only the latest one is kept.
+
+        Raises
+        ------
+        InvalidEdit
+            Another kind of edit is running.
+        """
+        if not self._threaded:
+            self.edit(label, step)
+        elif self._following and self._edits.busy and not self._edits.cancelling:
+            self._latest = _Request(label, step)
+        else:
+            self.require_idle()
+            self._following = True
+            self.edit(label, step)
+
+    def when_followed(self, call: Callable[[], None]) -> None:
+        """Call a function once all steps of `edit_latest` are adopted; calls keep their order."""
+        self._when_idle.append(call)
+        self._call_waiting()
+
+    def _call_waiting(self) -> None:
+        while self._when_idle and not self._following:
+            self._when_idle.pop(0)()
+
+    def require_idle(self, *, computing: bool = True) -> None:
+        """Refuse a new edit while another one runs.
+
+        Parameters
+        ----------
+        computing
+            If False, an edit that is still being computed without the session does not count.
+
+        Raises
+        ------
+        InvalidEdit
+            Another edit is running.
+        """
+        if self._edits.busy and (computing or not self._computing):
+            raise InvalidEdit(BUSY)
+
+    def _fork_job(self, request: _Request) -> Job:
+        """Return the job that edits a fork; its completion adopts the fork, or repeats the job on a new one.
+
+        A step that fails on an outdated fork is repeated too: it may succeed on the next one.
+        """
+        fork, following = self._session.fork(), self._following
+
+        def work(_progress: Progress, _cancel: Cancel) -> Completion:
+            message = ""
+            failure: Exception | None = None
+            try:
+                message = request.step(fork)
+                fork.prepare(surfaces=not following)
+            except ImplicitDecalsError as error:
+                failure = error
+
+            def complete() -> Job | None:
+                if failure is not None and fork.current:
+                    raise failure
+                if failure is not None or not self._session.adopt(fork):
+                    if not self._following:
+                        self._end_stroke()
+                    return self._fork_job(request)
+                self._adopted(message, request.done)
+                return None
+
+            return complete
+
+        return Job(request.label, work)
+
+    # -- saves ------------------------------------------------------------------------------------------
+
+    def save(self, path: str | PathLike[str], camera: Camera | None) -> None:
+        """Save the present state; if a save is running, save again after it."""
+        save = self._session.begin_save(path, camera=camera)
+        if not self._threaded:
+            save.write()()
+            self._show(f"saved to {path}")
+        elif not self._saves.start(self._save_job(save, path)):
+            self._next_save = self._save_job(save, path)
+            self._show("still saving; a second save follows")
+
+    def _save_job(self, save: SaveJob, path: str | PathLike[str]) -> Job:
+        def work(progress: Progress, _cancel: Cancel) -> Completion:
+            mark_saved = save.write(progress)
+
+            def complete() -> None:
+                mark_saved()
+                self._show(f"saved to {path}")
+
+            return complete
+
+        return Job("save", work)
+
+    # -- state ------------------------------------------------------------------------------------------
+
+    @property
+    def busy(self) -> bool:
+        """True while an edit or a save runs, or waits for `poll`."""
+        return self.busy_editing or self._saves.busy
+
+    @property
+    def busy_editing(self) -> bool:
+        """True while an edit runs, or waits for `poll`."""
+        return self._edits.busy
+
+    @property
+    def following(self) -> bool:
+        """True until all steps of `edit_latest` are adopted."""
+        return self._following
+
+    @property
+    def progress(self) -> str:
+        """Running jobs and their progress, in plain words."""
+        stages = (worker.progress for worker in (self._edits, self._saves) if worker.busy)
+        return ", ".join(f"{stage}: {100 * part:.0f} %" if part else f"{stage} …" for stage, part in stages)
+
+    def poll(self, *, dragging: bool = False, timeout: float | None = 0.0) -> bool:
+        """Complete finished jobs, and return True if a job ended.
+
+        Parameters
+        ----------
+        dragging
+            If True, only the steps of `edit_latest` are adopted; other edits wait for the end of the drag.
+        timeout
+            Longest time to wait for the edit, and for the save, in seconds; None for no limit.
+        """
+        saved = self._complete(self._saves, timeout, self._start_next_save)
+        if dragging and not self._following:
+            return saved
+        return self._complete(self._edits, timeout, self._start_next_edit) or saved
+
+    def _complete(self, worker: Worker, timeout: float | None, start_next: Callable[[], None]) -> bool:
+        """Complete the job of a worker, and start the next one even if this one failed."""
+        if not worker.busy:
+            return False
+        following: Job | None = None
+        try:
+            completion = worker.poll(timeout)
+            following = None if completion is None else completion()
+        except ImplicitDecalsError as error:
+            self._show(str(error))
+        finally:
+            if following is not None:
+                worker.start(following)
+            ended = not worker.busy
+            if ended:
+                start_next()
+        return ended
+
+    def _start_next_save(self) -> None:
+        """Start the save that was requested while another one ran."""
+        job, self._next_save = self._next_save, None
+        if job is not None:
+            self._saves.start(job)
+
+    def _start_next_edit(self) -> None:
+        """Start the latest queued step, or run the callbacks that wait for an empty queue."""
+        request, self._latest = self._latest, None
+        self._computing = self._following = False
+        if request is not None:
+            self.edit_latest(request.label, request.step)
+        self._call_waiting()
+
+    def cancel(self) -> None:
+        """Cancel the running edit; saves go on."""
+        if self._edits.busy:
+            self._edits.cancel()
+            self._latest = None
+            self._show("cancelled")
+
+    def close(self) -> None:
+        """Cancel the running edit, and finish all saves.
+
+        Raises
+        ------
+        InvalidScene
+            The file could not be written.
+        """
+        self.cancel()
+        self._edits.poll(CLOSE_TIMEOUT)
+        failure: Exception | None = None
+        while self._saves.busy:
+            try:
+                completion = self._saves.poll(None)
+                failure = None
+                if completion is not None:
+                    completion()
+            except Exception as error:  # raised after the last save
+                failure = error
+            self._start_next_save()
+        if failure is not None:
+            raise failure

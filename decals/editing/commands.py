@@ -1,0 +1,471 @@
+"""Commands for decals, images and the camera; each is an immutable value that computes an `Edit`."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array, Int64Array
+from decals.editing.document import Document
+from decals.editing.edit import Edit
+from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
+from decals.errors import InvalidEdit
+from decals.index.rows import as_numbers
+from decals.model import NO_IMAGE, Decals
+from decals.scenes.camera import Camera
+from decals.scenes.scene import DecalImage
+from decals.surfaces.surface import as_points, unit_rows
+from decals.validation import describe, finite_number, finite_vector, instance, whole_number
+
+DUPLICATE_OFFSET = 1.0
+"""Distance between a decal and its duplicate, in radii."""
+
+
+@dataclass(frozen=True, eq=False)
+class AddDecals:
+    """Add decals on top of their layers, under new numbers.
+
+    Parameters
+    ----------
+    decals
+        The decals.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import AddDecals, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(AddDecals(session.document.scene.decals[:1]))
+    >>> session.document.decals.numbers
+    array([0, 1, 2, 3])
+    """
+
+    decals: Decals
+    label: ClassVar[str] = "add"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        return document.compute_addition(self.decals)
+
+
+@dataclass(frozen=True, eq=False)
+class DecalCommand:
+    """Base of commands for some decals.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+    """
+
+    numbers: Int64Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", as_numbers(self.numbers))
+
+
+@dataclass(frozen=True, eq=False)
+class DeleteDecals(DecalCommand):
+    """Delete decals; their numbers are not given to other decals.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import DeleteDecals, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(DeleteDecals([1]))
+    >>> session.document.decals.numbers
+    array([0, 2])
+    """
+
+    label: ClassVar[str] = "delete"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        return document.compute_deletion(self.numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class SetValues(DecalCommand):
+    """Set values of decals, such as image, tint, opacity, layer, interaction or radius.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+    values
+        Arrays by their names in `decals.Decals`. Each is one value for all decals, or a row per decal.
+    label
+        Name of the undo entry.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, SetValues
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(SetValues.each([0, 2], layers=1, opacities=0.5))
+    >>> session.document.decals.decals.opacities
+    array([0.5, 1. , 0.5], dtype=float32)
+    """
+
+    values: Mapping[str, ArrayLike]
+    label: str = "set values"
+
+    @classmethod
+    def each(cls, numbers: ArrayLike, label: str = "set values", **values: ArrayLike) -> Self:
+        """Return the command with the values as keyword arguments."""
+        return cls(as_numbers(numbers), values, label)
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        if not isinstance(self.values, Mapping):
+            raise InvalidEdit(f"values: expected {{'layers': 1}} or such, got {describe(self.values)}")
+        before = document.decals.take(self.numbers)
+        arrays = {name: _broadcast(before, name, value) for name, value in self.values.items()}
+        return document.compute_replacement(self.numbers, before.replace(**arrays))
+
+
+@dataclass(frozen=True, eq=False)
+class MapValues(DecalCommand):
+    """Set one value of decals to a function of the decals, such as half their opacity.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+    name
+        Name of the array in `decals.Decals`.
+    function
+        Computes the new values from the decals.
+    label
+        Name of the undo entry.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, MapValues
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(MapValues([1], "opacities", lambda decals: 0.5 * decals.opacities))
+    >>> session.document.decals.decals.opacities
+    array([1. , 0.5, 1. ], dtype=float32)
+    """
+
+    name: str
+    function: Callable[[Decals], ArrayLike]
+    label: str = "set values"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        values = {self.name: self.function(document.decals.take(self.numbers))}
+        return SetValues(self.numbers, values, self.label).compute(document)
+
+
+@dataclass(frozen=True, eq=False)
+class ScaleDecals(DecalCommand):
+    """Multiply the radii of decals.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+    factor
+        Above 1 for larger decals, below 1 for smaller ones.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ScaleDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> radius = float(session.document.decals[1].radii[0])
+    >>> edit = session.do(ScaleDecals([1], 1.5))
+    >>> round(float(session.document.decals[1].radii[0]) / radius, 3)
+    1.5
+    """
+
+    factor: float
+    label: ClassVar[str] = "scale"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        factor = finite_number("factor", self.factor, InvalidEdit)
+        before = document.decals.take(self.numbers)
+        radii = before.radii.astype(np.float64) * factor
+        return document.compute_replacement(self.numbers, before.replace(radii=radii))
+
+
+@dataclass(frozen=True, eq=False)
+class TurnDecals(DecalCommand):
+    """Turn decals about their normals.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+    degrees
+        Angle in degrees, counter-clockwise seen from outside.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, TurnDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> tangent = session.document.decals[1].tangents[0]
+    >>> edit = session.do(TurnDecals([1], 60))
+    >>> round(float(session.document.decals[1].tangents[0] @ tangent), 3)
+    0.5
+    """
+
+    degrees: float
+    label: ClassVar[str] = "turn"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        angle = np.radians(finite_number("degrees", self.degrees, InvalidEdit))
+        before = document.decals.take(self.numbers)
+        tangents = np.cos(angle) * before.tangents + np.sin(angle) * before.bitangents
+        return document.compute_replacement(self.numbers, before.replace(tangents=tangents))
+
+
+@dataclass(frozen=True, eq=False)
+class MoveDecals(DecalCommand):
+    """Move decals over the surfaces, also from one object to another.
+
+    The first decal moves to the given point. The others keep their offsets from it: the offsets turn with the
+    first decal's normal, and end on the nearest surface.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+    position, normal
+        Surface point for the first decal and its normal, shape (3,) each.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, MoveDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(MoveDecals([1], (0, 0, 1), (0, 0, 1)))
+    >>> session.document.decals[1].positions
+    array([[0., 0., 1.]], dtype=float32)
+    """
+
+    position: Float32Array
+    normal: Float32Array
+    label: ClassVar[str] = "move"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        before = document.decals.take(self.numbers)
+        position, normal = _checked_point(self.position, self.normal)
+        first = move_decals(before[:1], SurfacePoints(position, normal, np.zeros(1, np.int32)))
+        if len(before) == 1:
+            return document.compute_replacement(self.numbers, first)
+        rotation = shortest_rotations(before.normals[:1], first.normals)[0]
+        offsets = (before.positions[1:].astype(np.float64) - before.positions[0]) @ rotation.T
+        targets = nearest_points(document.objects, first.positions + offsets)
+        others = move_decals(before[1:], targets)
+        return document.compute_replacement(self.numbers, Decals.concatenate([first, others]))
+
+
+@dataclass(frozen=True, eq=False)
+class DuplicateDecals(DecalCommand):
+    """Add copies of decals, beside them along the u axes of their images.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import DuplicateDecals, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(DuplicateDecals([0, 1]))
+    >>> session.document.decals.numbers
+    array([0, 1, 2, 3, 4])
+    """
+
+    label: ClassVar[str] = "duplicate"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        before = document.decals.take(self.numbers)
+        targets = before.positions + DUPLICATE_OFFSET * before.radii[:, None] * before.tangents
+        return document.compute_addition(move_decals(before, nearest_points(document.objects, targets)))
+
+
+@dataclass(frozen=True, eq=False)
+class AddImage:
+    """Add an image, as the last one.
+
+    Parameters
+    ----------
+    image
+        The image.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import AddImage, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(AddImage(decals.DecalImage.load("scale")))
+    >>> len(session.document.images)
+    2
+    """
+
+    image: DecalImage
+    label: ClassVar[str] = "add an image"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        _check_image(self.image)
+        return document.compute_parts(images=(*document.images, self.image))
+
+
+@dataclass(frozen=True, eq=False)
+class ReplaceImage:
+    """Replace an image; decals that show it show the new one.
+
+    Parameters
+    ----------
+    number
+        Index of the image.
+    image
+        The new image.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ReplaceImage
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> scale = decals.DecalImage.load("scale")
+    >>> edit = session.do(ReplaceImage(0, scale))
+    >>> session.document.images[0] is scale
+    True
+    """
+
+    number: int
+    image: DecalImage
+    label: ClassVar[str] = "replace an image"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        _check_image(self.image)
+        images = list(document.images)
+        images[_image_index(document, self.number)] = self.image
+        return document.compute_parts(images=tuple(images))
+
+
+@dataclass(frozen=True, eq=False)
+class RemoveImage:
+    """Remove an image. Decals that showed it show their tint; the index of later images decreases by one.
+
+    Parameters
+    ----------
+    number
+        Index of the image.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RemoveImage
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(RemoveImage(0))
+    >>> session.document.decals.decals.images
+    array([-1, -1, -1], dtype=int32)
+    """
+
+    number: int
+    label: ClassVar[str] = "remove an image"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        index = _image_index(document, self.number)
+        images = (*document.images[:index], *document.images[index + 1 :])
+        decals, numbers = document.decals.decals, document.decals.numbers
+        affected = decals.images >= index
+        indices = decals.images[affected]
+        indices = np.where(indices == index, NO_IMAGE, indices - 1)
+        return document.compute_replacement(
+            numbers[affected], decals[affected].replace(images=indices), images=images
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SetCamera:
+    """Replace the camera of the scene.
+
+    Parameters
+    ----------
+    camera
+        The new camera.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, SetCamera
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(SetCamera(decals.Camera.framing([[-5, -5, -5], [5, 5, 5]])))
+    >>> session.labels
+    ('set the camera',)
+    """
+
+    camera: Camera
+    label: ClassVar[str] = "set the camera"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        instance("camera", self.camera, Camera, InvalidEdit, "Camera.framing makes one")
+        return document.compute_parts(camera=self.camera)
+
+
+def _checked_point(position: ArrayLike, normal: ArrayLike) -> tuple[Float32Array, Float32Array]:
+    """Return a point and its unit normal as arrays of one row, or raise `InvalidEdit`."""
+    point = finite_vector("position", position, InvalidEdit)
+    direction = finite_vector("normal", normal, InvalidEdit)
+    if not direction.any():
+        raise InvalidEdit("normal: expected a direction, got a zero vector")
+    return as_points(point[None]), unit_rows(direction[None])
+
+
+def _broadcast(decals: Decals, name: str, value: ArrayLike) -> Any:
+    """Return a row of a value for each decal."""
+    present = getattr(decals, name, None)
+    if not isinstance(present, np.ndarray):
+        raise InvalidEdit(f"expected the name of an array of decals, such as 'layers', got {name!r}")
+    try:
+        array = np.asarray(value)
+        return array if array.ndim == present.ndim else np.broadcast_to(array, present.shape)
+    except ValueError as error:
+        raise InvalidEdit(
+            f"{name}: expected one value for all decals, or one for each of {len(decals)}, got {value!r:.60}"
+        ) from error
+
+
+def _image_index(document: Document, number: int) -> int:
+    return whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
+
+
+def _check_image(image: object) -> None:
+    instance("image", image, DecalImage, InvalidEdit, "DecalImage.load makes one")

@@ -1,0 +1,218 @@
+"""Actions on decals: add, resize, turn, recolour, reorder, relax and scatter."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array, Int32Array
+from blobtree.progress import Progress
+from decals.editing.action_state import ActionState, Cursor, require_pick
+from decals.editing.commands import AddDecals, MapValues, ScaleDecals, TurnDecals
+from decals.editing.document import Document
+from decals.editing.key_bindings import Group, action
+from decals.editing.queries import nearest_points
+from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
+from decals.editing.session import Command
+from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
+from decals.scattering.orientation import tangents
+from decals.scenes.objects import bounds_of
+
+FIRST_RADIUS = 0.05
+"""Radius of the first decal of a scene, in diagonals of the scene."""
+
+SCALE_STEP, TURN_STEP, FADE_STEP = 1.1, 7.5, 0.8
+"""Change by one key press or wheel step: factor of the radius, degrees, factor of the opacity."""
+
+FIRST_DECAL_COUNT = 100
+"""Number of decals scattered over an object without decals."""
+
+TINTS = ((1.0, 1.0, 1.0), (0.95, 0.45, 0.35), (0.95, 0.8, 0.35), (0.5, 0.85, 0.5), (0.4, 0.6, 0.95))
+"""sRGB colours that the tint key goes through."""
+
+
+def new_decal(document: Document, position: Float32Array, normal: Float32Array, model: int | None) -> Decals:
+    """Return a decal at a surface point.
+
+    Parameters
+    ----------
+    document
+        The document, for the usual size.
+    position, normal
+        The point and its unit normal, shape (3,) each.
+    model
+        Number of the decal to copy; None for a decal of median radius with the first image.
+    """
+    positions, normals = position[None], normal[None]
+    if model is not None:
+        like = document.decals[model]
+        turned = tangents(positions, normals, like.tangents[0], 0)
+        return like.replace(positions=positions, normals=normals, tangents=turned)
+    radii = document.decals.column("radii")
+    low, high = bounds_of(document.objects)
+    radius = float(np.median(radii)) if len(radii) else FIRST_RADIUS * float(np.linalg.norm(high - low))
+    return Decals(
+        positions,
+        normals,
+        tangents(positions, normals, (1.0, 0.0, 0.0), 0),
+        np.array([radius], np.float32),
+        images=np.array([0 if document.images else NO_IMAGE]),
+    )
+
+
+class DecalActions:
+    """Actions on the selected decals, and on decals under the cursor.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    """
+
+    def __init__(self, state: ActionState) -> None:
+        self._state = state
+        self._scatter_count = 0
+
+    def _map(self, label: str, name: str, function: Callable[[Decals], ArrayLike]) -> None:
+        """Set a value of the selected decals to a function of them."""
+        self._state.run(MapValues(self._state.selected_numbers, name, function, label))
+
+    @property
+    def _last_selected(self) -> Decals:
+        return self._state.session.document.decals[int(self._state.selected_numbers[-1])]
+
+    @action("add_decal", "Ctrl+Click", "a", summary="add a decal under the cursor", group=Group.DECALS)
+    def add_decal(self, cursor: Cursor) -> None:
+        """Add a decal like the last selected one, and select it."""
+        state, pick = self._state, require_pick(cursor)
+        model = state.selection[-1] if state.selection else None
+        state.run(AddDecals(new_decal(state.session.document, pick.position, pick.normal, model)))
+        state.selection = (state.session.document.decals.next_number - 1,)
+
+    @action(
+        "larger",
+        "Ctrl+WheelUp",
+        "plus",
+        "equal",
+        "KP_Add",
+        summary="larger",
+        group=Group.DECALS,
+        repeats=True,
+    )
+    def larger(self, _cursor: Cursor) -> None:
+        """Enlarge the selected decals."""
+        self._state.run(ScaleDecals(self._state.selected_numbers, SCALE_STEP))
+
+    @action(
+        "smaller",
+        "Ctrl+WheelDown",
+        "minus",
+        "KP_Subtract",
+        summary="smaller",
+        group=Group.DECALS,
+        repeats=True,
+    )
+    def smaller(self, _cursor: Cursor) -> None:
+        """Shrink the selected decals."""
+        self._state.run(ScaleDecals(self._state.selected_numbers, 1.0 / SCALE_STEP))
+
+    @action(
+        "turn_left",
+        "Shift+WheelUp",
+        "comma",
+        summary="turn counter-clockwise",
+        group=Group.DECALS,
+        repeats=True,
+    )
+    def turn_left(self, _cursor: Cursor) -> None:
+        """Turn the selected decals counter-clockwise."""
+        self._state.run(TurnDecals(self._state.selected_numbers, TURN_STEP))
+
+    @action(
+        "turn_right", "Shift+WheelDown", "period", summary="turn clockwise", group=Group.DECALS, repeats=True
+    )
+    def turn_right(self, _cursor: Cursor) -> None:
+        """Turn the selected decals clockwise."""
+        self._state.run(TurnDecals(self._state.selected_numbers, -TURN_STEP))
+
+    @action("next_image", "i", summary="next image", group=Group.DECALS)
+    def next_image(self, _cursor: Cursor) -> None:
+        """Give each selected decal the next image; after the last one comes the plain tint."""
+        self._shift_image(1)
+
+    @action("previous_image", "Shift+i", summary="previous image", group=Group.DECALS)
+    def previous_image(self, _cursor: Cursor) -> None:
+        """Give each selected decal the previous image."""
+        self._shift_image(-1)
+
+    def _shift_image(self, step: int) -> None:
+        count = len(self._state.session.document.images) - NO_IMAGE
+        self._map("change the image", "images", lambda d: (d.images - NO_IMAGE + step) % count + NO_IMAGE)
+
+    @action("next_tint", "t", summary="next tint", group=Group.DECALS)
+    def next_tint(self, _cursor: Cursor) -> None:
+        """Give the selected decals the tint after the first one's."""
+
+        def tint(decals: Decals) -> ArrayLike:
+            nearest = int(np.abs(np.array(TINTS) - decals.tints[0]).sum(axis=1).argmin())
+            return TINTS[(nearest + 1) % len(TINTS)]
+
+        self._map("tint", "tints", tint)
+
+    @action("fainter", "o", summary="more transparent", group=Group.DECALS, repeats=True)
+    def fainter(self, _cursor: Cursor) -> None:
+        """Lower the opacity of the selected decals."""
+        self._map("fade", "opacities", lambda d: d.opacities * FADE_STEP)
+
+    @action("stronger", "Shift+o", summary="less transparent", group=Group.DECALS, repeats=True)
+    def stronger(self, _cursor: Cursor) -> None:
+        """Raise the opacity of the selected decals."""
+        self._map("fade", "opacities", lambda d: np.minimum(d.opacities / FADE_STEP, 1.0))
+
+    @action("layer_up", "Prior", summary="one layer up", group=Group.DECALS)
+    def layer_up(self, _cursor: Cursor) -> None:
+        """Raise the layer of the selected decals."""
+        self._shift_layer(1)
+
+    @action("layer_down", "Next", summary="one layer down", group=Group.DECALS)
+    def layer_down(self, _cursor: Cursor) -> None:
+        """Lower the layer of the selected decals."""
+        self._shift_layer(-1)
+
+    def _shift_layer(self, step: int) -> None:
+        def shifted(decals: Decals) -> Int32Array:
+            layers: Int32Array = np.clip(decals.layers + step, -LAYER_LIMIT, LAYER_LIMIT - 1)
+            return layers
+
+        self._map(f"layer {shifted(self._last_selected)[0]}", "layers", shifted)
+
+    @action("next_interaction", "k", summary="push, overlap or independent", group=Group.DECALS)
+    def next_interaction(self, _cursor: Cursor) -> None:
+        """Give each selected decal the next interaction."""
+
+        def shifted(decals: Decals) -> Int32Array:
+            interactions: Int32Array = (decals.interactions + 1) % len(Interaction)
+            return interactions
+
+        name = Interaction(int(shifted(self._last_selected)[0])).name.lower()
+        self._map(f"interaction: {name}", "interactions", shifted)
+
+    @action("relax", "x", summary="even out the decals around the cursor", group=Group.MANY)
+    def relax(self, cursor: Cursor) -> None:
+        """Even out the decals around the cursor."""
+        self._state.run(RelaxDecals(require_pick(cursor).position))
+
+    @action("scatter", "g", summary="scatter new decals over the object under the cursor", group=Group.MANY)
+    def scatter(self, cursor: Cursor) -> None:
+        """Replace the decals on an object by as many scattered ones, with another seed each time."""
+        document, number = self._state.session.document, require_pick(cursor).object
+        self._scatter_count += 1
+        seed, objects, images = self._scatter_count, document.objects, len(document.images)
+        positions = document.decals.column("positions")
+
+        def compute(progress: Progress, cancel: Callable[[], bool]) -> Command:
+            count = int((nearest_points(objects, positions).objects == number).sum()) or FIRST_DECAL_COUNT
+            command = ScatterDecals((number,), count, seed)
+            return command.compute_command(objects, images, progress=progress, cancel=cancel)
+
+        self._state.background.compute("scatter", compute)

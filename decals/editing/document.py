@@ -1,0 +1,176 @@
+"""The edited document: the one owner of objects, decals, images and camera."""
+
+from contextlib import suppress
+from typing import Any, Self
+
+import numpy as np
+
+from blobtree._typing import Int64Array
+from decals.editing.edit import NO_DECALS, DecalStates, Edit, SceneParts
+from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
+from decals.index.editor import DecalEditor
+from decals.model import Decals
+from decals.scenes.camera import Camera
+from decals.scenes.objects import SceneObject
+from decals.scenes.scene import DecalImage, Scene
+from decals.validation import instance, whole_number
+
+ANY_POINT, ANY_DIRECTION = np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32)
+"""A query of a surface that is made only so that its lazy structures are built."""
+
+
+class ForkFamily:
+    """Identity that a document shares with its forks; results cached for one hold for all."""
+
+
+class Document:
+    """A scene whose decals keep their numbers while they are edited; renderers draw it in place.
+
+    Only `apply` changes a document. The ``compute_…`` methods return an `Edit` and change nothing.
+
+    Parameters
+    ----------
+    objects
+        Meshes and trees.
+    images
+        Images that the decals show.
+    camera
+        Camera of the scene.
+    decals
+        The decals by number.
+    family
+        The family of the document that this one is a fork of. Default: a new family.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import Document
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=4, images=["eye"])
+    >>> document = Document.from_scene(scene)
+    >>> len(document.decals), len(document.objects)
+    (4, 1)
+    """
+
+    def __init__(
+        self,
+        objects: tuple[SceneObject, ...],
+        images: tuple[DecalImage, ...],
+        camera: Camera,
+        decals: DecalEditor,
+        family: ForkFamily | None = None,
+    ) -> None:
+        self._objects, self._images, self._camera, self._decals = objects, images, camera, decals
+        self._family = ForkFamily() if family is None else family
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> Self:
+        """Return a document that begins as a scene.
+
+        Raises
+        ------
+        InvalidScene
+            The argument is not a `Scene`.
+        """
+        instance("scene to edit", scene, Scene, InvalidScene, "decals.cover makes one")
+        return cls(scene.objects, scene.images, scene.camera, DecalEditor(scene.decals))
+
+    @property
+    def objects(self) -> tuple[SceneObject, ...]:
+        """Meshes and trees."""
+        return self._objects
+
+    @property
+    def images(self) -> tuple[DecalImage, ...]:
+        """Images that the decals show."""
+        return self._images
+
+    @property
+    def camera(self) -> Camera:
+        """Camera of the scene."""
+        return self._camera
+
+    @property
+    def decals(self) -> DecalEditor:
+        """The decals, by number."""
+        return self._decals
+
+    @property
+    def family(self) -> ForkFamily:
+        """Identity shared with all forks."""
+        return self._family
+
+    @property
+    def scene(self) -> Scene:
+        """Immutable copy; its decals are in the order of their numbers."""
+        return Scene(objects=self.objects, images=self.images, camera=self.camera, decals=self.decals.decals)
+
+    def object(self, number: int) -> SceneObject:
+        """Return an object by its index, or raise `InvalidEdit`."""
+        return self.objects[whole_number("object", number, 0, len(self.objects) - 1, InvalidEdit)]
+
+    # -- forks ------------------------------------------------------------------------------------------
+
+    def fork(self) -> "Document":
+        """Return an independent copy; objects and images are shared."""
+        return Document(self._objects, self._images, self._camera, self._decals.copy(), self._family)
+
+    def adopt(self, fork: "Document") -> None:
+        """Take over the state of a fork, which must not be used afterwards; renderers keep this document."""
+        self._objects, self._images, self._camera = fork._objects, fork._images, fork._camera
+        self._decals.adopt(fork._decals)
+
+    def prepare_surfaces(self) -> None:
+        """Build what the surfaces build on their first query, such as bounding volume hierarchies."""
+        for item in self._objects:
+            with suppress(InvalidMesh):  # a tree without a visible surface
+                item.surface.project(ANY_POINT)
+                item.surface.raycast(ANY_POINT, ANY_DIRECTION)
+
+    # -- edits ------------------------------------------------------------------------------------------
+
+    def compute_replacement(self, numbers: Int64Array, decals: Decals, **parts: Any) -> Edit:
+        """Return the edit that gives decals new values and replaces scene parts.
+
+        Raises
+        ------
+        InvalidEdit
+            A decal would show an image that does not exist.
+        """
+        images = parts.get("images", self.images)
+        last = int(decals.images.max(initial=-1))
+        if last >= len(images):
+            raise InvalidEdit(
+                f"expected an image from 0 to {len(images) - 1}, got {last}; add the image first"
+            )
+        return self._compute(DecalStates.existing(numbers, decals), parts)
+
+    def compute_addition(self, decals: Decals) -> Edit:
+        """Return the edit that adds decals under new numbers."""
+        instance("decals", decals, Decals, InvalidEdit, "decals.scatter makes some")
+        first = self.decals.next_number
+        return self.compute_replacement(np.arange(first, first + len(decals)), decals)
+
+    def compute_deletion(self, numbers: Int64Array, **parts: Any) -> Edit:
+        """Return the edit that deletes decals and replaces scene parts."""
+        self.decals.take(numbers)  # raises for numbers without a decal
+        return self._compute(DecalStates.deleted(numbers), parts)
+
+    def compute_parts(self, **parts: Any) -> Edit:
+        """Return the edit that replaces objects, images or camera."""
+        return self._compute(NO_DECALS, parts)
+
+    def _compute(self, after: DecalStates, parts: dict[str, Any]) -> Edit:
+        before = DecalStates.read(self.decals, after.numbers)
+        parts_before = SceneParts(**{name: getattr(self, name) for name in parts})
+        return Edit(before, after, parts_before, SceneParts(**parts))
+
+    def apply(self, states: DecalStates, parts: SceneParts) -> None:
+        """Apply one side of an edit."""
+        states.apply_to(self._decals)
+        if parts.objects is not None:
+            self._objects = parts.objects
+        if parts.images is not None:
+            self._images = parts.images
+        if parts.camera is not None:
+            self._camera = parts.camera

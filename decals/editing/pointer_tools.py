@@ -1,0 +1,208 @@
+"""Pointer tools: pointer, wheel and key events to actions, for any window or none."""
+
+from collections.abc import Callable
+from enum import Enum, auto
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array
+from decals.editing.actions import KEYS, Actions
+from decals.editing.commands import MoveDecals
+from decals.editing.queries import SurfacePick, first_hit, nearest_points, pick, shortest_rotations
+from decals.errors import InvalidEdit
+from decals.validation import describe, finite_number, instance
+
+Ray = tuple[ArrayLike, ArrayLike]
+"""Origin and direction in scene coordinates."""
+
+Occluded = Callable[[float, float, Float32Array], bool]
+"""Returns True if another object in the window hides a surface point, at a pixel."""
+
+CLICK_DISTANCE = 3.0
+"""A press that moves farther than this is a drag, in pixels."""
+
+
+class Press(Enum):
+    """State of the left button."""
+
+    UP = auto()
+    DOWN = auto()
+    """Pressed, and not moved beyond `CLICK_DISTANCE`."""
+    DRAG = auto()
+
+
+class PointerTools:
+    """Translates pointer, wheel and key events to actions, by the key table.
+
+    Coordinates are in pixels. Every event method returns True if the event was used; otherwise it belongs to
+    the camera.
+
+    Parameters
+    ----------
+    actions
+        The actions.
+    ray
+        Returns the ray through a pixel, or None outside the picture.
+    occluded
+        Hidden points can neither be picked nor be the target of a drag.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import Actions, PointerTools
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=20, images=["eye"])
+    >>> rays = scene.camera.rays(100, 100)
+    >>> actions = Actions(decals.editing.EditSession(scene))
+    >>> tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
+    >>> tools.press(50, 50), tools.release(50, 50)
+    (False, False)
+    >>> len(actions.state.selection)
+    1
+    """
+
+    def __init__(
+        self,
+        actions: Actions,
+        ray: Callable[[float, float], Ray | None],
+        occluded: Occluded = lambda _x, _y, _point: False,
+    ) -> None:
+        self.actions = instance("actions", actions, Actions, InvalidEdit, "Actions(session) makes some")
+        self._ray, self._occluded = ray, occluded
+        self._press, self._press_position = Press.UP, (0.0, 0.0)
+        self._drag: DecalDrag | None = None
+
+    @property
+    def dragging(self) -> bool:
+        """True while decals are dragged."""
+        return self.drags_decals and self._press is Press.DRAG
+
+    @property
+    def drags_decals(self) -> bool:
+        """True while the button is down on a selected decal."""
+        return self._drag is not None
+
+    def at(self, x: float, y: float) -> SurfacePick | None:
+        """Return the surface point at a pixel, or None."""
+        x, y = _checked_pixel(x, y)
+        ray = self._ray(x, y)
+        surface_pick = None if ray is None else pick(self.actions.state.session.document, *ray)
+        if surface_pick is None or self._occluded(x, y, surface_pick.position):
+            return None
+        return surface_pick
+
+    def key(self, name: str, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
+        """Handle a key press with the cursor at a pixel."""
+        return self._perform(name, x, y, ctrl=ctrl, shift=shift)
+
+    def wheel(self, up: bool, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
+        """Handle one step of the wheel."""
+        return self._perform("WheelUp" if up else "WheelDown", x, y, ctrl=ctrl, shift=shift)
+
+    def press(self, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
+        """Handle a press of the left button."""
+        self._press_position, self._press, self._drag = _checked_pixel(x, y), Press.DOWN, None
+        if ctrl:
+            return True
+        selection = self.actions.state.selection
+        surface_pick = None if shift or not selection else self.at(x, y)
+        if surface_pick is None or surface_pick.owner not in selection:
+            return False
+        self._drag = DecalDrag(self.actions, surface_pick)
+        return True
+
+    def move(self, x: float, y: float) -> bool:
+        """Handle a move of the pointer."""
+        x, y = _checked_pixel(x, y)
+        if self._press is Press.UP:
+            return False
+        distance = np.hypot(x - self._press_position[0], y - self._press_position[1])
+        if self._press is Press.DOWN and distance > CLICK_DISTANCE:
+            self._press = Press.DRAG
+            if self._drag is not None:
+                self._drag.begin()
+        if self._drag is None:
+            return False
+        if self._press is Press.DRAG:
+            ray = self._ray(x, y)
+            if ray is not None:
+                self._drag.move(ray, lambda point: self._occluded(x, y, point))
+        return True
+
+    def release(self, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
+        """Handle the release of the left button."""
+        press, self._press = self._press, Press.UP
+        drag, self._drag = self._drag, None
+        if press is Press.UP:
+            return False
+        if press is Press.DOWN:
+            self._perform("Click", x, y, ctrl=ctrl, shift=shift)
+        elif drag is not None:
+            self.actions.state.end_stroke()
+        return drag is not None or ctrl
+
+    def _perform(self, name: str, x: float, y: float, *, ctrl: bool, shift: bool) -> bool:
+        if not isinstance(name, str):
+            raise InvalidEdit(f"key: expected its name, such as 'z', got {describe(name)}")
+        x, y = _checked_pixel(x, y)
+        action = KEYS.action_of(name, ctrl=ctrl, shift=shift)
+        if action is None:
+            return False
+        if action == "deselect":
+            self._drag = None
+        if self.dragging:
+            self.actions.state.end_stroke()
+        self.actions.perform(action, lambda: self.at(x, y))
+        self._continue_drag()
+        return True
+
+    def _continue_drag(self) -> None:
+        """Continue a drag after an action as another undo entry, unless its decals were deleted."""
+        if self._drag is not None and not self._drag.decals_exist:
+            self._drag = None
+        if self._drag is not None and self._press is Press.DRAG:
+            self._drag.begin()
+
+
+def _checked_pixel(x: float, y: float) -> tuple[float, float]:
+    return finite_number("x", x, InvalidEdit), finite_number("y", y, InvalidEdit)
+
+
+class DecalDrag:
+    """A drag of the selected decals over the surfaces.
+
+    Parameters
+    ----------
+    actions
+        The actions.
+    start
+        The pressed point, on one of the selected decals.
+    """
+
+    def __init__(self, actions: Actions, start: SurfacePick) -> None:
+        self._actions = actions
+        others = tuple(number for number in actions.state.selection if number != start.owner)
+        self._numbers = np.array([start.owner, *others], np.int64)
+        center = actions.state.session.document.decals[start.owner].positions[0]
+        self._normal = start.normal
+        self._offset: Float32Array = center - start.position
+
+    @property
+    def decals_exist(self) -> bool:
+        """True unless one of the decals was deleted."""
+        return bool(self._actions.state.session.document.decals.has(self._numbers).all())
+
+    def begin(self) -> None:
+        """Begin an undo entry."""
+        self._actions.state.begin_stroke("move")
+
+    def move(self, ray: Ray, occluded: Callable[[Float32Array], bool]) -> None:
+        """Move the decals to the visible surface point along a ray; without one they stay."""
+        document = self._actions.state.session.document
+        hit = first_hit(document.objects, *ray)
+        if not len(hit.objects) or occluded(hit.positions[0]):
+            return
+        offset = shortest_rotations(self._normal[None], hit.normals)[0] @ self._offset
+        target = nearest_points(document.objects, hit.positions + offset)
+        self._actions.state.run_latest(MoveDecals(self._numbers, target.positions[0], target.normals[0]))

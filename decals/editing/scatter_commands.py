@@ -1,0 +1,267 @@
+"""Commands for whole objects and many decals: scatter, relax, add and remove objects."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Int64Array
+from blobtree.progress import Progress
+from decals.editing.document import Document
+from decals.editing.edit import Edit
+from decals.editing.queries import SurfacePoints, move_decals, nearest_points
+from decals.errors import InvalidEdit
+from decals.model import Decals
+from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.polish import PUSHING_RADIUS, relax_near
+from decals.scattering.scatter import scatter
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names
+from decals.surfaces.surface import as_points
+from decals.validation import describe, finite_vector, whole_number
+
+SPACING = 3.0**0.5 / 1.03
+"""Distance of neighbours among decals without gaps, in radii (see `sizing.RADIUS_MARGIN`)."""
+
+MAX_SCATTERED_DECALS = 1_000_000
+
+RELAXED_DISTANCE = 1.01 * PUSHING_RADIUS
+"""Distance up to which decals take part when a neighbourhood is relaxed, in spacings."""
+
+
+def decals_on(document: Document, objects: Sequence[int]) -> Int64Array:
+    """Return the numbers of the decals whose nearest object is one of these, by index."""
+    nearest = nearest_points(document.objects, document.decals.decals.positions)
+    return document.decals.numbers[np.isin(nearest.objects, objects)]
+
+
+def object_indices(objects: object) -> tuple[int, ...]:
+    """Return the objects of a command as a tuple, or raise `InvalidEdit`; the indices are not checked."""
+    if not isinstance(objects, Sequence) or isinstance(objects, str | bytes):
+        raise InvalidEdit(f"objects: expected their numbers, such as (0,), got {describe(objects)}")
+    return tuple(objects)
+
+
+@dataclass(frozen=True, eq=False)
+class ReplaceDecals:
+    """Delete the decals on some objects, and add others.
+
+    Parameters
+    ----------
+    objects
+        Indices of the objects.
+    decals
+        The new decals.
+    expected_objects
+        The objects for which the decals were made. The command is refused if they changed meanwhile.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ReplaceDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(ReplaceDecals((0,), session.document.scene.decals[:2]))
+    >>> session.document.decals.numbers
+    array([3, 4])
+    """
+
+    objects: tuple[int, ...]
+    decals: Decals
+    expected_objects: tuple[SceneObject, ...] = ()
+    label: ClassVar[str] = "scatter"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        objects = [document.object(number) for number in object_indices(self.objects)]
+        pairs = zip(objects, self.expected_objects, strict=False)
+        if any(item is not expected for item, expected in pairs):
+            raise InvalidEdit("an object changed while its new decals were computed; scatter again")
+        deletion = document.compute_deletion(decals_on(document, self.objects))
+        return deletion.then(document.compute_addition(self.decals))
+
+
+@dataclass(frozen=True, eq=False)
+class ScatterDecals:
+    """Distribute decals evenly over some objects, in place of the decals that lie there.
+
+    Parameters
+    ----------
+    objects
+        Indices of the objects.
+    count
+        Number of decals.
+    seed
+        Random seed.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ScatterDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(ScatterDecals((0,), count=5))
+    >>> len(session.document.decals)
+    5
+    """
+
+    objects: tuple[int, ...]
+    count: int
+    seed: int = 0
+    label: ClassVar[str] = "scatter"
+
+    def compute_command(
+        self,
+        objects: Sequence[SceneObject],
+        images: int,
+        *,
+        progress: Progress | None = None,
+        cancel: Callable[[], bool] | None = None,
+    ) -> ReplaceDecals:
+        """Distribute the decals, in any thread, and return the quick command that adds them.
+
+        Parameters
+        ----------
+        objects
+            All objects of the document.
+        images
+            Number of images that the decals may show.
+        progress, cancel
+            As for `decals.scatter`.
+        """
+        for number in object_indices(self.objects):
+            whole_number("object", number, 0, len(objects) - 1, InvalidEdit)
+        whole_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
+        if images < 1:
+            raise InvalidEdit("expected an image for the decals to show, got none; add one first")
+        covered = tuple(objects[number] for number in self.objects)
+        decals = scatter(
+            [item.surface for item in covered],
+            count=self.count,
+            seed=self.seed,
+            images=images,
+            progress=progress,
+            cancel=cancel,
+        )
+        return ReplaceDecals(self.objects, decals, covered)
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit, which may take long."""
+        return self.compute_command(document.objects, len(document.images)).compute(document)
+
+
+@dataclass(frozen=True, eq=False)
+class RelaxDecals:
+    """Even out the decals around a point; all others stay where they are.
+
+    Only decals with the draw order of the nearest one take part.
+
+    Parameters
+    ----------
+    point
+        Centre of the neighbourhood, shape (3,).
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RelaxDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=20, images=["eye"]))
+    >>> edit = session.do(RelaxDecals((0, 0, 1)))
+    >>> session.labels
+    ('relax',)
+    """
+
+    point: ArrayLike
+    label: ClassVar[str] = "relax"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit; radii stay."""
+        center = as_points(finite_vector("point", self.point, InvalidEdit)[None])[0]
+        numbers, decals = document.decals.numbers, document.decals.decals
+        if not len(decals) or not document.objects:
+            return Edit()
+        distances = np.linalg.norm(decals.positions - center, axis=1)
+        closest = int(distances.argmin())
+        near = distances < RELAXED_DISTANCE * SPACING * decals.radii[closest]
+        rows = np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
+        if len(rows) < 2:
+            return Edit()
+        surfaces = nearest_points(document.objects, decals.positions[rows]).objects
+        order = np.argsort(surfaces, kind="stable")  # the solver expects particles sorted by surface
+        rows, surfaces = rows[order], surfaces[order]
+        before = OrientedPoints(decals.positions[rows], decals.normals[rows], surfaces)
+        after = relax_near(
+            Domain([item.surface for item in document.objects], 0),
+            before,
+            np.ones(len(rows), np.bool_),
+            (SPACING * decals.radii[rows]).astype(np.float32),
+            center,
+        )
+        moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
+        points = SurfacePoints(after.positions[moved], after.normals[moved], after.surface_ids[moved])
+        return document.compute_replacement(numbers[rows[moved]], move_decals(decals[rows[moved]], points))
+
+
+@dataclass(frozen=True, eq=False)
+class AddObject:
+    """Add a mesh or a BlobTree, as the last object; the decals stay where they are.
+
+    Parameters
+    ----------
+    object
+        The object; its name must be new.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import AddObject, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(AddObject(decals.TreeObject("ball", Point((3, 0, 0), radius=1.0))))
+    >>> session.document.objects[1].name
+    'ball'
+    """
+
+    object: SceneObject
+    label: ClassVar[str] = "add an object"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        if not isinstance(self.object, MeshObject | TreeObject):
+            raise InvalidEdit(f"expected a MeshObject or a TreeObject to add, got {describe(self.object)}")
+        objects = (*document.objects, self.object)
+        check_names(objects)
+        self.object.surface  # noqa: B018  # raises for a tree without a visible surface
+        return document.compute_parts(objects=objects)
+
+
+@dataclass(frozen=True, eq=False)
+class RemoveObject:
+    """Remove an object and the decals on it; the index of later objects decreases by one.
+
+    Parameters
+    ----------
+    number
+        Index of the object.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RemoveObject
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(RemoveObject(0))
+    >>> len(session.document.objects), len(session.document.decals)
+    (0, 0)
+    """
+
+    number: int
+    label: ClassVar[str] = "remove an object"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        removed = document.object(self.number)
+        others = tuple(item for item in document.objects if item is not removed)
+        return document.compute_deletion(decals_on(document, [self.number]), objects=others)

@@ -1,0 +1,325 @@
+"""Actions on objects and on the primitives of BlobTrees: select, move, add, resize, join and remove."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree import Node, Point, Segment
+from blobtree._typing import Float32Array
+from blobtree.formulas.falloff import RIM
+from blobtree.nodes.paths import Path, node_in_world, primitive_at
+from blobtree.nodes.surgery import Join, dominant_primitive, join_of, world_space_path
+from decals.editing.action_state import ActionState, Cursor, require_pick
+from decals.editing.background import Step
+from decals.editing.decal_actions import TINTS
+from decals.editing.key_bindings import Group, action
+from decals.editing.queries import SurfacePick
+from decals.editing.scatter_commands import AddObject, RemoveObject
+from decals.editing.session import EditSession
+from decals.editing.tree_commands import (
+    AddPrimitive,
+    DuplicatePrimitive,
+    JoinPrimitive,
+    MovePrimitive,
+    PaintPrimitive,
+    RemovePrimitive,
+    ResizePrimitive,
+    StructureCommand,
+)
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.scenes.objects import TreeObject, bounds_of
+from decals.surfaces.surface import unit_rows
+
+RESIZE_STEP = 1.05
+"""Factor of a primitive's radius by one key press."""
+
+BALL_RADIUS, LIMB_RADIUS, LIMB_LENGTH = 0.5, 0.4, 1.6
+"""Sizes of a new ball or limb, in radii of the primitive that it grows from."""
+
+OBJECT_RADIUS = 0.08
+"""Radius of a new object, in diagonals of the scene."""
+
+FIRST_OBJECT_RADIUS = 0.2
+"""Radius of the first object of a scene, in distances between the eye and its target."""
+
+MAX_DECALS_IN_DRAG = 5_000
+"""With more decals than this, dragging a primitive runs in the background."""
+
+
+class TreeActions:
+    """Actions on the selected primitive, or on the primitive or object under the cursor.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    """
+
+    def __init__(self, state: ActionState) -> None:
+        self._state = state
+        self._color_index = 0
+
+    # -- the selected primitive -------------------------------------------------------------------------
+
+    @action(
+        "select_primitive",
+        "m",
+        summary="select the primitive under the cursor, or deselect",
+        group=Group.SHAPE,
+    )
+    def toggle_primitive(self, cursor: Cursor) -> None:
+        """Deselect the primitive, or select the one under the cursor."""
+        if self._state.primitive:
+            self._state.primitive, self._state.message = None, "primitive deselected"
+            return
+        self._select(cursor)
+        self._state.message = "drag the blue ball to move the primitive, press M to deselect it"
+
+    def _select(self, cursor: Cursor) -> tuple[int, Path]:
+        """Select the primitive under the cursor unless one is selected, and return the selected one."""
+        if self._state.primitive is None:
+            pick = require_pick(cursor)
+            number, path = self._primitive_under(pick)
+            self._state.select_primitive(number, path, pick.position - self._middle(number, path))
+        assert self._state.primitive is not None
+        return self._state.primitive
+
+    def _primitive(self, cursor: Cursor) -> tuple[int, Path]:
+        """Return the selected primitive, or the one under the cursor."""
+        if self._state.primitive is not None:
+            return self._state.primitive
+        return self._primitive_under(require_pick(cursor))
+
+    def _primitive_under(self, pick: SurfacePick) -> tuple[int, Path]:
+        return pick.object, dominant_primitive(self._tree(pick.object), pick.position)
+
+    def _tree(self, number: int) -> Node:
+        item = self._state.session.document.objects[number]
+        if not isinstance(item, TreeObject):
+            raise InvalidEdit(f"{item.name!r} is a mesh and has no primitives; point at a BlobTree")
+        return item.tree
+
+    def _middle(self, number: int, path: Path) -> Float32Array:
+        """Return the middle of a primitive's box, which moves with the primitive."""
+        low, high = node_in_world(self._tree(number), path).bounds
+        return np.asarray((low + high) / 2)
+
+    @property
+    def handle_position(self) -> Float32Array:
+        """Point on the surface for the handle of the selected primitive, shape (3,)."""
+        assert self._state.primitive is not None
+        number, path = self._state.primitive
+        surface = self._state.session.document.objects[number].surface
+        target = self._middle(number, path) + self._state.handle_offset
+        position: Float32Array = surface.project(target[None])[0][0]
+        return position
+
+    def begin_drag(self) -> None:
+        """Begin to drag the selected primitive."""
+        self._state.begin_stroke(MovePrimitive.label)
+
+    def drag(self, offset: ArrayLike) -> None:
+        """Move the selected primitive.
+
+        Parameters
+        ----------
+        offset
+            Displacement from the position at the beginning of the drag, shape (3,).
+        """
+        if self._state.primitive is None:
+            return
+        command = MovePrimitive(*self._state.primitive, offset, quick=True)
+
+        def step(session: EditSession) -> str:
+            session.revert_stroke()
+            session.do(command)
+            return command.label
+
+        long = len(self._state.session.document.decals) > MAX_DECALS_IN_DRAG
+        self._state.run_latest_step(command.label, step, long=long)
+
+    def end_drag(self) -> None:
+        """End the drag; if the object has no visible surface left, the drag is reverted."""
+        state = self._state
+        if state.primitive is not None:
+            step = _surface_check(state.primitive[0])
+            state.background.when_followed(
+                lambda: state.run_latest_step(
+                    MovePrimitive.label, step, long=not state.background.busy_editing
+                )
+            )
+        state.end_stroke()
+
+    # -- primitives -------------------------------------------------------------------------------------
+
+    @action(
+        "thicker",
+        "bracketright",
+        summary="the selected primitive, or the one under the cursor, thicker",
+        group=Group.SHAPE,
+        repeats=True,
+    )
+    def thicker(self, cursor: Cursor) -> None:
+        """Enlarge the radius of a primitive."""
+        self._state.run(ResizePrimitive(*self._primitive(cursor), RESIZE_STEP))
+
+    @action("thinner", "bracketleft", summary="the same primitive thinner", group=Group.SHAPE, repeats=True)
+    def thinner(self, cursor: Cursor) -> None:
+        """Reduce the radius of a primitive."""
+        self._state.run(ResizePrimitive(*self._primitive(cursor), 1.0 / RESIZE_STEP))
+
+    @action("next_color", "c", summary="next colour for the same primitive", group=Group.SHAPE)
+    def next_color(self, cursor: Cursor) -> None:
+        """Give a primitive the next colour."""
+        number, path = self._primitive(cursor)
+        self._color_index += 1
+        self._state.run(PaintPrimitive(number, path, TINTS[self._color_index % len(TINTS)]))
+
+    @action(
+        "next_join",
+        "j",
+        summary="next join: blend, soft, union, intersection, difference",
+        group=Group.SHAPE,
+    )
+    def next_join(self, cursor: Cursor) -> None:
+        """Join a primitive in the next way that leaves a visible surface."""
+        number, path = self._select(cursor)
+        present, joins = join_of(self._tree(number), path), list(Join)
+        first = 0 if present is None else joins.index(present) + 1
+        self._restructure(*(JoinPrimitive(number, path, join) for join in joins[first:] + joins[:first]))
+
+    @action(
+        "add_ball", "n", summary="blend a ball into the tree under the cursor, selected", group=Group.SHAPE
+    )
+    def add_ball(self, cursor: Cursor) -> None:
+        """Blend a ball into the tree under the cursor, and select it."""
+        pick = require_pick(cursor)
+        path, thickness, color = self._base(pick)
+        ball = Point(_coordinates(pick.position), radius=BALL_RADIUS * thickness, color=color)
+        self._grow(pick, path, ball, BALL_RADIUS * thickness)
+
+    @action("add_limb", "l", summary="blend a limb into it that stands out", group=Group.SHAPE)
+    def add_limb(self, cursor: Cursor) -> None:
+        """Blend a segment along the normal into the tree under the cursor, and select it."""
+        pick = require_pick(cursor)
+        path, thickness, color = self._base(pick)
+        start = _coordinates(pick.position)
+        end = _coordinates(pick.position + LIMB_LENGTH * thickness * pick.normal)
+        limb = Segment(start, end, radius=LIMB_RADIUS * thickness, color=color)
+        self._grow(pick, path, limb, (LIMB_LENGTH / 2 + LIMB_RADIUS) * thickness)
+
+    def _base(self, pick: SurfacePick) -> tuple[Path, float, tuple[float, float, float]]:
+        """Return path, approximate radius and colour of the primitive that shows at a point."""
+        number, path = self._primitive_under(pick)
+        tree = self._tree(number)
+        return path, _thickness(node_in_world(tree, path)), primitive_at(tree, path).color
+
+    def _grow(self, pick: SurfacePick, path: Path, node: Node, height: float) -> None:
+        command = AddPrimitive(pick.object, world_space_path(self._tree(pick.object), path), node)
+        self._restructure(command, handle_offset=height * pick.normal)
+
+    def duplicate_selected(self) -> None:
+        """Add a copy of the selected primitive, to the right of it as seen."""
+        assert self._state.primitive is not None
+        eye, target = (np.asarray(point, np.float64) for point in self._state.view())
+        toward = eye - target
+        aside = np.cross(toward, np.eye(3)[np.abs(toward).argmin()])
+        number, path = self._state.primitive
+        distance = _thickness(node_in_world(self._tree(number), path))
+        self._restructure(DuplicatePrimitive(number, path, distance * unit_rows(aside[None])[0]))
+
+    def delete_selected(self) -> None:
+        """Remove the selected primitive."""
+        assert self._state.primitive is not None
+        self._restructure(RemovePrimitive(*self._state.primitive))
+
+    def _restructure(self, *commands: StructureCommand, handle_offset: Float32Array | None = None) -> None:
+        """Carry out the first command that leaves a visible surface, and select its primitive.
+
+        The edit builds a new surface, so it runs in the background.
+        """
+        result: list[tuple[int, Path]] = []
+
+        def step(session: EditSession) -> str:
+            failure: Exception | None = None
+            for command in commands:
+                try:
+                    _, path = command.restructure(command.tree(session.document))
+                    session.do(command)
+                except ImplicitDecalsError as error:
+                    failure = failure or error
+                    continue
+                result[:] = [] if path is None else [(command.object, path)]
+                return command.message
+            assert failure is not None
+            raise failure
+
+        def select() -> None:
+            for number, path in result:
+                self._state.select_primitive(number, path, handle_offset)
+
+        self._state.background.edit(commands[0].label, step, select)
+
+    # -- objects ----------------------------------------------------------------------------------------
+
+    @action(
+        "add_object",
+        "Shift+n",
+        summary="add a ball as a new object, under the cursor",
+        group=Group.SHAPE,
+    )
+    def add_object(self, cursor: Cursor) -> None:
+        """Add a ball as a new object, on the surface under the cursor or at the target of the camera."""
+        objects, pick = self._state.session.document.objects, cursor()
+        eye, target = (np.asarray(point, np.float64) for point in self._state.view())
+        if objects:
+            low, high = bounds_of(objects)
+            radius = OBJECT_RADIUS * float(np.linalg.norm(high - low))
+        else:
+            radius = FIRST_OBJECT_RADIUS * float(np.linalg.norm(eye - target))
+        up = unit_rows((eye - target)[None])[0] if pick is None else pick.normal
+        center = target if pick is None else pick.position + radius * up
+        names = {item.name for item in objects}
+        name = next(name for n in range(1, len(names) + 2) if (name := f"ball {n}") not in names)
+        ball = TreeObject(name, Point(_coordinates(center), radius=radius))
+
+        def select() -> None:
+            last = len(self._state.session.document.objects) - 1
+            self._state.select_primitive(last, (), radius * up)
+
+        self._state.run(AddObject(ball), select)
+
+    @action(
+        "remove_object",
+        "Shift+Delete",
+        summary="remove the object under the cursor, with its decals",
+        group=Group.SHAPE,
+    )
+    def remove_object(self, cursor: Cursor) -> None:
+        """Remove the object under the cursor, with its decals."""
+        self._state.run(RemoveObject(require_pick(cursor).object))
+
+
+def _surface_check(number: int) -> Step:
+    """Return the step that reverts the stroke if an object has no visible surface."""
+
+    def step(session: EditSession) -> str:
+        try:
+            session.document.objects[number].surface  # noqa: B018  (the access may raise)
+        except ImplicitDecalsError as error:
+            session.cancel_stroke()
+            return str(error)
+        session.document.prepare_surfaces()
+        return ""
+
+    return step
+
+
+def _thickness(node: Node) -> float:
+    """Return the approximate visible radius of a primitive; its box has its influence radius."""
+    low, high = node.bounds
+    return RIM * float((high - low).min()) / 2
+
+
+def _coordinates(point: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = np.asarray(point, np.float64).tolist()
+    return x, y, z

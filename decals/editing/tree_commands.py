@@ -1,0 +1,384 @@
+"""Commands for primitives of BlobTrees: move, resize, paint, add, remove, duplicate and join."""
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree import ISO, Node
+from blobtree.nodes import surgery
+from blobtree.nodes.paths import (
+    Path,
+    moved,
+    node_at,
+    primitive_at,
+    primitive_path,
+    resized,
+    with_node,
+    world_matrix,
+)
+from blobtree.nodes.surgery import Join
+from decals.editing.document import Document
+from decals.editing.edit import Edit
+from decals.editing.followers import followers
+from decals.editing.queries import move_decals
+from decals.errors import InvalidEdit
+from decals.scenes.objects import SceneObject, TreeObject
+from decals.validation import finite_number, finite_vector, instance, member
+
+
+@dataclass(frozen=True, eq=False)
+class PrimitiveCommand:
+    """Base of commands for a primitive of a BlobTree, or a branch.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    """
+
+    object: int
+    path: Path
+
+    def tree(self, document: Document) -> Node:
+        """Return the object's tree, or raise `InvalidEdit`."""
+        item = document.object(self.object)
+        if not isinstance(item, TreeObject):
+            raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh")
+        return item.tree
+
+    def compute_exchange(
+        self, document: Document, node: Node, offset: ArrayLike = (0.0, 0.0, 0.0), *, quick: bool = False
+    ) -> Edit:
+        """Return the edit that puts another node at the path, and moves the decals that follow it.
+
+        Parameters
+        ----------
+        document
+            The document.
+        node
+            The new node.
+        offset
+            Displacement of the node in the world, shape (3,).
+        quick
+            If True, the tree is not checked for a visible surface.
+        """
+        before = self.tree(document)
+        after = with_node(before, self.path, node)
+        item = TreeObject(document.objects[self.object].name, after)
+        if not quick:
+            item.surface  # noqa: B018  # raises for a tree without a visible surface
+        objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
+        numbers, points = followers(
+            document, self.object, tuple(self.path), item, np.asarray(offset, np.float64)
+        )
+        moved_along = move_decals(document.decals.take(numbers), points)
+        return document.compute_replacement(numbers, moved_along, objects=objects)
+
+
+@dataclass(frozen=True, eq=False)
+class MovePrimitive(PrimitiveCommand):
+    """Move a primitive, or a branch; decals follow the surface.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    offset
+        Displacement in the world, shape (3,).
+    quick
+        If True, the tree is not checked for a visible surface: for the steps of a drag. Check it at the end.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import MovePrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = decals.editing.EditSession(decals.cover(tree, count=20, images=["eye"]))
+    >>> edit = session.do(MovePrimitive(0, (1,), (0.1, 0, 0)))
+    >>> session.document.objects[0].tree.children[1].center
+    (1.3, 0.0, 0.0)
+    """
+
+    offset: ArrayLike
+    quick: bool = False
+    label: ClassVar[str] = "move a primitive"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        tree = self.tree(document)
+        offset = finite_vector("offset", self.offset, InvalidEdit)
+        local_offset = np.linalg.solve(world_matrix(tree, self.path), offset)
+        node = moved(node_at(tree, self.path), local_offset)
+        return self.compute_exchange(document, node, offset, quick=self.quick)
+
+
+@dataclass(frozen=True, eq=False)
+class ResizePrimitive(PrimitiveCommand):
+    """Multiply the radii of a primitive; decals stay on the surface.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the primitive in the object's tree.
+    factor
+        Above 1 for a thicker primitive, below 1 for a thinner one.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ResizePrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(ResizePrimitive(0, (1,), 1.5))
+    >>> round(session.document.objects[0].tree.children[1].radius, 3)
+    0.9
+    """
+
+    factor: float
+    label: ClassVar[str] = "resize a primitive"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        factor = finite_number("factor", self.factor, InvalidEdit)
+        if factor <= 0:
+            raise InvalidEdit(f"factor: expected a number above 0, got {factor}")
+        tree = self.tree(document)
+        command = replace(self, path=primitive_path(tree, self.path))
+        return command.compute_exchange(document, resized(primitive_at(tree, self.path), factor))
+
+
+@dataclass(frozen=True, eq=False)
+class PaintPrimitive(PrimitiveCommand):
+    """Set the colour of a primitive.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the primitive in the object's tree.
+    color
+        sRGB, each channel in [0, 1], shape (3,).
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, PaintPrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(PaintPrimitive(0, (1,), (1, 0, 0)))
+    >>> session.document.objects[0].tree.children[1].color
+    (1.0, 0.0, 0.0)
+    """
+
+    color: Any
+    label: ClassVar[str] = "paint a primitive"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        tree = self.tree(document)
+        path = primitive_path(tree, self.path)
+        primitive = replace(primitive_at(tree, path), color=self.color)  # type: ignore[type-var]
+        item = TreeObject(document.objects[self.object].name, with_node(tree, path, primitive))
+        objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
+        return document.compute_parts(objects=objects)
+
+
+def same_structure(before: SceneObject, after: SceneObject) -> bool:
+    """Return True if paths lead to the same nodes of two objects; affine maps around nodes do not count."""
+    return before is after or (
+        isinstance(before, TreeObject)
+        and isinstance(after, TreeObject)
+        and before.name == after.name
+        and surgery.same_structure(before.tree, after.tree)
+    )
+
+
+def compute_restructured(document: Document, number: int, tree: Node) -> Edit:
+    """Return the edit that replaces the tree of an object by one of another structure.
+
+    Decals inside the new surface move up to it. Decals outside move down to it if that is not farther than
+    their radius; otherwise they are deleted.
+    """
+    edit = PrimitiveCommand(number, ()).compute_exchange(document, tree)
+    after = edit.after
+    before = document.decals.take(after.numbers)
+    distances = np.linalg.norm(after.decals.positions.astype(np.float64) - before.positions, axis=1)
+    removed = (distances > before.radii) & (tree(before.positions) < ISO)
+    return edit.then(document.compute_deletion(after.numbers[removed])) if removed.any() else edit
+
+
+@dataclass(frozen=True, eq=False)
+class StructureCommand(PrimitiveCommand):
+    """Base of commands that change the structure of a tree."""
+
+    label: ClassVar[str]
+
+    @property
+    def message(self) -> str:
+        """Result for the user, in plain words."""
+        return self.label
+
+    def restructure(self, tree: Node) -> tuple[Node, Path | None]:
+        """Return the new tree, and the path of the command's node in it, if it still exists."""
+        raise NotImplementedError  # every subclass has its own
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit; see `compute_restructured` for the decals."""
+        return compute_restructured(document, self.object, self.restructure(self.tree(document))[0])
+
+
+@dataclass(frozen=True, eq=False)
+class AddPrimitive(StructureCommand):
+    """Join a new primitive, or branch, to a node of a tree.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    node
+        The new node, in the space of the node at the path.
+    join
+        How to join them: "blend", "soft union", "union", "intersection" or "difference", or a `Join`.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import AddPrimitive, EditSession
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(AddPrimitive(0, (), Point((-1.2, 0, 0), radius=0.6)))
+    >>> len(session.document.objects[0].tree.children)
+    3
+    """
+
+    node: Node
+    join: Join | str = Join.BLEND
+    label: ClassVar[str] = "add a primitive"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the new node."""
+        instance("node", self.node, Node, InvalidEdit, "such as Point(...)")
+        join = member("join", self.join, Join, InvalidEdit)
+        return surgery.add_node(tree, self.path, self.node, join)
+
+
+@dataclass(frozen=True, eq=False)
+class RemovePrimitive(StructureCommand):
+    """Remove a primitive, or branch, but not the last one; decals without a surface below them go too.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RemovePrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(RemovePrimitive(0, (1,)))
+    >>> session.document.objects[0].tree.radius
+    1.0
+    """
+
+    label: ClassVar[str] = "remove a primitive"
+
+    def restructure(self, tree: Node) -> tuple[Node, None]:
+        """Return the tree without the node."""
+        return surgery.remove_branch(tree, self.path), None
+
+
+@dataclass(frozen=True, eq=False)
+class DuplicatePrimitive(StructureCommand):
+    """Add a displaced copy of a primitive, or branch, joined in the same way.
+
+    The operands of a difference or intersection are blended with their copies, so the copies cut, or are
+    cut, too.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    offset
+        Displacement of the copy in the world, shape (3,).
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import DuplicatePrimitive, EditSession
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(DuplicatePrimitive(0, (1,), (0, 0.8, 0)))
+    >>> session.document.objects[0].tree.children[2].center
+    (1.2, 0.8, 0.0)
+    """
+
+    offset: ArrayLike
+    label: ClassVar[str] = "duplicate a primitive"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the copy."""
+        offset = finite_vector("offset", self.offset, InvalidEdit)
+        return surgery.duplicate_branch(tree, self.path, offset)
+
+
+@dataclass(frozen=True, eq=False)
+class JoinPrimitive(StructureCommand):
+    """Join a primitive, or branch, to its siblings in another way; the siblings stay joined as they are.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    join
+        How to join them: "blend", "soft union", "union", "intersection" or "difference", or a `Join`.
+        A difference subtracts the node from its siblings.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, JoinPrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(JoinPrimitive(0, (1,), "difference"))
+    >>> type(session.document.objects[0].tree).__name__
+    'Difference'
+    """
+
+    join: Join | str
+    label: ClassVar[str] = "join in another way"
+
+    @property
+    def message(self) -> str:
+        """Result for the user, in plain words."""
+        return f"joined by {Join(self.join).value}"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the node in it."""
+        join = member("join", self.join, Join, InvalidEdit)
+        return surgery.rejoin_branch(tree, self.path, join)

@@ -1,0 +1,5 @@
+from .evaluate import Samples
+
+__all__ = [
+    "Samples",
+]

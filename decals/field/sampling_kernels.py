@@ -1,0 +1,121 @@
+"""Warp kernels of `evaluate`: owner, image coordinates, field and colour at points."""
+
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+import warp as wp
+
+from decals.field.mapping import in_image
+from decals.field.ownership import NO_OWNER, complement_at, owner_at, owner_below, uv_at
+from decals.index.draw_order import next_number_below
+from decals.index.lookup import IndexedDecals
+from decals.record import RECORD, rank_of
+
+wp.set_module_options({"enable_backward": False})
+
+OPAQUE_ALPHA = 0.9999
+"""Alpha above which decals below are left out."""
+
+
+@wp.func
+def texel(x: wp.int32, y: wp.int32, extent: wp.vec3i, texels: wp.array(dtype=wp.vec4)) -> wp.vec4:
+    """Return a texel of an image with extent (first texel, width, height), clamped to its edge."""
+    return texels[extent[0] + wp.clamp(y, 0, extent[2] - 1) * extent[1] + wp.clamp(x, 0, extent[1] - 1)]
+
+
+@wp.func
+def image_at(uv: wp.vec2, extent: wp.vec3i, texels: wp.array(dtype=wp.vec4)) -> wp.vec4:
+    """Return the bilinear colour of an image, premultiplied and linear; its first row is at v = 1."""
+    x = uv[0] * float(extent[1]) - 0.5
+    y = (1.0 - uv[1]) * float(extent[2]) - 0.5
+    i = int(wp.floor(x))
+    j = int(wp.floor(y))
+    upper = wp.lerp(texel(i, j, extent, texels), texel(i + 1, j, extent, texels), x - wp.floor(x))
+    lower = wp.lerp(texel(i, j + 1, extent, texels), texel(i + 1, j + 1, extent, texels), x - wp.floor(x))
+    return wp.lerp(upper, lower, y - wp.floor(y))
+
+
+@wp.func
+def decal_color(
+    decal: wp.int32,
+    uv: wp.vec2,
+    decals: wp.array(dtype=wp.vec4),
+    extents: wp.array(dtype=wp.vec3i),
+    texels: wp.array(dtype=wp.vec4),
+) -> wp.vec4:
+    """Return the premultiplied linear colour of one decal: its image, or white, times tint and opacity."""
+    if not in_image(uv):
+        return wp.vec4(0.0, 0.0, 0.0, 0.0)
+    image = int(decals[RECORD * decal + 2][3])
+    tint = decals[RECORD * decal + 3]
+    color = wp.vec4(1.0, 1.0, 1.0, 1.0)
+    if image >= 0:
+        color = image_at(uv, extents[image], texels)
+    return tint[3] * wp.cw_mul(color, wp.vec4(tint[0], tint[1], tint[2], 1.0))
+
+
+@wp.func
+def image_point(
+    q: wp.vec3,
+    n_q: wp.vec3,
+    owner: wp.int32,
+    mapping: wp.int32,
+    contact: wp.int32,
+    index: IndexedDecals,
+) -> wp.vec3:
+    """Return (u, v, E): image coordinates of q in its owner, and the complement of the owner's field."""
+    complement = complement_at(q, n_q, owner, contact, index)
+    uv = uv_at(q, n_q, owner, complement, mapping, index)
+    return wp.vec3(uv[0], uv[1], complement)
+
+
+@wp.kernel
+def sample_points(
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    mapping: wp.int32,
+    contact: wp.int32,
+    index: IndexedDecals,
+    owners: wp.array(dtype=wp.int32),
+    uv: wp.array(dtype=wp.vec2),
+    fields: wp.array(dtype=wp.float32),
+):
+    """Write the topmost decal at each point, its image coordinates and field; no owner leaves zeros."""
+    i = wp.tid()
+    n_q = wp.normalize(normals[i])
+    owner = owner_at(points[i], n_q, contact, index)
+    owners[i] = owner
+    if owner != NO_OWNER:
+        image = image_point(points[i], n_q, owner, mapping, contact, index)
+        uv[i] = wp.vec2(image[0], image[1])
+        fields[i] = 1.0 - image[2]
+
+
+@wp.kernel
+def color_points(
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    mapping: wp.int32,
+    contact: wp.int32,
+    index: IndexedDecals,
+    owners: wp.array(dtype=wp.int32),
+    extents: wp.array(dtype=wp.vec3i),
+    texels: wp.array(dtype=wp.vec4),
+    colors: wp.array(dtype=wp.vec4),
+):
+    """Write the colour of all decals at each point, from the topmost (owners) down; premultiplied linear."""
+    i = wp.tid()
+    q = points[i]
+    n_q = wp.normalize(normals[i])
+    owner = owners[i]
+    color = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    while owner != NO_OWNER and color[3] < OPAQUE_ALPHA:
+        image = image_point(q, n_q, owner, mapping, contact, index)
+        uv = wp.vec2(image[0], image[1])
+        color += (1.0 - color[3]) * decal_color(owner, uv, index.records, extents, texels)
+        if not index.layered:
+            break
+        rank = rank_of(owner, index.records)
+        number = next_number_below(owner, index.records)
+        owner = owner_below(q, n_q, rank, number, contact, index)
+    colors[i] = color

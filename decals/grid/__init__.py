@@ -1,1 +1,0 @@
-"""Which decals can reach a point: a hierarchical hash grid, and edits of its own bytes."""

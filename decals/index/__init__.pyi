@@ -1,0 +1,7 @@
+from .editor import DecalEditor
+from .index import DecalIndex
+
+__all__ = [
+    "DecalEditor",
+    "DecalIndex",
+]

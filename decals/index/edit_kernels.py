@@ -1,0 +1,152 @@
+"""Warp kernels that insert one decal into the lists of the index, or remove it, in a single thread."""
+
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+import warp as wp
+
+from decals.index.decal_cells import (
+    EMPTY,
+    cell_key,
+    cell_of_block,
+    cells_across,
+    cells_in,
+    first_slot,
+    lowest_cell,
+    power_of_two,
+    touches,
+)
+from decals.index.draw_order import end_of_lower
+from decals.index.lookup import IndexedDecals
+from decals.record import RECORD, rank_of, xyz
+
+wp.set_module_options({"enable_backward": False})
+
+INITIAL_ROOM = 4
+"""Room of a new list, in decals. A full list moves to the end, with twice the room."""
+
+IDS_END = wp.constant(0)
+CELLS = wp.constant(1)
+TOUCHED = wp.constant(2)
+FITS = wp.constant(3)
+
+
+@wp.func
+def slot_of(key: wp.vec3i, index: IndexedDecals) -> wp.int32:
+    """Return the slot that holds a key, or the empty slot for it."""
+    slot = first_slot(key, index.mask)
+    entry = index.table[slot]
+    while entry[0] >= 0 and (entry[0] != key[0] or entry[1] != key[1] or entry[2] != key[2]):
+        slot = (slot + 1) & index.mask
+        entry = index.table[slot]
+    return slot
+
+
+@wp.func
+def room_needed(
+    slot: wp.int32,
+    index: IndexedDecals,
+    rooms: wp.array(dtype=wp.int32),
+) -> wp.int32:
+    """Return the number of ids that another decal in this cell needs at the end of all lists."""
+    if index.table[slot][0] == EMPTY:
+        return 1 + INITIAL_ROOM
+    count = index.ids[index.table[slot][3]]
+    if count < rooms[slot]:
+        return 0
+    return 1 + 2 * count
+
+
+@wp.kernel
+def remove_decal(
+    decal: wp.int32,
+    exponent: wp.int32,
+    level: wp.int32,
+    index: IndexedDecals,
+    state: wp.array(dtype=wp.int32),
+    ranges: wp.array(dtype=wp.vec2i),
+):
+    """Remove a decal with an unchanged record from its lists; write the ranges of ids that changed."""
+    ball = index.records[RECORD * decal]
+    position = xyz(ball)
+    width = power_of_two(exponent)
+    corner = lowest_cell(position, ball[3], width)
+    across = cells_across(position, ball[3], width)
+    touched = wp.int32(0)
+    for number in range(cells_in(across)):
+        cell = cell_of_block(corner, across, number)
+        if touches(position, ball[3], cell, width):
+            head = index.table[slot_of(cell_key(cell, level), index)][3]
+            end = head + 1 + index.ids[head]
+            position_in_list = end_of_lower(
+                wp.vec2i(head + 1, end), rank_of(decal, index.records), decal, index
+            )
+            for j in range(position_in_list, end - 1):
+                index.ids[j] = index.ids[j + 1]
+            index.ids[head] = index.ids[head] - 1
+            ranges[touched] = wp.vec2i(head, end)
+            touched += 1
+    state[TOUCHED] = touched
+
+
+@wp.kernel
+def insert_decal(
+    decal: wp.int32,
+    exponent: wp.int32,
+    level: wp.int32,
+    index: IndexedDecals,
+    rooms: wp.array(dtype=wp.int32),
+    state: wp.array(dtype=wp.int32),
+    ranges: wp.array(dtype=wp.vec2i),
+    slots: wp.array(dtype=wp.int32),
+):
+    """Insert a decal with its record into its lists, if all fit; write what changed."""
+    ball = index.records[RECORD * decal]
+    position = xyz(ball)
+    width = power_of_two(exponent)
+    corner = lowest_cell(position, ball[3], width)
+    across = cells_across(position, ball[3], width)
+    needed = wp.int32(0)
+    for number in range(cells_in(across)):
+        cell = cell_of_block(corner, across, number)
+        if touches(position, ball[3], cell, width):
+            needed += room_needed(slot_of(cell_key(cell, level), index), index, rooms)
+    state[TOUCHED] = 0
+    state[FITS] = 1
+    if state[IDS_END] + needed > index.ids.shape[0] or 4 * (state[CELLS] + cells_in(across)) > 3 * (
+        index.mask + 1
+    ):
+        state[FITS] = 0
+        return
+    touched = wp.int32(0)
+    for number in range(cells_in(across)):
+        cell = cell_of_block(corner, across, number)
+        if touches(position, ball[3], cell, width):
+            key = cell_key(cell, level)
+            slot = slot_of(key, index)
+            taken = room_needed(slot, index, rooms)
+            if taken > 0:
+                head = state[IDS_END]
+                if index.table[slot][0] == EMPTY:
+                    index.ids[head] = 0
+                    state[CELLS] = state[CELLS] + 1
+                else:
+                    old = index.table[slot][3]
+                    for j in range(index.ids[old] + 1):
+                        index.ids[head + j] = index.ids[old + j]
+                index.table[slot] = wp.vec4i(key[0], key[1], key[2], head)
+                rooms[slot] = taken - 1
+                state[IDS_END] = head + taken
+            head = index.table[slot][3]
+            end = head + 1 + index.ids[head]
+            position_in_list = end_of_lower(
+                wp.vec2i(head + 1, end), rank_of(decal, index.records), decal, index
+            )
+            for back in range(end - position_in_list):
+                index.ids[end - back] = index.ids[end - back - 1]
+            index.ids[position_in_list] = decal
+            index.ids[head] = index.ids[head] + 1
+            ranges[touched] = wp.vec2i(head, end + 1)
+            slots[touched] = wp.where(taken > 0, slot, -1)
+            touched += 1
+    state[TOUCHED] = touched

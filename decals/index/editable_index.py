@@ -1,0 +1,150 @@
+"""Index whose arrays change in place, one decal at a time; it is rebuilt where many decals change at once."""
+
+import math
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree._typing import Float32Array, Int64Array
+from decals.index import edit_kernels as kernels
+from decals.index.change_log import ChangeLog
+from decals.index.decal_cells import FINEST, MAX_CELLS_OF_DECAL, NO_PARITY, REACH_WITH_SLACK
+from decals.index.index import DecalIndex, indexed_decals
+from decals.index.rows import with_spare
+from decals.model import RECORD
+
+MAX_LEVELS = 128
+
+LEVELS, TABLE, IDS = "index_levels", "index_table", "index_ids"
+_TYPES = {LEVELS: wp.vec4, TABLE: wp.vec4i, IDS: wp.int32}
+
+
+class EditableIndex:
+    """Levels, hash table and lists of an index (`decals.index.index`), with spare room at the end.
+
+    Attributes
+    ----------
+    arrays : dict
+        "index_levels", "index_table" and "index_ids". A change may replace an array.
+    stale : bool
+        True if `build` must run before the arrays may be read.
+    parity : int
+        Sizes that share levels, as `DecalIndex.parity`.
+    """
+
+    def __init__(self) -> None:
+        self.arrays: dict[str, NDArray[Any]] = {}
+        self.stale = True
+        self.parity = NO_PARITY
+        self._level_of: dict[int, int] = {}
+        self._list_rooms: Any = None
+        self._records: Float32Array | None = None
+        self._on_cpu: Any = None
+        self._state, self._state_on_cpu = _shared(np.zeros(4, np.int32), wp.int32)
+        self._ranges, self._ranges_on_cpu = _shared(np.zeros((MAX_CELLS_OF_DECAL, 2), np.int32), wp.vec2i)
+        self._slots, self._slots_on_cpu = _shared(np.zeros(MAX_CELLS_OF_DECAL, np.int32), wp.int32)
+
+    @property
+    def level_count(self) -> int:
+        """Number of levels."""
+        return len(self._level_of)
+
+    def build(self, records: Float32Array, numbers: Int64Array, log: ChangeLog) -> bool:
+        """Build the index of the decals of these numbers anew.
+
+        Return True if sums over neighbours may now round otherwise, because levels follow each other in
+        another order.
+        """
+        self.stale = False
+        rows = records.reshape(-1, RECORD, 4)[numbers]
+        ranks = np.floor(rows[:, 1, 3]).astype(np.int32)
+        index = DecalIndex.build(rows[:, 0, :3], rows[:, 0, 3], ranks)
+        levels = np.zeros((MAX_LEVELS, 4), np.float32)
+        levels[: index.level_count] = index.levels
+        level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
+        reordered = index.parity != self.parity or not _same_order(self._level_of, level_of)
+        self.parity, self._level_of = index.parity, level_of
+        table, ids = index.table.copy(), index.ids.copy()
+        full = np.flatnonzero(table[:, 0] >= 0)
+        heads = table[full, 3]
+        rooms = np.zeros(len(table), np.int32)
+        rooms[full] = ids[heads]
+        listed = np.ones(len(ids), bool)
+        listed[heads] = False
+        ids[listed] = numbers[ids[listed]]
+        self._state[:2] = len(ids), len(full)
+        for name, array in {LEVELS: levels, TABLE: table, IDS: with_spare(ids)}.items():
+            self.arrays[name] = np.ascontiguousarray(array)
+            log.add(name, (0, len(array)), new=True)
+        self._list_rooms = _shared(rooms, wp.int32)[1]
+        self._on_cpu = None
+        return reordered
+
+    def insert(self, records: Float32Array, number: int, rank: int, log: ChangeLog) -> bool:
+        """Insert a decal into the lists of its cells; return False if they have no room for it."""
+        exponent = self._exponent(records, number)
+        self._widen_level(exponent, float(rank), log)
+        inputs = [number, exponent, self._level_of[exponent], self._indexed(records), self._list_rooms]
+        inputs += [self._state_on_cpu, self._ranges_on_cpu, self._slots_on_cpu]
+        wp.launch(kernels.insert_decal, 1, inputs, device="cpu")
+        if not self._state[3]:
+            return False
+        for slot in self._slots[: self._state[2]].tolist():
+            if slot >= 0:
+                log.add(TABLE, (slot, slot + 1))
+        self._log_lists(log)
+        return True
+
+    def remove(self, records: Float32Array, number: int, log: ChangeLog) -> None:
+        """Remove a decal, whose record is still unchanged, from the lists of its cells."""
+        exponent = self._exponent(records, number)
+        inputs = [number, exponent, self._level_of[exponent], self._indexed(records)]
+        inputs += [self._state_on_cpu, self._ranges_on_cpu]
+        wp.launch(kernels.remove_decal, 1, inputs, device="cpu")
+        self._log_lists(log)
+
+    def _indexed(self, records: Float32Array) -> Any:
+        """Return records and index as an `IndexedDecals` that shares their memory."""
+        if self._on_cpu is None or self._records is not records:
+            arrays = (self.arrays[name] for name in (LEVELS, TABLE, IDS))
+            self._records = records
+            self._on_cpu = indexed_decals(records, *arrays, layered=True, device="cpu")
+        return self._on_cpu
+
+    def _exponent(self, records: Float32Array, number: int) -> int:
+        """Return the exponent of a decal's cell size, as `decal_cells.cell_exponent`."""
+        x, y, z, influence = records[RECORD * number].tolist()
+        reach = influence * REACH_WITH_SLACK
+        farthest = max(abs(x), abs(y), abs(z)) + reach
+        exponent = math.frexp(reach)[1]
+        joins = self.parity != NO_PARITY and exponent % 2 != self.parity
+        return max(exponent - joins, math.frexp(farthest)[1] - FINEST)
+
+    def _widen_level(self, exponent: int, rank: float, log: ChangeLog) -> None:
+        """Add the level of a cell size if it is missing, and include a rank in its range."""
+        levels = self.arrays[LEVELS]
+        level = self._level_of.get(exponent)
+        if level is None:
+            level = self._level_of[exponent] = len(self._level_of)
+            levels[level] = 2.0**-exponent, 2.0**exponent, rank, rank
+        elif levels[level, 2] <= rank <= levels[level, 3]:
+            return
+        levels[level, 2:] = min(levels[level, 2], rank), max(levels[level, 3], rank)
+        log.add(LEVELS, (level, level + 1))
+
+    def _log_lists(self, log: ChangeLog) -> None:
+        for first, end in self._ranges[: self._state[2]].tolist():
+            log.add(IDS, (first, end))
+
+
+def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:
+    """Return an array, and a Warp array in the same memory."""
+    contiguous = np.ascontiguousarray(array)
+    return contiguous, wp.array(contiguous, dtype=dtype, device="cpu", copy=False)
+
+
+def _same_order(before: dict[int, int], after: dict[int, int]) -> bool:
+    """Return True if the levels that two indices share are in the same order."""
+    return [size for size in before if size in after] == [size for size in after if size in before]

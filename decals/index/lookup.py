@@ -1,0 +1,89 @@
+"""Look-up of a cell in the index: typed functions for Warp and GLSL, and the arrays that they read."""
+
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+import warp as wp
+
+from blobtree.transpile.glsl import uniform_struct
+
+wp.set_module_options({"enable_backward": False})
+
+HALF_RANGE = 8388608.0
+"""Cell coordinates lie in [−2²³, 2²³), where float32 represents multiples of ½ exactly."""
+
+MIX_X = wp.constant(wp.uint32(0x1B873593))
+MIX_Y = wp.constant(wp.uint32(0x27D4EB2F))
+MIX_Z = wp.constant(wp.uint32(0x165667B1))
+MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
+
+
+@uniform_struct(
+    records="decal_records",
+    layered="decal_layered",
+    level_count="index_level_count",
+    levels="index_levels",
+    table="index_table",
+    mask="index_mask",
+    ids="index_ids",
+)
+class IndexedDecals:
+    """Records and index of a set of decals on one device; ``shaders/decals.glsl`` has them as uniforms.
+
+    Attributes
+    ----------
+    records
+        `decals.model.Decals.packed`.
+    layered
+        `decals.model.Decals.layered`. Ranks are not read where it is False.
+    level_count, levels, table, mask, ids
+        Arrays of the index, as `decals.index.index` describes them; the table has ``mask + 1`` slots.
+    """
+
+    records: wp.array(dtype=wp.vec4)
+    layered: wp.bool
+    level_count: wp.int32
+    levels: wp.array(dtype=wp.vec4)
+    table: wp.array(dtype=wp.vec4i)
+    mask: wp.int32
+    ids: wp.array(dtype=wp.int32)
+
+
+@wp.func
+def cell_coordinate(x: wp.float32, cells_per_unit: wp.float32) -> wp.int32:
+    """Return the cell of a coordinate, counted from 0. It is exact: cells_per_unit is a power of two."""
+    c = wp.clamp(wp.floor(x * cells_per_unit), -HALF_RANGE, HALF_RANGE - 1.0)
+    return int(c + HALF_RANGE)
+
+
+@wp.func
+def cell_hash(x: wp.int32, y: wp.int32, z: wp.int32) -> wp.uint32:
+    """Return a 32-bit hash of a cell."""
+    h = (wp.uint32(x) * MIX_X) ^ (wp.uint32(y) * MIX_Y) ^ (wp.uint32(z) * MIX_Z)
+    h = (h ^ (h >> wp.uint32(15))) * MIX_ALL
+    return h ^ (h >> wp.uint32(13))
+
+
+@wp.func
+def cell_range(
+    q: wp.vec3,
+    level: wp.int32,
+    index: IndexedDecals,
+) -> wp.vec2i:
+    """Return the range (first, past last) in ids of the decals of one level that may reach q.
+
+    The decals are in draw order. The table uses open addressing with linear probing, and a slot holds the
+    whole key of its cell.
+    """
+    cells_per_unit = index.levels[level][0]
+    x = cell_coordinate(q[0], cells_per_unit) + (level << 24)
+    y = cell_coordinate(q[1], cells_per_unit)
+    z = cell_coordinate(q[2], cells_per_unit)
+    slot = int(cell_hash(x, y, z) & wp.uint32(index.mask))
+    entry = index.table[slot]
+    while entry[0] >= 0:
+        if entry[0] == x and entry[1] == y and entry[2] == z:
+            return wp.vec2i(entry[3] + 1, entry[3] + 1 + index.ids[entry[3]])
+        slot = (slot + 1) & index.mask
+        entry = index.table[slot]
+    return wp.vec2i(0, 0)

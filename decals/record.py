@@ -1,0 +1,116 @@
+"""Typed functions that read packed records (`Decals.packed`), for Warp and GLSL, and `Contact`."""
+
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+from enum import IntEnum
+
+import warp as wp
+
+from blobtree.formulas.falloff import RIM
+from decals.model import FACING_LIMIT as MODEL_FACING_LIMIT
+from decals.model import RECORD as MODEL_RECORD
+from decals.model import Interaction
+
+wp.set_module_options({"enable_backward": False})
+
+
+class Contact(IntEnum):
+    """Contact mode: how neighbours push the owner of a point.
+
+    `decals.field.contact` and `decals.field.radial` state the formulas.
+
+    Examples
+    --------
+    >>> import decals
+    >>> list(decals.Contact)
+    [<Contact.PRODUCT: 0>, <Contact.MIN: 1>, <Contact.RADIAL: 2>]
+    """
+
+    PRODUCT = 0
+    """Product of the factors h of all neighbours (paper, equation 5, repaired)."""
+    MIN = 1
+    """Smallest factor h: only the strongest push counts, so no image is torn where three decals meet."""
+    RADIAL = 2
+    """Scaling along rays from the centre, in convex cells: no image folds."""
+
+
+NEIGHBOR_REACH = 0.575
+"""Neighbour reach in influence radii. A neighbour beyond it would move r by less than 7e-5 of the rim."""
+
+NO_FIELD = 2.0
+"""Complement of a decal that does not act on a point: above every e."""
+
+RECORD = MODEL_RECORD
+FACING_LIMIT = MODEL_FACING_LIMIT
+NO_FACING_LIMIT = -2.0
+RIM_RADIUS = float(RIM)
+REACH_SQUARED = NEIGHBOR_REACH * NEIGHBOR_REACH
+INTERACTION_MASK = 3
+"""Mask of a rank's `Interaction`."""
+
+
+@wp.func
+def field_complement(z: wp.float32) -> wp.float32:
+    """Return the complement e = 1 − g(d) for z = d² = |q − p|²/s², to full relative precision also near 0."""
+    t = wp.min(z, 1.0)
+    return t * (3.0 - t * (3.0 - t))
+
+
+@wp.func
+def xyz(v: wp.vec4) -> wp.vec3:
+    """Return the first three components."""
+    return wp.vec3(v[0], v[1], v[2])
+
+
+@wp.func
+def rank_of(decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.int32:
+    """Return the rank of a decal."""
+    return int(decals[RECORD * decal + 1][3])
+
+
+@wp.func
+def is_contact_rank(rank: wp.int32) -> wp.bool:
+    """Return True if the decals of this rank are contact decals, which push each other."""
+    return (rank & INTERACTION_MASK) == Interaction.PUSH
+
+
+@wp.func
+def facing_limit(packed_rank: wp.float32) -> wp.float32:
+    """Return the smallest cosine between the normals of decal and surface; decals that spill have none."""
+    if packed_rank - wp.floor(packed_rank) > 0.25:
+        return NO_FACING_LIMIT
+    return FACING_LIMIT
+
+
+@wp.func
+def faces(n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True if a decal colours surface with this normal (facing rule)."""
+    facing = decals[RECORD * decal + 1]
+    return wp.dot(xyz(facing), n_q) > facing_limit(facing[3])
+
+
+@wp.func
+def complement_of(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
+    """Return the complement e of a decal's field at q; NO_FIELD out of reach, or where it faces away."""
+    ball = decals[RECORD * decal]
+    w = q - xyz(ball)
+    squared = wp.dot(w, w)
+    size = ball[3] * ball[3]
+    if squared >= REACH_SQUARED * size:  # most candidates return here, before any division
+        return NO_FIELD
+    if not faces(n_q, decal, decals):
+        return NO_FIELD
+    return field_complement(squared / size)
+
+
+@wp.func
+def apart(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.vec3:
+    """Return the vector from the centre of one decal to that of another."""
+    return xyz(decals[RECORD * other]) - xyz(decals[RECORD * decal])
+
+
+@wp.func
+def visible_radius(decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
+    """Return the visible radius of a decal."""
+    return RIM_RADIUS * decals[RECORD * decal][3]

@@ -1,0 +1,8 @@
+"""Pictures of scenes through OpenGL: `decals.render` draws one, a `Renderer` draws many.
+
+The public names are listed in `__init__.pyi` and are loaded at first use.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

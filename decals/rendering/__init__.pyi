@@ -1,0 +1,26 @@
+from .context import Context
+from .drawables import Drawable, register
+from .lights import Light, Lighting
+from .options import STUDIO, TRANSPARENT, Background, RenderOptions, SceneLike, Size
+from .picture import Buffers, Picture
+from .renderer import Renderer
+from .viewpoint import Projection, Viewpoint
+
+__all__ = [
+    "STUDIO",
+    "TRANSPARENT",
+    "Background",
+    "Buffers",
+    "Context",
+    "Drawable",
+    "Light",
+    "Lighting",
+    "Picture",
+    "Projection",
+    "RenderOptions",
+    "Renderer",
+    "SceneLike",
+    "Size",
+    "Viewpoint",
+    "register",
+]

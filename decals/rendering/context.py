@@ -1,0 +1,248 @@
+"""OpenGL contexts: their limits, and the programs and textures made in them."""
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from types import TracebackType
+from typing import Any, Self
+
+import moderngl
+
+from decals.errors import NoGraphics
+from decals.rendering.gl_libraries import hold_display, require_gl
+from decals.rendering.pixel_pass import (
+    COMPUTE_VERSION,
+    Defines,
+    PassBackend,
+    Program,
+    Slots,
+    backend_named,
+    choose_backend,
+    compile_compute,
+    compile_program,
+    driver_name,
+    pass_source,
+    probe_backend,
+)
+from decals.shaders import Source, compose
+
+MIN_VERSION = 330
+"""Version of OpenGL that is enough for everything but compute shaders; macOS ends at 410."""
+
+MAX_ANISOTROPY = 8.0
+"""Greatest ratio of a pixel's footprint in an image at which the image is not blurred."""
+
+DEPTH = "depth"
+"""Kind of textures that hold depths."""
+
+SOFTWARE_LOOP_ITERATIONS = 65_535
+"""Iterations after which Mesa's software rasteriser ends all loops of a pixel, without an error
+(LP_MAX_TGSI_LOOP_ITERATIONS)."""
+
+
+class _Entered(threading.local):
+    """The contexts whose blocks are open on this thread, the innermost last."""
+
+    def __init__(self) -> None:
+        self.contexts: list[moderngl.Context] = []
+
+
+_entered = _Entered()
+
+
+def _is_software(gl: moderngl.Context) -> bool:
+    """Return True if Mesa draws on the processor."""
+    return "llvmpipe" in gl.info["GL_RENDERER"] or "softpipe" in gl.info["GL_RENDERER"]
+
+
+def _anisotropy(gl: moderngl.Context) -> float:
+    """Return the degree of anisotropic filtering that is used.
+
+    Mesa's software rasteriser filters a 2 × 2 quad along the derivatives of its first pixel, even those that
+    ``textureGrad`` is given: neighbouring decals would show specks of each other's images.
+    """
+    return 1.0 if _is_software(gl) else min(MAX_ANISOTROPY, gl.max_anisotropy)
+
+
+def _newest_context() -> moderngl.Context:
+    """Make a context with compute shaders, or else an older one."""
+    settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
+    for version in (COMPUTE_VERSION, MIN_VERSION):  # some drivers give no newer version than requested
+        try:
+            return moderngl.create_context(require=version, standalone=True, **settings)
+        except Exception as error:  # glcontext raises bare Exceptions
+            reason = error
+    raise NoGraphics(
+        f"no OpenGL 3.3 context could be made here ({reason}); `implicit-decals doctor` shows what is missing"
+    ) from reason
+
+
+class Context:
+    """An OpenGL context and the programs compiled in it.
+
+    Use it as a context manager, or call `release`. GL calls belong into a ``with context.current():`` block.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+        Context to draw in, such as one attached to a window's; `standalone` makes one.
+    owned : bool
+        True if `release` ends the context too, False if it releases only what was made in it.
+    backend : str, optional
+        Backend of passes over all pixels, ``"fragment"`` or ``"compute"``. Default: the environment variable
+        ``IMPLICIT_DECALS_ENTRY`` or, without one, the faster backend by a short measurement.
+
+    Raises
+    ------
+    NoGraphics
+        If the backend is unknown or not supported.
+
+    Examples
+    --------
+    >>> from decals.rendering import Context, Renderer
+    >>> with Context.standalone(backend="fragment") as context, Renderer(context) as renderer:
+    ...     print(renderer.backend)
+    fragment
+    """
+
+    def __init__(self, gl: moderngl.Context, *, owned: bool = False, backend: str | None = None) -> None:
+        self.gl = gl
+        self._owned = owned
+        self._programs: dict[tuple[str, str], moderngl.Program] = {}
+        self._compute_programs: dict[str, moderngl.ComputeShader] = {}
+        self.requested_backend = backend_named(gl, backend) if backend else None
+        self._spare_textures: dict[tuple[tuple[int, int], str], list[moderngl.Texture]] = {}
+        self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
+        self.anisotropy = _anisotropy(gl)
+        self.software = _is_software(gl)
+        self.max_loop_iterations = SOFTWARE_LOOP_ITERATIONS if self.software else None
+
+    @classmethod
+    def standalone(cls, *, backend: str | None = None) -> "Context":
+        """Make a context of its own, without a window; ``backend`` is that of the class.
+
+        Raises
+        ------
+        NoGraphics
+            If OpenGL 3.3 is missing (the message says what to install), or the backend is not supported.
+        """
+        require_gl()
+        hold_display()
+        gl = _newest_context()
+        context = cls(gl, owned=True, backend=backend)
+        with context.current():  # a new context is current: give the thread back to the one before
+            return context
+
+    @property
+    def name(self) -> str:
+        """The renderer and the version of OpenGL, as the driver reports them."""
+        return driver_name(self.gl)
+
+    @cached_property
+    def backend(self) -> PassBackend:
+        """Backend of passes over all pixels. The first access needs the context to be current."""
+        return self.requested_backend or choose_backend(self.gl, software=self.software)
+
+    def probe(self, backend: PassBackend) -> None:
+        """Measure a backend now, if the choice of `backend` will need it."""
+        if self.requested_backend is None:
+            probe_backend(self.gl, backend, software=self.software)
+
+    @contextmanager
+    def current(self) -> Iterator[Self]:
+        """Make this the thread's current context within a ``with`` block.
+
+        Blocks nest, of one context and of several. A context that is not owned must be current already: its
+        window sees to that. (glcontext's own blocks leave no context current, hence the stack.)
+        """
+        if not self._owned:
+            yield self
+            return
+        stack = _entered.contexts
+        stack.append(self.gl)
+        self.gl.__enter__()  # type: ignore[no-untyped-call]
+        try:
+            yield self
+        finally:
+            stack.pop()
+            self.gl.__exit__(None, None, None)  # type: ignore[no-untyped-call]
+            if stack:
+                stack[-1].__enter__()  # type: ignore[no-untyped-call]
+
+    def program(self, vertex: Source, fragment: Source) -> moderngl.Program:
+        """Compile two sources, or return the program that was compiled of them before.
+
+        Raises
+        ------
+        decals.shaders.CompileError
+            If the driver refuses them.
+        """
+        key = vertex.text, fragment.text
+        if key not in self._programs:
+            self._programs[key] = compile_program(self.gl, vertex, fragment)
+        return self._programs[key]
+
+    def compute_program(self, source: Source) -> moderngl.ComputeShader:
+        """Compile a compute shader, or return the program that was compiled of it before.
+
+        Raises
+        ------
+        decals.shaders.CompileError
+            If the driver refuses it.
+        """
+        if source.text not in self._compute_programs:
+            self._compute_programs[source.text] = compile_compute(self.gl, source)
+        return self._compute_programs[source.text]
+
+    def pixel_program(
+        self, body: str, targets: int, *, slots: Slots | None = None, defines: Defines | None = None
+    ) -> Program:
+        """Compile the program of a pass over all pixels, or return the one that was compiled before.
+
+        Arguments are those of `decals.rendering.pixel_pass.pass_source`, errors those of `program`.
+        """
+        source = pass_source(self.backend, body, targets, slots, defines)
+        if self.backend is PassBackend.COMPUTE:
+            return self.compute_program(source)
+        return self.program(compose("screen.vert"), source)
+
+    def texture(self, size: tuple[int, int], kind: str) -> moderngl.Texture:
+        """Return a new texture: of four components of a moderngl type, or of ``"depth"``."""
+        spare = self._spare_textures.get((size, kind))
+        return spare.pop() if spare else self._new_texture(size, kind)
+
+    def prepare_texture(self, size: tuple[int, int], kind: str) -> None:
+        """Make a texture for a later call of `texture`: large allocations are slow, so one at a time."""
+        self._spare_textures.setdefault((size, kind), []).append(self._new_texture(size, kind))
+
+    def _new_texture(self, size: tuple[int, int], kind: str) -> moderngl.Texture:
+        return self.gl.depth_texture(size) if kind == DEPTH else self.gl.texture(size, 4, dtype=kind)
+
+    def clear_spare_textures(self) -> None:
+        """Release the prepared textures that were not used."""
+        for texture in (texture for spare in self._spare_textures.values() for texture in spare):
+            texture.release()
+        self._spare_textures.clear()
+
+    def release(self) -> None:
+        """Release the programs, and the context if it is owned. Calling twice is harmless."""
+        with self.current():
+            self.clear_spare_textures()
+            programs: list[Program] = [*self._programs.values(), *self._compute_programs.values()]
+            for program in programs:
+                program.release()
+        self._programs.clear()
+        self._compute_programs.clear()
+        if self._owned:
+            self.gl.release()
+            self._owned = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()

@@ -1,0 +1,96 @@
+"""The decal pass: colours all pixels at once, for any number of decals and objects."""
+
+from collections.abc import Mapping
+
+import moderngl
+
+from blobtree._typing import Float32Array
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
+from decals.rendering.context import Context
+from decals.rendering.decal_data import DecalData, decal_library
+from decals.rendering.gbuffer import GBuffer
+from decals.rendering.pixel_pass import PixelPass, Program, pixel_pass
+from decals.rendering.regions import WHOLE, Part, Rectangle
+from decals.rendering.textures import ImageArray
+from decals.rendering.tiles import Tile, attach_camera, read_floats, set_uniform
+
+BODY = "decal_pass.glsl"
+FIRST_DECAL_UNIT = 3
+"""Texture unit of the images. Lower units hold the G-buffer, higher ones the decals' data."""
+
+
+class DecalPass:
+    """Reads a G-buffer, writes its colour under decals and, on request, the decal at every pixel.
+
+    Parameters
+    ----------
+    context
+        Where to draw.
+    size
+        Size of the largest tile, in samples.
+    buffers
+        True to write owner, field and uv too.
+    """
+
+    def __init__(self, context: Context, size: tuple[int, int], *, buffers: bool = False) -> None:
+        self.paint = context.texture(size, "f2")
+        self.decal = context.texture(size, "f4") if buffers else None
+        self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
+        self._framebuffer = context.gl.framebuffer(self._targets)
+        self._context = context
+        self._passes: dict[str, PixelPass] = {}
+
+    def draw(
+        self,
+        rectangle: Rectangle,
+        gbuffer: GBuffer,
+        decals: DecalData | None,
+        images: ImageArray | None,
+        mapping: ImageMapping,
+        contact: Contact,
+        part: Part = WHOLE,
+    ) -> None:
+        """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours."""
+        painting = self._pass("" if decals is None else decal_library(contact, layered=decals.layered))
+        program = painting.program
+        textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
+        use_textures(program, textures)
+        if decals is not None and images is not None:
+            images.use(FIRST_DECAL_UNIT)
+            set_uniform(program, "decal_images", FIRST_DECAL_UNIT)
+            set_uniform(program, "decal_mapping", int(mapping))
+            decals.use(program, FIRST_DECAL_UNIT + 1)
+        painting.run(rectangle.rows(part))
+
+    def read_decal(self, tile: Tile) -> Float32Array:
+        """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""
+        return read_floats(self._framebuffer, 1, tile)
+
+    def _pass(self, library: str) -> PixelPass:
+        """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
+        if library not in self._passes:
+            program = decal_program(self._context, library, len(self._targets))
+            self._passes[library] = pixel_pass(self._context.gl, program, self._targets)
+        return self._passes[library]
+
+    def release(self) -> None:
+        """Release the memory."""
+        for painting in self._passes.values():
+            painting.release()
+        self._framebuffer.release()
+        for target in self._targets:
+            target.release()
+
+
+def decal_program(context: Context, library: str, targets: int = 1) -> Program:
+    """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
+    slots = {"decals": "//@ include decals.glsl", "functions": library} if library else {}
+    return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines={"DECALS": bool(library)}))
+
+
+def use_textures(program: Program, textures: Mapping[str, moderngl.Texture]) -> None:
+    """Bind textures to the units from 0 on, and set the samplers of these names."""
+    for unit, (name, texture) in enumerate(textures.items()):
+        texture.use(unit)
+        set_uniform(program, name, unit)

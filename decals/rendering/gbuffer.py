@@ -1,0 +1,107 @@
+"""The G-buffer: the visible surface at every pixel, which all kinds of objects write."""
+
+import moderngl
+import numpy as np
+
+from blobtree._typing import Float32Array
+from decals.rendering.context import DEPTH, Context
+from decals.rendering.pixel_pass import GROUP, PassBackend, run_pixels, scissor_of
+from decals.rendering.regions import WHOLE, Part, Rectangle
+from decals.rendering.tiles import Tile, attach_camera, read_floats, set_uniform
+from decals.shaders import compose
+
+
+class GBuffer:
+    """Position and object, normal, base colour, depth: see ``shaders/gbuffer.glsl``.
+
+    Parameters
+    ----------
+    context
+        Where to make the textures.
+    size
+        Width and height in samples.
+    """
+
+    def __init__(self, context: Context, size: tuple[int, int]) -> None:
+        self.size = size
+        self.position = context.texture(size, "f4")
+        self.normal = context.texture(size, "f4")
+        self.color = context.texture(size, "f2")
+        self.depth = context.texture(size, DEPTH)
+        for texture in (self.position, self.normal, self.color):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._framebuffer = context.gl.framebuffer([self.position, self.normal, self.color], self.depth)
+        self._depth_framebuffer = context.gl.framebuffer([], self.depth)
+        self._depth_program = depth_program(context)
+        self._screen = context.gl.vertex_array(self._depth_program, [])
+        self._clear_program = _clear_program(context) if context.backend is PassBackend.COMPUTE else None
+        self._gl = context.gl
+
+    def use(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Restrict the next draws to these rows of the lower left part of this size."""
+        self._bind(self._framebuffer, width, height, part)
+
+    def _bind(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
+        framebuffer.viewport = (0, 0, width, height)
+        framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
+        framebuffer.use()
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "<"
+
+    def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Clear these rows of the lower left part of this size."""
+        if self._clear_program is None:
+            self.use(width, height, part)  # first: it ends scissors of other passes
+            self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        else:
+            self._clear_by_compute(self._clear_program, Rectangle(0, 0, width, height).rows(part))
+            self._bind(self._depth_framebuffer, width, height, part)
+            self._depth_framebuffer.clear(depth=1.0)
+
+    def _clear_by_compute(self, program: moderngl.ComputeShader, rectangle: Rectangle) -> None:
+        for unit, texture in enumerate((self.position, self.normal, self.color)):
+            texture.bind_to_image(unit, read=False, write=True)
+        run_pixels(program, rectangle)
+        self._gl.memory_barrier()
+
+    def complete_depth(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Write the depth of surface that was not rasterised, in the lower left part of this size.
+
+        Only users of the depth buffer need it: in the other targets such surface is complete.
+        """
+        self._bind(self._depth_framebuffer, width, height, part)
+        self.position.use(0)
+        set_uniform(self._depth_program, "g_position", 0)
+        self._screen.render(vertices=3)
+
+    def read_position(self, tile: Tile) -> Float32Array:
+        """Read position and object id + 1, ``float32[h, w, 4]``, the lowest row first."""
+        return self._read(0, tile)
+
+    def read_normal(self, tile: Tile) -> Float32Array:
+        """Read the normals, ``float32[h, w, 4]``, the lowest row first."""
+        return self._read(1, tile)
+
+    def read_depth(self, part: Rectangle) -> float:
+        """Read the least depth in a rectangle of samples."""
+        viewport = part.x, part.y, part.width, part.height
+        data = self._depth_framebuffer.read(viewport, components=1, attachment=-1, alignment=1, dtype="f4")
+        return float(np.frombuffer(data, np.float32).min())
+
+    def _read(self, attachment: int, tile: Tile) -> Float32Array:
+        return read_floats(self._framebuffer, attachment, tile)
+
+    def release(self) -> None:
+        """Release the memory."""
+        framebuffers = self._framebuffer, self._depth_framebuffer
+        for resource in (self._screen, *framebuffers, self.position, self.normal, self.color, self.depth):
+            resource.release()
+
+
+def depth_program(context: Context) -> moderngl.Program:
+    """Return the program that writes the depth of surface that was not rasterised."""
+    return attach_camera(context.program(compose("screen.vert"), compose("depth.frag")))
+
+
+def _clear_program(context: Context) -> moderngl.ComputeShader:
+    return context.compute_program(compose("clear.comp", defines={"GROUP": GROUP}, version="430 core"))

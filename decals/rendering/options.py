@@ -1,0 +1,188 @@
+"""Options of a picture, and what the renderer reads of a scene."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+
+from blobtree._typing import UInt8Array
+from decals.errors import InvalidScene
+from decals.field.mapping import ImageMapping
+from decals.index.editor import DecalEditor
+from decals.model import Decals
+from decals.record import Contact
+from decals.rendering.lights import Lighting
+from decals.rendering.viewpoint import Viewpoint
+from decals.validation import describe, instance, member, whole_number
+
+Size: TypeAlias = tuple[int, int]
+"""Width and height."""
+
+Rgba: TypeAlias = tuple[float, float, float, float]
+
+MAX_PICTURE_SIDE = 1 << 20
+"""Pixels along each side of a picture, at most."""
+
+MAX_SAMPLES = 1024
+"""Samples along each axis of a pixel, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Background:
+    """A vertical gradient behind all objects.
+
+    Parameters
+    ----------
+    top, bottom : (red, green, blue, alpha)
+        sRGB and alpha at the upper and the lower edge, each in [0, 1], not premultiplied.
+
+    Raises
+    ------
+    InvalidScene
+        If a colour is not four such numbers.
+
+    Examples
+    --------
+    >>> from decals.rendering import Background
+    >>> white = Background((1, 1, 1, 1), (1, 1, 1, 1))
+    """
+
+    top: Rgba
+    bottom: Rgba
+
+    def __post_init__(self) -> None:
+        for name, color in (("top", self.top), ("bottom", self.bottom)):
+            try:
+                channels = np.array(color, np.float64)
+            except (TypeError, ValueError, OverflowError):
+                channels = np.zeros(0)
+            if channels.shape != (4,) or not ((channels >= 0.0) & (channels <= 1.0)).all():
+                raise InvalidScene(
+                    f"a background's {name}: expected sRGB and alpha in [0, 1], got {describe(color)}"
+                )
+
+
+STUDIO = Background((0.80, 0.82, 0.85, 1.0), (0.96, 0.96, 0.95, 1.0))
+"""Light grey, a little darker at the top."""
+
+TRANSPARENT = Background((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+"""No background: alpha is the part of a pixel that objects cover."""
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """Everything that decides a picture besides its scene and viewpoint.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    samples : int
+        Samples along each axis of a pixel; 2 means 4 samples a pixel.
+    contact : Contact
+        Contact mode: how decals that push each other share the surface.
+    mapping : ImageMapping
+        Image mapping: how images lie on curved surface.
+    background : Background
+        Colours behind the objects.
+    lights : Lighting, optional
+        Lights in place of the studio light.
+
+    Raises
+    ------
+    InvalidScene
+        If an option is of another type, or out of range.
+
+    Examples
+    --------
+    >>> from decals.rendering import RenderOptions
+    >>> RenderOptions(size=(320, 240), samples=4).sample_size
+    (1280, 960)
+    """
+
+    size: Size = (800, 600)
+    samples: int = 2
+    contact: Contact = Contact.PRODUCT
+    mapping: ImageMapping = ImageMapping.CORRECTED
+    background: Background = STUDIO
+    lights: Lighting | None = None
+
+    def __post_init__(self) -> None:
+        checked = {
+            "size": _size(self.size),
+            "samples": whole_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
+            "contact": member("contact", self.contact, Contact, InvalidScene),
+            "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
+        }
+        instance("background", self.background, Background, InvalidScene, "such as decals.rendering.STUDIO")
+        if self.lights is not None:
+            instance("lights", self.lights, Lighting, InvalidScene, "leave them out for the studio light")
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def sample_size(self) -> Size:
+        """Width and height in samples."""
+        return self.size[0] * self.samples, self.size[1] * self.samples
+
+
+def _size(size: Any) -> Size:
+    try:
+        width, height = size
+    except (TypeError, ValueError, KeyError):
+        raise InvalidScene(f"size: expected width and height in pixels, got {describe(size)}") from None
+    width, height = (
+        whole_number("size", side, 1, MAX_PICTURE_SIDE, InvalidScene) for side in (width, height)
+    )
+    return width, height
+
+
+class ImageLike(Protocol):
+    """An image of a scene: straight RGBA, row 0 at the top."""
+
+    @property
+    def pixels(self) -> UInt8Array: ...  # noqa: D102
+
+
+class SceneLike(Protocol):
+    """What the renderer reads of a scene, such as a `decals.Scene` or an editing document.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> from decals.rendering import SceneLike
+    >>> def count_decals(scene: SceneLike) -> int:
+    ...     return len(scene.decals)
+    >>> count_decals(decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20))
+    20
+    """
+
+    @property
+    def objects(self) -> Sequence[object]: ...  # noqa: D102
+    @property
+    def decals(self) -> Decals | DecalEditor: ...  # noqa: D102
+    @property
+    def images(self) -> Sequence[ImageLike]: ...  # noqa: D102
+    @property
+    def camera(self) -> Viewpoint: ...  # noqa: D102
+
+
+def is_scene_like(scene: object) -> bool:
+    """Return True if a value has objects, decals and images to draw."""
+    return all(hasattr(scene, name) for name in ("objects", "decals", "images"))
+
+
+def check_scene(scene: object) -> None:
+    """Raise InvalidScene for a value without objects, decals and images."""
+    if not is_scene_like(scene):
+        raise InvalidScene(f"scene: expected a Scene, got {describe(scene)}; decals.cover makes one")
+
+
+def viewpoint_of(scene: SceneLike, viewpoint: Viewpoint | None) -> Viewpoint:
+    """Return the viewpoint of a picture: the scene's camera by default."""
+    chosen: Any = getattr(scene, "camera", None) if viewpoint is None else viewpoint
+    if isinstance(chosen, type) or not (hasattr(chosen, "clip_matrix") and hasattr(chosen, "rays")):
+        raise InvalidScene(f"viewpoint: expected a Camera or a Projection, got {describe(chosen)}")
+    checked: Viewpoint = chosen
+    return checked

@@ -1,0 +1,288 @@
+"""Passes over all pixels of a target, as fragment or as compute shaders, from the same text.
+
+Neither backend is faster on every driver. Data-centre GPUs, which have few units for fragments, run compute
+shaders much faster. Software rasterisers run them as fast or several times slower. `choose_backend` measures
+both.
+"""
+
+import os
+import time
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from typing import Protocol, TypeAlias
+
+import moderngl
+import numpy as np
+
+from decals.errors import NoGraphics
+from decals.rendering.regions import Rectangle
+from decals.shaders import Source, compile_error, compose
+
+BACKEND_VARIABLE = "IMPLICIT_DECALS_ENTRY"
+"""Environment variable that names the backend: ``fragment`` or ``compute``."""
+
+COMPUTE_VERSION = 430
+"""Version of OpenGL that brought compute shaders; macOS has none."""
+
+GROUP = 8
+"""Side of a compute shader's square group of pixels."""
+
+MIN_COMPUTE_GAIN = 1.5
+"""Gain in speed from which compute is chosen: near 1 the choice would change from run to run."""
+
+_PROBE_SIZE = (256, 256)
+_PROBE_RUNS = 3
+_NOISE_SIZE = 64
+_TRIAL_SHADER = """#version 430 core
+layout(local_size_x = 1) in;
+layout(binding = 0, rgba32f) uniform image2D target;
+void main() { imageStore(target, ivec2(0), vec4(0.0)); }
+"""
+
+Defines: TypeAlias = Mapping[str, bool]
+Slots: TypeAlias = Mapping[str, str | Source]
+Program: TypeAlias = moderngl.Program | moderngl.ComputeShader
+"""A compiled program, which takes the uniforms of a pass."""
+
+
+class PassBackend(StrEnum):
+    """Kind of shader that runs a pass over all pixels."""
+
+    FRAGMENT = "fragment"
+    COMPUTE = "compute"
+
+
+# -- programs -------------------------------------------------------------------------------------------
+
+
+def compile_program(gl: moderngl.Context, vertex: Source, fragment: Source) -> moderngl.Program:
+    """Compile a vertex and a fragment shader; CompileError if the driver refuses them."""
+    try:
+        return gl.program(vertex_shader=vertex.text, fragment_shader=fragment.text)
+    except moderngl.Error as error:
+        raise compile_error(str(error), {"vertex_shader": vertex, "fragment_shader": fragment}) from error
+
+
+def compile_compute(gl: moderngl.Context, source: Source) -> moderngl.ComputeShader:
+    """Compile a compute shader; CompileError if the driver refuses it."""
+    try:
+        return gl.compute_shader(source.text)
+    except moderngl.Error as error:
+        raise compile_error(str(error), {"compute_shader": source}) from error
+
+
+def pass_source(
+    backend: PassBackend, body: str, targets: int, slots: Slots | None = None, defines: Defines | None = None
+) -> Source:
+    """Return the fragment or the compute shader of a pass.
+
+    Parameters
+    ----------
+    backend
+        Kind of shader.
+    body
+        Shader file that defines ``Pixel pixel_at(ivec2 texel)``.
+    targets
+        Number of textures that the pass fills, one or two.
+    slots, defines
+        Arguments of `decals.shaders.compose` for the body.
+    """
+    all_defines: dict[str, str | int | float | bool] = {**(defines or {}), "TWO_TARGETS": targets > 1}
+    all_slots = {"body": f"//@ include {body}", **(slots or {})}
+    if backend is PassBackend.COMPUTE:
+        all_defines["GROUP"] = GROUP
+        return compose("pixels.comp", slots=all_slots, defines=all_defines, version="430 core")
+    return compose("pixels.frag", slots=all_slots, defines=all_defines)
+
+
+# -- passes ---------------------------------------------------------------------------------------------
+
+
+class PixelPass(Protocol):
+    """A compiled pass over all pixels."""
+
+    @property
+    def program(self) -> Program:
+        """The program, which takes the uniforms."""
+        ...
+
+    def run(self, rectangle: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
+        ...
+
+    def release(self) -> None:
+        """Release the memory, except targets and program."""
+        ...
+
+
+def pixel_pass(gl: moderngl.Context, program: Program, targets: Sequence[moderngl.Texture]) -> PixelPass:
+    """Return the pass by which a program fills textures of floats."""
+    if isinstance(program, moderngl.ComputeShader):
+        return ComputePass(gl, program, targets)
+    return FragmentPass(gl, program, targets)
+
+
+class FragmentPass:
+    """One triangle over all pixels."""
+
+    def __init__(
+        self, gl: moderngl.Context, program: moderngl.Program, targets: Sequence[moderngl.Texture]
+    ) -> None:
+        self.program: Program = program
+        self._array = gl.vertex_array(program, [])
+        self._framebuffer = gl.framebuffer(list(targets))
+        self._gl = gl
+
+    def run(self, rectangle: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
+        right, top = rectangle.x + rectangle.width, rectangle.y + rectangle.height
+        self._framebuffer.viewport = (0, 0, right, top)
+        self._framebuffer.scissor = scissor_of(rectangle)
+        self._framebuffer.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        self._array.render(vertices=3)
+
+    def release(self) -> None:
+        """Release the memory."""
+        self._array.release()
+        self._framebuffer.release()
+
+
+class ComputePass:
+    """A group of invocations for every square of pixels."""
+
+    def __init__(
+        self, gl: moderngl.Context, program: moderngl.ComputeShader, targets: Sequence[moderngl.Texture]
+    ) -> None:
+        self.program: Program = program
+        self._targets = tuple(targets)
+        self._gl = gl
+
+    def run(self, rectangle: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
+        for unit, target in enumerate(self._targets):
+            target.bind_to_image(unit, read=False, write=True)
+        program = self.program
+        assert isinstance(program, moderngl.ComputeShader)
+        run_pixels(program, rectangle)
+        self._gl.memory_barrier()
+
+    def release(self) -> None:
+        """Do nothing: the pass owns neither targets nor program."""
+
+
+def scissor_of(rectangle: Rectangle) -> tuple[int, int, int, int]:
+    """Return a rectangle as OpenGL's scissors."""
+    return rectangle.x, rectangle.y, rectangle.width, rectangle.height
+
+
+def run_pixels(program: moderngl.ComputeShader, rectangle: Rectangle) -> None:
+    """Invoke a compute shader for every pixel of a rectangle."""
+    program["first_texel"] = rectangle.x, rectangle.y
+    program["end_texel"] = rectangle.x + rectangle.width, rectangle.y + rectangle.height
+    program.run(-(-rectangle.width // GROUP), -(-rectangle.height // GROUP))
+
+
+# -- choice of the backend ------------------------------------------------------------------------------
+
+_times: dict[tuple[str, PassBackend], float] = {}
+"""Seconds of the probe pass, by driver and backend."""
+
+
+def driver_name(gl: moderngl.Context) -> str:
+    """Return the renderer and the version of OpenGL, as the driver reports them."""
+    return f"{gl.info['GL_RENDERER']}, OpenGL {gl.info['GL_VERSION']}"
+
+
+def supports_compute(gl: moderngl.Context) -> bool:
+    """Return True if the current context runs compute shaders.
+
+    Some contexts can do more than their version promises: those that VTK makes through NVIDIA's EGL are of
+    version 3.2.
+    """
+    if gl.version_code >= COMPUTE_VERSION:
+        return True
+    try:
+        gl.compute_shader(_TRIAL_SHADER).release()
+    except moderngl.Error:
+        return False
+    return True
+
+
+def backend_named(gl: moderngl.Context, name: str) -> PassBackend:
+    """Return the backend of a name.
+
+    Raises
+    ------
+    NoGraphics
+        If the name is unknown, or the context cannot run the backend.
+    """
+    try:
+        backend = PassBackend(name.lower())
+    except ValueError as error:
+        known = ", ".join(PassBackend)
+        raise NoGraphics(f"expected one of {known} as the backend of passes, got {name!r}") from error
+    if backend is PassBackend.COMPUTE and not supports_compute(gl):
+        raise NoGraphics(
+            f"compute shaders need OpenGL 4.3, here is {driver_name(gl)}; "
+            f"ask for {PassBackend.FRAGMENT}, or for none"
+        )
+    return backend
+
+
+def choose_backend(gl: moderngl.Context, *, software: bool) -> PassBackend:
+    """Return the faster backend of the current context.
+
+    Each is measured once for each driver. Nothing is measured if only one is supported, and on a software
+    rasteriser, which is slower through compute shaders.
+
+    Raises
+    ------
+    NoGraphics
+        If the environment variable names a backend that is unknown or unsupported.
+    """
+    if name := os.environ.get(BACKEND_VARIABLE, ""):
+        return backend_named(gl, name)
+    if software or not supports_compute(gl):
+        return PassBackend.FRAGMENT
+    gain = measured(gl, PassBackend.FRAGMENT) / measured(gl, PassBackend.COMPUTE)
+    return PassBackend.COMPUTE if gain > MIN_COMPUTE_GAIN else PassBackend.FRAGMENT
+
+
+def probe_backend(gl: moderngl.Context, backend: PassBackend, *, software: bool) -> None:
+    """Measure a backend now, if `choose_backend` will measure it."""
+    if not software and not os.environ.get(BACKEND_VARIABLE) and supports_compute(gl):
+        measured(gl, backend)
+
+
+def measured(gl: moderngl.Context, backend: PassBackend) -> float:
+    """Return the result of `measure`, which is kept for each driver."""
+    key = driver_name(gl), backend
+    if key not in _times:
+        _times[key] = measure(gl, backend)
+    return _times[key]
+
+
+def measure(gl: moderngl.Context, backend: PassBackend) -> float:
+    """Return the seconds that the probe pass takes through a backend: the least of a few runs."""
+    noise = np.random.default_rng(0).random((_NOISE_SIZE, _NOISE_SIZE, 4), np.float32)
+    source = gl.texture((_NOISE_SIZE, _NOISE_SIZE), 4, noise.tobytes(), dtype="f4")
+    target = gl.texture(_PROBE_SIZE, 4, dtype="f2")
+    shader = pass_source(backend, "probe.glsl", 1)
+    compute = backend is PassBackend.COMPUTE
+    program = compile_compute(gl, shader) if compute else compile_program(gl, compose("screen.vert"), shader)
+    probe = pixel_pass(gl, program, [target])
+    source.use(0)
+    program["noise"] = 0
+    times = [_seconds(gl, probe) for _ in range(_PROBE_RUNS + 1)]
+    for resource in (probe, program, target, source):
+        resource.release()
+    return min(times[1:])
+
+
+def _seconds(gl: moderngl.Context, probe: PixelPass) -> float:
+    gl.finish()
+    begin = time.perf_counter()
+    probe.run(Rectangle(0, 0, *_PROBE_SIZE))
+    gl.finish()
+    return time.perf_counter() - begin

@@ -1,0 +1,8 @@
+"""Scattering of decals: particles that repel each other on all surfaces together, and decals of them.
+
+The public names are listed in `__init__.pyi` and are loaded at first use.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,22 @@
+from .creases import Creases
+from .density import PaintedImage, region_mask, vertex_density
+from .image_projections import Cylindrical, Planar, Spherical, TextureCoordinates
+from .orientation import Orientation, gradient_of
+from .remesh import remeshed_points
+from .variation import ImageChoice, Jitter
+
+__all__ = [
+    "Creases",
+    "Cylindrical",
+    "ImageChoice",
+    "Jitter",
+    "Orientation",
+    "PaintedImage",
+    "Planar",
+    "Spherical",
+    "TextureCoordinates",
+    "gradient_of",
+    "region_mask",
+    "remeshed_points",
+    "vertex_density",
+]

@@ -1,0 +1,124 @@
+"""Decals of oriented points: radii, tangents and images by a set of rules."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from decals.errors import InvalidScattering
+from decals.model import Decals
+from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.orientation import Direction, check_direction, max_curvatures, tangents
+from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii
+from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
+from decals.validation import real_number
+
+SAMPLES_PER_DECAL = 64
+"""Samples for each decal from which its radius is measured."""
+
+MIN_SAMPLES = 4096
+"""Least number of samples, so that the radii of few decals are accurate as well."""
+
+_SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
+_POSITION_JITTER_STREAM, _SIZE_JITTER_STREAM, _ANGLE_JITTER_STREAM = 7, 8, 9
+
+
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """Rules for the radii, tangents and images of decals; `decals.scatter` documents the attributes.
+
+    Raises
+    ------
+    InvalidScattering
+        For a sizing, factor, direction, number of images, weights, choice or jitter of the wrong kind.
+    """
+
+    sizing: Sizing = Sizing.COVERING
+    factor: float = 1.0
+    direction: Direction = None
+    images: int = 1
+    weights: ArrayLike | None = None
+    choice: ImageChoice = ImageChoice.RANDOM
+    jitter: Jitter | None = None
+    _shares: Float64Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("sizing", Sizing), ("choice", ImageChoice)):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                known = ", ".join(str(member) for member in kind)
+                raise InvalidScattering(f"{name}: expected one of {known}, got {value!r}")
+        if not isinstance(self.jitter, Jitter | None):
+            raise InvalidScattering(f"jitter: expected a Jitter, got {self.jitter!r}")
+        real_number("factor", self.factor, "a number above 0", lambda value: value > 0, InvalidScattering)
+        check_direction(self.direction)
+        object.__setattr__(self, "_shares", image_shares(self.images, self.weights))
+
+    def decals_of(
+        self,
+        points: OrientedPoints,
+        domain: Domain,
+        spacings: Float32Array,
+        movable: BoolArray,
+        *,
+        seed: int,
+    ) -> Decals:
+        """Return a decal for each point.
+
+        Parameters
+        ----------
+        points
+            Centres of the decals before jitter, sorted by surface.
+        domain
+            The surfaces of the points.
+        spacings
+            Spacing at each point, ``float32[n]``.
+        movable
+            True for points that jitter may move, ``bool[n]``.
+        seed
+            Seed of all random choices.
+        """
+        jitter = self.jitter or Jitter()
+        points = jitter.move(domain, points, spacings, movable, _stream(seed, _POSITION_JITTER_STREAM))
+        radii = jitter.scale(
+            self.factor * self._radii(domain, points, seed), _stream(seed, _SIZE_JITTER_STREAM)
+        )
+        directions = tangents(points.positions, points.normals, self.direction, _stream(seed, _ANGLE_STREAM))
+        if jitter.angle:
+            directions = jitter.turn(directions, points.normals, _stream(seed, _ANGLE_JITTER_STREAM))
+        return Decals(
+            positions=points.positions,
+            normals=points.normals,
+            tangents=directions,
+            radii=radii.astype(np.float32),
+            images=self._chosen_images(points, radii, seed),
+        )
+
+    def _radii(self, domain: Domain, points: OrientedPoints, seed: int) -> Float64Array:
+        """Return radii by the sizing; a surface without particles is not sampled."""
+        if self.sizing is Sizing.TOUCHING:
+            return touching_radii(points)
+        counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
+        samples_per_decal = max(SAMPLES_PER_DECAL, MIN_SAMPLES // max(len(points), 1))
+        samples = domain.sample(counts * samples_per_decal, stream=_SAMPLE_STREAM)
+        if self.sizing is Sizing.DELAUNAY:
+            return delaunay_radii(points, samples)
+
+        def project(trials: OrientedPoints) -> OrientedPoints:
+            projected, allowed = domain.project(trials)
+            return projected[np.flatnonzero(allowed)]
+
+        return covering_radii(points, samples, project, _stream(seed, _TRIAL_STREAM))
+
+    def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
+        if self.choice is ImageChoice.SIZE:
+            return ranked_images(self._shares, radii)
+        if self.choice is ImageChoice.CURVATURE:
+            return ranked_images(self._shares, max_curvatures(points.positions, points.normals))
+        return random_images(self._shares, len(points), _stream(seed, _IMAGE_STREAM))
+
+
+def _stream(seed: int, purpose: int) -> int:
+    """Derive a seed for one purpose, so that a change of one option does not affect the others."""
+    return int(np.random.SeedSequence([seed, purpose]).generate_state(1, np.uint64)[0])

@@ -1,0 +1,195 @@
+"""Neighbour queries: on the device among the particles of a state, and on the host among oriented points."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from blobtree.device import launch
+from decals.model import FACING_LIMIT
+from decals.scattering.particle_state import ParticleState
+from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
+from decals.scattering.search_kernels import mark_local_maxima, nearest_distances, ring_distances
+from decals.scattering.shared_kernels import MirrorPlanes, Particles
+from decals.surfaces.device_surface import Scalars, vectors
+
+MIN_PARALLEL_QUERIES = 4000
+"""Number of points from which a search uses more than one thread."""
+
+NEIGHBOR_COUNTS = (4, 16, 64, 256)
+"""Number of nearest points that a search examines, in turn, until enough of them face the same way."""
+
+
+class NeighborQuery:
+    """Nearest distances to the particles of a state, on its device.
+
+    Parameters
+    ----------
+    state
+        The particles.
+    reach
+        Largest distance, in spacings.
+    """
+
+    def __init__(self, state: ParticleState, reach: float) -> None:
+        self._state, self._reach = state, reach
+        self._grid = make_grid(state.count, state.device)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Update the search grid after particles moved."""
+        self._grid.build(self._state.positions, self._reach * self._state.spacing)
+
+    def nearest(
+        self, points: Particles, own: Scalars, mirrors: MirrorPlanes, *, enough: float = 0.0
+    ) -> Scalars:
+        """Return the distance of each point to the nearest particle that faces the same way, in spacings.
+
+        Parameters
+        ----------
+        points
+            Positions, normals and spacings, on the device.
+        own
+            Particle of each point that does not count, ``int32[n]``; -1 for none.
+        mirrors
+            Mirror planes of the points; a point's own image counts as a particle.
+        enough
+            The search ends at the first distance below this one.
+
+        Returns
+        -------
+        float32[n] on the device, at most the reach.
+        """
+        nearest = self._empty(len(own))
+        inputs = [self._search(), self._state.particles, enough, own, points, mirrors]
+        launch(nearest_distances, len(own), inputs, [nearest], device=self._state.device)
+        return nearest
+
+    def rings(self, points: Particles, own: Scalars, mirrors: MirrorPlanes) -> tuple[Scalars, Scalars]:
+        """Return the distance of each point to the nearest particle, and the mean of the six nearest.
+
+        Parameters are those of `nearest`; each of the six distances is at most the reach.
+        """
+        nearest, rings = self._empty(len(own)), self._empty(len(own))
+        inputs = [self._search(), self._state.particles, own, points, mirrors]
+        launch(ring_distances, len(own), inputs, [nearest, rings], device=self._state.device)
+        return nearest, rings
+
+    def nearest_of(self, rows: Int64Array) -> Float32Array:
+        """Return `nearest` for some particles of the state, ``float32[k]``."""
+        state = self._state
+        own = index_array(rows, state.device)
+        columns = [
+            state.positions,
+            state.normals,
+            state.sizes,
+            state.device_surface_ids,
+            state.device_movable,
+        ]
+        if len(rows) < state.count:
+            columns = [array[own].contiguous() for array in columns]
+        positions, normals, sizes, surface_ids, movable = columns
+        points = particle_struct(positions, normals, sizes)
+        mirrors = state.mirror_planes(points, surface_ids, movable)
+        nearest: Float32Array = self.nearest(points, own, mirrors).numpy()
+        return nearest
+
+    def _search(self) -> Any:
+        return neighbor_search(self._grid, self._reach, varied=self._state.varied)
+
+    def _empty(self, count: int) -> Any:
+        return wp.empty(count, dtype=wp.float32, device=self._state.device)
+
+
+def local_maxima(
+    points: Float32Array, values: Float32Array, radii: Float32Array, *, device: str
+) -> BoolArray:
+    """Return True for points with the largest value within their radius, ``bool[n]``; of equals the first."""
+    if len(points) == 0:
+        return np.zeros(0, np.bool_)
+    positions = vectors(np.ascontiguousarray(points), device)
+    grid = make_grid(len(points), device)
+    grid.build(positions, float(np.median(radii)))
+    columns: list[Any] = [
+        wp.array(np.ascontiguousarray(rows, dtype=np.float32), dtype=wp.float32, device=device)
+        for rows in (values, radii)
+    ]
+    flags: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+    launch(mark_local_maxima, len(points), [grid.id, positions, *columns], [flags], device=device)
+    maxima: BoolArray = flags.numpy() == 1
+    return maxima
+
+
+def index_array(rows: NDArray[np.integer], device: str) -> Scalars:
+    """Return indices as an ``int32`` array of a device."""
+    return wp.array(rows.astype(np.int32), dtype=wp.int32, device=device)
+
+
+class FacingTree:
+    """Search among oriented points for neighbours on the same side of a wall.
+
+    An oriented point q faces another p if the dot product of their normals is above `FACING_LIMIT`, the
+    rule by which a decal at p colours q.
+    """
+
+    def __init__(self, positions: Float32Array, normals: Float32Array) -> None:
+        self._tree = cKDTree(positions)
+        self._normals = normals
+
+    def nearest(
+        self, points: Float32Array, normals: Float32Array, *, count: int = 1, skip_self: bool = False
+    ) -> tuple[Float64Array, Int64Array]:
+        """Return distances and indices of the `count` nearest facing points, ``[n, count]`` each.
+
+        Rows fill up with infinity and -1 where fewer than `count` of the last of `NEIGHBOR_COUNTS` nearest
+        points face the point. With `skip_self` the points are the tree's own, and are not their own
+        neighbours.
+        """
+        distances = np.full((len(points), count), np.inf)
+        indices = np.full((len(points), count), -1, np.int64)
+        open_rows = np.arange(len(points))
+        for width in self._widths(count + skip_self):
+            if len(open_rows) == 0:
+                break
+            sorted_arrays = self._nearest_among(
+                points[open_rows], normals[open_rows], width, open_rows if skip_self else None
+            )
+            columns = slice(0, min(count, width))
+            distances[open_rows, columns], indices[open_rows, columns] = (
+                array[:, columns] for array in sorted_arrays
+            )
+            open_rows = open_rows[~np.isfinite(distances[open_rows, -1])]
+        return distances, indices
+
+    def _widths(self, least: int) -> list[int]:
+        """Return growing numbers of neighbours, at most the number of points."""
+        total = int(self._tree.n)
+        if total == 0:
+            return []
+        widths = [min(max(width, least + 3), total) for width in NEIGHBOR_COUNTS]
+        return widths[:1] + [wide for narrow, wide in pairwise(widths) if wide > narrow]
+
+    def _nearest_among(
+        self, points: Float32Array, normals: Float32Array, width: int, own: Int64Array | None
+    ) -> tuple[Float64Array, Int64Array]:
+        """Sort the facing ones to the front of the `width` nearest points."""
+        distances, indices = (
+            array.reshape(len(points), width)
+            for array in self._tree.query(points, k=np.arange(1, width + 1), workers=_workers(len(points)))
+        )
+        facing = np.einsum("nki,ni->nk", self._normals[indices], normals) > FACING_LIMIT
+        if own is not None:
+            facing &= indices != own[:, None]
+        order = np.argsort(~facing, axis=1, kind="stable")
+        facing = np.take_along_axis(facing, order, axis=1)
+        distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
+        indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
+        return distances, indices
+
+
+def _workers(points: int) -> int:
+    return -1 if points >= MIN_PARALLEL_QUERIES else 1

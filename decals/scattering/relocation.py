@@ -1,0 +1,161 @@
+"""Relocation: crowded particles move to gaps, and drifted ones return across steps of the density."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import Float32Array, Int64Array
+from decals.scattering.domain import Domain, OrientedPoints, apportion, crosses_density_step
+from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
+from decals.scattering.particle_state import ParticleState
+from decals.scattering.repulsion import particle_struct
+from decals.surfaces.device_surface import vectors
+
+MIN_ENERGY_RATIO = 1.8
+"""Energy of a crowded particle, as a multiple of the median energy."""
+
+MIN_GAP = 0.55
+"""Least distance of a filled point from all particles, in spacings; a hole of a perfect tiling has 0.577."""
+
+MIN_SEPARATION = 1.2
+"""Least distance between points that are filled, or particles that leave, at the same time, in spacings."""
+
+MAX_RELOCATED_SHARE = 0.02
+"""Largest share of the particles that is relocated at once, besides one."""
+
+GAP_REACH = 1.5
+"""Distance from all particles, in spacings, from which gaps count as equal."""
+
+CANDIDATES_PER_MOVER, CANDIDATES_PER_PARTICLE = 200, 4
+"""Candidate points for each particle that moves, and at most for each particle."""
+
+_CANDIDATE_STREAM = 1000
+
+
+class CandidatePoints:
+    """Points all over the domain where gaps are looked for, drawn once and used in turn.
+
+    Parameters
+    ----------
+    domain
+        The surfaces, with density and mask.
+    sizes_at
+        Spacing at positions, a function of ``points[n, 3]`` to ``[n]``.
+    """
+
+    def __init__(self, domain: Domain, sizes_at: Callable[[Float32Array], Float32Array]) -> None:
+        self._domain, self._sizes_at = domain, sizes_at
+        self._points: OrientedPoints | None = None
+        self._sizes: Float32Array | None = None
+        self._next = 0
+
+    def next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
+        """Return enough points for some movers of `count` particles, and the spacings there."""
+        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
+        batch_size = min(len(points), CANDIDATES_PER_MOVER * mover_count + 1000)
+        rows = (self._next + np.arange(batch_size)) % len(points)
+        self._next = (self._next + batch_size) % len(points)
+        return points[rows], sizes[rows]
+
+    def _drawn(self, count: int) -> tuple[OrientedPoints, Float32Array]:
+        if self._points is None or self._sizes is None:
+            points = self._domain.sample(apportion(self._domain.masses, count), stream=_CANDIDATE_STREAM)
+            self._points = points[np.random.default_rng(_CANDIDATE_STREAM).permutation(count)]
+            self._sizes = self._sizes_at(self._points.positions)
+        return self._points, self._sizes
+
+
+class DensityAnchors:
+    """Spacing at which each particle began, and the last position where it had about that spacing.
+
+    The initial sample follows the density. Afterwards no force keeps the counts at a step of the density:
+    pressures are equal on both sides, and the gap between the last two rows belongs to neither, so the coarse
+    side gains about half a row. Hence particles that drift across a step of the density return.
+
+    Parameters
+    ----------
+    sizes_at
+        Spacing at positions, a function of ``points[n, 3]`` to ``[n]``.
+    """
+
+    def __init__(self, sizes_at: Callable[[Float32Array], Float32Array]) -> None:
+        self._sizes_at = sizes_at
+        self._sizes: Float32Array | None = None
+        self._points: OrientedPoints | None = None
+
+    def restore(self, state: ParticleState) -> None:
+        """Return drifted particles to their last anchors, and update the spacings of all particles."""
+        sizes = self._sizes_at(state.positions.numpy())
+        if self._sizes is None or self._points is None:
+            self._sizes = sizes
+        else:
+            drifted = np.flatnonzero(crosses_density_step(self._sizes, sizes))
+            state.move_to(drifted, self._points.positions[drifted], self._points.normals[drifted])
+            sizes[drifted] = self._sizes_at(self._points.positions[drifted])
+        state.resize(sizes)
+        self._points = state.points()
+
+    def set(self, state: ParticleState, rows: Int64Array) -> None:
+        """Anchor some particles where they are now."""
+        if self._sizes is not None:
+            self._points = state.points()
+            self._sizes[rows] = self._sizes_at(self._points.positions[rows])
+
+
+def crowded_particles(state: ParticleState) -> Int64Array:
+    """Return the particles to relocate, the most crowded first; of neighbours only one."""
+    energies = state.energies
+    max_count = 1 + int(MAX_RELOCATED_SHARE * state.count)
+    rows = np.flatnonzero(state.movable & (energies > MIN_ENERGY_RATIO * np.median(energies)))
+    if len(rows) == 0:
+        return rows
+    rows = rows[np.argsort(-energies[rows], kind="stable")]
+    points = state.positions.numpy()[rows]
+    separations = MIN_SEPARATION * state.host_sizes[rows]
+    maxima = local_maxima(points, energies[rows], separations, device=state.device)
+    return rows[maxima][:max_count]
+
+
+def relocate(
+    state: ParticleState, movers: Int64Array, candidates: OrientedPoints, candidate_sizes: Float32Array
+) -> Int64Array:
+    """Move particles to the candidates in the largest gaps of their own surfaces; return those that moved.
+
+    Repulsion acts only nearby: it carries no particle to another component, round a sharp tip, or past
+    its neighbours. Counts of the surfaces stay the same. `candidate_sizes` are spacings at the candidates.
+    """
+    gaps = _gap_sizes(state, candidates, candidate_sizes)
+    bare = np.flatnonzero(gaps > MIN_GAP)
+    separations = MIN_SEPARATION * candidate_sizes[bare]
+    maxima = local_maxima(candidates.positions[bare], gaps[bare], separations, device=state.device)
+    targets = bare[maxima]
+    targets = targets[np.argsort(-gaps[targets], kind="stable")]
+    moved: list[int] = []
+    filled: list[int] = []
+    for surface in np.unique(state.surface_ids[movers]):
+        own_movers = movers[state.surface_ids[movers] == surface].tolist()
+        own_targets = targets[candidates.surface_ids[targets] == surface].tolist()
+        pairs = min(len(own_movers), len(own_targets))
+        moved += own_movers[:pairs]
+        filled += own_targets[:pairs]
+    rows = np.array(moved, np.int64)
+    state.move_to(rows, candidates.positions[filled], candidates.normals[filled])
+    return rows
+
+
+def _gap_sizes(state: ParticleState, candidates: OrientedPoints, sizes: Float32Array) -> Float32Array:
+    """Return the distance of each candidate to the nearest facing particle, in spacings, up to a limit."""
+    device, count = state.device, len(candidates)
+    points = particle_struct(
+        vectors(candidates.positions, device),
+        vectors(candidates.normals, device),
+        wp.array(sizes, dtype=wp.float32, device=device),
+    )
+    own: Any = index_array(np.full(count, -1), device)
+    surface_ids = index_array(candidates.surface_ids, device)
+    enabled = index_array(np.ones(count, np.int32), device)
+    mirrors = state.mirror_planes(points, surface_ids, enabled)
+    gaps: Float32Array = NeighborQuery(state, GAP_REACH).nearest(points, own, mirrors, enough=MIN_GAP).numpy()
+    return gaps

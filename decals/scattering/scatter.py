@@ -1,0 +1,153 @@
+"""`scatter`: cover surfaces with decals in one call."""
+
+from collections.abc import Callable, Sequence
+
+from numpy.typing import ArrayLike
+
+from blobtree.progress import Progress
+from decals.errors import InvalidScattering
+from decals.model import Decals
+from decals.scattering.appearance import Appearance
+from decals.scattering.domain import Density, Mask, as_surfaces
+from decals.scattering.orientation import Direction
+from decals.scattering.polish import CLOSE_DISTANCE
+from decals.scattering.relaxation import Relaxation
+from decals.scattering.sizing import Sizing
+from decals.scattering.variation import ImageChoice, Jitter
+from decals.surfaces.surface import Surface
+from decals.validation import function_or_none, real_number
+
+RELAXATION_SHARE = 0.8
+"""Share of the relaxation in the whole work, for progress bars."""
+
+
+def scatter(
+    surfaces: Surface | Sequence[Surface],
+    *,
+    count: int | None = None,
+    spacing: float | None = None,
+    seed: int = 0,
+    density: Density | None = None,
+    mask: Mask | None = None,
+    fixed: ArrayLike | None = None,
+    regularity: float = 1.0,
+    sizing: Sizing = Sizing.COVERING,
+    factor: float = 1.0,
+    direction: Direction = None,
+    images: int = 1,
+    weights: ArrayLike | None = None,
+    choice: ImageChoice = ImageChoice.RANDOM,
+    jitter: Jitter | None = None,
+    device: str = "cpu",
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> Decals:
+    """Cover surfaces with evenly scattered decals, without gaps.
+
+    `Relaxation` places the decals as in the paper: particles repel each other on all surfaces at once. The
+    default radii are the least ones that leave no gap.
+
+    Parameters
+    ----------
+    surfaces : Surface or sequence of Surface
+        One surface, or several that are covered together.
+    count : int, optional
+        Exact number of decals, the fixed ones included. Give either `count` or `spacing`.
+    spacing : float, optional
+        Distance of neighbours, in model units; the count follows from it.
+    seed : int, default: 0
+        Seed of all random choices, from 0 upward; the same seed gives the same decals.
+    density : callable, optional
+        Relative density of decals: a function of ``points[n, 3]`` to numbers above zero, ``[n]``.
+    mask : callable, optional
+        Where decals may lie: a function of ``points[n, 3]`` to ``bool[n]``.
+    fixed : array_like, optional
+        Positions of decals that never move, ``float[k, 3]``.
+    regularity : float, default: 1.0
+        From 0 (random positions) to 1 (as even as possible). In between the relaxation stops when the
+        least distance reaches that share of the one at 1.
+    sizing : Sizing, default: Sizing.COVERING
+        Rule for the radii.
+    factor : float, default: 1.0
+        Factor of the radii.
+    direction : array_like, callable or Orientation, optional
+        Direction of the images' u axes: a vector, a function of ``points[n, 3]`` to ``vectors[n, 3]``, or an
+        `Orientation`. Random by default.
+    images : int, default: 1
+        Number of images to choose from.
+    weights : array_like, optional
+        Relative frequency of each image, ``float[images]``; equal by default.
+    choice : ImageChoice, default: ImageChoice.RANDOM
+        Rule for the image of each decal.
+    jitter : Jitter, optional
+        Random deviations of positions, radii and directions; none by default.
+    device : str, default: "cpu"
+        Warp device of the relaxation, such as ``"cuda:0"``.
+    progress : callable, optional
+        Called with the name of the stage and the fraction done.
+    cancel : callable, optional
+        Called before every step; return True to stop the relaxation. The particles get their decals as they
+        lie then.
+
+    Returns
+    -------
+    Decals
+
+    Raises
+    ------
+    InvalidScattering
+        For an argument of the wrong kind or out of range, or a count without visible area.
+
+    See Also
+    --------
+    Relaxation : The same, step by step.
+    cover : Decals and a camera for whole models.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> ball = decals.surfaces.ImplicitSurface(Point((0, 0, 0), radius=1.0))
+    >>> len(decals.scatter(ball, count=50))
+    50
+    >>> dense_below = lambda points: 1.0 + 3.0 * (points[:, 1] < 0)
+    >>> half = decals.scatter(ball, count=50, seed=1, density=dense_below)
+    >>> int((half.positions[:, 1] < 0).sum())
+    40
+    """
+    checked_surfaces = as_surfaces(surfaces)
+    real_number(
+        "regularity", regularity, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0, InvalidScattering
+    )
+    function_or_none("progress", progress, InvalidScattering)
+    Appearance(sizing, factor, direction, images, weights, choice, jitter)  # check before the long work
+    report = progress or (lambda stage, fraction: None)
+    relaxation = Relaxation(
+        checked_surfaces,
+        count=count,
+        spacing=spacing,
+        seed=seed,
+        density=density,
+        mask=mask,
+        fixed=fixed,
+        device=device,
+    )
+    if regularity > 0.0:
+        relaxation.run(
+            lambda stage, fraction: report(stage, RELAXATION_SHARE * fraction),
+            until=None if regularity == 1.0 else regularity * CLOSE_DISTANCE,
+            cancel=cancel,
+        )
+    report("measuring radii", RELAXATION_SHARE)
+    decals = relaxation.to_decals(
+        seed=seed,
+        sizing=sizing,
+        factor=factor,
+        direction=direction,
+        images=images,
+        weights=weights,
+        choice=choice,
+        jitter=jitter,
+    )
+    report("measuring radii", 1.0)
+    return decals

@@ -1,0 +1,201 @@
+"""Warp kernels of searches among particles: nearest distances, local maxima, and candidates for a move."""
+
+# mypy: disable-error-code="call-overload"
+# (Warp declares no arithmetic of vectors)
+
+import warp as wp
+
+from decals.scattering.shared_kernels import (
+    MirrorPlanes,
+    NeighborSearch,
+    Particles,
+    Six,
+    insert_distance,
+    mean_distance,
+    mirrored,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Candidates:
+    """Positions that particles may move to, the same number for each particle."""
+
+    per_particle: wp.int32
+    positions: wp.array(dtype=wp.vec3)
+    normals: wp.array(dtype=wp.vec3)
+    forbidden: wp.array(dtype=wp.int32)
+    """1 where no particle may lie."""
+    nearest: wp.array(dtype=wp.float32)
+    """Distance of each to the nearest particle, in spacings."""
+    rings: wp.array(dtype=wp.float32)
+    """Mean distance of each to the six nearest particles, in spacings."""
+
+
+@wp.struct
+class ChoiceRule:
+    """Rule for the best candidate; distances are in spacings."""
+
+    min_gain: wp.float32
+    """Least ratio of the nearest distance after a move to that before."""
+    close: wp.float32
+    """Nearest distance that is large enough."""
+    ideal_ring: wp.float32
+    """Mean distance to the six nearest in a perfect tiling."""
+
+
+@wp.kernel
+def nearest_distances(
+    first: wp.int32,
+    search: NeighborSearch,
+    particles: Particles,
+    enough: wp.float32,
+    own: wp.array(dtype=wp.int32),
+    points: Particles,
+    mirrors: MirrorPlanes,
+    nearest: wp.array(dtype=wp.float32),
+) -> None:
+    """Measure the distance of each point to the nearest particle that faces the same way, in spacings.
+
+    At most the reach of the search. A point's own particle does not count, and its own image behind a mirror
+    plane does. The search ends at the first distance below `enough`.
+    """
+    k = first + wp.tid()
+    p = points.positions[k]
+    n = points.normals[k]
+    size = points.sizes[k]
+    least = float(search.reach)
+    for w in range(mirrors.per_point * k, mirrors.per_point * (k + 1)):
+        if wp.length_sq(mirrors.normals[w]) > 0.0:
+            image = mirrored(p, mirrors.points[w], mirrors.normals[w])
+            least = wp.min(least, wp.length(p - image) / size)
+    j = int(0)
+    query = wp.hash_grid_query(search.grid, p, search.reach * search.widening * size)
+    while least > enough and wp.hash_grid_query_next(query, j):
+        if j != own[k]:
+            x = wp.length(p - particles.positions[j]) / (0.5 * (size + particles.sizes[j]))
+            if x < least and wp.dot(n, particles.normals[j]) > search.facing_limit:
+                least = x
+    nearest[k] = least
+
+
+@wp.kernel
+def ring_distances(
+    first: wp.int32,
+    search: NeighborSearch,
+    particles: Particles,
+    own: wp.array(dtype=wp.int32),
+    points: Particles,
+    mirrors: MirrorPlanes,
+    nearest: wp.array(dtype=wp.float32),
+    rings: wp.array(dtype=wp.float32),
+) -> None:
+    """Measure the distance of each point to the nearest particle, and the mean distance to the six nearest.
+
+    As `nearest_distances`, but images of the neighbours count as well. Each distance is at most the reach.
+    """
+    k = first + wp.tid()
+    p = points.positions[k]
+    n = points.normals[k]
+    size = points.sizes[k]
+    reach = search.reach
+    six = Six(reach, reach, reach, reach, reach, reach)
+    for w in range(mirrors.per_point * k, mirrors.per_point * (k + 1)):
+        if wp.length_sq(mirrors.normals[w]) > 0.0:
+            image = mirrored(p, mirrors.points[w], mirrors.normals[w])
+            six = insert_distance(six, wp.length(p - image) / size)
+    j = int(0)
+    query = wp.hash_grid_query(search.grid, p, reach * search.widening * size)
+    while wp.hash_grid_query_next(query, j):
+        if j != own[k]:
+            q = particles.positions[j]
+            pair_size = 0.5 * (size + particles.sizes[j])
+            x = wp.length(p - q) / pair_size
+            if x < six[5] and wp.dot(n, particles.normals[j]) > search.facing_limit:
+                six = insert_distance(six, x)
+                for w in range(mirrors.per_point * k, mirrors.per_point * (k + 1)):
+                    if wp.dot(q - mirrors.points[w], mirrors.normals[w]) > 0.0:
+                        image = mirrored(q, mirrors.points[w], mirrors.normals[w])
+                        six = insert_distance(six, wp.length(p - image) / pair_size)
+    nearest[k] = six[0]
+    rings[k] = mean_distance(six)
+
+
+@wp.kernel
+def mark_local_maxima(
+    first: wp.int32,
+    grid: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    values: wp.array(dtype=wp.float32),
+    radii: wp.array(dtype=wp.float32),
+    flags: wp.array(dtype=wp.int32),
+) -> None:
+    """Write 1 where no other point within a point's radius has a larger value; of equals the first wins."""
+    i = first + wp.tid()
+    value = values[i]
+    radius = radii[i]
+    flag = int(1)
+    j = int(0)
+    query = wp.hash_grid_query(grid, points[i], radius)
+    while flag == 1 and wp.hash_grid_query_next(query, j):
+        higher = values[j] > value or (values[j] == value and j < i)
+        if higher and wp.length(points[i] - points[j]) < radius:
+            flag = 0
+    flags[i] = flag
+
+
+@wp.kernel
+def sample_around(
+    first: wp.int32,
+    seed: wp.int32,
+    per_center: wp.int32,
+    log_shortest: wp.float32,
+    log_longest: wp.float32,
+    centers: wp.array(dtype=wp.vec3),
+    center_sizes: wp.array(dtype=wp.float32),
+    points: wp.array(dtype=wp.vec3),
+    reaches: wp.array(dtype=wp.float32),
+) -> None:
+    """Sample random points around each centre, their distances uniform on a logarithmic scale."""
+    k = first + wp.tid()
+    i = k / per_center
+    state = wp.rand_init(seed, k)
+    direction = wp.vec3(wp.randn(state), wp.randn(state), wp.randn(state))
+    length = center_sizes[i] * wp.exp(wp.randf(state, log_shortest, log_longest))
+    points[k] = centers[i] + wp.normalize(direction) * length
+    reaches[k] = 1.01 * length + 1.0e-4 * center_sizes[i]
+
+
+@wp.kernel
+def move_to_best(
+    first: wp.int32,
+    rule: ChoiceRule,
+    rows: wp.array(dtype=wp.int32),
+    current_nearest: wp.array(dtype=wp.float32),
+    candidates: Candidates,
+    particles: Particles,
+    moved: wp.array(dtype=wp.int32),
+) -> None:
+    """Move each particle to the best allowed candidate, and write 1 for those that moved.
+
+    The best candidate has the largest nearest distance. Of several beyond `close` it is the one whose ring
+    is nearest to the ideal one.
+    """
+    m = first + wp.tid()
+    least = float(rule.min_gain * current_nearest[m])
+    deviation = float(1.0e30)
+    choice = int(-1)
+    for t in range(candidates.per_particle):
+        k = m * candidates.per_particle + t
+        if candidates.forbidden[k] == 0 and candidates.nearest[k] >= least:
+            uneven = wp.abs(candidates.rings[k] - rule.ideal_ring)
+            if least < rule.close or uneven < deviation:
+                choice = k
+                deviation = uneven
+                least = wp.min(candidates.nearest[k], rule.close)
+    moved[m] = 0
+    if choice >= 0:
+        particles.positions[rows[m]] = candidates.positions[choice]
+        particles.normals[rows[m]] = candidates.normals[choice]
+        moved[m] = 1

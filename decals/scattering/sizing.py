@@ -1,0 +1,238 @@
+"""Radii of decals: gap-free, touching, or by the paper's rule."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeAlias
+
+import numpy as np
+
+from blobtree._typing import Float64Array, Int64Array
+from blobtree.formulas.falloff import RIM
+from decals.scattering.domain import OrientedPoints
+from decals.scattering.neighbors import FacingTree
+
+RADIUS_MARGIN = 0.03
+"""Margin of covering radii, as a share: an allowance for farthest points that the search missed."""
+
+PEAK_FRACTION = 0.75
+"""Distance of a point from its decal, as a share of the decal's radius so far, from which it is a peak."""
+
+TRIAL_RANGE = 2.5
+"""Distance that a round of trials may gain, in its own spreads; nearer peaks drop out."""
+
+MAX_BARE_SHARE = 0.05
+"""Largest share of a decal's mean area that may stay bare to spare the decal an outsized radius."""
+
+MAX_RADIUS_RATIO = 1.5
+"""Ratio of an outsized radius to the larger of the radius without bare points and the median of those."""
+
+CORNER_TOLERANCE = 1.02
+"""Ratio of the distances from two decals up to which a point is a corner of both Voronoi cells."""
+
+TRIALS_PER_PEAK = 6
+"""Random points around each peak in each round."""
+
+TRIAL_SPREADS = (1.0, 0.6, 0.3, 0.15)
+"""Standard deviation of the random points of each round, in mean distances of the samples."""
+
+
+class Sizing(Enum):
+    """Rules for the radii of decals.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> ball = decals.surfaces.ImplicitSurface(Point((0, 0, 0), radius=1.0))
+    >>> covering = decals.scatter(ball, count=40)
+    >>> touching = decals.scatter(ball, count=40, sizing=decals.Sizing.TOUCHING)
+    >>> bool(touching.radii.max() < covering.radii.min())
+    True
+    """
+
+    COVERING = "covering"
+    """Least radii that leave no gap."""
+    TOUCHING = "touching"
+    """Half the distance to the nearest neighbour: decals do not overlap."""
+    DELAUNAY = "delaunay"
+    """The paper's rule: the field ends at the farthest Delaunay neighbour. It leaves small gaps."""
+
+
+Project: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
+"""Project points onto their own surfaces, and drop those that are hidden there."""
+
+
+def covering_radii(
+    decals: OrientedPoints, samples: OrientedPoints, project: Project, seed: int
+) -> Float64Array:
+    """Return the least radii, up to a small margin, at which decals cover the surfaces they lie on.
+
+    A decal reaches to the farthest point of the surface that is nearer to it than to any other decal that
+    faces the point: a corner of its Voronoi cell. Dense samples find the neighbourhood of each corner. The
+    centre of the circle through its three decals and random trials approach it. The paper's rule, influence
+    radius = distance D of the farthest Delaunay neighbour, leaves gaps: a perfect hexagonal tiling already
+    needs s = D / (sqrt(3) 0.4542) = 1.271 D.
+
+    Two kinds of points stay bare. No decal among the last of `NEIGHBOR_COUNTS` nearest faces the first kind.
+    The second would make a decal outsized (`MAX_BARE_SHARE`, `MAX_RADIUS_RATIO`), such as a lone folded face
+    or a distant scrap. A decal that owns no sample gets half the distance to its nearest neighbour, else the
+    median radius.
+
+    Parameters
+    ----------
+    decals
+        Centres, with the normals of their surfaces.
+    samples
+        Points spread evenly over the area to cover, 32 or more for each decal.
+    project
+        Projects trial points onto their surfaces.
+    seed
+        Seed of the trials.
+
+    Returns
+    -------
+    float64[n], above zero.
+    """
+    tree = FacingTree(decals.positions, decals.normals)
+    owned = _find_owners(tree, samples)
+    limits = _max_radii(owned, len(decals))
+    radii = np.zeros(len(decals))
+    _grow(radii, owned, limits)
+    rng = np.random.default_rng(seed)
+    sample_distance = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
+    owned = owned.peaks(PEAK_FRACTION * radii)
+    owned = owned.joined(_find_owners(tree, project(_circumcenters(owned, decals))))
+    _grow(radii, owned, limits)
+    for spread in TRIAL_SPREADS:
+        least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
+        owned = owned.peaks(least)
+        trials = _random_points_around(owned.points, spread * sample_distance, rng)
+        owned = owned.joined(_find_owners(tree, project(trials)))
+        _grow(radii, owned, limits)
+    return (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
+
+
+def touching_radii(decals: OrientedPoints) -> Float64Array:
+    """Return half the distance to the nearest facing decal; the median radius without such a decal."""
+    tree = FacingTree(decals.positions, decals.normals)
+    nearest = tree.nearest(decals.positions, decals.normals, skip_self=True)[0][:, 0]
+    return _with_median(0.5 * nearest)
+
+
+def delaunay_radii(decals: OrientedPoints, samples: OrientedPoints) -> Float64Array:
+    """Return radii by the paper's rule (section 3.3): influence up to the farthest Delaunay neighbour.
+
+    Two decals are neighbours in the surface's own Delaunay triangulation if their Voronoi cells meet: if a
+    sample is nearest to the one and next nearest to the other.
+    """
+    owned = _find_owners(FacingTree(decals.positions, decals.normals), samples)
+    pairs = owned.decals[(owned.decals[:, :2] >= 0).all(axis=1), :2]
+    starts, ends = decals.positions[pairs[:, 0]], decals.positions[pairs[:, 1]]
+    lengths = np.linalg.norm(starts.astype(np.float64) - ends, axis=1)
+    farthest = np.full(len(decals), -np.inf)
+    for side in (0, 1):
+        np.maximum.at(farthest, pairs[:, side], lengths)
+    return float(RIM) * _with_median(farthest)
+
+
+def _with_median(radii: Float64Array) -> Float64Array:
+    """Replace values that are not finite or not above zero by the median of the others, or 1."""
+    valid = np.isfinite(radii) & (radii > 0)
+    return np.where(valid, radii, float(np.median(radii[valid])) if valid.any() else 1.0)
+
+
+@dataclass(frozen=True)
+class _OwnedPoints:
+    """Points, and the three nearest decals that face each, ``[n, 3]``: distances and indices, -1 for none."""
+
+    points: OrientedPoints
+    distances: Float64Array
+    decals: Int64Array
+
+    def joined(self, other: "_OwnedPoints") -> "_OwnedPoints":
+        """Return the points of both."""
+        return _OwnedPoints(
+            OrientedPoints.joined([self.points, other.points]),
+            np.concatenate([self.distances, other.distances]),
+            np.concatenate([self.decals, other.decals]),
+        )
+
+    def peaks(self, least: Float64Array) -> "_OwnedPoints":
+        """Return the farthest point of each corner of a Voronoi cell, at least so far from its owner.
+
+        Points with the same owner and the same next two decals share a corner of the owner's cell. `least`
+        holds a distance for each decal.
+        """
+        owners = self.decals[:, 0]
+        outer = np.flatnonzero((owners >= 0) & (self.distances[:, 0] > least[owners]))
+        corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:], axis=1)])
+        order = np.lexsort((-self.distances[outer, 0], *corners.T))
+        sorted_corners = corners[order]
+        is_first = np.ones(len(order), np.bool_)
+        is_first[1:] = (sorted_corners[1:] != sorted_corners[:-1]).any(axis=1)
+        rows = outer[order[is_first]]
+        return _OwnedPoints(self.points[rows], self.distances[rows], self.decals[rows])
+
+
+def _find_owners(tree: FacingTree, points: OrientedPoints) -> _OwnedPoints:
+    return _OwnedPoints(points, *tree.nearest(points.positions, points.normals, count=3))
+
+
+def _circumcenters(peaks: _OwnedPoints, decals: OrientedPoints) -> OrientedPoints:
+    """Return the centre of the circle through the three decals of each peak, as a guess of its corner."""
+    whole = np.flatnonzero((peaks.decals >= 0).all(axis=1))
+    a, b, c = np.moveaxis(decals.positions[peaks.decals[whole]].astype(np.float64), 1, 0)
+    ab, ac = b - a, c - a
+    normal = np.cross(ab, ac)
+    square = np.einsum("ni,ni->n", normal, normal)
+    ab2, ac2 = np.einsum("ni,ni->n", ab, ab), np.einsum("ni,ni->n", ac, ac)
+    offset = ac2[:, None] * np.cross(normal, ab) + ab2[:, None] * np.cross(ac, normal)
+    offset /= np.where(square > 0, 2.0 * square, 1.0)[:, None]
+    sound = (square > 0) & (np.linalg.norm(offset, axis=1) < 2.0 * peaks.distances[whole, 0])
+    centers = (a + offset)[sound].astype(np.float32)
+    normals, surface_ids = peaks.points.normals[whole][sound], peaks.points.surface_ids[whole][sound]
+    return OrientedPoints(centers, normals, surface_ids)
+
+
+def _max_radii(owned: _OwnedPoints, count: int) -> Float64Array:
+    """Return the radius beyond which each decal is outsized."""
+    distances, owners = owned.distances[:, 0], owned.decals[:, 0]
+    bare_samples = max(1, round(MAX_BARE_SHARE * len(owners) / count))
+    order = np.lexsort((-distances, owners))
+    order = order[owners[order] >= 0]
+    if len(order) == 0:
+        return np.zeros(count)
+    starts = np.searchsorted(owners[order], np.arange(count + 1))
+    next_largest = starts[:-1] + bare_samples
+    enough = next_largest < starts[1:]
+    trimmed = np.where(enough, distances[order[np.minimum(next_largest, len(order) - 1)]], 0.0)
+    median = float(np.median(trimmed[enough])) if enough.any() else np.inf
+    return MAX_RADIUS_RATIO * np.maximum(trimmed, median)
+
+
+def _grow(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array) -> None:
+    """Grow the radius of every decal, up to its limit, to all points that it owns or nearly owns."""
+    close = (owned.decals >= 0) & (owned.distances <= CORNER_TOLERANCE * owned.distances[:, :1])
+    distances, owners = owned.distances[close], owned.decals[close]
+    within = distances <= limits[owners]
+    np.maximum.at(radii, owners[within], distances[within])
+
+
+def _random_points_around(points: OrientedPoints, spread: float, rng: np.random.Generator) -> OrientedPoints:
+    """Return normally distributed points around each point."""
+    repeated = points[np.repeat(np.arange(len(points)), TRIALS_PER_PEAK)]
+    offsets = rng.normal(0.0, spread, repeated.positions.shape).astype(np.float32)
+    return OrientedPoints(repeated.positions + offsets, repeated.normals, repeated.surface_ids)
+
+
+def _without_zeros(radii: Float64Array, tree: FacingTree, decals: OrientedPoints) -> Float64Array:
+    """Replace the zero radii of decals that own no sample."""
+    zero = ~(radii > 0)
+    if not zero.any():
+        return radii
+    nearest, _ = tree.nearest(decals.positions, decals.normals, skip_self=True)
+    others = radii[~zero]
+    fallback = float(np.median(others)) if len(others) else 1.0
+    usable = np.isfinite(nearest[:, 0]) & (nearest[:, 0] > 0)
+    return np.where(zero, np.where(usable, 0.5 * nearest[:, 0], fallback), radii)

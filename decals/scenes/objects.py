@@ -1,0 +1,203 @@
+"""Objects of a scene: meshes and BlobTrees by name, and models of other kinds as such objects."""
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree import Node
+from blobtree._typing import Float32Array, Int32Array
+from blobtree.lazy import Lazy
+from decals.errors import InvalidScene
+from decals.surfaces.convert import as_shape
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
+from decals.validation import finite_vector, instance
+
+Color = tuple[float, float, float]
+Box = tuple[Float32Array, Float32Array]
+"""Lower and upper corner, ``float32[3]`` each."""
+
+CLAY: Color = (0.72, 0.68, 0.62)
+"""Default colour of a mesh."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshObject:
+    """A triangle mesh in a scene.
+
+    Parameters
+    ----------
+    name : str
+        Name of the object, unique in its scene.
+    vertices : float32[n, 3]
+        Positions in the scene's units.
+    faces : int32[m, 3]
+        Corner indices, counter-clockwise seen from outside.
+    color : (red, green, blue)
+        sRGB colour between the decals, each channel in [0, 1].
+    source : str, optional
+        Where the mesh came from, so that a scene file need not repeat it: a path, or ``"sample:NAME"``.
+
+    Raises
+    ------
+    InvalidMesh
+        If the arrays have wrong shapes or indices, NaN, or no area.
+    InvalidScene
+        If the name is empty or the colour is out of range.
+
+    Examples
+    --------
+    >>> import decals
+    >>> corner = decals.MeshObject("corner", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> corner.surface.area
+    0.5
+    """
+
+    name: str
+    vertices: Float32Array
+    faces: Int32Array
+    color: Color = CLAY
+    source: str | None = None
+    surface: MeshSurface = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        surface = MeshSurface(self.vertices, self.faces)
+        checked = {
+            "name": _name(self.name),
+            "color": _color(self.name, self.color),
+            "surface": surface,
+            "vertices": surface.vertices,
+            "faces": surface.faces,
+        }
+        for key, value in checked.items():
+            object.__setattr__(self, key, value)
+
+    @property
+    def bounds(self) -> Box:
+        """Lower and upper corner of the mesh, float32[3] each."""
+        return self.surface.bounds
+
+
+@dataclass(frozen=True, eq=False)
+class TreeObject:
+    """A BlobTree in a scene; its colour is an attribute of its field.
+
+    Parameters
+    ----------
+    name : str
+        Name of the object, unique in its scene.
+    tree : Node
+        The model; its iso surface is drawn.
+
+    Raises
+    ------
+    InvalidScene
+        If the name is empty or the tree is not a BlobTree.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> ball = decals.TreeObject("ball", blobtree.Point((0, 0, 0), radius=1))
+    >>> ball.name
+    'ball'
+    """
+
+    name: str
+    tree: Node
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", _name(self.name))
+        if not isinstance(self.tree, Node):
+            raise InvalidScene(f"object {self.name!r}: expected a BlobTree, got {type(self.tree).__name__}")
+
+    @Lazy
+    def surface(self) -> ImplicitSurface:
+        """Return the tree's surface; the first call polygonizes it to find where it lies."""
+        return ImplicitSurface(self.tree)
+
+    @property
+    def bounds(self) -> Box:
+        """Lower and upper corner of the surface (not of the field's support), float32[3] each."""
+        return self.surface.bounds
+
+
+SceneObject = MeshObject | TreeObject
+
+
+def as_object(model: object, name: str, *, color: Color = CLAY) -> SceneObject:
+    """Return a model as an object of a scene.
+
+    Parameters
+    ----------
+    model : Model or SceneObject
+        An object of a scene is returned as it is; `decals.surfaces.convert.as_shape` lists all other kinds.
+    name : str
+        Name of the object; the model of a file is named after the file.
+    color : (red, green, blue)
+        Colour of a mesh.
+
+    Raises
+    ------
+    InvalidScene, InvalidMesh, InvalidFile
+        If the model is of another kind, or cannot be used.
+    """
+    if isinstance(model, MeshObject | TreeObject):
+        return model
+    source = os.fspath(model) if isinstance(model, str | os.PathLike) else None
+    shape = as_shape(model, name=name, error=InvalidScene)
+    name = name if source is None else Path(source).stem
+    return TreeObject(name, shape) if isinstance(shape, Node) else MeshObject(name, *shape, color, source)
+
+
+def as_objects(models: Iterable[object]) -> list[SceneObject]:
+    """Return models as objects with different names: the second object of a name becomes ``name-2``.
+
+    Kinds of models and errors are those of `as_object`.
+    """
+    objects: list[SceneObject] = []
+    for number, model in enumerate(models, 1):
+        item = as_object(model, f"model {number}")
+        objects.append(_renamed(item, {other.name for other in objects}))
+    return objects
+
+
+def _renamed(item: SceneObject, taken: set[str]) -> SceneObject:
+    name, number = item.name, 2
+    while name in taken:
+        name, number = f"{item.name}-{number}", number + 1
+    return item if name == item.name else replace(item, name=name)
+
+
+def bounds_of(objects: Iterable[SceneObject]) -> Box:
+    """Return the box around several objects; InvalidScene if there are no objects."""
+    boxes = [item.bounds for item in objects]
+    if not boxes:
+        raise InvalidScene("expected at least one object, got none; add a mesh or a BlobTree")
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def check_names(objects: Sequence[SceneObject]) -> None:
+    """Raise InvalidScene if two objects have the same name."""
+    names = [item.name for item in objects]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidScene(f"expected a different name for each object, got {name!r} twice; rename one")
+
+
+def _name(name: str) -> str:
+    instance("an object's name", name, str, InvalidScene, "give it a name of letters")
+    if not name.strip():
+        raise InvalidScene("expected a name for the object, got an empty one; give it a name")
+    return name
+
+
+def _color(name: str, color: ArrayLike) -> Color:
+    values = finite_vector(f"object {name!r}, colour", color, InvalidScene)
+    if not ((values >= 0.0) & (values <= 1.0)).all():
+        raise InvalidScene(f"object {name!r}: expected a colour of three numbers in [0, 1], got {color!r}")
+    red, green, blue = values.tolist()
+    return red, green, blue

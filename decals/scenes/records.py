@@ -1,0 +1,217 @@
+"""Objects as a scene file has them: meshes by reference or in full, trees as BlobTree documents."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from msgspec import UNSET, Meta, Struct, UnsetType
+from numpy.typing import NDArray
+
+from blobtree.io import TreeFile, from_tree_file, to_tree_file
+from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.images import is_builtin
+from decals.model import NO_IMAGE, Decals, Interaction
+from decals.scenes.camera import Vector
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.surfaces.mesh_file import MeshArrays, read_mesh
+
+SAMPLE = "sample:"
+"""How the source of a mesh begins that is a sample and no file."""
+
+SampleLoader = Callable[[str], MeshArrays]
+"""Gives the vertices and faces of a sample mesh by its name."""
+
+
+class _InlineMesh(Struct, forbid_unknown_fields=True):
+    """Little-endian float32 and int32 rows; msgspec writes bytes as base64."""
+
+    vertices: bytes
+    faces: bytes
+
+
+class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
+    """A mesh: where its triangles come from, or the triangles."""
+
+    name: str
+    color: Vector
+    source: str | None = None
+    data: _InlineMesh | None = None
+
+
+class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True):
+    """A tree."""
+
+    name: str
+    tree: TreeFile
+
+
+def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
+    """Describe an object; paths are relative to the folder."""
+    if isinstance(item, TreeObject):
+        return TreeRecord(item.name, to_tree_file(item.tree))
+    if item.source is not None:
+        return MeshRecord(item.name, item.color, source=relative(item.source, folder))
+    data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
+    return MeshRecord(item.name, item.color, data=data)
+
+
+def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoader | None) -> SceneObject:
+    """Make, read or fetch an object that was described.
+
+    Raises
+    ------
+    InvalidScene, InvalidMesh, blobtree.ImplicitDecalsError
+        If what it names is missing or broken.
+    """
+    if isinstance(record, TreeRecord):
+        return TreeObject(record.name, from_tree_file(record.tree))
+    if (record.source is None) == (record.data is None):
+        raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
+    if record.data is not None:
+        vertices, faces = _unpacked(record.name, record.data)
+        return MeshObject(record.name, vertices, faces, record.color)
+    vertices, faces = _mesh(str(record.source), folder, samples)
+    source = absolute(str(record.source), folder)
+    return MeshObject(record.name, vertices, faces, record.color, source)
+
+
+def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshArrays:
+    if not source.startswith(SAMPLE):
+        return read_mesh(folder / source)
+    if samples is None:
+        raise InvalidScene(f"the mesh {source!r} is a sample; pass samples=, or use the command line")
+    return samples(source.removeprefix(SAMPLE))
+
+
+def _packed(array: NDArray[Any], kind: str) -> bytes:
+    return np.ascontiguousarray(array, kind).tobytes()
+
+
+def _unpacked(name: str, data: _InlineMesh) -> MeshArrays:
+    try:
+        vertices = np.frombuffer(data.vertices, "<f4").reshape(-1, 3)
+        faces = np.frombuffer(data.faces, "<i4").reshape(-1, 3)
+    except ValueError as error:
+        raise InvalidScene(f"mesh {name!r}: expected rows of three 4-byte numbers ({error})") from error
+    return vertices.astype(np.float32), faces.astype(np.int32)
+
+
+def relative(source: str, folder: Path) -> str:
+    """Write a path as seen from the folder, so that scene and files can move together."""
+    path = Path(source)
+    if _is_name(source):
+        return source
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # another drive
+        return path.resolve().as_posix()
+
+
+def absolute(source: str, folder: Path) -> str:
+    """Undo `relative`."""
+    return source if _is_name(source) else str(folder / source)
+
+
+def _is_name(source: str) -> bool:
+    """Return True if a source is a sample or a generated image rather than a path."""
+    return source.startswith(SAMPLE) or is_builtin(source)
+
+
+Whole = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]
+
+_INTERACTIONS = {kind.name.lower(): kind for kind in Interaction}
+_OLD_NAMES = {"contact": Interaction.PUSH}
+"""Names in files of earlier versions."""
+
+
+class DecalRecord(Struct, forbid_unknown_fields=True):
+    """One decal; `decals.scenes.scene_file` shows it in a file."""
+
+    position: Vector
+    normal: Vector
+    tangent: Vector
+    radius: float
+    image: Annotated[int, Meta(ge=NO_IMAGE, le=2**31 - 1)] = 0
+    spill: bool = False
+    interaction: Literal["independent", "push", "overlap", "contact"] | UnsetType = UNSET
+    layer: Whole | UnsetType = UNSET
+    tint: Vector | UnsetType = UNSET
+    opacity: float | UnsetType = UNSET
+
+
+def records_of(decals: Decals) -> Iterator[DecalRecord]:
+    """Describe decals, in their order."""
+    columns = (
+        _rows(_decimals(decals.positions)),
+        _rows(_decimals(decals.normals)),
+        _rows(_decimals(decals.tangents)),
+        _decimals(decals.radii).tolist(),
+        decals.images.tolist(),
+        decals.spill.tolist(),
+        _unless_default(decals.interactions, Interaction.PUSH, list(_INTERACTIONS)),
+        _unless_default(decals.layers, 0),
+        _unless_default(_decimals(decals.tints), 1.0),
+        _unless_default(_decimals(decals.opacities), 1.0),
+    )
+    return (DecalRecord(*values) for values in zip(*columns, strict=True))
+
+
+def _unless_default(array: NDArray[Any], default: float, names: Sequence[str] | None = None) -> Iterator[Any]:
+    """Give each row's value, or its name, as JSON has it; UNSET where it is the default throughout."""
+    usual = (array == default).all(axis=tuple(range(1, array.ndim)))
+    for value, omit in zip(array.tolist(), usual.tolist(), strict=True):
+        known = value if names is None else names[value]
+        yield UNSET if omit else tuple(known) if isinstance(known, list) else known
+
+
+def _given(value: Any, default: Any) -> Any:
+    """Give the default for what a file leaves out."""
+    return default if value is UNSET else value
+
+
+def _whole(values: Iterable[int]) -> NDArray[np.int32]:
+    return np.array(list(values), np.int32)
+
+
+def _rows(array: NDArray[np.float64]) -> list[Any]:
+    return [tuple(row) for row in array.tolist()]
+
+
+def _decimals(array: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Doubles whose shortest decimal is that of the float32, and which round to it again."""
+    short = array.astype(np.str_).astype(np.float64)
+    return np.where(short.astype(np.float32) == array, short, array.astype(np.float64))
+
+
+def decals_of(records: list[DecalRecord]) -> Decals:
+    """Make the decals that were described.
+
+    Raises
+    ------
+    InvalidScene
+        If one of them cannot be.
+    """
+    if not records:
+        return Decals.empty()
+    with np.errstate(over="ignore"):  # what overflows float32 is refused as infinite
+        return _checked_decals(records)
+
+
+def _checked_decals(records: list[DecalRecord]) -> Decals:
+    try:
+        return Decals(
+            positions=np.array([record.position for record in records], np.float32),
+            normals=np.array([record.normal for record in records], np.float32),
+            tangents=np.array([record.tangent for record in records], np.float32),
+            radii=np.array([record.radius for record in records], np.float32),
+            images=_whole(record.image for record in records),
+            spill=np.array([record.spill for record in records], np.bool_),
+            interactions=_whole((_INTERACTIONS | _OLD_NAMES)[_given(r.interaction, "push")] for r in records),
+            layers=_whole(_given(record.layer, 0) for record in records),
+            tints=np.array([_given(record.tint, (1.0, 1.0, 1.0)) for record in records], np.float32),
+            opacities=np.array([_given(record.opacity, 1.0) for record in records], np.float32),
+        )
+    except ImplicitDecalsError as error:
+        raise InvalidScene(f"decals: {error}") from error

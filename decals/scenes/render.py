@@ -1,0 +1,91 @@
+"""From a scene or a model to a picture in one call."""
+
+import os
+from typing import cast
+
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
+from decals.rendering.lights import Lighting
+from decals.rendering.options import STUDIO, Background, RenderOptions, SceneLike, Size, is_scene_like
+from decals.rendering.picture import Picture
+from decals.rendering.renderer import Renderer
+from decals.rendering.viewpoint import Viewpoint
+from decals.scenes.cover import fitting_camera
+from decals.scenes.load import load_model
+from decals.scenes.objects import SceneObject, as_objects
+from decals.scenes.scene import Scene
+from decals.surfaces.convert import Model
+
+
+def render(
+    scene: SceneLike | SceneObject | Model,
+    *,
+    size: Size = (800, 600),
+    samples: int = 2,
+    contact: Contact = Contact.PRODUCT,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+    background: Background = STUDIO,
+    lights: Lighting | None = None,
+    viewpoint: Viewpoint | None = None,
+) -> Picture:
+    """Draw a scene, or a model without decals.
+
+    Each call makes an OpenGL context. For many pictures, keep a `decals.rendering.Renderer`.
+
+    Parameters
+    ----------
+    scene : Scene, SceneObject or Model
+        A scene; or a model as `decals.cover` takes it, or the path of a model or a scene.
+    size : (int, int)
+        Width and height in pixels.
+    samples : int
+        Samples along each axis of a pixel; 2 means 4 samples a pixel.
+    contact : Contact
+        Contact mode: how decals that push each other share the surface.
+    mapping : ImageMapping
+        Image mapping: how images lie on curved surface.
+    background : Background
+        Colours behind the objects, such as `decals.rendering.TRANSPARENT`.
+    lights : Lighting, optional
+        Lights in place of the studio light.
+    viewpoint : Camera or Projection, optional
+        Viewpoint in place of the scene's camera.
+
+    Returns
+    -------
+    Picture
+        An array of pixels, uint8[h, w, 4], with a method ``save``.
+
+    Raises
+    ------
+    InvalidScene, InvalidMesh, InvalidFile
+        If the scene or an option cannot be used.
+    NoGraphics
+        If there is no OpenGL; the message says what to install.
+    TooMuchData
+        If the scene does not fit on the GPU.
+
+    See Also
+    --------
+    decals.show, decals.rendering.Renderer
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
+    >>> decals.render(scene, size=(64, 48))
+    Picture(64 × 48 pixels)
+    """
+    options = RenderOptions(size, samples, contact, mapping, background, lights)
+    drawn = cast(SceneLike, scene) if is_scene_like(scene) else _scene_of(scene, options.size)
+    with Renderer() as renderer:
+        return Picture(renderer.render(drawn, options, viewpoint=viewpoint))
+
+
+def _scene_of(model: object, size: Size) -> Scene:
+    """Return a model without decals, or the scene of a file, as a scene that fills a picture."""
+    loaded = load_model(model) if isinstance(model, str | os.PathLike) else model
+    if isinstance(loaded, Scene):
+        return loaded
+    objects = as_objects([loaded])
+    return Scene(objects=tuple(objects), camera=fitting_camera(objects, aspect=size[0] / size[1]))

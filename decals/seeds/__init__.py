@@ -1,1 +1,0 @@
-"""Where decals go: one population of particles that repel each other on all surfaces at once."""

@@ -1,0 +1,177 @@
+"""Models of other kinds as our surfaces: pyvista and trimesh meshes, arrays, files and BlobTrees."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias, TypeGuard, runtime_checkable
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike
+
+import blobtree
+from blobtree import Node
+from decals.errors import ImplicitDecalsError, InvalidMesh
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, polygon_triangles, read_mesh
+from decals.surfaces.surface import Surface
+from decals.validation import describe, is_file
+
+MODEL_ADVICE = (
+    "give a BlobTree, a pyvista dataset, a mesh with vertices and faces, a pair of arrays (vertices, faces)"
+    " or the path of a model"
+)
+
+
+@runtime_checkable
+class MeshLike(Protocol):
+    """A mesh of any library (trimesh, blobtree, ours): ``float[n, 3]`` and ``int[m, k]`` arrays."""
+
+    @property
+    def vertices(self) -> ArrayLike:
+        """Positions of the vertices."""
+        ...
+
+    @property
+    def faces(self) -> ArrayLike:
+        """Corner indices of the faces."""
+        ...
+
+
+Model: TypeAlias = (
+    Node | MeshLike | pv.DataSet | pv.MultiBlock | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str]
+)
+"""Everything that has a shape: see `as_shape`."""
+
+
+def as_shape(
+    model: object, *, name: str = "model", error: type[ImplicitDecalsError] = InvalidMesh
+) -> Node | MeshArrays:
+    """Return the tree of a model, or its vertices and triangles.
+
+    Parameters
+    ----------
+    model : Model
+        A BlobTree. Or a pyvista dataset, whose surface is extracted and triangulated. Or any object with
+        ``vertices`` and ``faces``, such as a trimesh mesh. Or a tuple ``(vertices, faces)`` of arrays. Or the
+        path of a mesh file or of a tree in JSON.
+    name : str
+        Name of the model in messages.
+    error : type
+        Exception that is raised for an object of any other kind.
+
+    Returns
+    -------
+    Node or (float32[n, 3], int32[m, 3])
+
+    Raises
+    ------
+    InvalidMesh, InvalidFile
+        If the model has no faces, its indices are wrong, or its file cannot be used.
+    """
+    if isinstance(model, Node):
+        return model
+    if isinstance(model, str | os.PathLike):
+        if not is_file(Path(model)):
+            raise error(f"{name}: expected a model, found no file {os.fspath(model)!r}; check the path")
+        return read_shape(model)
+    if isinstance(model, pv.DataSet | pv.MultiBlock):
+        return dataset_triangles(model, name=name)
+    if isinstance(model, MeshLike) and not isinstance(model, type):
+        return _array_triangles(model.vertices, model.faces, name)
+    if _is_array_pair(model):
+        return _array_triangles(*model, name)
+    raise error(f"{name}: expected a model, got {describe(model)}; {MODEL_ADVICE}")
+
+
+def as_surface(
+    model: object, *, name: str = "surface", error: type[ImplicitDecalsError] = InvalidMesh
+) -> Surface:
+    """Return a model as a surface for decals.
+
+    A `Surface` is returned as it is, an object of a scene gives its own surface. All other models, and the
+    arguments and errors, are those of `as_shape`.
+
+    Examples
+    --------
+    >>> import pyvista
+    >>> from decals.surfaces import as_surface
+    >>> round(as_surface(pyvista.Cube()).area, 3)
+    6.0
+    """
+    if is_surface(model):
+        return model
+    if is_surface(own := getattr(model, "surface", None)):
+        return own
+    shape = as_shape(model, name=name, error=error)
+    return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(*shape)
+
+
+def is_surface(value: object) -> TypeGuard[Surface]:
+    """Return True for a surface; a class of surfaces is not one."""
+    return isinstance(value, Surface) and not isinstance(value, type)
+
+
+def is_model(value: object) -> bool:
+    """Return True if the value is one model, so not a sequence of models."""
+    known = (Node, pv.DataSet, pv.MultiBlock, str, os.PathLike, MeshLike)
+    return is_surface(value) or isinstance(value, known) or _is_array_pair(value)
+
+
+def read_shape(path: str | os.PathLike[str]) -> Node | MeshArrays:
+    """Read a mesh file, or a tree from a JSON file.
+
+    Raises
+    ------
+    InvalidMesh, InvalidFile
+        If the file is missing or cannot be used.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".json":
+        return read_mesh(path)
+    try:
+        return blobtree.load(path)
+    except OSError as error:
+        raise InvalidMesh(
+            f"could not read {str(path)!r} ({error.strerror}); check its permissions"
+        ) from error
+
+
+def _is_array_pair(model: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
+    arrays = (np.ndarray, list, tuple)
+    return isinstance(model, tuple) and len(model) == 2 and all(isinstance(part, arrays) for part in model)
+
+
+def _array_triangles(vertices: ArrayLike, faces: ArrayLike | Sequence[Any], name: str) -> MeshArrays:
+    try:
+        points = np.asarray(vertices, np.float32)
+    except (TypeError, ValueError, OverflowError):
+        points = np.zeros(0, np.float32)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InvalidMesh(f"{name}: expected vertices of shape [n, 3], got {describe(vertices)}")
+    return polygon_triangles(points, _polygons(faces, name), name=name)
+
+
+def _polygons(faces: ArrayLike | Sequence[Any], name: str) -> Any:
+    """Return corner indices as ``int[m, k]``, or as a list of ``int[k_i]``."""
+    try:
+        rows = np.asarray(faces)
+        if rows.size == 0:
+            return []
+        polygons: Any = rows if rows.ndim == 2 else None
+    except (TypeError, ValueError, OverflowError):  # rows of different lengths
+        polygons = _ragged(faces)
+    listed = [polygons] if isinstance(polygons, np.ndarray) else polygons
+    if not listed or any(row.dtype.kind not in "iu" or row.ndim not in (1, 2) for row in listed):
+        raise InvalidMesh(f"{name}: expected faces as rows of corner indices, got {describe(faces)}")
+    if any(row.shape[-1] < 3 for row in listed) and isinstance(polygons, np.ndarray):
+        raise InvalidMesh(f"{name}: expected faces of 3 or more corners, got {polygons.shape[1]}")
+    return polygons
+
+
+def _ragged(faces: Any) -> list[Any]:
+    try:
+        return [np.asarray(row) for row in faces]
+    except (TypeError, ValueError, OverflowError):
+        return []

@@ -1,0 +1,145 @@
+"""Meshes from files and from pyvista datasets: PLY by our own reader, every other format by pyvista's."""
+
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike
+from vtkmodules.vtkCommonCore import vtkLogger
+
+from blobtree._typing import Float32Array, Int32Array
+from decals.errors import InvalidMesh
+from decals.surfaces.ply import Polygons, read_ply
+from decals.validation import describe, is_file
+
+MeshArrays = tuple[Float32Array, Int32Array]
+"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
+
+_VOLUMES = (pv.UnstructuredGrid, pv.StructuredGrid, pv.MultiBlock)
+"""Kinds of datasets in files whose boundary is a surface; an image or a point set has none."""
+
+
+def read_mesh(path: str | PathLike[str]) -> MeshArrays:
+    """Read a mesh file of any format that pyvista reads, as triangles.
+
+    Polygons and triangle strips are triangulated. Of volume meshes the boundary is taken. Vertices keep their
+    order. Cells without area, such as lines, are left out.
+
+    Parameters
+    ----------
+    path : str or path
+        File of a format that pyvista knows by its suffix.
+
+    Returns
+    -------
+    vertices : float32[n, 3]
+        In the file's units.
+    faces : int32[m, 3]
+        Corner indices.
+
+    Raises
+    ------
+    InvalidMesh
+        If the file is missing, of an unknown kind, unreadable, or has no faces or wrong indices.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib, pyvista
+    >>> from decals.surfaces import read_mesh
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "cube.stl"
+    >>> pyvista.Cube().triangulate().save(path)
+    >>> vertices, faces = read_mesh(path)
+    >>> vertices.shape, faces.shape
+    ((8, 3), (12, 3))
+    """
+    path = Path(path)
+    if not is_file(path):
+        raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
+    if path.suffix.lower() == ".ply":
+        return polygon_triangles(*read_ply(path), name=str(path))
+    return dataset_triangles(_read_dataset(path), name=str(path))
+
+
+def dataset_triangles(dataset: pv.DataSet | pv.MultiBlock, *, name: str) -> MeshArrays:
+    """Return the vertices and triangles of a pyvista dataset's surface.
+
+    Messages call the dataset by ``name``.
+    """
+    surface = (
+        dataset if isinstance(dataset, pv.PolyData) else dataset.extract_surface(algorithm="dataset_surface")
+    )
+    _check_indices(surface.face_connectivity, surface.n_points, name)
+    if surface.n_strips:
+        surface = surface.triangulate()
+    sizes = np.diff(surface.face_offsets)
+    if len(sizes) and (sizes == sizes[0]).all():
+        return polygon_triangles(surface.points, surface.regular_faces, name=name)
+    return polygon_triangles(surface.points, list(surface.irregular_faces), name=name)
+
+
+def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> MeshArrays:
+    """Divide polygons into triangles, concave ones too, after a check of their indices."""
+    vertices: Any = np.asarray(points, np.float32)
+    if len(polygons) == 0:
+        raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
+    if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
+        _check_indices(polygons, len(vertices), name)
+        return vertices, polygons.astype(np.int32)
+    corners = np.concatenate(list(polygons))
+    _check_indices(corners, len(vertices), name)
+    surface = pv.PolyData.from_irregular_faces(vertices, [p for p in polygons if len(p) > 2])
+    return vertices, surface.triangulate().regular_faces.astype(np.int32)
+
+
+def _check_indices(corners: Any, count: int, name: str) -> None:
+    """Refuse corner indices out of range: VTK's filters trust them and crash."""
+    if len(corners) and (corners.min() < 0 or corners.max() >= count):
+        bad = corners.min() if corners.min() < 0 else corners.max()
+        raise InvalidMesh(f"{name!r} has {count} points but a face asks for number {bad}; export it again")
+
+
+def _read_dataset(path: Path) -> pv.DataSet | pv.MultiBlock:
+    try:
+        with _vtk_errors() as errors:
+            dataset = pv.read(path)
+    except Exception as error:  # readers and their plugins raise all sorts of exceptions
+        raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(str(error))})") from error
+    if errors:
+        raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(errors[0])})")
+    if not isinstance(dataset, (pv.PolyData, *_VOLUMES)):
+        raise InvalidMesh(f"expected a surface mesh in {str(path)!r}, got {describe(dataset)}; convert it")
+    return dataset
+
+
+def _reason(text: str) -> str:
+    line = (text.strip().splitlines() or [""])[0].rstrip(".")
+    return "it is damaged or of another format" if not line or line.startswith("Algorithm vtk") else line
+
+
+@contextmanager
+def _vtk_errors() -> Iterator[list[str]]:
+    """Collect the errors that VTK reports, instead of letting it print them."""
+    messages: list[str] = []
+    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
+    root_level = logging.root.manager.disable
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    logging.disable(logging.CRITICAL)  # pyvista's readers send VTK's errors there as well
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            with pv.VtkErrorCatcher(send_to_logging=False) as catcher:
+                yield messages
+        messages.extend(event.alert for event in catcher.error_events)
+        # An error inside one of pyvista's readers comes as a warning that quotes it.
+        messages.extend(
+            str(w.message).partition('"')[2] for w in caught if "raised an error" in str(w.message)
+        )
+    finally:
+        logging.disable(root_level)
+        vtkLogger.SetStderrVerbosity(verbosity)

@@ -1,0 +1,96 @@
+"""Warp kernels of queries of a BlobTree: projection onto its surface, containment."""
+
+# mypy: disable-error-code="attr-defined"
+# (Warp does not declare the fields of its query results)
+
+import warp as wp
+
+from blobtree.device import KERNEL_OPTIONS
+from blobtree.formulas.falloff import ISO
+from blobtree.tape.evaluate_kernels import project_to_surface
+from blobtree.tape.interpreter import field_value
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+
+@wp.func
+def has_converged(f: wp.vec4, tolerance: wp.float32) -> wp.bool:
+    """Return True if a point with this field and gradient lies on the surface and has a normal."""
+    return wp.abs(f[0] - ISO) <= tolerance and wp.length_sq(wp.vec3(f[1], f[2], f[3])) > 0.0
+
+
+@wp.kernel
+def project(
+    first: wp.int32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    max_step: wp.float32,
+    tolerance: wp.float32,
+    points: wp.array(dtype=wp.vec3),
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    converged: wp.array(dtype=wp.int32),
+) -> None:
+    """Project points by Newton's method: write positions, normals, and 1 where it converges."""
+    i = first + wp.tid()
+    p, f = project_to_surface(points[i], max_step, tape, span)
+    positions[i] = p
+    normals[i] = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+    if has_converged(f, tolerance):
+        converged[i] = 1
+
+
+@wp.kernel
+def project_with_mesh(
+    first: wp.int32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    max_step: wp.float32,
+    tolerance: wp.float32,
+    mesh: wp.uint64,
+    face_normals: wp.array(dtype=wp.vec3),
+    center: wp.vec3,
+    radius: wp.float32,
+    points: wp.array(dtype=wp.vec3),
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+) -> None:
+    """Project points by Newton's method: write positions and normals.
+
+    A point without convergence starts again at the closest point of the coarse mesh. If that fails too, it
+    takes that closest point, and the normal of its face.
+    """
+    i = first + wp.tid()
+    p, f = project_to_surface(points[i], max_step, tape, span)
+    normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+    if not has_converged(f, tolerance):
+        far = 1.01 * (wp.length(points[i] - center) + radius)
+        query = wp.mesh_query_point_no_sign(mesh, points[i], far)
+        if query.result:
+            p = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+            normal = face_normals[query.face]
+            q, g = project_to_surface(p, max_step, tape, span)
+            if has_converged(g, tolerance):
+                p = q
+                normal = -wp.normalize(wp.vec3(g[1], g[2], g[3]))
+    positions[i] = p
+    normals[i] = normal
+
+
+@wp.kernel
+def mark_above(
+    first: wp.int32,
+    tape: wp.array(dtype=wp.vec4),
+    span: wp.vec2i,
+    low: wp.vec3,
+    high: wp.vec3,
+    points: wp.array(dtype=wp.vec3),
+    flags: wp.array(dtype=wp.int32),
+) -> None:
+    """Write 1 where the field is above the iso value."""
+    i = first + wp.tid()
+    p = points[i]
+    if wp.min(p, low) == low and wp.max(p, high) == high:
+        f = field_value(p, tape, span)  # only here: Warp works out both sides of `and`
+        if f > ISO:
+            flags[i] = 1

@@ -1,0 +1,241 @@
+"""Checks of arguments: each returns the checked value, or raises an error that says what was expected."""
+
+import math
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blobtree._typing import BoolArray, Float64Array, Int32Array
+from decals.errors import ImplicitDecalsError, InvalidDecals
+
+T = TypeVar("T")
+E = TypeVar("E", bound=Enum)
+
+LENGTH_TOLERANCE = 1e-6
+"""Vectors whose length, or whose cosine with the normal, is so near to 1 or 0 are kept bit for bit."""
+
+MIN_TANGENT_SINE = 1e-3
+"""Sine of the angle between a tangent and its normal below which the tangent is refused."""
+
+
+def describe(value: object) -> str:
+    """Return a value in a few words: numbers and text as they are, other objects by their type."""
+    if isinstance(value, int | float | str | bytes | list | tuple | np.number | np.ndarray) or value is None:
+        return " ".join(f"{value!r:.60}".split())
+    return f"a {type(value).__name__}"
+
+
+# -- single values: the error is the caller's -----------------------------------------------------------
+
+
+def instance(name: str, value: object, kind: type[T], error: type[ImplicitDecalsError], advice: str) -> T:
+    """Return a value of a type; raise an error with advice for any other."""
+    if not isinstance(value, kind):
+        raise error(f"{name}: expected a {kind.__name__}, got {describe(value)}; {advice}")
+    return value
+
+
+def member(name: str, value: Any, kind: type[E], error: type[ImplicitDecalsError]) -> E:
+    """Return a member of an enumeration, which may be given by its value."""
+    try:
+        return kind(value)
+    except ValueError:
+        names = ", ".join(f"{kind.__name__}.{one.name}" for one in kind)
+        raise error(f"{name}: expected one of {names}, got {describe(value)}") from None
+
+
+def whole_number(name: str, value: Any, low: int, high: int | None, error: type[ImplicitDecalsError]) -> int:
+    """Return a whole number from low to high as an int; ``high`` None is no limit.
+
+    If low is above high, no index is valid: the scene has no such part.
+    """
+    known = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if known and low <= value and (high is None or value <= high):
+        return int(value)
+    if high is None:
+        expected = f"a whole number from {low} upward"
+    elif low <= high:
+        expected = f"a whole number from {low} to {high}"
+    else:
+        expected = "no index, as the scene has none of these"
+    raise error(f"{name}: expected {expected}, got {describe(value)}")
+
+
+def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
+    """Return a finite number as a float."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number) or isinstance(value, str | bytes):
+        raise error(f"{name}: expected a finite number, got {describe(value)}")
+    return number
+
+
+def real_number(
+    name: str,
+    value: Any,
+    expected: str,
+    allowed: Callable[[float], bool],
+    error: type[ImplicitDecalsError],
+) -> float:
+    """Return a finite number that is allowed; ``expected`` describes such numbers in the message."""
+    try:
+        number = math.nan if isinstance(value, str | bytes | bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) and allowed(number)):
+        raise error(f"{name}: expected {expected}, got {describe(value)}")
+    return number
+
+
+def finite_vector(name: str, value: Any, error: type[ImplicitDecalsError]) -> Float64Array:
+    """Return three finite numbers as ``float64[3]``."""
+    try:
+        numbers = np.array(value, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        numbers = np.zeros(0)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise error(f"{name}: expected three finite numbers, got {describe(value)}")
+    return numbers
+
+
+def real_array(name: str, values: ArrayLike, error: type[ImplicitDecalsError]) -> Float64Array:
+    """Return numbers as an array of any shape."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise error(f"{name}: expected numbers, got {describe(values)}") from reason
+
+
+def function_or_none(name: str, value: Any, error: type[ImplicitDecalsError]) -> None:
+    """Raise an error unless the value is None or can be called."""
+    if value is not None and not callable(value):
+        raise error(f"{name}: expected a function or None, got {describe(value)}")
+
+
+def function_values(
+    name: str, function: Callable[..., ArrayLike], *arguments: Any, error: type[ImplicitDecalsError]
+) -> Float64Array:
+    """Return the numbers that a user's function returns; the error names a function that fails."""
+    try:
+        values = function(*arguments)
+    except ImplicitDecalsError:
+        raise
+    except Exception as reason:
+        raise error(
+            f"{name}: expected numbers from the function, but it raised {type(reason).__name__}: {reason}"
+        ) from reason
+    return real_array(name, values, error)
+
+
+def is_file(path: Path) -> bool:
+    """Return True for an existing file; False also for an impossible path (too long, with a NUL)."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+# -- columns of decals: InvalidDecals -------------------------------------------------------------------
+
+
+def finite_array(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Float64Array:
+    """Return finite numbers of a shape (-1: any length) as a new float64 array."""
+    try:
+        array = np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidDecals(f"{name}: expected numbers, got {values!r:.80}") from error
+    _check_shape(name, array.shape, shape)
+    bad = ~np.isfinite(array)
+    if bad.any():
+        row = int(np.argwhere(bad)[0][0])
+        raise InvalidDecals(
+            f"{name}: expected finite numbers, got {array[row]} in row {row}; drop or repair it"
+        )
+    return array
+
+
+def _check_shape(name: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    if len(shape) != len(expected) or any(e not in (-1, s) for s, e in zip(shape, expected, strict=True)):
+        lengths = ", ".join("n" if e == -1 else str(e) for e in expected)
+        raise InvalidDecals(f"{name}: expected shape [{lengths}], got {list(shape)}; give one row per decal")
+
+
+def check_range(
+    name: str, values: Float64Array, low: float, high: float, *, advice: str = "rescale the model"
+) -> None:
+    """Raise InvalidDecals for values outside a range."""
+    bad = (values < low) | (values > high)
+    if bad.any():
+        index = tuple(np.argwhere(bad)[0])
+        raise InvalidDecals(
+            f"{name}: expected values from {low:g} to {high:g}, got {values[index]:g} in row {index[0]};"
+            f" {advice}"
+        )
+
+
+def unit_vectors(name: str, vectors: Float64Array) -> Float64Array:
+    """Return vectors scaled to length 1; those that have it within rounding are kept."""
+    largest = np.abs(vectors).max(axis=1, initial=0.0)
+    if (largest == 0.0).any():
+        row = int(np.argmin(largest))
+        raise InvalidDecals(f"{name}: expected a direction, got a zero vector in row {row}; give it a length")
+    scaled = vectors / largest[:, None]
+    lengths = np.linalg.norm(scaled, axis=1) * largest
+    keep = np.abs(lengths - 1.0) <= LENGTH_TOLERANCE
+    return np.where(keep[:, None], vectors, scaled / np.linalg.norm(scaled, axis=1, keepdims=True))
+
+
+def orthogonal_vectors(tangents: Float64Array, normals: Float64Array) -> Float64Array:
+    """Return unit tangents perpendicular to unit normals; those that are so within rounding are kept."""
+    along = (tangents * normals).sum(axis=1)
+    across = tangents - along[:, None] * normals
+    lengths = np.linalg.norm(across, axis=1)
+    if (lengths < MIN_TANGENT_SINE).any():
+        row = int(np.argmin(lengths))
+        raise InvalidDecals(
+            f"tangents: expected a direction across the normal, got {tangents[row]}"
+            f" along normal {normals[row]} in row {row}; turn one of them"
+        )
+    keep = np.abs(along) <= LENGTH_TOLERANCE
+    return np.where(keep[:, None], tangents, across / np.maximum(lengths, MIN_TANGENT_SINE)[:, None])
+
+
+def whole_array(name: str, values: Any, count: int, *, low: int, high: int, default: int) -> Int32Array:
+    """Return whole numbers from low to high as a new array; the default in each row for None."""
+    array = np.full(count, default, np.int64) if values is None else np.array(values)
+    _check_shape(name, array.shape, (count,))
+    if count and array.dtype.kind not in "iu":
+        raise InvalidDecals(f"{name}: expected whole numbers, got {array.dtype}; round or index first")
+    bad = (array < low) | (array > high)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InvalidDecals(f"{name}: expected numbers from {low} to {high}, got {array[row]} in row {row}")
+    return array.astype(np.int32)
+
+
+def unit_interval(name: str, values: Any, shape: tuple[int, ...]) -> Float64Array:
+    """Return numbers from 0 to 1 as a new array; ones for None."""
+    array = finite_array(name, np.ones(shape) if values is None else values, shape)
+    check_range(name, array, 0.0, 1.0, advice="divide colours in bytes by 255")
+    return array
+
+
+def bool_array(name: str, values: Any, count: int) -> BoolArray:
+    """Return truth values as a new array; False for None."""
+    array = np.zeros(count, np.bool_) if values is None else np.array(values)
+    _check_shape(name, array.shape, (count,))
+    if count and array.dtype != np.bool_:
+        raise InvalidDecals(f"{name}: expected True or False, got {array.dtype}; compare or cast it first")
+    return array.astype(np.bool_)
+
+
+def row_selection(rows: ArrayLike) -> NDArray[Any]:
+    """Return indices or a mask as an array; an empty list selects no row."""
+    array = np.asarray(rows)
+    return array.astype(np.intp) if array.size == 0 else array

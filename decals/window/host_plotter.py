@@ -1,0 +1,198 @@
+"""Host plotters: the window of an editor, its own or one that the caller provides."""
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any
+
+import pyvista as pv
+from numpy.typing import ArrayLike
+
+from decals.editing.document import Document
+from decals.editing.pointer_tools import Ray
+from decals.errors import InvalidScene, NoGraphics
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
+from decals.validation import describe, whole_number
+from decals.vtk.subplot import SubplotRenderer
+
+DEFAULT_SIZE = (1200, 800)
+"""Width and height of a window, in pixels."""
+
+BOTTOM_COLOR, TOP_COLOR = (0.80, 0.82, 0.85), (0.96, 0.96, 0.95)
+"""Background of a window."""
+
+MAX_WINDOW_SIDE = 16384
+"""Pixels along each side of a window, at most: the limit of VTK."""
+
+
+class HostPlotter:
+    """The plotter in which a scene is edited.
+
+    Parameters
+    ----------
+    plotter
+        The caller's plotter; None for a new window.
+    off_screen, size
+        Of a new window.
+
+    Attributes
+    ----------
+    plotter
+        The plotter.
+    provided
+        True for the caller's plotter, which stays open.
+    """
+
+    def __init__(self, plotter: Any, *, off_screen: bool, size: tuple[int, int]) -> None:
+        self.provided = plotter is not None
+        self.plotter: Any = checked_plotter(plotter) if self.provided else new_plotter(off_screen, size)
+        self._timer = 0
+
+    @property
+    def interactor(self) -> Any:
+        """VTK's interactor."""
+        return self.plotter.iren.interactor
+
+    @property
+    def has_timers(self) -> bool:
+        """True if the interactor sends timer events: it does not off screen."""
+        return not getattr(self.plotter, "off_screen", False)
+
+    def start_timer(self, milliseconds: int) -> None:
+        """Send repeated timer events, if the interactor has timers."""
+        self.plotter.iren.initialize()
+        if self.has_timers:
+            self._timer = self.interactor.CreateRepeatingTimer(milliseconds)
+
+    def stop_timer(self) -> None:
+        """Stop the timer events."""
+        if self._timer:
+            self.interactor.DestroyTimer(self._timer)
+            self._timer = 0
+
+    def add_scene(self, scene: Scene) -> None:
+        """Show a scene; a provided plotter keeps a camera that was set."""
+        keep_camera = self.provided and self.plotter.renderer.camera_set
+        self.plotter.decals.add_scene(scene, camera=not keep_camera)
+
+    @property
+    def open(self) -> bool:
+        """True until the plotter is closed."""
+        return self.plotter.render_window is not None
+
+
+def ray_through(subplot: SubplotRenderer, x: float, y: float) -> Ray | None:
+    """Return the ray through the centre of a pixel of the window, or None outside the subplot."""
+    renderer: Any = subplot.vtk_renderer
+    (left, low), (width, height) = renderer.GetOrigin(), renderer.GetSize()
+    x, y = x - left + 0.5, y - low + 0.5
+    if not (0 <= x <= width and 0 <= y <= height):
+        return None
+    rays = subplot.viewpoint().rays(width, height)
+    return rays.origins(x, y), rays.directions(x, y)
+
+
+def camera_of(subplot: SubplotRenderer) -> Camera | None:
+    """Return the camera of a subplot, or None for a parallel projection, which a scene cannot store."""
+    camera = subplot.vtk_renderer.camera
+    if camera.parallel_projection:
+        return None
+    return Camera(tuple(camera.position), tuple(camera.focal_point), tuple(camera.up), camera.view_angle)
+
+
+def eye_and_target(subplot: SubplotRenderer) -> tuple[ArrayLike, ArrayLike]:
+    """Return the position of a subplot's camera, and its focal point."""
+    camera = subplot.vtk_renderer.camera
+    return camera.position, camera.focal_point
+
+
+class SubplotBackup:
+    """Scene and settings of a subplot before a document is edited in it.
+
+    Parameters
+    ----------
+    subplot
+        The subplot.
+    """
+
+    def __init__(self, subplot: SubplotRenderer) -> None:
+        self._subplot, self._scene = subplot, subplot.scene
+        self._scale, self._samples = subplot.draw_scale, subplot.samples
+        self._wait, self._keep = subplot.wait_for_gpu, subplot.keep_previous_frame
+
+    def restore(self, document: Document) -> None:
+        """Restore settings and scene; a scene that was edited is replaced by the result."""
+        subplot = self._subplot
+        subplot.draw_scale, subplot.samples = self._scale, self._samples
+        subplot.wait_for_gpu, subplot.keep_previous_frame = self._wait, self._keep
+        if subplot.scene is document:
+            subplot.scene = document.scene if isinstance(self._scene, Scene) else self._scene
+
+
+def edits_at(subplot: SubplotRenderer, x: int, y: int) -> bool:
+    """Return True if a subplot covers a pixel and a window edits in it."""
+    return isinstance(subplot.scene, Document) and subplot.covers(x, y)
+
+
+def require_screen() -> None:
+    """Raise `NoGraphics` if there is no screen for a window; VTK would silently draw off screen."""
+    linux = sys.platform.startswith("linux")
+    if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise NoGraphics(
+            "expected a screen for the window, got none (DISPLAY is not set); log in with a desktop, "
+            "use `ssh -X`, or draw pictures with `implicit-decals render`"
+        )
+
+
+def checked_size(size: object) -> tuple[int, int]:
+    """Return width and height of a window, or raise `InvalidScene`."""
+    if not isinstance(size, Sequence) or len(size) != 2:
+        raise InvalidScene(f"size: expected width and height in pixels, got {describe(size)}")
+    width, height = (whole_number("size", side, 1, MAX_WINDOW_SIDE, InvalidScene) for side in size)
+    return width, height
+
+
+def new_plotter(off_screen: bool, size: tuple[int, int]) -> Any:
+    """Return an empty plotter with a background, without VTK's multisampling.
+
+    Decals are antialiased by their own samples. Without a graphics card, multisampling takes half of a
+    frame's time.
+    """
+    if not off_screen:
+        require_screen()
+    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
+    plotter.disable_anti_aliasing()
+    plotter.set_background(BOTTOM_COLOR, top=TOP_COLOR)
+    return plotter
+
+
+def checked_plotter(plotter: Any) -> Any:
+    """Return the caller's plotter if it is open and has an interactor, or raise `InvalidScene`."""
+    if not isinstance(plotter, pv.BasePlotter):
+        raise InvalidScene(f"expected a pyvista plotter to edit in, got {type(plotter).__name__}")
+    if getattr(plotter, "render_window", None) is None:
+        raise InvalidScene("expected an open plotter to edit in, but this one was closed; make another")
+    if getattr(plotter, "iren", None) is None:
+        raise InvalidScene("expected a plotter with an interactor; make pyvistaqt's with off_screen=False")
+    return plotter
+
+
+def before_screenshots(plotter: Any, call: Callable[[], None]) -> Callable[[], None]:
+    """Call a function before each screenshot of a plotter; the returned function ends that."""
+    method, before = plotter.screenshot, vars(plotter).get("screenshot")
+
+    @wraps(method)
+    def screenshot(*arguments: Any, **options: Any) -> Any:
+        call()
+        return method(*arguments, **options)
+
+    def end() -> None:
+        if vars(plotter).get("screenshot") is screenshot:  # else it was wrapped once more
+            del vars(plotter)["screenshot"]
+            if before is not None:
+                vars(plotter)["screenshot"] = before
+
+    vars(plotter)["screenshot"] = screenshot  # pyvista refuses new attributes in the usual way
+    return end

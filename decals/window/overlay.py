@@ -1,0 +1,155 @@
+"""Overlay of the editing window: outlines of the selected decals, a status line, and the help."""
+
+import textwrap
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from blobtree._typing import Float32Array
+from decals.editing.actions import KEYS
+from decals.editing.document import Document
+from decals.editing.outlines import outline, undisturbed_rims
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
+
+MAX_OUTLINES = 64
+"""Number of outlined decals, at most."""
+
+OUTLINE_COLOR = (1.0, 0.75, 0.1)
+OUTLINE_WIDTH = 3
+
+TEXT_BACKGROUND_OPACITY = 0.85
+
+LINE_HEIGHT, LETTER_WIDTH = 1.3, 0.62
+"""Sizes of the help's font, relative to its size."""
+
+MIN_HELP_SIZE, MAX_HELP_SIZE = 6, 18
+"""Size of the help's font, in pixels."""
+
+TEXT_MARGIN = 12
+"""Space beside text, in pixels."""
+
+WIDE_LETTERS = 0.9
+"""Number of wide letters in the width of an average letter."""
+
+MAX_STATUS_HEIGHT = 0.3
+"""Height of the status relative to the window, at most."""
+
+ELLIPSIS = " …"
+"""End of a status that was cut."""
+
+
+class Overlay:
+    """Outlines, status and help in a plotter.
+
+    Parameters
+    ----------
+    plotter
+        The plotter; its active subplot shows the overlay.
+    """
+
+    def __init__(self, plotter: pv.BasePlotter) -> None:
+        self._plotter: Any = plotter
+        self._renderer: Any = plotter.renderer
+        self._lines = pv.PolyData()
+        self._outlined: tuple[object, ...] = ()
+        self._actor = plotter.add_mesh(
+            pv.Line((0, 0, 0), (0, 0, 0)),
+            color=OUTLINE_COLOR,
+            line_width=OUTLINE_WIDTH,
+            lighting=False,
+            pickable=False,
+            reset_camera=False,
+            render=False,
+            name="decals-selection",
+        )
+        self._actor.mapper.dataset = self._lines
+        self._actor.use_bounds = False
+        self._actor.ForceTranslucentOn()  # so that it writes no depth and occludes nothing
+        self._text = ""
+        self._status: Any = plotter.add_text(
+            "", position=(TEXT_MARGIN, 10), font_size=9, color="black", render=False, name="decals-status"
+        )
+        self._help: Any = plotter.add_text(
+            "\n".join(KEYS.help_lines()),
+            position=(TEXT_MARGIN, 40),
+            font_size=8,
+            color="black",
+            font="courier",
+            render=False,
+            name="decals-help",
+        )
+        for text in (self._status, self._help):
+            text.prop.SetBackgroundColor(1.0, 1.0, 1.0)
+            text.prop.SetBackgroundOpacity(TEXT_BACKGROUND_OPACITY)
+        self._help.SetVisibility(False)
+
+    def outline(
+        self, document: Document, numbers: tuple[int, ...], contact: Contact, mapping: ImageMapping
+    ) -> None:
+        """Outline decals, the last one by its visible part."""
+        key = (document.objects, document.decals.version, numbers, contact, mapping) if numbers else ()
+        if key == self._outlined:
+            return
+        self._outlined = key
+        last = numbers[-MAX_OUTLINES:]
+        lines = [outline(document, last[-1], contact=contact, mapping=mapping)] if last else []
+        lines += list(undisturbed_rims(document, np.array(last[:-1], np.int64), mapping=mapping))
+        self._lines.copy_from(_polylines(lines))
+        self._actor.SetVisibility(bool(lines))
+
+    def show_status(self, text: str) -> None:
+        """Show a text at the bottom, in several lines if it is too long."""
+        self._text = text
+        self._status.SetInput(text)
+        size = [0.0, 0.0]
+        self._status.GetSize(self._renderer, size)
+        width, height = self._renderer.GetSize()
+        room = width - 2 * TEXT_MARGIN
+        if size[0] > room > 0:
+            letters = max(int(len(text) * room / size[0] * WIDE_LETTERS), len(ELLIPSIS))
+            lines = max(int(height * MAX_STATUS_HEIGHT / size[1]), 1)
+            wrapped = textwrap.wrap(text, letters, max_lines=lines, placeholder=ELLIPSIS)
+            self._status.SetInput("\n".join(wrapped))
+
+    def show_help(self, visible: bool) -> None:
+        """Show the help as large as the window allows, or hide it."""
+        self._help.SetVisibility(visible)
+        if not visible:
+            return
+        width, height = self._renderer.GetSize()
+        lines = KEYS.help_lines()
+        by_height = (height - 60) / (LINE_HEIGHT * len(lines))
+        by_width = (width - 2 * TEXT_MARGIN) / (LETTER_WIDTH * max(map(len, lines)))
+        self._help.prop.SetFontSize(max(MIN_HELP_SIZE, min(MAX_HELP_SIZE, int(min(by_height, by_width)))))
+
+    def release(self) -> None:
+        """Remove everything from the plotter."""
+        for actor in (self._actor, self._status, self._help):
+            self._plotter.remove_actor(actor, render=False)
+
+    @property
+    def status(self) -> str:
+        """Text at the bottom."""
+        return self._text
+
+    @property
+    def help_visible(self) -> bool:
+        """True while the help is visible."""
+        return bool(self._help.GetVisibility())
+
+    @property
+    def lines(self) -> pv.PolyData:
+        """The drawn outlines."""
+        return self._lines
+
+
+def _polylines(lines: list[Float32Array]) -> pv.PolyData:
+    """Return lines, shape (k, 3) each, as one dataset."""
+    if not lines:
+        return pv.PolyData()
+    counts = [len(line) for line in lines]
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    cells = [np.concatenate([[n], start + np.arange(n)]) for n, start in zip(counts, starts, strict=True)]
+    return pv.PolyData(np.concatenate(lines), lines=np.concatenate(cells))

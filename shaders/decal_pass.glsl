@@ -1,0 +1,30 @@
+// The decal pass, body of pixels.frag and pixels.comp: for every pixel of the G-buffer the decals that cover it, over
+// the object's own colour. DECALS: there are decals; the slot holds decals.glsl. TWO_TARGETS: also write owner, field and uv.
+//@ include camera.glsl
+//@ include pixel.glsl
+uniform sampler2D g_position;
+uniform sampler2D g_normal;
+uniform sampler2D g_color;
+
+//@ slot decals optional
+
+// color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
+Pixel pixel_at(ivec2 texel) {
+    Pixel pixel;
+    pixel.color = texelFetch(g_color, texel, 0);  // half the bytes of a position, which the background need not read
+    vec4 buffers = vec4(-1.0, 0.0, 0.0, 0.0);
+#ifdef DECALS
+    if (pixel.color.w > 0.0) {
+        vec3 position = texelFetch(g_position, texel, 0).xyz;
+        vec3 normal = texelFetch(g_normal, texel, 0).xyz;
+        DecalHit hit = decal_at(position, normal);
+        vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
+        pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;
+        buffers = vec4(float(hit.owner), hit.field, hit.uv);
+    }
+#endif
+#ifdef TWO_TARGETS
+    pixel.buffers = buffers;
+#endif
+    return pixel;
+}

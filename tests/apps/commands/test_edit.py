@@ -1,0 +1,90 @@
+"""``implicit-decals edit``, off screen."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import blobtree
+from blobtree import Point
+from decals import Camera, Scene, save_scene
+from decals.apps.cli import run
+from decals.apps.commands import edit as edit_module
+from decals.window import EditWindow
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[EditWindow]:
+    """Return the list of windows that `edit` opens, off screen and closed at once."""
+    opened: list[EditWindow] = []
+
+    class Window(EditWindow):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options, off_screen=True)
+            opened.append(self)
+
+        @staticmethod
+        def require_screen() -> None:
+            pass
+
+    monkeypatch.setattr(edit_module, "EditWindow", Window)
+    return opened
+
+
+def test_edit_opens_models_and_scenes(folder: Path, windows: list[EditWindow]) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    arguments = ["edit", "ball.json", "--decals", "20", "--size", "80x60", "--save", "scene.json"]
+    assert run(arguments) == 0
+    assert len(windows[0].document.decals) == 20
+    assert windows[0].actions.path == Path("scene.json")
+    save_scene(windows[0].document.scene, folder / "scene.json")
+    assert run(["edit", "scene.json", "--size", "80x60"]) == 0
+    assert len(windows[1].document.decals) == 20
+    assert windows[1].actions.path == Path("scene.json")
+
+
+def test_models_are_saved_to_a_new_file(folder: Path, windows: list[EditWindow]) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    for path in ("ball-decals.json", "ball-decals-2.json", "ball-decals-3.json"):
+        assert run(["edit", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
+        assert windows[-1].actions.path == Path(path)
+        (folder / path).write_text("another file")
+
+
+def test_edit_reports_unsaved_changes(
+    folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+
+    def show(window: EditWindow) -> None:
+        window.tools.key("a", 0, 0, ctrl=True)
+        window.tools.key("d", 0, 0)
+
+    monkeypatch.setattr(EditWindow, "show", show)
+    assert run(["edit", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
+    assert len(windows[0].document.decals) == 10
+    assert "without saving" in capsys.readouterr().err
+
+
+def test_invalid_arguments(folder: Path, windows: list[EditWindow], capsys: Capture) -> None:
+    save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "scene.json")
+    for wrong, message in (
+        (["edit", "scene.json", "--decals", "3"], "has its own decals"),
+        (["edit", "nothing.ply"], "nothing.ply"),
+        (["edit", "scene.json", "--size", "0x3"], "--size"),
+        (["edit", "scene.json", "--save", "scene.png"], "scene.png"),
+    ):
+        assert run(wrong) == 2
+        assert message in capsys.readouterr().err
+    assert windows == []
+
+
+def test_edit_needs_a_screen(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert run(["edit", "knot"]) == 2
+    assert "DISPLAY" in capsys.readouterr().err

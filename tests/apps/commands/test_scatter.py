@@ -1,0 +1,81 @@
+"""``implicit-decals scatter``."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from PIL import Image
+
+from decals import load_scene
+from decals.apps.cli import run
+from tests.apps.commands.pictures import picture
+
+Capture = pytest.CaptureFixture[str]
+
+
+def test_a_scene_and_a_table_hold_the_same_decals(folder: Path) -> None:
+    arguments = ["scatter", "spheres", "--count", "25", "--images", "3", "--seed", "4"]
+    assert run([*arguments, "-o", "scene.json"]) == 0
+    assert run([*arguments, "-o", "decals.csv"]) == 0
+    scene = load_scene(folder / "scene.json")
+    assert len(scene.images) == 3
+    assert [item.name for item in scene.objects] == ["spheres"]
+    header, *rows = (folder / "decals.csv").read_text().splitlines()
+    assert header == "x,y,z,nx,ny,nz,tx,ty,tz,radius,image"
+    table = np.array([row.split(",") for row in rows], float)
+    decals = scene.decals
+    expected = [
+        decals.positions,
+        decals.normals,
+        decals.tangents,
+        decals.radii[:, None],
+        decals.images[:, None],
+    ]
+    assert len(table) == 25
+    assert np.allclose(table, np.hstack(expected), rtol=1e-6, atol=1e-7)
+
+
+def test_render_draws_a_written_scene(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    size = ["--size", "64x48", "--samples", "1"]
+    assert run(["scatter", "ball.ply", "--count", "30", "-o", "scene.json"]) == 0
+    assert run(["render", "scene.json", *size, "-o", "scattered.png"]) == 0
+    assert run(["render", "ball.ply", "--decals", "30", *size, "-o", "rendered.png"]) == 0
+    assert np.array_equal(picture(folder / "scattered.png"), picture(folder / "rendered.png"))
+
+
+def test_spacing_and_sizing_rule(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    rules = ["--spacing", "0.2", "--sizing", "touching", "--along", "cross", "--factor", "0.5"]
+    assert run(["scatter", "ball.ply", *rules, "-o", "scene.json"]) == 0
+    radii = load_scene(folder / "scene.json").decals.radii
+    assert len(radii) == pytest.approx(np.pi / (0.2**2 * np.sqrt(0.75)), abs=3)
+    assert np.median(radii) == pytest.approx(0.25 * 0.2, rel=0.15)
+
+
+def test_a_painted_image_sets_the_density(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    Image.fromarray(np.array([[0, 255]], np.uint8).repeat(8, axis=1)).save(folder / "half.png")
+    image = ["--count", "200", "--painted", "half.png", "--painted-along", "y", "--black", "0.25"]
+    rules = ["--choice", "curvature", "--regularity", "0.6"]
+    assert run(["scatter", "ball.ply", *image, *rules, "-o", "scene.json"]) == 0
+    positions = load_scene(folder / "scene.json").decals.positions
+    assert (positions[:, 2] < 0).sum() == pytest.approx(40, abs=4)  # seen from +y, z runs to the right
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--regularity", "2", "-o", "a.json"], "regularity: expected a number from 0 to 1"),
+        (["--painted", "none.png", "-o", "a.json"], "found no file"),
+        (["--count", "5", "--spacing", "0.1", "-o", "a.json"], "--count or --spacing"),
+        (["--count", "-1", "-o", "a.json"], "--count: expected"),
+        (["--images", "257", "-o", "a.json"], "--images: expected"),
+        (["--spacing", "0", "-o", "a.json"], "spacing: expected a length above 0"),
+        (["-o", "a.png"], "expected an output file"),
+    ],
+)
+def test_invalid_arguments(folder: Path, capsys: Capture, arguments: list[str], message: str) -> None:
+    assert run(["scatter", "spheres", *arguments]) == 2
+    assert message in capsys.readouterr().err

@@ -1,0 +1,169 @@
+"""Torus, disc and box: their shapes, maps, offsets and meshes; and what follows from declared parameters."""
+
+import inspect
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import ISO, Box, Disc, InvalidNode, Node, Point, Torus, from_json, polygonize, to_json
+from blobtree.formulas.falloff import RIM
+from blobtree.formulas.skeletons import SKELETONS
+from blobtree.nodes.parameters import Quantity, describe, parameters_of
+from blobtree.nodes.paths import moved, resized
+from blobtree.nodes.primitives import Primitive
+from blobtree.nodes.tree import NODE_KINDS
+from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
+from tests.blobtree.trees import SOLIDS, points_around
+from tests.oracles import blobtree as oracle
+
+TORUS = Torus((0.1, 0.2, 0.3), (1, 2, 2), 1.0, radius=0.25)
+DISC = Disc((0.1, 0.2, 0.3), (2, -1, 2), 1.0, radius=0.2)
+BOX = Box((0.1, 0.2, 0.3), (1.0, 0.5, 2.0), radius=0.2)
+EACH = pytest.mark.parametrize("node", [TORUS, DISC, BOX], ids=["torus", "disc", "box"])
+
+PLACEMENTS = {
+    "as it is": lambda node: node,
+    "moved": lambda node: node.translate((0.3, -0.2, 0.5)),
+    "turned and scaled": lambda node: node.rotate((1, 2, 3), 50).scale(0.8),
+    "mirrored": lambda node: node.scale((-1, 1, 1)),
+    "stretched": lambda node: node.rotate((3, 1, 0), 20).scale((0.5, 1.0, -0.7)),
+    "twisted": lambda node: node.twist(40.0),
+    "grown": lambda node: node.offset(0.1),
+    "shrunk and scaled": lambda node: node.scale(2.0).offset(-0.1).translate((1, 0, 0)),
+}
+
+
+@EACH
+@pytest.mark.parametrize("place", PLACEMENTS.values(), ids=PLACEMENTS)
+def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:  # type: ignore[no-untyped-def]
+    placed = place(node)
+    points = points_around(np.random.default_rng(2), placed, 300)
+    field = oracle.evaluate(placed, points)
+    np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
+    smooth = field.margin > 1e-3
+    np.testing.assert_allclose(
+        placed.gradient(points[smooth]), oracle.gradient(placed, points[smooth]), atol=5e-4
+    )
+
+
+@EACH
+def test_the_visible_radius_is_the_distance_of_the_surface_from_the_skeleton(node: Node) -> None:
+    mesh = polygonize(node, resolution=40)
+    assert_valid(mesh)
+    assert_closed(mesh)
+    np.testing.assert_allclose(oracle.value(node, mesh.vertices), ISO, atol=2e-5)
+    hits = node.raycast(np.tile([[5.0, 4.0, 3.0]], (50, 1)), mesh.vertices[:50] - np.array([5.0, 4.0, 3.0]))
+    assert hits.hit.mean() > 0.9
+    np.testing.assert_allclose(oracle.value(node, hits.positions[hits.hit]), ISO, atol=1e-3)
+
+
+def test_known_points_of_each_surface() -> None:
+    on_torus = [[1.25, 0, 0], [0, 0.75, 0], [1, 0, 0.25]]
+    np.testing.assert_allclose(Torus((0, 0, 0), (0, 0, 9), 1.0, radius=0.25)(on_torus), ISO, atol=1e-6)
+    on_disc = [[0, 0, 0.2], [1.2, 0, 0], [0.3, 0.4, -0.2]]
+    np.testing.assert_allclose(Disc((0, 0, 0), (0, 0, 1e-300), 1.0, radius=0.2)(on_disc), ISO, atol=1e-6)
+    on_box = [[1.1, 0, 0], [0, 0.6, 0], [0, 0, -2.1], [1 + 0.06, 0.5 + 0.08, 0]]
+    np.testing.assert_allclose(Box((0, 0, 0), (2, 1, 4), radius=0.1)(on_box), ISO, atol=1e-6)
+    assert Box((0, 0, 0), (2, 1, 4), radius=0.1)([[0.9, 0.4, 1.9]]).tolist() == [1.0]
+
+
+def test_the_handle_of_a_torus_is_in_its_mesh() -> None:
+    mesh = polygonize(TORUS, resolution=60)
+    assert len(mesh.vertices) == len(mesh.faces) // 2  # V − E + F = 0
+
+
+def test_bounds_are_tight() -> None:
+    reach = 0.2 / RIM
+    for node, half in (
+        (Torus((1, 0, 0), (0, 0, 1), 1.0, radius=0.2), (1.09, 1.09, 0)),
+        (Disc((1, 0, 0), (0, 0, 1), 1.0, radius=0.2), (1.09, 1.09, 0)),
+        (Box((1, 0, 0), (2, 4, 6), radius=0.2), (1, 2, 3)),
+    ):
+        np.testing.assert_allclose(node.bounds[1], np.add((1, 0, 0), half) + reach, atol=0.01)
+
+
+def test_one_kind_is_one_run_and_maps_fold_into_tori_and_discs() -> None:
+    rng = np.random.default_rng(1)
+    for kind, stretched in ((Torus, False), (Disc, False), (Box, True)):
+        nodes = [node for node in (SOLIDS.leaf(rng) for _ in range(60)) if isinstance(node, kind)]
+        tree = sum((node.rotate((1, 2, 3), 30) for node in nodes[1:]), nodes[0].rotate((0, 0, 1), 10))
+        assert isinstance(tree, Node)
+        assert tree.tape.stretched is stretched
+        assert len(tree.tape.headers) == 1
+
+
+@EACH
+def test_a_move_and_a_resize_keep_the_kind(node: Primitive) -> None:
+    shifted = moved(node, (1, 2, 3))
+    assert type(shifted) is type(node)
+    points = points_around(np.random.default_rng(3), node, 100)
+    np.testing.assert_allclose(shifted(points + np.array([1, 2, 3])), node(points), atol=2e-5)
+    thick = resized(node, 2.0)
+    assert thick == replace(node, radius=2.0 * node.radius)  # type: ignore[type-var]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Torus((0, 0, 0), (0, 0, 0), 1.0, radius=0.2), "axis: expected a direction"),
+        (lambda: Torus((0, 0, 0), (0, 0, 1), 0.0, radius=0.2), "ring_radius: expected a number above 0"),
+        (lambda: Disc((0, 0, 0), (0, 0, 1), -1.0, radius=0.2), "disc_radius: expected a number above 0"),
+        (lambda: Disc((0, 0, 0), "z", 1.0, radius=0.2), "axis: expected three finite numbers"),
+        (lambda: Box((0, 0, 0), (1, -1, 1), radius=0.2), "size: expected three numbers from 0"),
+        (lambda: Box((0, 0, 0), (1, 1, 1), radius=0.0), "radius: expected a number above 0"),
+    ],
+)
+def test_wrong_parameters_are_refused(make: Any, message: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(InvalidNode, match=message):
+        make()
+
+
+# -- declarations ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", NODE_KINDS.values(), ids=NODE_KINDS)
+def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -> None:
+    parameters = parameters_of(kind)
+    document = inspect.getdoc(kind) or ""
+    for name, parameter in parameters.items():
+        assert parameter.name == name
+        assert f"{name} : " in document
+        assert describe(parameter) in document
+    operands = {field.name for field in fields(kind)} - set(parameters)  # type: ignore[arg-type]
+    assert operands <= {"operands", "child", "solid", "tool"}
+    assert ">>> " in document
+
+
+def test_every_skeleton_has_a_primitive_with_a_radius_and_a_color() -> None:
+    kinds = [kind for kind in NODE_KINDS.values() if issubclass(kind, Primitive)]
+    assert [kind.skeleton for kind in kinds] == list(SKELETONS)
+    for kind in kinds:
+        quantities = [parameter.quantity for parameter in parameters_of(kind).values()]
+        assert quantities.count(Quantity.COLOR) == 1
+        assert Quantity.RADIUS in quantities
+        assert Quantity.POINT in quantities
+
+
+@EACH
+def test_files_hold_the_declared_parameters(node: Node) -> None:
+    (record,) = json.loads(to_json(node))["nodes"]
+    assert NODE_KINDS[record.pop("type")] is type(node)
+    assert list(record) == list(parameters_of(type(node)))
+    assert from_json(to_json(node)) == node == eval(repr(node), {"Torus": Torus, "Disc": Disc, "Box": Box})
+
+
+def test_a_point_keeps_its_place_on_the_tape() -> None:
+    assert Point((1, 2, 3), radius=RIM).tape.data.tolist()[1] == [1.0, 2.0, 3.0, 1.0]
+
+
+def test_the_guide_lists_every_primitive_with_its_parameters() -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "modelling.md").read_text()
+    for kind in NODE_KINDS.values():
+        if issubclass(kind, Primitive):
+            declared = [p for p in parameters_of(kind).values() if p.quantity is not Quantity.COLOR]
+            arguments = [p.name + "=…" * (p.quantity is Quantity.RADIUS) for p in declared]
+            assert f"`{kind.__name__}({', '.join(arguments)})`" in guide

@@ -1,0 +1,79 @@
+"""The table of blocks that rays read matches the field."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import distance_transform_cdt
+
+from blobtree import ISO, Node, Point
+from blobtree._typing import Int32Array
+from blobtree.cells.refine_kernels import SURELY_INSIDE
+from blobtree.tape.evaluate import values_at
+from blobtree.tape.tape import Tape
+from blobtree.tracing.rays import EMPTY
+from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, tracing_cells
+from tests.blobtree.trees import random_trees
+from tests.oracles import blobtree as oracle
+
+CORNERS = Point((0, 0, 0), radius=0.02) | Point((1, 1, 1), radius=0.02)
+THIN = Point((0, 0, 0), radius=0.1) | Point((5, 0, 0), radius=0.1)
+TREES = {"corners": CORNERS, "thin": THIN} | dict(enumerate(random_trees(seed=51, count=8)))
+
+
+def table(cells: TracingCells) -> Int32Array:
+    return cells.blocks.reshape(cells.counts)
+
+
+def pruned(cells: TracingCells, texel: int, whole: Tape) -> Tape:
+    """The tape behind a texel with its length."""
+    length = int(cells.tape[texel, 0])
+    return Tape(
+        cells.tape[texel + 1 : texel + 1 + length], whole.registers, whole.skeletons, whole.operators,
+        whole.stretched, whole.warps, whole.warp_registers, whole.instruction_set,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_the_table_matches_the_field(name: str | int) -> None:
+    tree: Node = TREES[name]
+    cells = tracing_cells(tree, device="cpu")
+    blocks = table(cells)
+    rng = np.random.default_rng(0)
+    places = rng.uniform(0.0, cells.counts, (40_000, 3))
+    points = (cells.lower + places * cells.block_size).astype(np.float32)
+    known = blocks[tuple(places.astype(int).T)]
+    value = oracle.value(tree, points.astype(np.float64))
+    assert (value[known <= EMPTY] <= ISO + 1e-5).all()
+    assert (value[known == SURELY_INSIDE] >= ISO - 1e-5).all()
+    assert ((known >= 0) | (known == SURELY_INSIDE) | (known <= EMPTY)).all()
+    for texel in rng.permutation(np.unique(known[known >= 0]))[:20]:
+        here = known == texel
+        seen = values_at(pruned(cells, texel, tree.tape), points[here])
+        np.testing.assert_allclose(seen, value[here], atol=2e-5 * max(1.0, value.max()))
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_empty_layers_match_the_chessboard_distance(name: str | int) -> None:
+    """Against SciPy's chessboard distance to the nearest block that is not empty."""
+    blocks = table(tracing_cells(TREES[name], device="cpu"))
+    empty = blocks <= EMPTY
+    layers = EMPTY - blocks[empty]
+    if empty.all():
+        return
+    expected = distance_transform_cdt(empty, metric="chessboard")[empty] - 1
+    np.testing.assert_array_equal(layers, np.minimum(expected, MAX_LAYERS))
+    assert layers.max() > 0
+
+
+def test_blocks_cover_the_box_of_the_tree() -> None:
+    cells = tracing_cells(THIN, device="cpu")
+    lower, upper = (corner.astype(np.float64) for corner in THIN.bounds)
+    assert max(cells.counts) == cells.counts[0] == BLOCKS_ALONG
+    extent = cells.block_size * np.array(cells.counts)
+    assert (cells.lower + extent >= upper - 1e-6).all()
+    assert (extent - (upper - lower) <= cells.block_size * 1.001).all()
+
+
+def test_all_blocks_of_an_empty_tree_are_empty() -> None:
+    nothing = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
+    cells = tracing_cells(nothing, device="cpu")
+    assert (cells.blocks == EMPTY - MAX_LAYERS).all()

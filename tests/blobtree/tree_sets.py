@@ -1,0 +1,48 @@
+"""Sets of random trees over which whatever holds of every tree is tested, in batches of forty."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from blobtree import Node
+from blobtree._typing import Float32Array
+from tests.blobtree.custom_kinds import CUSTOM_TREES
+from tests.blobtree.trees import SOLIDS, points_around, random_trees
+
+BATCH = 40
+POINTS = 150
+
+BUILT_IN_TREES = random_trees(seed=1, count=240)
+SOLID_TREES = random_trees(seed=21, count=80, more=SOLIDS)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Some trees of a set, and how exact their fields are."""
+
+    start: int
+    trees: list[Node]
+    value_error: float
+    color_error: float
+
+    def cases(self) -> list[tuple[Node, Float32Array]]:
+        """The trees, each with points around it."""
+        rng = np.random.default_rng(self.start)
+        return [(tree, points_around(rng, tree, POINTS)) for tree in self.trees]
+
+
+def _batches(trees: list[Node], value_error: float, color_error: float) -> list[Batch]:
+    starts = range(0, len(trees), BATCH)
+    return [Batch(start, trees[start : start + BATCH], value_error, color_error) for start in starts]
+
+
+_SETS = {
+    "built_in": _batches(BUILT_IN_TREES, 1e-5, 2e-4),
+    "solids": _batches(SOLID_TREES, 2e-5, 3e-4),
+    "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),
+}
+_BATCHES = {f"{name}-{batch.start}": batch for name, batches in _SETS.items() for batch in batches}
+
+EVERY_BATCH = pytest.mark.parametrize("batch", _BATCHES.values(), ids=_BATCHES)
+FIRST_BATCHES = pytest.mark.parametrize("batch", [batches[0] for batches in _SETS.values()], ids=_SETS)

@@ -1,0 +1,16 @@
+"""Fixtures for all tests."""
+
+import pytest
+
+from decals.rendering.gl_libraries import missing_gl_libraries
+
+
+@pytest.fixture(scope="session")
+def vtk_display() -> None:
+    """Let VTK draw once: its first window would end the standalone OpenGL contexts made before."""
+    if missing_gl_libraries():
+        return
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=True, window_size=(16, 16))
+    plotter.show(auto_close=True)

@@ -1,0 +1,271 @@
+"""Long edits beside the window: what they come to is what they would have come to at once."""
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+
+from decals.editing import (
+    Actions,
+    DeleteDecals,
+    EditSession,
+    MovePrimitive,
+    RemoveObject,
+    ScaleDecals,
+    TurnDecals,
+)
+from decals.editing.background import BUSY, step_of
+from decals.errors import InvalidEdit
+from tests.decals.editing.background import LONG, Held, finish, press, threaded
+from tests.decals.editing.scenes import digest, scene
+
+pytestmark = pytest.mark.usefixtures("few_are_many")
+
+
+@pytest.mark.parametrize(
+    "action", ["larger", "turn_left", "delete", "duplicate", "next_tint", "fainter", "relax"]
+)
+def test_what_is_done_in_the_background_is_what_is_done_at_once(action: Any) -> None:
+    there, here = threaded(), Actions(EditSession(scene()))
+    first = digest(there.state.session.document)
+    for actions in (there, here):
+        press(actions, "select_all")
+        press(actions, action)
+    assert there.state.background.busy
+    assert digest(there.state.session.document) == first
+    finish(there)
+    assert digest(there.state.session.document) == digest(here.state.session.document) != first
+    assert (there.state.message, there.state.selection) == (here.state.message, here.state.selection)
+    there.state.end_stroke()
+    here.state.end_stroke()
+    assert there.state.session.labels == here.state.session.labels
+    press(there, "undo")
+    finish(there)
+    assert digest(there.state.session.document) == first
+    press(there, "redo")
+    finish(there)
+    assert digest(there.state.session.document) == digest(here.state.session.document)
+
+
+def test_few_decals_are_changed_at_once() -> None:
+    actions = threaded()
+    actions.state.selection = (1, 2)
+    press(actions, "larger")
+    assert not actions.state.background.busy
+    actions.state.end_stroke()
+    assert actions.state.session.labels == ("larger",)
+
+
+def test_what_hands_do_meanwhile_stays_and_counts() -> None:
+    actions = threaded()
+    session, radius = actions.state.session, scene().decals.radii[7]
+    held = Held(ScaleDecals(np.arange(60), 2.0))
+    actions.state.background.edit("scale", held)
+    assert held.begun.wait(LONG)
+    session.do(ScaleDecals([7], 3.0))
+    session.do(DeleteDecals([8]))
+    session.undo()
+    held.go.set()
+    finish(actions)
+    assert held.runs == 2
+    assert session.document.decals[7].radii[0] == pytest.approx(6 * radius)
+    assert session.labels == ("scale", "scale")
+    session.undo()
+    assert session.document.decals[7].radii[0] == pytest.approx(3 * radius)
+
+
+def test_an_edit_that_hands_made_impossible_says_so() -> None:
+    actions = threaded()
+    held = Held(ScaleDecals(np.arange(60), 2.0))
+    actions.state.background.edit("scale", held)
+    assert held.begun.wait(LONG)
+    actions.state.session.do(DeleteDecals([8]))
+    after = digest(actions.state.session.document)
+    held.go.set()
+    finish(actions)
+    assert "number of a decal, got 8" in actions.state.message
+    assert digest(actions.state.session.document) == after
+
+
+def test_an_undo_that_something_came_before_takes_nothing_back() -> None:
+    actions = threaded()
+    session = actions.state.session
+    session.do(ScaleDecals(np.arange(60), 2.0))
+    press(actions, "undo")
+    session.do(ScaleDecals([3], 2.0))
+    after = digest(session.document)
+    finish(actions)
+    assert "undo again" in actions.state.message
+    assert digest(session.document) == after
+    assert session.labels == ("scale", "scale")
+
+
+def test_one_edit_at_a_time_and_who_comes_next_is_told() -> None:
+    actions = threaded()
+    session = actions.state.session
+    session.do(TurnDecals([1], 5.0))
+    held = Held(ScaleDecals(np.arange(60), 2.0))
+    actions.state.background.edit("scale", held)
+    assert held.begun.wait(LONG)
+    state = digest(session.document)
+    for action in ("relax", "scatter", "undo", "redo"):
+        actions.state.message = ""
+        press(actions, action)
+        assert actions.state.message == BUSY
+    assert digest(session.document) == state
+    assert "scale" in actions.state.background.progress
+    held.go.set()
+    finish(actions)
+    assert session.labels == ("turn", "scale")
+    assert actions.state.background.progress == ""
+
+
+def test_escape_drops_what_goes_on() -> None:
+    actions = threaded()
+    first = digest(actions.state.session.document)
+    held = Held(ScaleDecals(np.arange(60), 2.0))
+    actions.state.background.edit("scale", held)
+    assert held.begun.wait(LONG)
+    press(actions, "deselect")
+    assert actions.state.message == "cancelled"
+    held.go.set()
+    finish(actions)
+    assert digest(actions.state.session.document) == first
+    assert actions.state.session.labels == ()
+
+
+def test_of_a_drag_of_many_the_last_place_counts_and_it_is_one_entry() -> None:
+    actions = threaded()
+    session = actions.state.session
+    numbers = np.arange(60)
+    session.begin_stroke("move")
+    held = Held(TurnDecals(numbers, 10.0))
+    actions.state.background.edit_latest("turn", held)
+    assert held.begun.wait(LONG)
+    left_out, last = Held(TurnDecals(numbers, 20.0)), Held(TurnDecals(numbers, 30.0))
+    for step in (left_out, last):
+        actions.state.background.edit_latest("turn", step)
+        step.go.set()
+    actions.state.end_stroke()
+    held.go.set()
+    finish(actions)
+    assert (held.runs, left_out.runs, last.runs) == (1, 0, 1)
+    assert session.labels == ("move",)
+    expected = EditSession(scene())
+    expected.do(TurnDecals(numbers, 10.0))
+    expected.do(TurnDecals(numbers, 30.0))
+    assert digest(session.document) == digest(expected.document)
+
+
+def test_a_drag_that_begins_before_the_last_one_is_all_seen_is_an_entry_of_its_own() -> None:
+    actions = threaded()
+    session = actions.state.session
+    numbers = np.arange(60)
+    held = Held(TurnDecals(numbers, 10.0))
+    actions.state.begin_stroke("move")
+    actions.state.background.edit_latest("turn", held)
+    assert held.begun.wait(LONG)
+    actions.state.end_stroke()
+    actions.state.begin_stroke("again")
+    session.do(TurnDecals([1], 10.0))
+    held.go.set()
+    finish(actions)
+    session.do(TurnDecals([2], 10.0))
+    session.do(TurnDecals([3], 10.0))
+    actions.state.end_stroke()
+    assert session.labels == ("again",)
+    session.undo()
+    assert digest(session.document) == digest(EditSession(scene()).document)
+
+
+def test_while_something_is_dragged_other_edits_wait() -> None:
+    actions = threaded()
+    actions.state.background.edit("scale", step_of(ScaleDecals(np.arange(60), 2.0)))
+    actions.state.session.begin_stroke("move")
+    actions.state.session.do(TurnDecals([1], 5.0))
+    assert not actions.state.background.poll(dragging=True, timeout=LONG)
+    actions.state.end_stroke()
+    finish(actions)
+    assert actions.state.session.labels == ("move", "scale")
+
+
+def test_edits_continue_while_decals_are_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, go = threading.Event(), threading.Event()
+    actions = threaded()
+    from decals.editing import scatter_commands as population
+
+    scatter = population.scatter
+
+    def slowly(*arguments: Any, **options: Any) -> Any:
+        begun.set()
+        assert go.wait(LONG)
+        return scatter(*arguments, **options)
+
+    monkeypatch.setattr(population, "scatter", slowly)
+    press(actions, "scatter")
+    assert begun.wait(LONG)
+    session = actions.state.session
+    box = session.document.decals.numbers[-1]
+    actions.state.selection = (int(box),)
+    press(actions, "larger")
+    press(actions, "undo")
+    press(actions, "larger")
+    go.set()
+    finish(actions)
+    assert session.labels == ("larger", "scatter")
+    press(actions, "undo")
+    finish(actions)
+    press(actions, "undo")
+    finish(actions)
+    assert digest(session.document) == digest(EditSession(scene()).document)
+
+
+def test_scattered_decals_for_a_changed_object_are_refused() -> None:
+    actions = threaded()
+    press(actions, "scatter")
+    actions.state.session.do(MovePrimitive(0, (0, 0), (0.05, 0, 0)))
+    after = digest(actions.state.session.document)
+    finish(actions)
+    assert "scatter again" in actions.state.message
+    assert digest(actions.state.session.document) == after
+
+
+def test_relaxing_goes_on_where_its_object_went() -> None:
+    actions = threaded()
+    press(actions, "relax")
+    actions.state.session.do(RemoveObject(0))
+    finish(actions)
+    assert actions.state.session.labels[0] == "remove an object"
+
+
+def test_closing_drops_an_edit() -> None:
+    actions = threaded()
+    first = digest(actions.state.session.document)
+    actions.state.background.edit("scale", step_of(ScaleDecals(np.arange(60), 2.0)))
+    actions.state.background.close()
+    assert digest(actions.state.session.document) == first
+
+
+def test_what_nobody_foresaw_is_raised_and_what_waits_goes_on() -> None:
+    actions = threaded()
+    called = []
+
+    def step(_session: Any) -> None:
+        raise MemoryError
+
+    actions.state.background.edit_latest("move", step)
+    actions.state.background.when_followed(lambda: called.append(True))
+    with pytest.raises(MemoryError):
+        actions.state.background.poll(timeout=LONG)
+    assert called
+    assert not actions.state.background.following
+    actions.state.background.edit("scale", step_of(ScaleDecals(np.arange(60), 2.0)))
+    finish(actions)
+    assert actions.state.session.labels == ("scale",)
+
+
+def test_an_edit_that_no_thread_does_raises_at_once() -> None:
+    actions = Actions(EditSession(scene()))
+    with pytest.raises(InvalidEdit):
+        actions.state.background.edit("scale", step_of(ScaleDecals([1], np.nan)))

@@ -1,0 +1,199 @@
+"""Whatever a session, a command or a window is given: an error of ours, and nothing has changed."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from blobtree import InvalidNode
+from blobtree.nodes.paths import primitive_near, primitive_paths
+from decals.editing import (
+    AddDecals,
+    AddImage,
+    AddObject,
+    AddPrimitive,
+    Document,
+    DuplicatePrimitive,
+    EditSession,
+    JoinPrimitive,
+    MoveDecals,
+    MovePrimitive,
+    PaintPrimitive,
+    RelaxDecals,
+    RemoveImage,
+    RemoveObject,
+    RemovePrimitive,
+    ReplaceDecals,
+    ReplaceImage,
+    ResizePrimitive,
+    ScaleDecals,
+    ScatterDecals,
+    SetCamera,
+    SetValues,
+    TurnDecals,
+    first_hit,
+    outline,
+    pick,
+)
+from decals.errors import ImplicitDecalsError, InvalidEdit, InvalidPoints, InvalidScene
+from decals.scenes.camera import Camera
+from decals.scenes.objects import MeshObject, TreeObject
+from decals.scenes.scene import DecalImage, Scene
+from decals.validation import finite_number, finite_vector, whole_number
+from tests.decals.editing.scenes import TREE, digest, one, scene
+
+RIVET = DecalImage.load("rivet")
+NUMBERS = (0, 1, -3, 10**400, 1e300, float("nan"), float("inf"), True, 0.5, np.float32(2), np.array(np.nan))
+OTHERS = (
+    None,
+    "x",
+    "",
+    b"x",
+    [],
+    {},
+    object(),
+    [None],
+    ["x"],
+    np.zeros((2, 2)),
+    TREE,
+    one(),
+    RIVET,
+    ScaleDecals,
+)
+ROWS = ((1, 2), (0, 0, 0), (1e300, 0, 0), (float("nan"), 0, 0), np.ones(3), [1, 2, 3])
+anything = st.sampled_from((*NUMBERS, *OTHERS, *ROWS))
+
+COMMANDS = {
+    "add": AddDecals,
+    "alter": lambda x: SetValues([1], x),
+    **{
+        f"alter {name}": lambda x, name=name: SetValues.each([1, 2], **{name: x})
+        for name in ("positions", "normals", "tangents", "radii", "images", "spill", "layers", "tints")
+    },
+    "scale": lambda x: ScaleDecals([1], x),
+    "scale whom": lambda x: ScaleDecals(x, 1.5),
+    "turn": lambda x: TurnDecals([1], x),
+    "carry": lambda x: MoveDecals([1], x, (0, 0, 1)),
+    "carry normal": lambda x: MoveDecals([1], (0, 0, 1), x),
+    "add an image": AddImage,
+    "change which image": lambda x: ReplaceImage(x, RIVET),
+    "change an image": lambda x: ReplaceImage(0, x),
+    "remove an image": RemoveImage,
+    "look": SetCamera,
+    "add an object": AddObject,
+    "remove an object": RemoveObject,
+    "move": lambda x: MovePrimitive(0, (0,), x),
+    "move in which": lambda x: MovePrimitive(x, (0,), (0, 0, 0.1)),
+    "move which": lambda x: MovePrimitive(0, x, (0, 0, 0.1)),
+    "move which child": lambda x: MovePrimitive(0, (x,), (0, 0, 0.1)),
+    "resize": lambda x: ResizePrimitive(0, (0, 0), x),
+    "paint": lambda x: PaintPrimitive(0, (0, 0), x),
+    "add a primitive": lambda x: AddPrimitive(0, (0, 0), x),
+    "add a primitive where": lambda x: AddPrimitive(0, x, TREE),
+    "add a primitive in which": lambda x: AddPrimitive(x, (), TREE),
+    "add a primitive how": lambda x: AddPrimitive(0, (), TREE, x),
+    "remove a primitive": lambda x: RemovePrimitive(0, x),
+    "duplicate a primitive": lambda x: DuplicatePrimitive(0, x, (0, 0, 0.1)),
+    "duplicate a primitive where": lambda x: DuplicatePrimitive(0, (0, 0), x),
+    "join": lambda x: JoinPrimitive(0, x, "union"),
+    "join how": lambda x: JoinPrimitive(0, (1,), x),
+    "relax": RelaxDecals,
+    "scatter where": lambda x: ScatterDecals(x, 3),
+    "scatter on which": lambda x: ScatterDecals((x,), 3),
+    "scatter": lambda x: ScatterDecals((1,), x),
+    "scatter from which seed": lambda x: ScatterDecals((1,), 3, x),
+    "coat where": lambda x: ReplaceDecals(x, one()),
+    "coat": lambda x: ReplaceDecals((1,), x),
+    "nothing": lambda x: x,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def session() -> Any:
+    return EditSession(scene())
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+@pytest.mark.parametrize("name", COMMANDS)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    deadline=None,
+    max_examples=40,
+)
+@given(x=anything)
+def test_commands_do_something_or_say_why_not(session: Any, name: str, x: Any) -> None:
+    before = digest(session.document)
+    try:
+        session.do(COMMANDS[name](x))
+    except ImplicitDecalsError:
+        assert digest(session.document) == before
+    while session.undo():
+        pass
+    assert digest(session.document) == before
+
+
+@pytest.mark.parametrize(
+    ("ask", "error"),
+    [
+        (lambda x: EditSession(x), InvalidScene),
+        (lambda x: Document.from_scene(x), InvalidScene),
+        (lambda x: EditSession(scene()).do(x), InvalidEdit),
+        (lambda x: Scene(objects=[x], camera=Camera((0, 0, 1))), InvalidScene),
+        (lambda x: Scene(objects=(), camera=x), InvalidScene),
+        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), images=[x]), InvalidScene),
+        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), decals=x), InvalidScene),
+        (lambda x: TreeObject("tree", x), InvalidScene),
+        (lambda x: TreeObject(x, TREE), InvalidScene),
+        (lambda x: MeshObject("mesh", x, [[0, 1, 2]]), ImplicitDecalsError),
+        (lambda x: DecalImage(x, RIVET.pixels), InvalidScene),
+        (lambda x: DecalImage("rivet", x), InvalidScene),
+        (lambda x: DecalImage.load(x), InvalidScene),
+        (lambda x: Camera(x), InvalidScene),
+        (lambda x: Camera((0, 0, 1), fov=x), InvalidScene),
+        (lambda x: pick(Document.from_scene(scene()), x, (0, 0, 1)), InvalidPoints),
+        (lambda x: pick(Document.from_scene(scene()), (0, 0, 1), x), InvalidPoints),
+        (lambda x: first_hit(scene().objects, x, (0, 0, 1)), InvalidPoints),
+        (lambda x: outline(Document.from_scene(scene()), x), InvalidEdit),
+        (lambda x: primitive_near(TREE, x), InvalidNode),
+        (lambda x: primitive_paths(x), InvalidNode),
+    ],
+)
+@pytest.mark.parametrize("wrong", [None, 10**400, float("nan"), {}, object(), [None], np.zeros((2, 2))])
+def test_what_is_of_the_wrong_kind_is_named(ask: Any, error: Any, wrong: Any) -> None:
+    with pytest.raises(error, match="expected"):
+        ask(wrong)
+
+
+@pytest.mark.parametrize("path", [None, 5, "", [], b"x", object(), "a\0b"])
+def test_a_session_is_saved_to_paths_alone(path: Any) -> None:
+    with pytest.raises(InvalidEdit, match="expected a path to save to"):
+        EditSession(scene()).save(path)
+
+
+def test_a_camera_to_save_is_one(tmp_path: Path) -> None:
+    session = EditSession(scene())
+    with pytest.raises(InvalidScene, match="camera: expected a Camera"):
+        session.save(tmp_path / "scene.json", camera=(0, 0, 1))
+    assert not list(tmp_path.iterdir())
+
+
+@given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(), st.none(), st.lists(st.floats())))
+def test_checks_give_what_fits_or_say_what_came(value: Any) -> None:
+    fits = isinstance(value, int | float) and abs(value) <= sys.float_info.max
+    checked(finite_number, value, fits)
+    checked(
+        lambda *args: whole_number(*args[:2], -3, 3, args[2]), value, type(value) is int and -3 <= value <= 3
+    )
+    checked(finite_vector, value, isinstance(value, list) and len(value) == 3 and np.isfinite(value).all())
+
+
+def checked(check: Any, value: Any, fits: Any) -> None:
+    if fits:
+        np.testing.assert_array_equal(check("it", value, InvalidEdit), value)
+    else:
+        with pytest.raises(InvalidEdit, match=r"it: expected .*, got "):
+            check("it", value, InvalidEdit)

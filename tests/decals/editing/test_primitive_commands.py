@@ -1,0 +1,256 @@
+"""Commands for primitives: moves through maps, and decals that follow."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+
+from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment, define_skeleton
+from blobtree.nodes.paths import node_in_world, primitive_at
+from decals.editing import (
+    EditSession,
+    MovePrimitive,
+    PaintPrimitive,
+    ResizePrimitive,
+)
+from decals.editing.actions import Actions
+from decals.editing.followers import DragAnchor, following_weights
+from decals.errors import InvalidEdit, InvalidMesh
+from decals.scattering.scatter import scatter
+from decals.scenes.camera import Camera
+from decals.scenes.objects import TreeObject
+from decals.scenes.scene import DecalImage, Scene
+from tests.decals.editing.scenes import digest
+
+A, B = Point((0, 0, 0), radius=1.0), Segment((1, 0, 0), (2, 0, 0), radius=0.5)
+C = Cone((0, 0, 2), (0, 0, 3), radius=0.4, end_radius=0.2)
+NESTED = (A + B.translate((0.5, 0, 0)).scale(2)) - (C.rotate((0, 0, 1), 90) | A)
+
+
+def session_of(tree: Any, count: int = 80) -> Any:
+    item = TreeObject("tree", tree)
+    return EditSession(
+        Scene(
+            objects=(item,),
+            decals=scatter([item.surface], count=count),
+            images=(DecalImage.load("scale"),),
+            camera=Camera.framing(item.bounds),
+        )
+    )
+
+
+@wp.func
+def rod(q: wp.vec3, half: wp.float32) -> wp.vec3:
+    return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
+
+
+def test_skeletons_of_ones_own_move_again_and_again_by_the_same_path() -> None:
+    own = define_skeleton(rod, convex=True)
+    session = session_of(A + own(0.5, radius=0.4).translate((0.8, 0, 0)) + own(1.0, radius=0.3))
+    first = digest(session.document)
+    for path in ((1,), (2,)):
+        before = node_in_world(session.document.objects[0].tree, path)
+        for _ in range(3):
+            session.do(MovePrimitive(0, path, (0.0, 0.1, 0.2)))
+        session.do(ResizePrimitive(0, path, 1.1))
+        session.do(ResizePrimitive(0, path, 1 / 1.1))
+        session.do(PaintPrimitive(0, path, (1, 0, 0)))
+        after = node_in_world(session.document.objects[0].tree, path)
+        points = np.random.default_rng(0).uniform(*before.bounds, (300, 3)).astype(np.float32)
+        there = np.add(points, (0, 0.3, 0.6))
+        np.testing.assert_allclose(after(there), before(points), atol=1e-4)
+        assert after.colors(there).max() == 1
+        decals, item = session.document.decals.decals, session.document.objects[0]
+        assert np.abs(item.tree(decals.positions) - ISO).max() < 1e-4
+    while session.undo():
+        pass
+    assert digest(session.document) == first
+
+
+def test_a_branch_moves_as_a_whole() -> None:
+    tree = (A + B).rotate((0, 0, 1), 20) | Point((0, 0, 5), radius=1)
+    session = session_of(tree)
+    before = session.document.decals.decals
+    session.do(MovePrimitive(0, (0,), (0.5, 0, 0)))
+    after = session.document.decals.decals
+    low = before.positions[:, 2] < 2
+    np.testing.assert_allclose(after.positions[low], before.positions[low] + (0.5, 0, 0), atol=1e-4)
+    np.testing.assert_array_equal(after.positions[~low], before.positions[~low])
+
+
+@pytest.mark.parametrize("path", [(0,), (1, 0, 0)])
+def test_a_move_is_one_in_the_world_whatever_lies_above(path: Any) -> None:
+    tree = A + B.rotate((0, 1, 1), 40).translate((3, 1, 0))
+    offset = np.array([0.2, -0.1, 0.3])
+    session = session_of(tree)
+    before = node_in_world(tree, path)
+    session.do(MovePrimitive(0, path, offset))
+    after = node_in_world(session.document.objects[0].tree, path)
+    points = np.random.default_rng(0).uniform(*before.bounds, (300, 3)).astype(np.float32)
+    np.testing.assert_allclose(after(points + offset), before(points), atol=1e-5)
+
+
+def test_decals_on_a_primitive_go_along_and_the_others_stay() -> None:
+    tree = A | Point((5, 0, 0), radius=1.0)
+    session = session_of(tree)
+    before = session.document.decals.decals
+    session.do(MovePrimitive(0, (1,), (0.3, 0.4, 0)))
+    after = session.document.decals.decals
+    right = before.positions[:, 0] > 2
+    np.testing.assert_array_equal(after.positions[~right], before.positions[~right])
+    np.testing.assert_allclose(after.positions[right], before.positions[right] + (0.3, 0.4, 0), atol=1e-4)
+    np.testing.assert_allclose(after.tangents, before.tangents, atol=1e-3)
+
+
+@pytest.mark.parametrize("tree", [A + B, Ricci([A, B], exponent=3), A - Point((0, 0, 1.2), radius=0.6)])
+@pytest.mark.parametrize(
+    "command",
+    [
+        MovePrimitive(0, (1,), (0.1, 0.15, -0.1)),
+        ResizePrimitive(0, (1,), 1.2),
+        ResizePrimitive(0, (0,), 0.8),
+    ],
+)
+def test_decals_stay_on_the_surface_and_come_back(tree: Any, command: Any) -> None:
+    session = session_of(tree)
+    first = digest(session.document)
+    change = session.do(command)
+    assert len(change.after.numbers)
+    decals, item = session.document.decals.decals, session.document.objects[0]
+    assert np.abs(item.tree(decals.positions) - ISO).max() < 1e-4
+    normals = item.surface.normal(decals.positions)
+    cosines = np.einsum("ni,ni->n", normals, decals.normals)
+    assert (cosines < 0.999).sum() <= 2  # on a crease, rounding decides whose normal it is
+    session.undo()
+    assert digest(session.document) == first
+
+
+def test_following_is_whole_on_a_primitive_alone_and_shared_in_a_blend() -> None:
+    tree = A + Point((1.2, 0, 0), radius=1.0)
+    low, high = tree.bounds
+    points = scatter([TreeObject("t", tree).surface], count=100).positions
+    first, second = following_weights(tree, (0,), points), following_weights(tree, (1,), points)
+    np.testing.assert_allclose(first + second, 1.0, atol=0.02)
+    mirror = points * (-1, 1, 1) + (1.2, 0, 0)
+    np.testing.assert_allclose(following_weights(tree, (1,), mirror), first, atol=0.02)
+    far = np.abs(points[:, 0] - low[0]) > (high - low)[0] * 0.7
+    assert first[far].max() < 0.15
+
+
+def test_decals_in_a_hole_follow_the_tool() -> None:
+    tree = A - Point((0, 0, 1.1), radius=0.5)
+    points = TreeObject("t", tree).surface.project([[0, 0, 0.6]])[0]
+    np.testing.assert_allclose(following_weights(tree, (1,), points), 1.0, atol=0.02)
+    np.testing.assert_allclose(following_weights(tree, (0,), points), 0.0, atol=0.02)
+
+
+@pytest.mark.parametrize("way", [(0.02, 0.03, -0.02), (0.4, 0.3, -0.2)])
+def test_a_quick_move_is_the_same_move_without_a_surface(way: Any) -> None:
+    quick, whole = session_of(A + B), session_of(A + B)
+    quick.do(MovePrimitive(0, (1,), way, quick=True))
+    whole.do(MovePrimitive(0, (1,), way))
+    assert "surface" not in vars(quick.document.objects[0])
+    decals, tree = quick.document.decals.decals, quick.document.objects[0].tree
+    assert decals.packed().tobytes() == whole.document.decals.decals.packed().tobytes()
+    assert tree == whole.document.objects[0].tree
+    assert np.abs(tree(decals.positions) - ISO).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    "tree", [A + B, Ricci([A, B.scale(1.2)], exponent=3), A - Point((0, 0, 1.2), radius=0.6)]
+)
+@pytest.mark.parametrize("path", [(0,), (1,)])
+def test_beyond_its_reach_a_node_carries_nothing_along(tree: Any, path: Any) -> None:
+    """What is asked of decals near the node alone is what all would have been given, bit for bit."""
+    item, other = TreeObject("tree", tree), TreeObject("other", Point((1.5, 0.2, 0.4), radius=0.9))
+    positions = scatter([item.surface, other.surface], count=300).positions
+    start = DragAnchor(((item, other), 0, path), tree, positions)
+    np.testing.assert_array_equal(start.weights, following_weights(tree, path, positions.astype(np.float64)))
+    assert 0 < (start.weights > 0).sum() < len(positions)
+
+
+def test_a_drag_in_steps_ends_as_one_move_does() -> None:
+    other = TreeObject("other", Point((2.6, 0, 0), radius=0.5))
+    tree = TreeObject("tree", A + B)
+    decals = scatter([tree.surface, other.surface], count=120)
+    scene = Scene(
+        objects=(tree, other),
+        decals=decals,
+        images=(DecalImage.load("scale"),),
+        camera=Camera.framing(tree.bounds),
+    )
+    steps, at_once = EditSession(scene), EditSession(scene)
+    for path, way in (((1,), np.array([0.2, 0.1, -0.1])), ((0,), np.array([0.0, -0.3, 0.1]))):
+        actions = Actions(steps)
+        actions.state.primitive = 0, path
+        actions.trees.begin_drag()
+        for share in (0.2, 1.4, 0.7, 1.0):
+            actions.trees.drag(share * way)
+        actions.trees.end_drag()
+        at_once.do(MovePrimitive(0, path, way, quick=True))
+        one, same = steps.document, at_once.document
+        assert one.decals.decals.packed().tobytes() == same.decals.decals.packed().tobytes()
+        assert one.objects[0].tree == same.objects[0].tree
+    assert len(steps.labels) == len(at_once.labels) == 2
+
+
+def test_a_path_may_be_a_list() -> None:
+    one, other = session_of(A + B, 12), session_of(A + B, 12)
+    one.do(MovePrimitive(0, [1], (0, 0, 0.1)))
+    other.do(MovePrimitive(0, (1,), (0, 0, 0.1)))
+    assert one.document.objects[0].tree == other.document.objects[0].tree
+    moved = one.document.decals.decals.positions
+    np.testing.assert_array_equal(moved, other.document.decals.decals.positions)
+
+
+def test_a_primitive_that_leaves_nothing_to_see_goes_back() -> None:
+    """A tool that removes everything: the steps of a drag pass, its end is refused."""
+    session = session_of(A - Point((1.2, 0, 0), radius=1.3), 12)
+    actions = Actions(session)
+    actions.state.primitive = (0, (1,))
+    state = digest(session.document)
+    actions.trees.begin_drag()
+    actions.trees.drag((-1.2, 0, 0))
+    actions.trees.end_drag()
+    assert digest(session.document) == state
+    assert session.labels == ()
+    assert "surface" in actions.state.message
+
+
+def test_painting_leaves_the_decals() -> None:
+    session = session_of(A + B)
+    change = session.do(PaintPrimitive(0, (1,), (1, 0, 0)))
+    assert not len(change.after.numbers)
+    assert primitive_at(session.document.objects[0].tree, (1,)).color == (1, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("command", "error", "message"),
+    [
+        (MovePrimitive(1, (0,), (0, 0, 1)), InvalidEdit, "0 to 0, got 1"),
+        (MovePrimitive(0, (5,), (0, 0, 1)), InvalidNode, "path"),
+        (MovePrimitive(0, (0,), (0, 0, np.nan)), InvalidEdit, "offset"),
+        (ResizePrimitive(0, (0,), 0.0), InvalidEdit, "above 0"),
+        (PaintPrimitive(0, (0,), (2, 0, 0)), InvalidNode, "color"),
+        (ResizePrimitive(0, (0,), 0.001), InvalidMesh, "surface"),
+    ],
+)
+def test_what_cannot_be_is_refused(command: Any, error: Any, message: Any) -> None:
+    session = session_of(A)
+    session.document.apply(*_under_a_sum(session.document))
+    before = digest(session.document)
+    with pytest.raises(error, match=message):
+        session.do(command)
+    assert digest(session.document) == before
+
+
+def _under_a_sum(document: Any) -> Any:
+    change = document.compute_parts(objects=(TreeObject("tree", A - Point((0, 0, 0), radius=0.5)),))
+    return change.after, change.parts_after
+
+
+def test_below_a_twist_nothing_moves_alone() -> None:
+    session = session_of((A + B).twist(30))
+    with pytest.raises(InvalidNode, match="below a Twist"):
+        session.do(MovePrimitive(0, (0, 0), (0, 0, 1)))

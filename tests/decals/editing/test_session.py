@@ -1,0 +1,163 @@
+"""The stack: strokes, undo, redo, saving, listeners."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from decals.editing import AddDecals, DeleteDecals, EditSession, MoveDecals, ScaleDecals, SetValues
+from decals.errors import InvalidDecals, InvalidEdit, InvalidScene
+from decals.scenes.scene_file import load_scene
+from tests.decals.editing.scenes import digest, one, scene
+
+
+@pytest.fixture
+def session() -> Any:
+    return EditSession(scene())
+
+
+def drag(session: Any, steps: Any = 10) -> None:
+    for x in np.linspace(0, 0.5, steps):
+        session.do(MoveDecals([3], np.array([x, 0, 1], np.float32), np.array([0, 0, 1], np.float32)))
+
+
+def test_a_drag_is_one_entry(session: EditSession) -> None:
+    first = digest(session.document)
+    session.begin_stroke("drag")
+    drag(session)
+    assert session.modified
+    session.end_stroke()
+    last = digest(session.document)
+    assert session.labels == ("drag",)
+    assert session.undo() == "drag"
+    assert digest(session.document) == first
+    assert session.redo() == "drag"
+    assert digest(session.document) == last
+    assert session.redo() is None
+
+
+def test_a_cancelled_stroke_leaves_no_trace(session: EditSession) -> None:
+    first = digest(session.document)
+    session.do(ScaleDecals([1], 2.0))
+    before = digest(session.document)
+    session.begin_stroke("drag")
+    drag(session)
+    session.do(DeleteDecals([3]))
+    session.do(AddDecals(one()))
+    session.cancel_stroke()
+    assert digest(session.document) == before
+    assert session.labels == ("scale",)
+    session.undo()
+    assert digest(session.document) == first
+    assert session.undo() is None
+
+
+def test_a_stroke_can_start_over(session: EditSession) -> None:
+    session.begin_stroke("drag")
+    session.do(ScaleDecals([1], 2.0))
+    session.revert_stroke()
+    session.do(ScaleDecals([1], 3.0))
+    session.end_stroke()
+    radius = scene().decals.radii[1]
+    assert session.document.decals[1].radii[0] == pytest.approx(3 * radius)
+    session.undo()
+    assert session.document.decals[1].radii[0] == radius
+
+
+def scale_and_fail(session: Any) -> None:
+    with session.stroke("both"):
+        session.do(ScaleDecals([1], 2.0))
+        session.do(DeleteDecals([99]))
+
+
+def test_an_error_within_a_stroke_takes_all_of_it_back(session: EditSession) -> None:
+    before = digest(session.document)
+    with pytest.raises(InvalidDecals):
+        scale_and_fail(session)
+    assert digest(session.document) == before
+    assert session.labels == ()
+
+
+def test_a_stroke_says_in_words_what_it_is(session: EditSession) -> None:
+    with pytest.raises(InvalidEdit, match="label: expected a str, got None"), session.stroke(None):
+        session.do(ScaleDecals([1], 1.5))
+    assert session.labels == ()
+
+
+def test_a_stroke_that_adds_and_deletes(session: EditSession) -> None:
+    before = digest(session.document)
+    with session.stroke("flicker"):
+        session.do(AddDecals(one()))
+        session.do(ScaleDecals([60], 2.0))
+        session.do(DeleteDecals([60, 5]))
+    after = digest(session.document)
+    session.undo()
+    assert digest(session.document) == before
+    session.redo()
+    assert digest(session.document) == after
+
+
+def test_a_new_command_ends_what_could_be_redone(session: EditSession) -> None:
+    session.do(ScaleDecals([1], 2.0))
+    session.undo()
+    session.do(ScaleDecals([2], 2.0))
+    assert session.redo() is None
+    assert session.labels == ("scale",)
+
+
+def test_what_does_nothing_leaves_no_entry(session: EditSession) -> None:
+    session.do(DeleteDecals([]))
+    with session.stroke("nothing"):
+        pass
+    assert session.labels == ()
+
+
+def test_a_listener_may_end_with_what_it_hears(session: EditSession) -> None:
+    heard = []
+
+    def once(_change: Any) -> None:
+        heard.append("once")
+        stop()
+
+    stop = session.subscribe(once)
+    session.subscribe(lambda _change: heard.append("always"))
+    session.do(ScaleDecals([1], 2.0))
+    session.do(ScaleDecals([1], 2.0))
+    assert heard == ["once", "always", "always"]
+
+
+def test_listeners_hear_of_every_change(session: EditSession) -> None:
+    heard = []
+    stop = session.subscribe(lambda change: heard.append(change.after.numbers.tolist()))
+    session.do(ScaleDecals([1, 4], 2.0))
+    session.undo()
+    session.redo()
+    with pytest.raises(InvalidDecals):
+        session.do(DeleteDecals([99]))
+    stop()
+    stop()
+    session.do(ScaleDecals([2], 2.0))
+    assert heard == [[1, 4]] * 3
+
+
+def test_saving(session: EditSession, tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    session.do(SetValues.each([1], tints=[0.5, 1, 0]))
+    session.do(DeleteDecals([0]))
+    assert session.modified
+    session.save(path)
+    assert not session.modified
+    loaded = load_scene(path)
+    assert loaded.decals.packed().tobytes() == session.document.decals.decals.packed().tobytes()
+    session.undo()
+    assert session.modified
+    session.redo()
+    assert not session.modified
+
+
+def test_a_save_that_fails_leaves_the_file_and_the_mark(session: EditSession, tmp_path: Path) -> None:
+    session.do(DeleteDecals([0]))
+    with pytest.raises(InvalidScene, match="existing folder"):
+        session.save(tmp_path / "nowhere" / "scene.json")
+    assert session.modified

@@ -1,0 +1,88 @@
+"""Contexts: what they cannot do they say; they nest; programs are compiled once."""
+
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import pytest
+
+from decals.errors import NoGraphics
+from decals.rendering.context import Context
+from decals.shaders import CompileError, Source, compose
+
+
+def usable(context: Context) -> bool:
+    try:
+        context.gl.texture((2, 2), 4).release()
+    except moderngl.Error:
+        return False
+    return True
+
+
+def test_no_context_is_a_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(**_: object) -> None:
+        raise Exception("eglInitialize failed (0x3001)")  # noqa: TRY002
+
+    monkeypatch.setattr(moderngl, "create_context", fail)
+    with pytest.raises(NoGraphics, match=r"no OpenGL 3.3 context .*0x3001.*doctor"):
+        Context.standalone()
+
+
+def test_the_newest_context_that_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some drivers give no more than what is asked for, others fail where they have less."""
+    real, asked = moderngl.create_context, []
+
+    def old(*, require: int, **settings: Any) -> moderngl.Context:
+        asked.append(require)
+        if require > 410:
+            raise Exception("requested OpenGL version is not supported")  # noqa: TRY002
+        return real(require=require, **settings)
+
+    monkeypatch.setattr(moderngl, "create_context", old)
+    with Context.standalone() as context, context.current():
+        assert usable(context)
+    assert asked == [430, 330]
+
+
+def test_missing_libraries_are_asked_for_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise NoGraphics("apt-get install libegl1")
+
+    monkeypatch.setattr("decals.rendering.context.require_gl", missing)
+    monkeypatch.setattr(moderngl, "create_context", lambda **_: pytest.fail("must not be reached"))
+    with pytest.raises(NoGraphics, match="libegl1"):
+        Context.standalone()
+
+
+def test_blocks_nest_and_give_back(context: Context) -> None:
+    with context.current(), Context.standalone() as other:
+        assert usable(context)
+        with other.current():
+            with context.current():
+                assert usable(context)
+            assert usable(other)
+        assert usable(context)
+
+
+def test_a_program_is_compiled_once(context: Context) -> None:
+    sources = (
+        compose("screen.vert"),
+        Source.named("a", "#version 330 core\nout vec4 c; void main() { c = vec4(1); }"),
+    )
+    assert context.program(*sources) is context.program(*sources)
+
+
+def test_a_bad_shader_names_its_file_and_line(context: Context, tmp_path: Path) -> None:
+    (tmp_path / "a.frag").write_text("//@ slot ink\nout vec4 c;\nvoid main() { c = ink(); }\n")
+    ink = Source.named("ink.glsl", "vec4 ink() {\n    return vec4(missing, 1.0);\n}")
+    fragment = compose("a.frag", slots={"ink": ink}, directory=tmp_path)
+    with pytest.raises(CompileError, match=r"ink.glsl:2: .*missing"):
+        context.program(compose("screen.vert"), fragment)
+
+
+def test_an_attached_context_is_left_alone(context: Context) -> None:
+    attached = Context(context.gl)
+    with attached.current():
+        assert usable(attached)
+    attached.release()
+    assert usable(context)

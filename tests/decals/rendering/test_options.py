@@ -1,0 +1,95 @@
+"""Invalid arguments of a renderer raise an error that names them in one line."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from decals.errors import ImplicitDecalsError, InvalidPoints, InvalidScene
+from decals.rendering import Background
+from decals.rendering.lights import Light, Lighting
+from decals.rendering.options import RenderOptions
+from decals.rendering.renderer import Renderer
+from decals.scenes.camera import Camera
+from tests.decals.editing.scenes import one, scene
+
+SIZE = (16, 12)
+NUMBERS = (-1, 0, True, 10**400, 0.5, float("nan"), float("inf"), np.array(np.nan))
+OTHERS = (None, "x", b"x", {}, ..., [None], ["x"], np.zeros((2, 2)), np.full((4, 4), np.nan), int, one())
+WRONG = (*NUMBERS, *OTHERS)
+
+
+def refused(call: Any, error: type[ImplicitDecalsError] = InvalidScene) -> None:
+    with pytest.raises(error) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert "expected" in str(caught.value)
+
+
+def drawn(renderer: Renderer, shown: Any, *, viewpoint: Any = None, **options: Any) -> Any:
+    return renderer.render(shown, RenderOptions(**options), viewpoint=viewpoint)
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=repr)
+def test_every_argument_is_checked_by_every_picture(renderer: Renderer, wrong: Any) -> None:
+    shown = scene()
+    refused(lambda: renderer.render(wrong, RenderOptions(size=SIZE)))
+    refused(lambda: renderer.buffers(wrong, RenderOptions(size=SIZE)))
+    refused(lambda: renderer.begin_frame(wrong, RenderOptions(size=SIZE, samples=1)))
+    for name in ("size", "samples", "background", "mapping", "contact", "viewpoint", "lights"):
+        if wrong is None and name in ("viewpoint", "lights"):
+            continue  # these may be left out
+        if name in ("mapping", "contact") and type(wrong) in (int, bool) and 0 <= wrong < 3:
+            continue  # the numbers of two modes
+        if name == "samples" and wrong is True:
+            pass  # no number of samples
+        refused(lambda name=name: drawn(renderer, shown, **{"size": SIZE, name: wrong}))  # type: ignore[misc]
+    for name in ("x", "y"):
+        if not (type(wrong) is int and 0 <= wrong < 12):
+            refused(
+                lambda name=name: renderer.buffers_at(
+                    shown, **{"x": 1, "y": 1, name: wrong}, options=RenderOptions(size=SIZE)
+                ),  # type: ignore[misc]
+                InvalidPoints,
+            )
+    refused(lambda: Renderer(renderer.context, max_tile=wrong))
+    if wrong is not None:
+        refused(lambda: Renderer(wrong))
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=repr)
+def test_lights_and_backgrounds_are_made_of_numbers(wrong: Any) -> None:
+    for name in ("color", "direction", "position", "attenuation"):
+        if not (wrong is None and name == "position"):
+            refused(lambda name=name: Light(**{"color": (1, 1, 1), "direction": (0, 0, -1), name: wrong}))  # type: ignore[misc]
+    refused(lambda: Lighting(wrong))
+    refused(lambda: Lighting((wrong,)))
+    refused(lambda: Background(wrong, (0, 0, 0, 0)))
+    refused(lambda: Background((0, 0, 0, 0), wrong))
+
+
+@pytest.mark.parametrize("cone", ["x", None, float("nan"), [1]])
+def test_cones_of_lights_are_angles(cone: Any) -> None:
+    refused(lambda: Light((1, 1, 1), (0, 0, -1), cone=cone))
+    refused(lambda: Light((1, 1, 1), (0, 0, -1), exponent=cone))
+
+
+def test_sizes_and_lights_may_be_any_sequences(renderer: Renderer) -> None:
+    light = Light(np.ones(3), [0, 0, -1])  # type: ignore[arg-type]
+    same = Light((1, 1, 1), (0, 0, -1))
+    assert light == same
+    pictures = [
+        renderer.render(scene(), RenderOptions(size=size, lights=Lighting((light,))))  # type: ignore[arg-type]
+        for size in ([16, 12], np.array([16, 12]), (np.int64(16), 12))
+    ]
+    for picture in pictures:
+        np.testing.assert_array_equal(picture, pictures[0])
+
+
+def test_a_picture_after_a_refused_one_is_as_before(renderer: Renderer) -> None:
+    before = renderer.render(scene(), RenderOptions(size=SIZE))
+    refused(lambda: renderer.render(scene(), RenderOptions(size=SIZE), viewpoint=np.eye(4)))  # type: ignore[arg-type]
+    refused(lambda: renderer.render(scene(), RenderOptions(size=SIZE, background="white")))  # type: ignore[arg-type]
+    np.testing.assert_array_equal(renderer.render(scene(), RenderOptions(size=SIZE)), before)
+    with pytest.raises(InvalidScene, match="viewpoint: expected a Camera"):
+        renderer.render(scene(), RenderOptions(size=SIZE), viewpoint=Camera)  # type: ignore[arg-type]

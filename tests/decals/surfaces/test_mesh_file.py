@@ -1,0 +1,183 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.errors import InvalidMesh
+from decals.surfaces.mesh_file import dataset_triangles, read_mesh
+
+HEADER = """ply
+format {form} 1.0
+comment made by hand
+element vertex {vertices}
+property float x
+property double y
+property float z
+property uchar red
+element face {faces}
+property list uchar int vertex_indices
+end_header
+"""
+SQUARE = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
+
+
+def _ascii_ply(points: list[tuple[float, float, float]], polygons: list[list[int]]) -> bytes:
+    rows = [f"{x} {y} {z} 255" for x, y, z in points] + [
+        f"{len(p)} {' '.join(map(str, p))}" for p in polygons
+    ]
+    return (
+        HEADER.format(form="ascii", vertices=len(points), faces=len(polygons)) + "\n".join(rows) + "\n"
+    ).encode()
+
+
+def _binary_ply(points: list[tuple[float, float, float]], polygons: list[list[int]], order: str) -> bytes:
+    form = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    body = b""
+    for point in points:
+        row = np.zeros(1, [("x", order + "f4"), ("y", order + "f8"), ("z", order + "f4"), ("red", "u1")])
+        row["x"], row["y"], row["z"] = point
+        body += row.tobytes()
+    for polygon in polygons:
+        body += bytes([len(polygon)]) + np.array(polygon, order + "i4").tobytes()
+    return HEADER.format(form=form, vertices=len(points), faces=len(polygons)).encode() + body
+
+
+def _area(path: Path) -> float:
+    vertices, faces = read_mesh(path)
+    assert vertices.dtype == np.float32
+    assert faces.dtype == np.int32
+    a, b, c = vertices[faces].transpose(1, 0, 2).astype(np.float64)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp", "vtk"])
+def test_every_common_format_gives_the_same_sphere(tmp_path: Path, suffix: str) -> None:
+    sphere = pv.Sphere(theta_resolution=12, phi_resolution=9)
+    path = tmp_path / f"sphere.{suffix}"
+    sphere.save(path)
+    vertices, faces = read_mesh(path)
+    assert len(faces) == sphere.n_cells
+    assert np.allclose(
+        vertices[faces].mean(axis=(0, 1)),
+        np.asarray(sphere.points)[sphere.regular_faces].mean(axis=(0, 1)),
+        atol=1e-5,
+    )
+    assert _area(path) == pytest.approx(sphere.area, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "polygons", [[[0, 1, 2], [0, 2, 3]], [[0, 1, 2, 3]], [[0, 1, 2], [0, 2, 3, 0]], [[0, 1], [0, 1, 2, 3]]]
+)
+@pytest.mark.parametrize("order", ["", "<", ">"])
+def test_ply_polygons_of_any_size(tmp_path: Path, polygons: list[list[int]], order: str) -> None:
+    path = tmp_path / "a.ply"
+    path.write_bytes(_binary_ply(SQUARE, polygons, order) if order else _ascii_ply(SQUARE, polygons))
+    assert np.array_equal(read_mesh(path)[0], np.array(SQUARE, np.float32))
+    assert _area(path) == pytest.approx(1.0)
+
+
+def test_ply_agrees_with_vtk(tmp_path: Path) -> None:
+    sphere = pv.Sphere()
+    for binary in (True, False):
+        sphere.save(tmp_path / "a.ply", binary=binary)
+        vertices, faces = read_mesh(tmp_path / "a.ply")
+        reference = pv.read(tmp_path / "a.ply")
+        assert np.array_equal(vertices, reference.points)
+        assert np.array_equal(faces, reference.regular_faces)
+
+
+def test_a_concave_polygon_keeps_its_area(tmp_path: Path) -> None:
+    arrow = [(0.0, 0.0, 0.0), (2.0, 1.0, 0.0), (0.0, 2.0, 0.0), (1.5, 1.0, 0.0)]
+    path = tmp_path / "a.ply"
+    path.write_bytes(_ascii_ply(arrow, [[0, 1, 2, 3]]))
+    assert _area(path) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+def test_a_ply_cut_anywhere_is_refused_not_crashed_on(tmp_path: Path, order: str) -> None:
+    polygons = [[0, 1, 2], [0, 2, 3, 1]]
+    whole = _binary_ply(SQUARE, polygons, order) if order else _ascii_ply(SQUARE, polygons)
+    path = tmp_path / "a.ply"
+    for end in range(0, len(whole) - 2, 3):
+        path.write_bytes(whole[:end])
+        with pytest.raises(InvalidMesh, match=r"a\.ply"):
+            read_mesh(path)
+
+
+@pytest.mark.parametrize("corner", [4, -1, 99_999_999])
+def test_wrong_indices_are_refused_not_crashed_on(tmp_path: Path, corner: int) -> None:
+    for polygons in ([[0, 1, corner]], [[0, 1, 2, corner]]):
+        (tmp_path / "a.ply").write_bytes(_ascii_ply(SQUARE, polygons))
+        with pytest.raises(InvalidMesh, match="asks for number"):
+            read_mesh(tmp_path / "a.ply")
+    rows = "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 5\n"
+    (tmp_path / "a.vtk").write_text(
+        f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n{rows}4 0 1 2 {corner}\n"
+    )
+    with pytest.raises(InvalidMesh, match="asks for number"):
+        read_mesh(tmp_path / "a.vtk")
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp", "vtk", "off", "gltf", "xyz", "json", ""])
+@pytest.mark.parametrize("content", [b"", b"hello world\n" * 30, b"\x00\xff" * 200])
+def test_junk_is_one_quiet_error(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], suffix: str, content: bytes
+) -> None:
+    path = tmp_path / f"junk.{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(InvalidMesh, match="junk") as caught:
+        read_mesh(path)
+    assert "\n" not in str(caught.value)
+    out, err = capfd.readouterr()
+    assert (out, err) == ("", "")
+
+
+def test_truncated_files_of_other_formats(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for suffix in ("obj", "stl", "vtp", "vtk"):
+        path = tmp_path / f"cut.{suffix}"
+        pv.Sphere().save(path)
+        whole = path.read_bytes()
+        path.write_bytes(whole[: len(whole) // 3])
+        with pytest.raises(InvalidMesh, match="cut"):
+            read_mesh(path)
+    assert capfd.readouterr().err == ""
+
+
+def test_points_without_faces(tmp_path: Path) -> None:
+    pv.PolyData(np.random.default_rng(0).random((5, 3))).save(tmp_path / "cloud.vtp")
+    with pytest.raises(InvalidMesh, match=r"no faces|cloud"):
+        read_mesh(tmp_path / "cloud.vtp")
+    (tmp_path / "a.ply").write_bytes(_ascii_ply(SQUARE, []))
+    with pytest.raises(InvalidMesh, match="4 points but no faces"):
+        read_mesh(tmp_path / "a.ply")
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    for path in (tmp_path / "nowhere.ply", tmp_path):
+        with pytest.raises(InvalidMesh, match="check the path"):
+            read_mesh(path)
+
+
+@pytest.mark.parametrize("name", ["a" * 5000 + ".ply", "a\0b.ply"])
+def test_a_path_that_no_file_can_have(name: str) -> None:
+    with pytest.raises(InvalidMesh, match="found none"):
+        read_mesh(name)
+
+
+def test_a_volume_mesh_gives_its_boundary(tmp_path: Path) -> None:
+    pv.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    assert _area(tmp_path / "a.vtu") == pytest.approx(24.0)
+
+
+def test_a_picture_is_no_mesh(tmp_path: Path) -> None:
+    pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "a.vti")
+    with pytest.raises(InvalidMesh, match="ImageData"):
+        read_mesh(tmp_path / "a.vti")
+
+
+def test_strips_are_triangulated() -> None:
+    strip = pv.PolyData(np.array(SQUARE, np.float32), strips=[4, 0, 1, 3, 2])
+    vertices, faces = dataset_triangles(strip, name="strip")
+    assert faces.shape == (2, 3)
+    assert len(vertices) == 4

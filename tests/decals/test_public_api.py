@@ -1,0 +1,66 @@
+"""The public names of the package: a list that changes only on purpose."""
+
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+import decals
+
+PACKAGES = [
+    "editing", "errors", "field", "images", "index", "rendering", "scattering", "scenes", "surfaces", "vtk",
+    "window",
+]  # fmt: skip
+NAMES = [
+    "Camera", "Contact", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError", "Interaction",
+    "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__", "cover", "edit",
+    "evaluate", "load_image", "load_model", "load_scene", "render", "save_scene", "scatter", "show",
+]  # fmt: skip
+OF_PACKAGES = {
+    "field": ["Samples"],
+    "index": ["DecalEditor", "DecalIndex"],
+    "rendering": [
+        "Background", "Buffers", "Context", "Drawable", "Light", "Lighting", "Picture", "Projection",
+        "RenderOptions", "Renderer", "STUDIO", "SceneLike", "Size", "TRANSPARENT", "Viewpoint", "register",
+    ],
+    "scattering": [
+        "Creases", "Cylindrical", "ImageChoice", "Jitter", "Orientation", "PaintedImage", "Planar",
+        "Spherical", "TextureCoordinates", "gradient_of", "region_mask", "remeshed_points", "vertex_density",
+    ],
+    "surfaces": ["ImplicitSurface", "MeshSurface", "Model", "Surface", "as_surface", "read_mesh"],
+}  # fmt: skip
+
+
+def test_the_names_of_decals() -> None:
+    assert decals.__all__ == sorted([*NAMES, *PACKAGES])
+    assert dir(decals) == decals.__all__
+
+
+@pytest.mark.parametrize("package", OF_PACKAGES)
+def test_the_names_of_a_package(package: str) -> None:
+    assert getattr(decals, package).__all__ == OF_PACKAGES[package]
+
+
+@pytest.mark.parametrize("package", ["", *PACKAGES])
+def test_every_name_can_be_loaded(package: str) -> None:
+    module = import_module(f"decals.{package}".rstrip("."))
+    for name in getattr(module, "__all__", []):
+        assert getattr(module, name) is not None, name
+
+
+def test_unknown_names_are_attribute_errors() -> None:
+    with pytest.raises(AttributeError, match="nothing"):
+        decals.nothing  # noqa: B018
+
+
+def test_public_functions_are_no_packages() -> None:
+    for name in NAMES:
+        assert type(getattr(decals, name)).__name__ != "module", name
+
+
+def test_importing_the_errors_loads_nothing_heavy() -> None:
+    heavy = {"warp", "pyvista", "moderngl", "vtk"}
+    code = f"import sys, decals.errors; print(sorted({heavy} & sys.modules.keys()))"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"

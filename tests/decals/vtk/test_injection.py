@@ -1,0 +1,302 @@
+"""Decals in VTK's own shaders: the same owners and places in images as our renderer finds, VTK's light."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.errors import InvalidScene
+from decals.model import Decals
+from decals.record import Contact
+from decals.rendering import Buffers
+from decals.rendering.options import RenderOptions
+from decals.scenes.camera import Camera
+from decals.scenes.objects import MeshObject
+from decals.scenes.scene import Scene
+from decals.surfaces.convert import as_shape
+from decals.vtk import injection
+from tests.decals.rendering.pictures import in_layers, scattered
+from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.scenes import shot
+from tests.oracles.raster import edges
+
+SIZE = (160, 120)
+UV_STEPS = 4096.0
+
+OWNER = f"""
+  vec3 n = normalize({injection.NORMAL});
+  DecalHit found = decal_at({injection.POSITION}, n);
+  int number = found.owner + 1;
+  ambientColor = vec3(0.0);
+  diffuseColor = vec3(float(number & 255), float((number >> 8) & 255), 128.0) / 255.0;
+"""
+UV = f"""
+  vec3 n = normalize({injection.NORMAL});
+  DecalHit found = decal_at({injection.POSITION}, n);
+  int u = int(round(found.uv.x * {UV_STEPS - 1})), v = int(round(found.uv.y * {UV_STEPS - 1}));
+  ambientColor = vec3(0.0);
+  diffuseColor = vec3(float(u & 255), float((u >> 8) + 16 * (v >> 8)), float(v & 255)) / 255.0;
+"""
+
+
+def torus() -> pv.PolyData:
+    return pv.ParametricTorus(ringradius=1.0, crosssectionradius=0.4, u_res=40, v_res=20, w_res=5).clean()
+
+
+def decals_over(mesh: pv.PolyData, count: int = 90, *, seed: int = 4) -> Decals:
+    thing = MeshObject("mesh", *as_shape(mesh))
+    return scattered(thing, count, seed, radii=(0.08, 0.4))
+
+
+def subplot_with(
+    plotter: Factory, mesh: pv.DataSet, decals: Decals, *, paint: str = injection.PAINT, **look: object
+) -> tuple[pv.Plotter, pv.Actor]:
+    pl = plotter(window_size=SIZE)
+    pl.disable_anti_aliasing()
+    actor = pl.add_mesh(mesh, **look)
+    pl.decals.add(decals, images=["scale"])
+    subplot = pl.decals.subplot
+    subplot.applied._injections.append(injection.Injection(subplot, actor, paint=paint))
+    pl.camera_position = [(2.0, -2.6, 2.4), (0, 0, 0), (0, 0, 1)]
+    pl.reset_camera_clipping_range()
+    return pl, actor
+
+
+def found_by_us(pl: pv.Plotter, mesh: pv.DataSet) -> Buffers:
+    """The batch renderer's, of the same mesh from the same camera."""
+    subplot = pl.decals.subplot
+    scene = Scene(
+        objects=(MeshObject("mesh", *as_shape(mesh)),),
+        camera=Camera((0, 0, 1)),
+        decals=pl.decals.scene.decals,
+        images=pl.decals.scene.images,
+    )
+    with subplot.current():
+        return subplot.renderer.buffers(
+            scene, RenderOptions(size=SIZE, contact=subplot.contact), viewpoint=subplot.viewpoint()
+        )
+
+
+LOOKS: dict[str, dict[str, object]] = {
+    "flat": {},
+    "smooth": {"smooth_shading": True},
+    "scalars": {"scalars": "height"},
+    "cell scalars": {"scalars": "number"},
+    "culled": {"culling": "back"},
+}
+
+
+CASES = [(look, Contact.PRODUCT) for look in LOOKS] + [("flat", Contact.MIN), ("flat", Contact.RADIAL)]
+
+
+@pytest.mark.parametrize(("look", "contact"), CASES)
+def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, contact: Contact) -> None:
+    mesh = torus()
+    mesh["height"] = mesh.points[:, 2]
+    mesh.cell_data["number"] = np.arange(mesh.n_cells)
+    decals = decals_over(mesh)
+    options = {"lighting": False, "show_scalar_bar": False, **LOOKS[look]}
+    for paint, layered in ((OWNER, False), (OWNER, True), (UV, False)):
+        pl, _ = subplot_with(
+            plotter, mesh, in_layers(decals, 1) if layered else decals, paint=paint, **options
+        )
+        pl.decals.subplot.contact = contact
+        seen = shot(pl)
+        ours = found_by_us(pl, mesh)
+        sure = (ours.object_id == 0) & ~edges(ours.object_id)
+        assert sure.mean() > 0.2
+        if paint is OWNER:
+            owner = seen[..., 0] + 256 * seen[..., 1] - 1
+            same = owner == ours.owner
+            assert (ours.owner[sure] >= 0).mean() > 0.2
+            assert same[sure].mean() > 0.998
+            continue
+        u, v = seen[..., 0] + 256 * (seen[..., 1] % 16), seen[..., 2] + 256 * (seen[..., 1] // 16)
+        error = np.abs(np.stack([u, v], -1) / (UV_STEPS - 1) - ours.uv)[sure & (ours.owner >= 0)]
+        assert np.quantile(error, 0.98) < 1.5 / UV_STEPS
+        assert np.quantile(error, 0.995) < 0.01
+
+
+def test_light_is_vtks(plotter: Factory) -> None:
+    """Under an opaque decal of one colour an actor looks as if it were of it, elsewhere as without us."""
+    mesh = torus()
+    decals = decals_over(mesh).replace(images=np.full(90, -1), tints=np.full((90, 3), [0.8, 0.35, 0.2]))
+    pl, actor = subplot_with(plotter, mesh, decals, color="lightblue", specular=0.4, ambient=0.2)
+    seen = shot(pl)
+    ours = found_by_us(pl, mesh)
+    pl.decals.remove(actor)
+    plain = shot(pl)
+    actor.prop.diffuse_color = actor.prop.ambient_color = (0.8, 0.35, 0.2)  # highlights keep theirs
+    painted = shot(pl)
+    covered = (ours.field > 0.53) & (ours.object_id == 0)
+    free = (ours.owner < 0) & ~edges(ours.owner >= 0)
+    assert covered.sum() > 500
+    assert (ours.object_id == 0)[free].sum() > 300
+    assert (np.abs(seen - painted)[covered].max(axis=-1) <= 1).mean() > 0.99  # but for inner silhouettes
+    np.testing.assert_array_equal(seen[free & ~edges(ours.object_id)], plain[free & ~edges(ours.object_id)])
+
+
+def test_scalars_edges_and_opacity_stay(plotter: Factory) -> None:
+    mesh = pv.Sphere(theta_resolution=16, phi_resolution=16)
+    mesh["height"] = mesh.points[:, 2]
+    looks = [{"show_edges": True}, {"opacity": 0.5}, {"pbr": True}, {"scalars": "height", "show_edges": True}]
+    decals = decals_over(mesh, 30).replace(radii=np.full(30, 0.1))
+    for look in looks:
+        pl, actor = subplot_with(plotter, mesh, decals, show_scalar_bar=False, **look)
+        seen = shot(pl)
+        ours = found_by_us(pl, mesh)
+        pl.decals.remove(actor)
+        plain = shot(pl)
+        free = (ours.owner < 0) & ~edges(ours.owner >= 0) & ~edges(ours.object_id)
+        if "opacity" not in look:  # where decals of the back shine through
+            np.testing.assert_array_equal(seen[free], plain[free])
+        assert (seen != plain).any(axis=-1)[ours.field > 0.6].mean() > 0.6
+        if "show_edges" in look:
+            black = (plain < 12).all(axis=-1) & (ours.field > 0.55)
+            assert black.sum() > 30
+            assert (seen[black] < 12).mean() > 0.95
+
+
+def test_decals_over_stock_actors_and_our_objects(plotter: Factory) -> None:
+    """Every actor shows its part of a decal that lies on both, owner for owner."""
+    ball, box = pv.Sphere(radius=0.6), pv.Cube(center=(0.6, 0, 0)).triangulate().subdivide(3)
+    decals = scattered(MeshObject("ball", *as_shape(ball)), 60, 2, radii=(0.1, 0.3))
+    pl, _ = subplot_with(plotter, box, decals, paint=OWNER, lighting=False)
+    pl.decals.add_mesh(ball)
+    seen = shot(pl)
+    ours = found_by_us(pl, box)
+    shown = seen[..., 2] == 128
+    owner = seen[..., 0] + 256 * seen[..., 1] - 1
+    assert (shown & (owner >= 0)).sum() > 100
+    assert (owner == ours.owner)[shown].mean() > 0.99
+    hit = pl.decals.subplot.at(80, 60)
+    assert hit is None or hit.object_id == 0
+
+
+def test_decals_that_follow_and_decals_that_stay(plotter: Factory) -> None:
+    mesh = torus()
+    decals = decals_over(mesh)
+
+    def picture(*, follow: bool, moved: bool, **options: object) -> np.ndarray:
+        pl = plotter(window_size=SIZE)
+        pl.disable_anti_aliasing()
+        actor = pl.add_mesh(mesh, lighting=False, color="white")
+        pl.decals.add(decals, images=["tile"])
+        pl.decals.apply(actor, follow=follow)
+        if moved:
+            actor.position = (0.0, 5.0, 0.0)
+        y = 5.0 if moved else 0.0
+        pl.camera_position = [(2.0, y - 2.6, 2.4), (0, y, 0), (0, 0, 1)]
+        pl.reset_camera_clipping_range()
+        return shot(pl)
+
+    first = picture(follow=True, moved=False)
+    assert (np.abs(picture(follow=True, moved=True) - first).max(axis=-1) > 3).mean() < 0.005
+    np.testing.assert_array_equal(picture(follow=False, moved=False), first)
+    moved = picture(follow=False, moved=True)
+    assert (moved == 255).all()  # they are where the actor was
+
+
+def test_changes_show_with_the_next_frame(plotter: Factory) -> None:
+    mesh = torus()
+    pl, actor = subplot_with(plotter, mesh, decals_over(mesh), color="white")
+    first = shot(pl)
+    pl.decals.scene = pl.decals.scene.replace(decals=decals_over(mesh, seed=5))
+    assert (shot(pl) != first).any()
+    pl.decals.scene = pl.decals.scene.replace(decals=in_layers(decals_over(mesh, seed=5), 2))
+    layered = shot(pl)
+    assert (layered != first).any()
+    pl.decals.clear()
+    bare = shot(pl)
+    pl.decals.remove(actor)
+    np.testing.assert_array_equal(shot(pl), bare)
+
+
+def test_what_others_put_into_the_shader_stays(plotter: Factory) -> None:
+    """Under decals, where it changes while they are there, and once they are taken off."""
+    mesh = torus()
+    decals = decals_over(mesh).replace(images=np.full(90, -1), tints=np.full((90, 3), [0.2, 0.3, 0.9]))
+    tag = "//VTK::Color::Impl"
+    pl, actor = subplot_with(plotter, mesh, decals, lighting=False)
+    shot(pl)
+    sure = ~edges(found_by_us(pl, mesh).object_id)
+    shader = actor.GetShaderProperty()
+    for color, seen_as in (("0.0, 1.0, 0.0", [0, 255, 0]), ("1.0, 0.0, 0.0", [255, 0, 0])):
+        text = f"{tag}\n  diffuseColor = ambientColor = vec3({color});\n"
+        shader.AddFragmentShaderReplacement(tag, True, text, False)
+        theirs = (shot(pl)[sure] == seen_as).all(axis=-1)
+        assert 0.1 < theirs.mean() < 0.9  # and elsewhere decals
+    pl.decals.remove(actor)
+    assert ((shot(pl)[sure] == [255, 0, 0]).all(axis=-1)).sum() > theirs.sum() + 200
+    assert shader.GetNumberOfShaderReplacements() == 1
+    assert shader.GetNthShaderReplacementTypeAsString(0) == "Fragment"
+
+
+def test_a_mesh_that_changes_keeps_true_normals(plotter: Factory) -> None:
+    mesh = torus()
+    pl, actor = subplot_with(plotter, mesh, decals_over(mesh), color="white")
+    shot(pl)
+    mesh.points[:] = np.asarray(mesh.points) * (1.0, 1.0, 0.6)
+    changed = shot(pl)
+    fresh, _ = subplot_with(plotter, mesh.copy(), pl.decals.scene.decals, color="white")
+    np.testing.assert_array_equal(shot(fresh), changed)
+    actor.mapper.dataset = torus()
+    again, _ = subplot_with(plotter, torus(), pl.decals.scene.decals, color="white")
+    np.testing.assert_array_equal(shot(pl), shot(again))
+
+
+def test_solids_take_decals_on_their_surface(plotter: Factory) -> None:
+    grid = pv.ImageData(
+        dimensions=(5, 5, 5), spacing=(0.25,) * 3, origin=(-0.5,) * 3
+    ).cast_to_unstructured_grid()
+    surface = grid.extract_surface(algorithm="dataset_surface")
+    pl, _ = subplot_with(plotter, grid, decals_over(surface, 40), paint=OWNER, lighting=False)
+    seen = shot(pl)
+    ours = found_by_us(pl, grid)
+    sure = (ours.object_id == 0) & ~edges(ours.object_id)
+    assert ((seen[..., 0] + 256 * seen[..., 1] - 1) == ours.owner)[sure].mean() > 0.99
+
+
+def test_subplots_share_an_actor_and_lay_their_own_decals_on_it(plotter: Factory) -> None:
+    mesh = torus()
+
+    def picture(left: str | None, right: str | None, *, taken_off: bool = False) -> np.ndarray:
+        pl = plotter(shape=(1, 2), window_size=(320, 120), border=False)
+        pl.disable_anti_aliasing()
+        actor = pl.add_mesh(mesh, color="white")
+        for column, image in enumerate((left, right)):
+            pl.subplot(0, column)
+            pl.add_actor(actor, render=False)
+            pl.camera_position = [(2.0, -2.6, 2.4), (0, 0, 0), (0, 0, 1)]
+            pl.reset_camera_clipping_range()
+            if image is not None:
+                pl.decals.add(decals_over(mesh), images=[image])
+                pl.decals.apply(actor)
+        first = shot(pl)
+        np.testing.assert_array_equal(shot(pl), first)
+        if taken_off:
+            pl.subplot(0, 0)
+            pl.decals.remove(actor)
+            return shot(pl)
+        return first
+
+    scales, tiles, bare = (picture(image, image) for image in ("scale", "tile", None))
+    np.testing.assert_array_equal(picture("scale", "tile"), np.hstack([scales[:, :160], tiles[:, 160:]]))
+    off = picture("scale", "tile", taken_off=True)
+    np.testing.assert_array_equal(off, np.hstack([bare[:, :160], tiles[:, 160:]]))
+    one = picture(None, "tile")
+    np.testing.assert_array_equal(one, off)
+
+
+@pytest.mark.parametrize("kind", ["volume", "glyphs", "composite"])
+def test_other_mappers_are_refused(plotter: Factory, kind: str) -> None:
+    pl = plotter()
+    blocks = pv.MultiBlock([pv.Sphere(), pv.Cube()])
+    add: dict[str, Callable[[], object]] = {
+        "volume": lambda: pl.add_volume(pv.ImageData(dimensions=(3, 3, 3)), scalars=np.ones(27)),
+        "glyphs": lambda: pl.add_points(np.zeros((1, 3)), style="points_gaussian"),
+        "composite": lambda: pl.add_composite(blocks)[0],
+    }
+    with pytest.raises(InvalidScene, match="vtkPolyDataMapper"):
+        pl.decals.apply(add[kind]())

@@ -1,0 +1,191 @@
+"""Windows come and go: nothing stays behind, and other contexts live on."""
+
+import gc
+import warnings
+import weakref
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.errors import InvalidScene
+from decals.rendering import Renderer
+from decals.rendering.options import RenderOptions
+from tests.decals.shapes import Picture, View
+from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.scenes import both, shot
+
+STATUS = Path("/proc/self/statm")
+PAGE = 4096
+
+
+def show_and_close(plotter: Factory, *, ours: bool = True) -> np.ndarray:
+    pl = plotter()
+    actor = pl.add_mesh(pv.Sphere())
+    if ours:
+        pl.decals.add_scene(both())
+        pl.decals.apply(actor)
+    seen = shot(pl)
+    pl.close()
+    return seen
+
+
+def make(**options: object) -> pv.Plotter:
+    return pv.Plotter(off_screen=True, window_size=(160, 120), **options)
+
+
+def test_closing_lets_go_of_everything(plotter: Factory) -> None:
+    show_and_close(plotter)
+    pl = make()
+    pl.decals.apply(pl.add_mesh(pv.Sphere()))
+    pl.decals.add_scene(both())
+    shot(pl)
+    things = [weakref.ref(item) for item in (pl, pl.decals, pl.decals.subplot, pl.decals.subplot.renderer)]
+    pl.close()
+    del pl
+    gc.collect()
+    assert [thing() for thing in things] == [None] * len(things)
+
+
+def test_reopening_shows_the_same(plotter: Factory) -> None:
+    first = show_and_close(plotter)
+    for _ in range(3):
+        np.testing.assert_array_equal(show_and_close(plotter), first)
+
+
+def grown(cycles: int, *, ours: bool) -> float:
+    """Bytes that the process grows by with each window, in the median of a few runs."""
+    for _ in range(4):
+        show_and_close(make, ours=ours)
+    sizes = []
+    for _ in range(4):
+        before = int(STATUS.read_text().split()[1])
+        for _ in range(cycles // 4):
+            show_and_close(make, ours=ours)
+            gc.collect()
+        sizes.append((int(STATUS.read_text().split()[1]) - before) * PAGE / (cycles // 4))
+    return float(np.median(sizes))
+
+
+@pytest.mark.slow
+def test_memory_stays_flat(plotter: Factory) -> None:
+    plotter()
+    if not STATUS.exists():
+        pytest.skip("this system does not say how large the process is")
+    assert grown(20, ours=True) < 40_000
+
+
+@pytest.mark.slow
+def test_memory_stays_flat_for_long(plotter: Factory) -> None:
+    """No more than what VTK itself leaves behind, but for what a driver keeps of each program ever compiled.
+
+    Mesa 22.3 keeps one to two kilobytes of each, without any window or VTK too, and a window has ten.
+    """
+    plotter()
+    if not STATUS.exists():
+        pytest.skip("this system does not say how large the process is")
+    ours, vtks = grown(200, ours=True), grown(200, ours=False)
+    print(f"{ours:.0f} bytes a window with decals, {vtks:.0f} without")
+    assert ours < vtks + 30_000
+
+
+def test_a_renderer_of_its_own_outlives_windows(plotter: Factory) -> None:
+    """VTK ends the EGL display that all share with its last window, unless it is held."""
+    with Renderer() as own:
+        first = own.render(both(), RenderOptions(size=(64, 48)))
+        show_and_close(plotter)
+        np.testing.assert_array_equal(own.render(both(), RenderOptions(size=(64, 48))), first)
+        show_and_close(plotter, ours=False)
+        np.testing.assert_array_equal(own.render(both(), RenderOptions(size=(64, 48))), first)
+
+
+def test_a_failing_scene_says_so_once_and_recovers(
+    plotter: Factory, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    bad = Picture(np.zeros((4, 4), np.uint8))
+    pl.decals.scene = View(both().objects, both().camera, both().decals, (bad,))
+    shot(pl)
+    shot(pl)
+    assert capfd.readouterr().err.count("InvalidImage: image 0: expected") == 1
+    pl.decals.scene = both()
+    np.testing.assert_array_equal(shot(pl), first)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, 1.5, float("nan")])
+def test_impossible_scales_are_refused(plotter: Factory, scale: float) -> None:
+    subplot = plotter().decals.subplot
+    with pytest.raises(InvalidScene, match="draw_scale: expected"):
+        subplot.draw_scale = scale
+    assert subplot.draw_scale == 1.0
+
+
+def test_clearing_a_plotter_and_filling_it_again(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    pl.decals.clear()
+    assert (shot(pl) == shot(pl)[0, 0]).all()
+    pl.decals.add_scene(both())
+    np.testing.assert_array_equal(shot(pl), first)
+
+
+def test_a_plotter_without_decals_has_nothing_of_ours(plotter: Factory) -> None:
+    pl = plotter()
+    pl.add_mesh(pv.Sphere())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        shot(pl)
+    assert "decals" not in pl.__dict__
+    assert "decals" not in pl.renderer.actors
+
+
+def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    pl.decals.apply(pl.add_mesh(pv.Sphere(), show_edges=True))
+    for width in (160, 170, 150):
+        pl.window_size = width, 120
+        shot(pl)
+        pl.decals.subplot.at(80, 60)
+        pl.render_window.MakeCurrent()
+        assert pl.decals.subplot.renderer.context.gl.error == "GL_NO_ERROR"
+
+
+def test_a_window_that_is_given_another_context_shows_the_same(plotter: Factory) -> None:
+    """Qt makes one anew when a widget is docked elsewhere; here the window is ended and drawn again."""
+    pl = plotter()
+    pl.decals.add_scene(both())
+    pl.decals.apply(pl.add_mesh(pv.Sphere(center=(0, 0, 1), radius=0.4)))
+    first = shot(pl)
+    for _ in range(2):
+        old = pl.decals.subplot.renderer.context
+        pl.render_window.Finalize()
+        np.testing.assert_array_equal(shot(pl), first)
+        assert old.stale
+        assert pl.decals.subplot.renderer.context is not old
+        assert (
+            pl.decals.subplot.renderer.context.gl is old.gl
+        )  # moderngl would keep another's memory for good
+        np.testing.assert_array_equal(shot(pl), first)
+
+
+def test_what_could_not_be_drawn_is_tried_again_once_it_is_asked_for_otherwise(
+    plotter: Factory, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pl = plotter(window_size=(1200, 40))
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    context = pl.decals.subplot.renderer.context
+    context.max_texture_size = min(context.max_texture_size, 16384)  # some cards take more
+    pl.decals.subplot.samples = 16
+    shot(pl)
+    pl.camera.azimuth = 1.0
+    shot(pl)
+    assert capfd.readouterr().err.count("InvalidScene: expected at most") == 1
+    pl.camera.azimuth = 0.0
+    pl.decals.subplot.samples = 2
+    np.testing.assert_array_equal(shot(pl), first)

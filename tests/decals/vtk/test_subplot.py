@@ -1,0 +1,310 @@
+"""What a stage shows is what the batch renderer draws, and what it says lies there."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.errors import InvalidPoints, InvalidScene, NoGraphics
+from decals.field.mapping import ImageMapping
+from decals.index.editor import DecalEditor
+from decals.record import Contact
+from decals.rendering import TRANSPARENT
+from decals.rendering.options import RenderOptions
+from decals.scenes.objects import MeshObject
+from decals.surfaces.convert import as_shape
+from decals.vtk.subplot import SubplotRenderer
+from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.scenes import both, shot
+from tests.oracles.raster import edges
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_the_window_shows_the_batch_renderers_pixels(plotter: Factory, samples: int) -> None:
+    pl = plotter()
+    pl.set_background("black")
+    pl.decals.add_scene(both())
+    subplot = pl.decals.subplot
+    subplot.samples = samples
+    seen = shot(pl)
+    with subplot.current():
+        batch = subplot.renderer.render(
+            both(), RenderOptions(size=(160, 120), samples=samples, background=TRANSPARENT)
+        )
+        object_id = subplot.renderer.buffers(both(), RenderOptions(size=(160, 120))).object_id
+    sure = ~edges(object_id)
+    inside = sure & (object_id >= 0)
+    assert inside.mean() > 0.2
+    assert np.abs(seen - batch[..., :3])[inside].max() <= 1
+    assert (seen[sure & (object_id < 0)] == 0).all()
+
+
+def test_one_place_in_the_window(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    subplot = pl.decals.subplot
+    shot(pl)
+    with subplot.current():
+        buffers = subplot.renderer.buffers(
+            both(), RenderOptions(size=(160, 120)), viewpoint=subplot.viewpoint()
+        )
+    sure = ~edges(buffers.object_id)
+    rng = np.random.default_rng(1)
+    for x, y in rng.integers(0, (160, 120), (30, 2)).tolist():
+        if not sure[y, x]:
+            continue
+        hit = subplot.at(x, 119 - y)
+        if hit is None:
+            assert buffers.object_id[y, x] == -1
+            continue
+        assert hit.object_id == buffers.object_id[y, x]
+        np.testing.assert_allclose(hit.position, buffers.position[y, x], atol=1e-4)
+        if hit.field > 0.52:
+            assert hit.owner == buffers.owner[y, x]
+            np.testing.assert_allclose(hit.uv, buffers.uv[y, x], atol=1e-2)
+    assert subplot.at(-1, 5) is None
+    assert subplot.at(5, 120) is None
+
+
+def test_before_the_first_frame_there_is_no_graphics(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    with pytest.raises(NoGraphics, match="render it first"):
+        pl.decals.subplot.at(80, 60)
+
+
+def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    subplot = pl.decals.subplot
+    first = shot(pl)
+    np.testing.assert_array_equal(shot(pl), first)
+    assert not subplot.drawn_fraction
+    ball = pl.add_mesh(pv.Sphere(radius=0.2, center=both().camera.target), reset_camera=False)
+    ball.position = 0.5 * (np.array(both().camera.position) - both().camera.target)
+    with_ball = shot(pl)
+    assert not subplot.drawn_fraction
+    assert (with_ball != first).any()
+    assert (with_ball == first).mean() > 0.8
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda pl: setattr(pl.camera, "position", np.array(pl.camera.position) + 0.1),
+        lambda pl: setattr(pl.decals.subplot, "samples", 1),
+        lambda pl: setattr(pl.decals.subplot, "draw_scale", 0.5),
+        lambda pl: setattr(pl.decals.subplot, "mapping", ImageMapping.CHORD),
+        lambda pl: setattr(pl.decals.subplot, "contact", Contact.MIN),
+        lambda pl: setattr(pl.decals, "scene", both().replace(decals=both().decals[:60])),
+        lambda pl: setattr(pl.decals, "scene", both().replace(objects=both().objects[:1])),
+        lambda pl: setattr(pl, "window_size", (150, 120)),
+    ],
+)
+def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[pv.Plotter], None]) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    change(pl)
+    seen = shot(pl)
+    assert seen.shape != first.shape or (seen != first).any()
+
+
+def test_the_stages_renderer_may_draw_other_things_in_between(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    subplot = pl.decals.subplot
+    first = shot(pl)
+    other = both().replace(objects=both().objects[:1])
+    for size in ((160, 120), (320, 240), (50, 40)):
+        with subplot.current():
+            subplot.renderer.render(other, RenderOptions(size=size, samples=1))
+            subplot.renderer.draw(other, RenderOptions(size=size, samples=1))
+        np.testing.assert_array_equal(shot(pl), first)
+
+
+def prepared(subplot: SubplotRenderer, samples: int) -> int:
+    """Prepare a frame by the smallest parts; how many there were."""
+    for shortest_rotations in range(1, 10_000):
+        shown = subplot.prepare(samples, 0.0)
+        if shown is not None:
+            assert shown > 0
+            return shortest_rotations
+    raise AssertionError("the frame is never done")
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory, samples: int) -> None:
+    other, pl = plotter(), plotter()
+    for one in (other, pl):
+        one.decals.add_scene(both())
+    other.decals.subplot.samples = samples
+    whole = shot(other)
+    subplot = pl.decals.subplot
+    subplot.samples, subplot.draw_scale = samples, 0.5
+    small = shot(pl)
+    assert subplot.prepare(samples, 0.0) is None
+    np.testing.assert_array_equal(shot(pl), small)
+    assert not subplot.drawn_fraction
+    assert prepared(subplot, samples) > 100
+    assert subplot.prepare(samples, 0.0) == 0.0
+    subplot.draw_scale = 1.0
+    np.testing.assert_array_equal(shot(pl), whole)
+    assert not subplot.drawn_fraction
+
+
+def test_what_changes_while_a_frame_is_prepared_is_in_it(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    subplot = pl.decals.subplot
+    subplot.draw_scale = 0.5
+    shot(pl)
+    for _ in range(100):
+        subplot.prepare(2, 0.0)
+    pl.camera.position = np.array(pl.camera.position) + 0.1
+    pl.decals.scene = both().replace(decals=both().decals[:60])
+    shot(pl)
+    prepared(subplot, 2)
+    subplot.draw_scale = 1.0
+    seen = shot(pl)
+    assert not subplot.drawn_fraction
+    subplot.draw_scale = 0.5
+    shot(pl)
+    subplot.draw_scale = 1.0
+    np.testing.assert_array_equal(shot(pl), seen)
+    assert not subplot.drawn_fraction
+
+
+def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
+    """Decals and objects that change in place, in a scene that stays the same thing."""
+
+    class Document:
+        camera, images = both().camera, both().images
+        objects, decals = both().objects, DecalEditor(both().decals)
+
+    document = Document()
+    pl = plotter()
+    pl.decals.add_scene(both())
+    first = shot(pl)
+    pl.decals.scene = document
+    np.testing.assert_array_equal(shot(pl), first)
+    document.decals.delete(int(pl.decals.subplot.at(80, 60).owner))
+    share = pl.decals.subplot.work_fraction(pl.decals.subplot.samples)
+    without = shot(pl)
+    assert 0.0 < pl.decals.subplot.drawn_fraction == share < 0.5
+    assert (without != first).any()
+    np.testing.assert_array_equal(shot(pl), without)
+    document.objects = (*both().objects, MeshObject("ball", *as_shape(pv.Sphere(center=(0, 0, 4)))))
+    shot(pl)
+    assert pl.bounds.z_max > 4.2
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda pl: pl.enable_parallel_projection(),
+        lambda pl: setattr(pl.decals.subplot, "lights", "vtk"),
+        lambda pl: setattr(pl.decals.subplot, "draw_scale", 0.5),
+        lambda pl: setattr(pl.decals.subplot, "contact", Contact.RADIAL),
+        lambda pl: pl.add_mesh(pv.Sphere(radius=0.2, center=(0.2, -0.4, 0.4))),
+        lambda pl: setattr(pl.decals.subplot.actor, "position", (0.1, 0.2, 0.1)),
+    ],
+)
+def test_frames_drawn_in_part_are_those_drawn_whole(
+    plotter: Factory, change: Callable[[pv.Plotter], None]
+) -> None:
+    """In two subplots of one window, each with a document of its own, seen and lit in VTK's ways."""
+    pl = plotter(shape=(1, 2), window_size=(240, 120))
+    rng, documents = np.random.default_rng(1), []
+    for column in range(2):
+        pl.subplot(0, column)
+        pl.decals.add_scene(both())
+        pl.decals.subplot.scene = document = Edited()
+        change(pl)
+        documents.append(document)
+    subplots = pl.decals.subplots
+    shot(pl)
+    for step in range(6):
+        editor = documents[step % 2].decals
+        number = int(rng.choice(editor.numbers))
+        editor.change(number, positions=editor[number].positions + np.float32(0.1), tints=[(1.0, 0.3, 0.2)])
+        seen = shot(pl)
+        assert subplots[step % 2].drawn_fraction < 0.6
+        for subplot in subplots:
+            subplot.renderer._targets.forget()
+        np.testing.assert_array_equal(seen, shot(pl))
+        assert [subplot.drawn_fraction for subplot in subplots] == [1.0, 1.0]
+
+
+class Edited:
+    """A scene whose decals are edited."""
+
+    camera, images, objects = both().camera, both().images, both().objects
+
+    def __init__(self) -> None:
+        self.decals = DecalEditor(both().decals)
+
+
+def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> None:
+        raise RuntimeError("Cannot detect window with OpenGL support")
+
+    pl = plotter()
+    pl.add_mesh(pv.Sphere())
+    shot(pl)
+    monkeypatch.setattr("decals.vtk.context._idle", {})
+    monkeypatch.setattr("decals.vtk.context.DefaultLoader", none)
+    pl.decals.subplot.scene = both()
+    with pytest.raises(NoGraphics, match=r"EGL, GLX, WGL or macOS, got a vtk\w+Window"):
+        pl.decals.subplot.at(80, 60)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *[("samples", wrong) for wrong in (0, 1.5, "2", True, 10**9, None)],
+        *[("draw_scale", wrong) for wrong in (0.0, 1.5, "x", None, float("nan"))],
+        ("contact", 7),
+        ("mapping", "chord"),
+        ("scene", 5),
+        ("scene", "knot"),
+    ],
+)
+def test_what_a_stage_cannot_be_set_to_is_said_at_once(plotter: Factory, name: str, value: object) -> None:
+    subplot = plotter().decals.subplot
+    before = getattr(subplot, name)
+    with pytest.raises(InvalidScene, match=f"{name}( must be|: expected).* got {value!r}"):
+        setattr(subplot, name, value)
+    assert getattr(subplot, name) == before
+
+
+@pytest.mark.parametrize("place", [(float("nan"), 0), (0, float("inf")), ("x", 0), (0, None), ([1], 2)])
+def test_a_place_that_is_none_is_refused(plotter: Factory, place: tuple[float, float]) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    with pytest.raises(InvalidPoints, match=r"[xy]: expected a finite number"):
+        pl.decals.subplot.at(*place)
+
+
+def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    subplot = pl.decals.subplot
+    whole, part = subplot.at(80, 60), subplot.at(80.9, 60.2)
+    assert whole is not None
+    assert part is not None
+    np.testing.assert_array_equal(whole.position, part.position)
+    assert subplot.at(1e300, -1e300) is None
+    assert subplot.at(-0.1, 60) is None
+
+
+def test_more_samples_than_targets_can_have_are_refused(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both())
+    shot(pl)
+    subplot = pl.decals.subplot
+    with subplot.current(), pytest.raises(InvalidScene, match="take fewer a pixel"):
+        subplot.renderer.draw(both(), RenderOptions(size=(160, 120), samples=1000))

@@ -1,0 +1,128 @@
+"""In a loop of asyncio's a window ticks by itself: for as long as something goes on, and not after that."""
+
+import asyncio
+import gc
+import weakref
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.editing.scatter_commands import decals_on
+from decals.window import EditWindow
+from tests.decals.editing.scenes import scene
+from tests.decals.vtk.conftest import Factory, plotter
+from tests.decals.window.driver import Driver
+
+__all__ = ["plotter"]
+
+
+def tasks() -> list[asyncio.Task]:
+    return [task for task in asyncio.all_tasks() if "EditWindow" in task.get_name()]
+
+
+async def rested(window: EditWindow) -> None:
+    async with asyncio.timeout(60):
+        while tasks():
+            await asyncio.sleep(0.01)
+    assert not window.busy
+
+
+def test_scattered_decals_are_applied_and_the_drawing_is_reported(plotter: Factory) -> None:
+    pl = plotter()
+    drawn: list[pv.Plotter] = []
+    pl.add_on_render_callback(drawn.append)
+
+    async def play() -> None:
+        window = EditWindow(scene(), plotter=pl)
+        window.show()
+        await rested(window)
+        driver = Driver(window)
+        on_tree = set(decals_on(driver.document, [0]).tolist())
+        at = next(at for number, at in driver.visible() if number in on_tree)
+        driver.key("g", at)
+        assert window.background.busy
+        assert len(tasks()) == 1
+        count = len(drawn)
+        await rested(window)
+        assert driver.session.labels == ("scatter",)
+        assert len(drawn) > count
+        assert not on_tree & set(driver.document.decals.numbers.tolist())
+        window.close()
+
+    asyncio.run(play())
+
+
+def test_frames_become_whole_by_themselves_once_nothing_moves(plotter: Factory) -> None:
+    pl = plotter()
+
+    async def play() -> None:
+        window = EditWindow(scene(), plotter=pl)
+        window.show()
+        await rested(window)
+        first = np.asarray(pl.screenshot(None, return_img=True))
+        window.frames.budget.record(1.0, 10.0)  # as on a slow machine
+        window.begin_motion()  # as the camera does
+        pl.render()
+        assert window.subplot.draw_scale < 1.0
+        await rested(window)
+        assert (window.subplot.draw_scale, window.subplot.samples) == (1.0, window.frames.samples)
+        pl.render()
+        np.testing.assert_array_equal(np.asarray(pl.image), first)
+        window.close()
+
+    asyncio.run(play())
+
+
+def test_closing_ends_the_ticks_and_nothing_keeps_a_window(plotter: Factory) -> None:
+    async def play() -> None:
+        window = EditWindow(scene(), plotter=plotter())
+        window.show()
+        assert len(tasks()) == 1
+        window.close()
+        await asyncio.sleep(0)
+        assert not tasks()
+        other = EditWindow(scene(), plotter=plotter())
+        other.show()
+        other.redraw(whole=False)
+        gone = weakref.ref(other)
+        del other
+        gc.collect()
+        assert gone() is None  # with its task still there
+        await asyncio.sleep(0.1)
+        assert not tasks()
+
+    asyncio.run(play())
+
+
+def test_a_loop_that_ended_leaves_the_next_one_to_tick(plotter: Factory) -> None:
+    window = EditWindow(scene(), plotter=plotter())
+
+    async def begin() -> None:
+        window.show()
+        assert window.ticking
+
+    async def go_on() -> None:
+        window.redraw(whole=False)
+        assert len(tasks()) == 1
+        await rested(window)
+
+    asyncio.run(begin())
+    assert not window.ticking
+    asyncio.run(go_on())
+    asyncio.run(begin())
+    window.close()
+
+
+@pytest.mark.parametrize("looping", [False, True])
+def test_a_window_of_our_own_without_a_screen_does_not_wait(looping: bool) -> None:
+    async def play() -> None:
+        with EditWindow(scene(), off_screen=True, size=(60, 40)) as window:
+            window.show()
+            assert window.ticking is looping
+
+    if looping:
+        asyncio.run(play())
+    else:
+        with pytest.raises(StopIteration):
+            play().send(None)

@@ -1,0 +1,240 @@
+"""Driven windows: what is done with mouse and keys is done to the scene, is seen, and can be undone."""
+
+from itertools import islice, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree.nodes.paths import node_in_world
+from decals.editing.commands import ScaleDecals
+from decals.editing.scatter_commands import RemoveObject, decals_on
+from decals.errors import InvalidEdit
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
+from decals.scenes.scene_file import load_scene
+from decals.window import EditWindow
+from tests.decals.window.driver import Driver
+
+
+def test_a_drag_deforms_the_neighbours_and_undo_gives_back_the_first_picture(driver: Driver) -> None:
+    first, state = driver.shot(), driver.state
+    number, at = next(driver.visible())
+    driver.click(at)
+    owner, uv = driver.owners()
+    marked = driver.shot()
+    assert (marked != first).any()
+    driver.drag(at, (at[0] + 4, at[1]), (at[0] + 12, at[1] + 3))
+    after_owner, after_uv = driver.owners()
+    neighbours = (owner == after_owner) & (owner >= 0) & (owner != number)
+    moved = (np.abs(after_uv - uv).max(axis=2) > 1e-3) & neighbours
+    assert moved.sum() > 10
+    assert driver.session.labels == ("move",)
+    driver.key("z", ctrl=True)
+    driver.key("Escape")
+    assert driver.state == state
+    driver.window.actions.state.message = ""
+    driver.window.update_overlay()
+    np.testing.assert_array_equal(driver.shot(), first)
+
+
+def test_neighbours_deform_while_the_pointer_is_down(driver: Driver) -> None:
+    _, at = next(driver.visible())
+    driver.click(at)
+    seen = [driver.owners()[1]]
+    driver.event("LeftButtonPressEvent", at)
+    for step in (5, 10, 15):
+        driver.event("MouseMoveEvent", (at[0] + step, at[1]))
+        seen.append(driver.owners()[1])
+    for before, after in pairwise(seen):
+        assert (before != after).any()
+    driver.event("LeftButtonReleaseEvent", (at[0] + 15, at[1]))
+
+
+def test_the_camera_is_left_its_drags_and_wheel(driver: Driver) -> None:
+    state, before = driver.state, driver.plotter.camera.position
+    driver.drag((3, 3), (40, 20), (60, 30))
+    turned = driver.plotter.camera.position
+    assert turned != before
+    _, at = next(driver.visible())
+    driver.wheel(at)
+    closer = driver.plotter.camera.position
+    assert closer != turned
+    driver.click(at)
+    assert len(driver.window.actions.state.selection) == 1
+    driver.drag(at, (at[0] + 10, at[1]))
+    driver.wheel(at, ctrl=True)
+    assert driver.plotter.camera.position == pytest.approx(closer)
+    assert driver.session.labels == ("move",)
+    driver.key("z", ctrl=True)
+    driver.key("z", ctrl=True)
+    assert driver.state == state
+
+
+def test_a_click_places_on_either_object(driver: Driver) -> None:
+    for number in (0, 1):
+        at = next(at for n, at in driver.visible() if n in decals_on(driver.document, [number]))
+        driver.click(at, ctrl=True)
+        (placed,) = driver.window.actions.state.selection
+        assert placed in decals_on(driver.document, [number])
+        assert driver.window.tools.at(*at).owner == placed
+    assert len(driver.document.decals) == 62
+
+
+def test_the_cpu_picks_what_the_window_shows(driver: Driver) -> None:
+    owner, _ = driver.owners()
+    height, width = owner.shape
+    rng = np.random.default_rng(0)
+    wrong = 0
+    for _ in range(100):
+        x, y = int(rng.integers(width)), int(rng.integers(height))
+        found = driver.window.tools.at(x, y)
+        wrong += owner[height - 1 - y, x] != (-1 if found is None else found.owner)
+    assert wrong <= 2  # silhouettes
+
+
+def test_keys_of_pyvista_are_ours_where_the_table_says_so(driver: Driver) -> None:
+    """`plus` widens lines in pyvista, `k` and `t` mean something to VTK; here they edit."""
+    number, at = next(driver.visible())
+    driver.click(at)
+    radius = driver.document.decals[number].radii[0]
+    driver.key("plus")
+    driver.key("k")
+    assert driver.document.decals[number].radii[0] > radius
+    assert driver.document.decals[number].interactions[0] == 2
+    assert driver.window.overlay._actor.prop.line_width == 3
+    driver.key("h")
+    assert driver.window.overlay.help_visible
+    driver.key("h")
+    assert not driver.window.overlay.help_visible
+
+
+def test_what_is_selected_is_outlined(driver: Driver) -> None:
+    (number, at), (_, there) = islice(driver.visible(), 2)
+    driver.click(at)
+    decal = driver.document.decals[number]
+    points = driver.window.overlay.lines.points
+    assert np.linalg.norm(points - decal.positions[0], axis=1).max() < 1.1 * decal.radii[0]
+    driver.click(there, shift=True)
+    assert driver.window.overlay.lines.n_lines == 2
+    driver.key("Escape")
+    assert driver.window.overlay.lines.n_points == 0
+
+
+def test_outlines_wait_until_a_drag_has_ended(driver: Driver) -> None:
+    _, at = next(driver.visible())
+    driver.click(at)
+    assert driver.window.overlay.lines.n_lines == 1
+    driver.event("LeftButtonPressEvent", at)
+    driver.event("MouseMoveEvent", (at[0] + 9, at[1]))
+    assert driver.window.overlay.lines.n_points == 0
+    driver.event("LeftButtonReleaseEvent", (at[0] + 9, at[1]))
+    assert driver.window.overlay.lines.n_lines == 1
+
+
+@pytest.mark.parametrize("max_decals", [5_000, 5])
+def test_a_primitive_is_moved_by_its_handle_and_decals_follow(
+    driver: Any, max_decals: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.editing.tree_actions.MAX_DECALS_IN_DRAG", max_decals)
+    monkeypatch.setattr("decals.editing.session.MAX_REPLAYED_DECALS", max_decals)
+    point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
+    bare = driver.shot()
+    driver.key("m", driver.pixel(point))
+    first, state = driver.shot(), driver.state
+    ball = (first != bare).any(axis=-1) & (first[..., 2] > first[..., 0] + 30)
+    assert ball[119 - driver.pixel(point)[1], driver.pixel(point)[0]], "the handle is seen"
+    number, path = driver.window.actions.state.primitive
+    widget = driver.window.handle.widget
+    center = driver.window.actions.trees.handle_position
+    assert widget.GetCenter() == pytest.approx(center.tolist())
+    before, first_tree = driver.document.decals.decals.positions, driver.document.objects[number].tree
+    widget.InvokeEvent("StartInteractionEvent")
+    for step in (0.1, 0.2, 0.4):
+        widget.SetCenter(*np.add(center, (step, 0, 0)).tolist())
+        widget.InvokeEvent("InteractionEvent")
+    widget.InvokeEvent("EndInteractionEvent")
+    driver.finish()
+    moved = np.linalg.norm(driver.document.decals.decals.positions - before, axis=1)
+    assert moved.max() > 0.2
+    assert (moved == 0).any()
+    low, high = node_in_world(driver.document.objects[number].tree, path).bounds
+    moved_by = low + high - sum(node_in_world(first_tree, path).bounds)
+    assert moved_by / 2 == pytest.approx([0.4, 0, 0], abs=1e-5)
+    assert driver.session.labels == ("move a primitive",)
+    assert (driver.shot() != first).any()
+    driver.key("z", ctrl=True)
+    assert driver.state == state
+    driver.key("m", driver.pixel(point))
+    assert driver.window.handle.widget is None
+    assert number == 0
+    assert path
+
+
+def test_saving_keeps_the_windows_camera(opened: Any, tmp_path: Path) -> None:
+    driver = opened(path=tmp_path / "scene.json")
+    driver.drag((3, 3), (40, 20))
+    driver.key("s", ctrl=True)
+    driver.finish()
+    assert not driver.session.modified
+    assert "saved to" in driver.window.overlay.status
+    saved = load_scene(tmp_path / "scene.json")
+    assert saved.camera.position == pytest.approx(driver.plotter.camera.position)
+    assert saved.decals.packed().tobytes() == driver.document.decals.decals.packed().tobytes()
+
+
+def test_a_session_goes_on_in_another_window(opened: Any) -> None:
+    first = opened()
+    _, at = next(first.visible())
+    first.click(at)
+    first.key("Delete")
+    first.window.close()
+    assert first.session._listeners == []
+    second = opened(first.session)
+    assert len(second.document.decals) == 59
+    second.key("z", ctrl=True)
+    assert len(second.document.decals) == 60
+
+
+def test_a_closed_window_says_so_and_its_session_goes_on(opened: Any) -> None:
+    driver = opened()
+    driver.window.close()
+    with pytest.raises(InvalidEdit, match="was closed"):
+        driver.window.show()
+    driver.window.redraw(whole=True)
+    driver.session.do(ScaleDecals(driver.document.decals.numbers[:1], 1.5))
+    assert driver.session.undo() is not None
+
+
+def test_an_empty_scene_can_be_opened_and_nothing_breaks(opened: Any) -> None:
+    driver = opened(Scene(objects=(), camera=Camera((0, 0, 5))))
+    for key in "adikoxgmtc":
+        driver.key(key, (90, 60))
+    driver.click((90, 60), ctrl=True)
+    driver.drag((20, 20), (40, 40))
+    driver.key("z", ctrl=True)
+    assert driver.session.labels == ()
+
+
+def test_two_windows_at_once(opened: Any) -> None:
+    one, two = opened(), opened()
+    _, at = next(one.visible())
+    one.click(at)
+    one.key("Delete")
+    assert (len(one.document.decals), len(two.document.decals)) == (59, 60)
+    assert (one.shot() != two.shot()).any()
+    assert isinstance(one.window, EditWindow)
+
+
+def test_an_object_that_is_removed_is_not_held_any_more(driver: Driver) -> None:
+    point = driver.document.objects[0].surface.project([[1.3, 1.2, 2]])[0][0]
+    driver.key("m", driver.pixel(point))
+    assert driver.window.handle.widget is not None
+    driver.session.do(RemoveObject(0))
+    driver.window.redraw(whole=True)
+    assert driver.window.actions.state.primitive is None
+    assert driver.window.handle.widget is None
+    driver.key("z", ctrl=True)
+    driver.key("m", driver.pixel(point))
+    assert driver.window.handle.widget is not None

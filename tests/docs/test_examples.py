@@ -1,0 +1,61 @@
+"""Every public name has an example in its docstring, and every example runs."""
+
+import doctest
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blobtree.errors import ImplicitDecalsError
+
+PACKAGES = (
+    "blobtree",
+    "decals",
+    "decals.editing",
+    "decals.images",
+    "decals.index",
+    "decals.rendering",
+    "decals.scattering",
+    "decals.surfaces",
+    "decals.vtk",
+    "decals.window",
+)
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def public_objects() -> Iterator[tuple[str, Any]]:
+    """Yield each public class and function once, errors excepted."""
+    seen: set[int] = set()
+    for package in PACKAGES:
+        module = import_module(package)
+        for name in getattr(module, "__all__", ()):
+            value = getattr(module, name)
+            if not (inspect.isclass(value) or inspect.isfunction(value)) or id(value) in seen:
+                continue
+            if inspect.isclass(value) and issubclass(value, ImplicitDecalsError):
+                continue
+            seen.add(id(value))
+            yield f"{package}.{name}", value
+
+
+OBJECTS = dict(public_objects())
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_a_public_name_has_an_example(name: str) -> None:
+    text = inspect.getdoc(OBJECTS[name]) or ""
+    assert "Examples\n--------" in text, f"{name} has no Examples section"
+    assert ">>>" in text
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_an_example_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    runner = doctest.DocTestRunner(optionflags=FLAGS)
+    report: list[str] = []
+    for example in doctest.DocTestFinder().find(OBJECTS[name], name, globs={}):
+        runner.run(example, out=report.append)
+    assert not runner.failures, "".join(report)

@@ -1,0 +1,176 @@
+"""The Python of every page runs as printed, and what the pages promise of it is true."""
+
+import re
+import runpy
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+from PIL import Image
+
+from blobtree import Point, polygonize
+from decals import load_scene
+from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+DRAWS = re.compile(r"\brender\b|\bRenderer\b|\bPlotter\b|\bshow\(|\bedit\(")
+
+Session = dict[str, Any]
+
+
+def code(page: Path) -> str:
+    """Python blocks of a page, as the one script that they make."""
+    return "\n\n".join(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL))
+
+
+def check_readme(session: Session) -> None:
+    assert len(load_scene("scene.json").decals) == len(session["scene"].decals)
+    colors = Image.open("duck.png").getcolors(1 << 20)
+    assert colors is not None
+    assert len(colors) > 1000
+
+
+def check_tour(session: Session) -> None:
+    assert len(session["scene"].decals) == 400
+    assert len(session["both"].decals) == 500
+    assert not np.array_equal(np.asarray(Image.open("duck.png")), np.asarray(Image.open("smaller.png")))
+
+
+def check_modelling(session: Session) -> None:
+    assert len(session["mesh"].faces) > 1000
+    assert session["surface"].n_points > 1000
+    assert session["low"][0] < session["high"][0]
+
+
+def check_custom_nodes(session: Session) -> None:
+    assert len(session["mesh"].faces) > 1000
+    assert session["model"].bounds[1][0] > 1.2
+    page = (DOCS / "custom-nodes.md").read_text(encoding="utf-8")
+    (promise,) = re.findall(r"print\(error\)  # ([\w.]+):(\d+): halfway: ", page)
+    assert f"{promise[0]}:{promise[1]}: halfway: " in session["printed"]
+
+
+def check_meshing(session: Session) -> None:
+    assert len(session["mesh"].faces) > 1000
+    assert set(np.unique(session["sharp"].sheet_counts)) <= {0, 1, 2, 3}
+    assert len(session["shown"].vertices) > len(session["sharp"].vertices)
+    assert len(session["edited"].faces) > 1000
+    assert session["surface"].n_points > 1000
+    assert list(session["field"].keys()) == ["plane", "lines", "surface"]
+    assert len(session["close"].faces) > 1000
+
+
+def check_decals(session: Session) -> None:
+    assert session["samples"].owner[0] in (0, 1, 2)
+    assert len(session["first_two"]) == 2
+    assert len(session["all_of_them"]) == 6
+    pictures = [np.asarray(Image.open(f"{name}.png")) for name in ("rings", "radial", "layered", "chord")]
+    assert not np.array_equal(pictures[0], pictures[1])
+
+
+def check_rendering(session: Session) -> None:
+    assert session["picture"].shape == (480, 640, 4)
+    assert (session["buffers"].owner >= 0).any()
+
+
+def check_scattering(session: Session) -> None:
+    assert len(session["spots"]) == 300
+    assert (session["spots"].positions[:, 1] > -0.5).all()
+    assert session["relaxation"].count == 500
+    assert "rho=" in session["printed"]
+
+
+def check_editing(session: Session) -> None:
+    assert Path("scene.json").exists()
+    assert len(session["session"].labels) == 4
+    assert len(session["edited"].decals) == 100
+    assert len(session["selected"]) == 1
+
+
+def check_pyvista(session: Session) -> None:
+    assert session["pick"].object_id == 0
+    assert session["pick"].owner >= 0
+    for name in ("among", "stock", "two", "lights"):
+        drawn = np.asarray(Image.open(f"{name}.png").convert("RGB")).astype(int)
+        path = DOCS / "images" / "pyvista" / f"{name}.png"
+        stored = np.asarray(Image.open(path).convert("RGB")).astype(int)
+        assert drawn.shape == stored.shape
+        assert np.abs(drawn - stored).mean() < 6
+
+
+CHECKS: dict[str, Callable[[Session], None]] = {
+    "README": check_readme,
+    "tour": check_tour,
+    "modelling": check_modelling,
+    "custom-nodes": check_custom_nodes,
+    "meshing": check_meshing,
+    "decals": check_decals,
+    "rendering": check_rendering,
+    "scattering": check_scattering,
+    "editing": check_editing,
+    "pyvista": check_pyvista,
+}
+"""Checks of what is left after a page's code has run, by the page's name."""
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if code(page)], ids=lambda page: page.stem)
+def test_the_python_of_a_page_runs(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As one script, in an empty folder, without windows."""
+    script = code(page)
+    if DRAWS.search(script) and (missing := missing_gl_libraries()):
+        pytest.skip(f"no OpenGL here: {install_advice(missing)}")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pv, "OFF_SCREEN", True)
+    Path("script.py").write_text(script, encoding="utf-8")
+    session = runpy.run_path("script.py", run_name="script")
+    session["printed"] = capsys.readouterr().out
+    if page.stem in CHECKS:
+        CHECKS[page.stem](session)
+
+
+def test_every_check_has_a_page_with_code() -> None:
+    assert set(CHECKS) <= {page.stem for page in PAGES if code(page)}
+
+
+def test_links_between_pages_lead_to_files() -> None:
+    """Relative links and pictures of every page, also of pages for contributors."""
+    broken = []
+    for page in [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]:
+        targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
+        files = [target for target in targets if "://" not in target]
+        broken += [f"{page.name}: {file}" for file in files if not (page.parent / file).exists()]
+    assert broken == []
+
+
+def test_commands_on_pages_name_existing_files() -> None:
+    missing = []
+    for page in [*PAGES, ROOT / "CONTRIBUTING.md"]:
+        text = page.read_text(encoding="utf-8")
+        modules = set(re.findall(r"python -m ((?:tests|decals)\.[\w.]*\w)", text)) - {"tests.bench.NAME"}
+        missing += [f"{page.name}: {module}" for module in modules if find_spec(module) is None]
+        files = re.findall(r"python ([\w/]+\.py)", text)
+        missing += [f"{page.name}: {file}" for file in files if not (ROOT / file).exists()]
+    assert missing == []
+
+
+def test_the_key_table_is_that_of_the_editor() -> None:
+    """To correct the page, copy the result of `help_table` between its two marks."""
+    from decals.editing import KEYS
+
+    page = (DOCS / "editing.md").read_text(encoding="utf-8")
+    assert f"<!-- keys -->\n{KEYS.help_table()}<!-- /keys -->" in page
+
+
+def test_creases_save_as_many_triangles_as_the_page_says() -> None:
+    tree = Point((0, 0, 0), radius=1.0) - Point((0.8, 0.13, 0.07), radius=0.9)
+    plain, sharp = (len(polygonize(tree, chord_error=0.01, creases=c).faces) for c in (False, True))
+    text = (DOCS / "meshing.md").read_text(encoding="utf-8").replace(",", "")
+    assert all(f"{count} " in text for count in (plain, sharp)), (plain, sharp)

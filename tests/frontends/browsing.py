@@ -1,0 +1,105 @@
+"""A real browser before a page that this process serves: what it shows, and user for it."""
+
+import asyncio
+import io
+import shutil
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from PIL import Image
+from playwright.async_api import Page, async_playwright
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+SIZE = (500, 380)
+PATIENCE = 120
+"""Seconds: the first frame compiles shaders."""
+PICTURE = "canvas, img.image-display-area"
+"""Where trame's views show what they get."""
+LOSS = 2.0
+"""Levels of 255 in the mean that JPEG may take away."""
+
+
+def browser_path() -> str | None:
+    """Where a browser of Chromium's kind is installed."""
+    return next((path for path in map(shutil.which, NAMES) if path), None)
+
+
+@asynccontextmanager
+async def opened(url: str, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Page]:
+    """A page in a browser without a screen."""
+    async with async_playwright() as player:
+        browser = await player.chromium.launch(
+            executable_path=browser_path(), args=["--no-sandbox", "--disable-gpu"]
+        )
+        page = await browser.new_page(viewport={"width": size[0], "height": size[1]})
+        await page.goto(url)
+        await page.wait_for_selector(PICTURE)
+        yield page
+        await browser.close()
+
+
+@asynccontextmanager
+async def served(server: Any) -> AsyncIterator[Page]:
+    """The page of a trame server of this process."""
+    task = server.start(
+        exec_mode="task",
+        host="127.0.0.1",
+        port=0,
+        timeout=0,
+        open_browser=False,
+        show_connection_info=False,
+    )
+    await server.ready
+    async with opened(f"http://127.0.0.1:{server.port}/") as page:
+        yield page
+    await server.stop()
+    await task
+
+
+async def seen(page: Page) -> np.ndarray:
+    """The picture in the page's canvas, ``int[h, w, 3]``."""
+    data = await page.locator(PICTURE).first.screenshot()
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+
+
+def drawn(plotter: pv.Plotter) -> np.ndarray:
+    """The picture that pyvista saves, ``int[h, w, 3]``."""
+    return np.asarray(plotter.screenshot(None, return_img=True))[..., :3].astype(int)
+
+
+async def until(true: Callable[[], bool]) -> None:
+    """Let the server go on until something is so."""
+    async with asyncio.timeout(PATIENCE):
+        while not true():
+            await asyncio.sleep(0.05)
+
+
+async def shows(page: Page, plotter: pv.Plotter) -> np.ndarray:
+    """Wait until the browser shows what the plotter draws; that picture."""
+    async with asyncio.timeout(PATIENCE):
+        while True:
+            there, here = await seen(page), drawn(plotter)
+            if there.shape == here.shape and np.abs(there - here).mean() < LOSS:
+                return here
+            await asyncio.sleep(0.1)
+
+
+async def point(page: Page, plotter: pv.Plotter, *places: tuple[int, int]) -> None:
+    """Move the pointer over the canvas; places count from the lower left, as VTK's do."""
+    box = await page.locator(PICTURE).first.bounding_box()
+    assert box is not None
+    height = plotter.window_size[1]
+    for x, y in places:
+        await page.mouse.move(box["x"] + x + 0.5, box["y"] + height - 1 - y + 0.5)
+        await asyncio.sleep(0.05)
+
+
+async def drag(page: Page, plotter: pv.Plotter, *places: tuple[int, int]) -> None:
+    """A drag over the canvas with the left button."""
+    await point(page, plotter, places[0])
+    await page.mouse.down()
+    await point(page, plotter, *places[1:])
+    await page.mouse.up()

@@ -1,0 +1,139 @@
+"""Decals in a real browser, served by trame, as a program: ``python -m tests.frontends.in_browser NAME``.
+
+``page`` takes a path behind its name, where it saves the picture of docs/pyvista.md.
+"""
+
+import asyncio
+import io
+import sys
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pyvista as pv
+from PIL import Image
+from playwright.async_api import Page
+from trame.app import get_server
+from trame.ui.vuetify3 import VAppLayout
+from trame_pyvista.widgets import PyVistaRCAView, PyVistaRemoteView
+from trame_server.core import Server
+
+from decals.editing.scatter_commands import decals_on
+from decals.window import EditWindow
+from tests.decals.editing.scenes import scene
+from tests.decals.vtk.scenes import both
+from tests.decals.window.driver import Driver
+from tests.frontends import page as docs
+from tests.frontends.browsing import LOSS, PATIENCE, drag, drawn, point, seen, served, shows, until
+
+
+async def page(picture: str | None = None) -> None:
+    """The app of the page: decals are seen as the plotter draws them, turned, grown and resized."""
+    session: dict[str, Any] = {"__name__": "__main__"}
+    with patch.object(Server, "start"):
+        exec(compile(docs.code("browser"), "pyvista.md", "exec"), session)
+    plotter, scale = session["pl"], session["scene"].decals.radii[0]
+    async with served(session["server"]) as browser:
+        first = await shows(browser, plotter)
+        assert covered(first).mean() > 0.1
+        if picture is not None:
+            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+            image.quantize(256).save(picture, optimize=True)
+        position = plotter.camera.position
+        await drag(browser, plotter, (40, 40), (80, 60), (140, 70))
+        await until(lambda: plotter.camera.position != position)
+        turned = await shows(browser, plotter)
+        assert np.abs(turned - first).mean() > 2
+        slider = browser.get_by_role("slider")
+        for _ in range(4):
+            await slider.press("ArrowLeft")
+        await until(lambda: np.isclose(plotter.decals.scene.decals.radii[0], 0.6 * scale))
+        smaller = await shows(browser, plotter)
+        assert np.abs(smaller - turned).mean() > 2
+        await browser.set_viewport_size({"width": 420, "height": 300})
+        await until(lambda: plotter.window_size == [420, 240])
+        assert (await shows(browser, plotter)).shape == (240, 420, 3)
+
+
+def covered(picture: np.ndarray) -> np.ndarray:
+    """Where something other than the background is."""
+    return np.abs(picture - picture[0, 0]).max(axis=-1) > 8
+
+
+async def user() -> None:
+    """A click selects a decal, a drag moves it, keys undo that: the first picture comes back.
+
+    Decals are scattered in the background, and the page shows them when they are done.
+    """
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("user", client_type="vue3")
+    page = {"VAppLayout": VAppLayout, "PyVistaRemoteView": PyVistaRemoteView}
+    page |= {"scene": scene(), "pl": plotter, "server": server}
+    exec(compile(docs.code("editing"), "pyvista.md", "exec"), page)
+    window = page["window"]
+    driver = Driver(window)
+    async with served(server) as browser:
+        first, state = await shows(browser, plotter), driver.state
+        number, at = next(driver.visible())
+        await drag(browser, plotter, at)
+        await until(lambda: window.actions.state.selection == (number,))
+        await drag(browser, plotter, at, (at[0] + 6, at[1]), (at[0] + 20, at[1] + 6))
+        await until(lambda: driver.session.labels == ("move",) and not window.tools.dragging)
+        moved = await shows(browser, plotter)
+        assert np.abs(moved - first).mean() > 0.5
+        await browser.keyboard.press("Control+z")
+        await until(lambda: driver.state == state)
+        await browser.keyboard.press("Escape")
+        await until(lambda: window.actions.state.selection == ())
+        np.testing.assert_array_equal(await shows(browser, plotter), first)
+        await scattering(browser, window, driver)
+    window.close()
+    await asyncio.sleep(0)
+    assert not [task for task in asyncio.all_tasks() if "EditWindow" in task.get_name()]
+
+
+async def scattering(browser: Page, window: EditWindow, driver: Driver) -> None:
+    """Keys act where the pointer is, also where it went without a button."""
+    on_tree = set(decals_on(window.document, [0]).tolist())
+    number, at = next((number, at) for number, at in driver.visible() if number in on_tree)
+    await point(browser, window.plotter, at)
+    await browser.keyboard.press("g")
+    await until(lambda: driver.session.labels == ("scatter",) and not window.busy)
+    assert number not in window.document.decals.numbers
+    picture = drawn(window.plotter)  # draws nothing: the last frame was a whole one
+    async with asyncio.timeout(PATIENCE):
+        while np.abs(await seen(browser) - picture).mean() > LOSS:
+            await asyncio.sleep(0.1)
+    await browser.keyboard.press("Shift+N")
+    await until(lambda: len(window.document.objects) == 3)
+    assert driver.session.labels[-1] == "add an object"
+
+
+async def streamed() -> None:
+    """trame-rca's view, which pyvista takes too: decals are seen, and turned."""
+    plotter = pv.Plotter(off_screen=True)
+    plotter.decals.add_scene(both())
+    server = get_server("streamed", client_type="vue3")
+    with VAppLayout(server, full_height=True):
+        view = PyVistaRCAView(plotter, style="width: 100%; height: 100%")
+    async with served(server) as browser:
+        first = await shows(browser, view.plotter)
+        await drag(browser, plotter, (40, 40), (80, 60), (140, 70))
+        await until(lambda: np.abs(drawn(plotter) - first).mean() > 2)
+        turned = await shows(browser, plotter)
+        plotter.add_on_render_callback(lambda _: view.render())
+        bare = both().replace(decals=both().decals[:0])
+        plotter.decals.scene = bare
+        plotter.render()
+        assert np.abs(await shows(browser, plotter) - turned).mean() > 2
+
+
+def main() -> None:
+    """Run one of the functions above, by its name."""
+    name, *arguments = sys.argv[1:]
+    asyncio.run({"page": page, "user": user, "streamed": streamed}[name](*arguments))
+    print("done")
+
+
+if __name__ == "__main__":
+    main()

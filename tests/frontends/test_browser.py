@@ -1,0 +1,41 @@
+"""Decals in a real browser, and in a live notebook: run by name, ``pytest -m browser``.
+
+Each check is a program of its own: servers and kernels come and go with it.
+"""
+
+from importlib.util import find_spec
+
+import pytest
+
+from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from tests.display import run_module
+
+pytestmark = pytest.mark.browser
+
+NEEDED = ("playwright", "trame_pyvista")
+FOR_NOTEBOOKS = ("nbclient", "ipykernel", "ipywidgets", "nest_asyncio2")
+
+
+def require(*modules: str) -> None:
+    """Skip where something is missing, and say what to install."""
+    missing = [name for name in modules if find_spec(name) is None]
+    if missing:
+        names = ", ".join(missing)
+        pytest.skip(f"missing: {names}; pip install 'implicit-decals[browser]' playwright nbclient ipykernel")
+    from tests.frontends.browsing import browser_path
+
+    if browser_path() is None:
+        pytest.skip("no Chromium here (on Debian: apt-get install --no-install-recommends chromium)")
+    if libraries := missing_gl_libraries():
+        pytest.skip(f"no OpenGL here: {install_advice(libraries)}")
+
+
+@pytest.mark.parametrize("check", ["page", "user", "streamed"])
+def test_in_a_browser(check: str) -> None:
+    require(*NEEDED)
+    assert "done" in run_module("tests.frontends.in_browser", check)
+
+
+def test_in_a_live_notebook() -> None:
+    require(*NEEDED, *FOR_NOTEBOOKS)
+    assert "done" in run_module("tests.frontends.in_notebook")
