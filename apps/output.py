@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from blobtree.io import write_atomically
-from decals.apps.errors import UsageError
+from decals.errors import InvalidInput
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
@@ -23,22 +23,22 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
 
     Raises
     ------
-    UsageError
+    InvalidInput
         If the extension is unknown, the folder missing or read-only, or the path a folder.
     """
     if path.is_dir():
-        raise UsageError(f"expected a file to write, {str(path)!r} is a folder; add a file name")
+        raise InvalidInput(f"expected a file to write, {str(path)!r} is a folder; add a file name")
     if path.suffix.lower() not in suffixes:
         known = ", ".join(suffixes)
-        raise UsageError(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
+        raise InvalidInput(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
     folder = path.parent
     if not folder.is_dir():
-        raise UsageError(f"the output folder {str(folder)!r} does not exist; create it first")
+        raise InvalidInput(f"the output folder {str(folder)!r} does not exist; create it first")
     try:
         tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof
     except OSError as error:
         reason = f"the output folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
-        raise UsageError(reason) from error
+        raise InvalidInput(reason) from error
 
 
 def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:

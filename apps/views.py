@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from decals import Camera, ImplicitDecalsError, MeshObject
-from decals.apps.errors import UsageError
+from decals.errors import InvalidInput
 from decals.scenes.camera import THREE_QUARTER as THREE_QUARTER_DIRECTION
 from decals.scenes.objects import SceneObject
 
@@ -65,7 +65,7 @@ def parse_view(camera: str | None, axes: Axes) -> View:
 
     Raises
     ------
-    UsageError
+    InvalidInput
         If it is neither.
     """
     name = camera or THREE_QUARTER
@@ -75,11 +75,11 @@ def parse_view(camera: str | None, axes: Axes) -> View:
         x, y, z = (float(part) for part in name.split(","))
     except ValueError:
         presets = ", ".join(PRESETS)
-        raise UsageError(
+        raise InvalidInput(
             f"--camera: expected {presets}, or a direction such as 1,0.5,2; got {camera!r}"
         ) from None
     if not 0.0 < math.hypot(x, y, z) < math.inf:
-        raise UsageError(f"--camera: expected a finite direction other than 0,0,0; got {camera!r}")
+        raise InvalidInput(f"--camera: expected a finite direction other than 0,0,0; got {camera!r}")
     return View((x, y, z), axes.up)
 
 
@@ -88,7 +88,7 @@ def frame(objects: Sequence[SceneObject], view: View, size: Size) -> Camera:
 
     Raises
     ------
-    UsageError
+    InvalidInput
         If the objects are too large or too small for a camera.
     """
     points = np.concatenate(
@@ -102,4 +102,4 @@ def frame(objects: Sequence[SceneObject], view: View, size: Size) -> Camera:
             points, direction=view.direction, up=view.up, aspect=size[0] / size[1], margin=_MARGIN
         )
     except ImplicitDecalsError as error:
-        raise UsageError(f"no camera sees the model: {error}") from error
+        raise InvalidInput(f"no camera sees the model: {error}") from error

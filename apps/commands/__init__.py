@@ -1,1 +1,1 @@
-"""The commands, one file each, and their shared options, help texts and progress bars."""
+"""The commands, one file each, and what they share: values of options and progress bars."""

@@ -1,21 +1,60 @@
-"""``implicit-decals demo``: three pictures that show the method."""
+"""``implicit-decals demo``: three pictures that show the method, and their scenes.
+
+Two pictures show a creature and its egg: under scales, and a close-up in tiles. The creature is an implicit
+surface, the egg a mesh. The particles spread over both at once, so scales push each other where they touch.
+"""
 
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from cyclopts import Parameter
+from numpy.typing import NDArray
 from rich.console import Console
 
+from blobtree import Progress
+from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
 from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.errors import UsageError
 from decals.apps.gallery import spanning
-from decals.apps.models.demo_scenes import nest_scene, tile_scene
+from decals.apps.models.shapes import creature, egg
 from decals.apps.output import check_output, write_picture
+from decals.errors import InvalidInput
 from decals.rendering import Renderer
 from decals.rendering.options import RenderOptions
 
+Floats = NDArray[np.float32]
+
 PICTURES = ("hero.png", "contact.png", "span.png")
+
+COUNT = 1100
+EYE_RADIUS = 0.23
+_EYE_CLEARANCE = 0.17
+"""Distance from an eye within which scales are removed; the eye fills the gap and pushes its neighbours."""
+_EYES = np.array([[1.06, 2.29, 0.45], [1.06, 2.29, -0.45]], np.float32)
+"""Positions of the creature's eyes, before they are projected onto its surface."""
+
+_EGG_CENTER = np.array([1.33, 0.66, 0.0], np.float32)
+_EGG_RADIUS, _EGG_HEIGHT = 0.56, 0.70
+_SCALES = (
+    "scale#2f7f8c",
+    "scale#3a8a6a",
+    "scale#4f9448",
+    "scale#76a83a",
+    "scale#a8b437",
+    "scale#cf9f34",
+    "scale#cf7a30",
+    "scale#c4512f",
+    "scale#9c3542",
+)
+"""Images of the scales, from the tip of the tail to the egg."""
+
+_UP = np.array([0.0, 1.0, 0.0], np.float32)
+_BACKWARD = np.array([-1.0, -0.55, 0.0], np.float32)
+_EGG_TOLERANCE = 1.08
+"""Points within this many radii of the egg's centre lie on it: its thick end bulges out of the ellipsoid."""
+
+_GLAZES = ("tile#2f7f95", "tile#c9a227", "tile#b5533c", "tile#e4dcc8", "tile#3f6b4f")
 
 
 def demo(
@@ -57,6 +96,73 @@ def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise UsageError(
+        raise InvalidInput(
             f"could not make the output folder {str(folder)!r} ({error.strerror}); choose another"
         ) from error
+
+
+def nest_scene(*, progress: Progress) -> Scene:
+    """Cover the creature and the egg with scales that point toward the tail, or up the egg.
+
+    Parameters
+    ----------
+    progress : blobtree.Progress
+        Reports the scattering.
+    """
+    objects = TreeObject("creature", creature()), _egg()
+    scales = scatter(
+        [item.surface for item in objects],
+        count=COUNT,
+        direction=_directions,
+        progress=progress,
+    )
+    scales = scales.replace(images=_choose_images(scales.positions))
+    return Scene(
+        objects=objects,
+        camera=Camera(position=(4.1, 2.7, 6.6), target=(0.10, 1.16, 0.10), fov=24.0),
+        images=tuple(DecalImage.load(name) for name in (*_SCALES, "eye")),
+        decals=_with_eyes(scales, objects[0]),
+    )
+
+
+def tile_scene(scene: Scene) -> Scene:
+    """Show the decals of the nest scene as glazed tiles, where a paw touches the egg."""
+    chosen = np.random.default_rng(3).integers(0, len(_GLAZES), len(scene.decals))
+    return scene.replace(
+        images=tuple(DecalImage.load(name) for name in _GLAZES),
+        decals=scene.decals.replace(images=chosen.astype(np.int32)),
+        camera=Camera(position=(2.3, 1.5, 3.6), target=(0.98, 0.82, 0.42), fov=20.0),
+    )
+
+
+def _egg() -> MeshObject:
+    vertices, faces = egg(_EGG_CENTER, radius=_EGG_RADIUS, height=_EGG_HEIGHT)
+    return MeshObject("egg", vertices, faces, color=(0.86, 0.80, 0.68))
+
+
+def _directions(points: Floats) -> Floats:
+    """Return the directions of the scales: from head to tail on the creature, upward on the egg."""
+    sizes = np.array([_EGG_RADIUS, _EGG_HEIGHT, _EGG_RADIUS], np.float32)
+    on_egg = np.linalg.norm((points - _EGG_CENTER) / sizes, axis=1, keepdims=True) < _EGG_TOLERANCE
+    return np.where(on_egg, _UP, _BACKWARD)
+
+
+def _choose_images(points: Floats) -> NDArray[np.int32]:
+    """Choose an image for each scale: a gradient from the tail to the egg, with random variation."""
+    gradient = np.clip((points[:, 0] - 0.25 * points[:, 1] + 2.1) / 3.6, 0.0, 1.0)
+    jitter = np.random.default_rng(7).uniform(-0.7, 0.7, len(points))
+    return np.clip(np.rint(gradient * (len(_SCALES) - 1) + jitter), 0, len(_SCALES) - 1).astype(np.int32)
+
+
+def _with_eyes(scales: Decals, body: TreeObject) -> Decals:
+    """Replace the scales at the eyes by two eyes."""
+    positions, normals = body.surface.project(_EYES)
+    gaps = np.linalg.norm(scales.positions[:, None] - positions, axis=2).min(axis=1)
+    eyes = Decals(
+        positions=positions,
+        normals=normals,
+        tangents=np.cross(_UP, normals),
+        radii=np.full(len(positions), EYE_RADIUS, np.float32),
+        images=np.full(len(positions), len(_SCALES), np.int32),
+    )
+    return Decals.concatenate([scales[gaps > _EYE_CLEARANCE], eyes])

@@ -13,17 +13,16 @@ from decals.apps.commands.options import (
     MAX_SEED,
     Definitions,
     OptionalWhole,
+    ScatterOptions,
     check_count,
     parse_size,
 )
 from decals.apps.commands.progress_bars import progress_bars
-from decals.apps.commands.scatter_options import ScatterOptions
-from decals.apps.errors import UsageError
-from decals.apps.models.definitions import import_definitions
-from decals.apps.models.loading import load_models
+from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_output
 from decals.apps.views import UPRIGHT, parse_view
+from decals.errors import InvalidInput
 from decals.window import EditWindow
 
 
@@ -81,7 +80,7 @@ def edit(
     loaded, path = load_models(model), save
     if isinstance(loaded, Scene):
         if decals is not None or image or seed is not None:
-            raise UsageError("a saved scene has its own decals; leave out --decals, --image and --seed")
+            raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
         scene, path = loaded, path or Path(model[0])
     else:
         with progress_bars() as progress:

@@ -1,13 +1,18 @@
-"""Types, parsers and range checks of command-line values."""
+"""Values of options: types, parsers and range checks, and the decals that ``render`` and ``edit`` scatter."""
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from decals.apps.errors import UsageError
-from decals.apps.views import Size
+from blobtree import Progress
+from decals import DecalImage, Scene, scatter
+from decals.apps.commands.progress_bars import PREPARING
+from decals.apps.views import Size, View, frame
+from decals.errors import InvalidInput
+from decals.scenes.objects import SceneObject
 
 MAX_EDGE = 16384
 """Longest edge of a picture, in pixels."""
@@ -16,6 +21,8 @@ TILE = 768
 """Samples per axis that are drawn at once: small enough to interrupt a command within seconds."""
 MAX_DECALS = 1_000_000
 MAX_SEED = 2**32 - 1
+DEFAULT_COUNT = 500
+DEFAULT_IMAGES = ("scale",)
 
 
 def _whole(_type: Any, tokens: Sequence[Token]) -> int:
@@ -40,14 +47,49 @@ def parse_size(text: str) -> Size:
     """Parse a picture size such as ``"1200x900"``."""
     match = re.fullmatch(r"(\d{1,9})[xX×](\d{1,9})", text.strip())
     if match is None:
-        raise UsageError(f"--size: expected WIDTHxHEIGHT such as 1200x900, got {text!r}")
+        raise InvalidInput(f"--size: expected WIDTHxHEIGHT such as 1200x900, got {text!r}")
     width, height = int(match[1]), int(match[2])
     if not (1 <= width <= MAX_EDGE and 1 <= height <= MAX_EDGE):
-        raise UsageError(f"--size: expected 1 to {MAX_EDGE} pixels a side, got {text!r}")
+        raise InvalidInput(f"--size: expected 1 to {MAX_EDGE} pixels a side, got {text!r}")
     return width, height
 
 
 def check_count(option: str, value: int, low: int, high: int) -> None:
-    """Raise `UsageError` if a whole number lies outside its range."""
+    """Raise `InvalidInput` if a whole number lies outside its range."""
     if not low <= value <= high:
-        raise UsageError(f"{option}: expected a whole number from {low} to {high}, got {value}")
+        raise InvalidInput(f"{option}: expected a whole number from {low} to {high}, got {value}")
+
+
+@dataclass(frozen=True)
+class ScatterOptions:
+    """Number, images and random seed of the decals."""
+
+    count: int
+    images: tuple[DecalImage, ...]
+    seed: int
+
+    @classmethod
+    def from_arguments(
+        cls, count: int | None, images: Sequence[str] | None, seed: int | None
+    ) -> "ScatterOptions":
+        """Check the arguments, fill in the defaults and read the images."""
+        count, seed = DEFAULT_COUNT if count is None else count, seed or 0
+        check_count("--decals", count, 0, MAX_DECALS)
+        check_count("--seed", seed, 0, MAX_SEED)
+        return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
+
+    def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
+        """Return a scene of the objects covered with decals, and a camera that shows them."""
+        progress(PREPARING, 0.0)
+        return Scene(
+            objects=tuple(objects),
+            camera=frame(objects, view, size),
+            images=self.images,
+            decals=scatter(
+                [item.surface for item in objects],
+                count=self.count,
+                seed=self.seed,
+                images=len(self.images),
+                progress=progress,
+            ),
+        )

@@ -9,10 +9,9 @@ from cyclopts import Parameter
 from decals import TreeObject
 from decals.apps.commands.options import Definitions, OptionalWhole
 from decals.apps.commands.progress_bars import progress_bars
-from decals.apps.errors import UsageError
-from decals.apps.models.definitions import import_definitions
-from decals.apps.models.loading import load_model
+from decals.apps.models.loading import import_definitions, load_model
 from decals.apps.output import MESH_SUFFIXES, check_output, replacing
+from decals.errors import InvalidInput
 
 OptionalLength = Annotated[float | None, Parameter(show_default=False)]
 
@@ -54,7 +53,7 @@ def polygonize(
     import_definitions(define)
     loaded = load_model(model)
     if not isinstance(loaded, TreeObject):
-        raise UsageError(f"expected a BlobTree in JSON or a sample (creature, spheres), got {model!r}")
+        raise InvalidInput(f"expected a BlobTree in JSON or a sample (creature, spheres), got {model!r}")
     with progress_bars() as progress:
         surface = loaded.tree.to_pyvista(
             resolution=resolution,
@@ -65,7 +64,7 @@ def polygonize(
             progress=progress,
         )
         if surface.n_points == 0:
-            raise UsageError(
+            raise InvalidInput(
                 f"{model!r} has no surface in cells of this size: its parts may be smaller than a cell, or "
                 "the tree may be empty; increase --resolution"
             )

@@ -11,18 +11,17 @@ from decals.apps.commands.options import (
     TILE,
     Definitions,
     OptionalWhole,
+    ScatterOptions,
     Whole,
     check_count,
     parse_size,
 )
 from decals.apps.commands.progress_bars import progress_bars
-from decals.apps.commands.scatter_options import ScatterOptions
-from decals.apps.errors import UsageError
-from decals.apps.models.definitions import import_definitions
-from decals.apps.models.loading import load_models
+from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output, write_picture
 from decals.apps.views import UPRIGHT, frame, parse_view
+from decals.errors import InvalidInput
 from decals.rendering import Renderer
 from decals.rendering.options import RenderOptions
 
@@ -90,7 +89,7 @@ def render(
     import_definitions(define)
     loaded = load_models(model)
     if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
-        raise UsageError("a saved scene has its own decals; leave out --decals, --image and --seed")
+        raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
     options = ScatterOptions.from_arguments(decals, image, seed)
     # The renderer comes first: without graphics the command fails before the long work.
     with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:

@@ -12,12 +12,11 @@ from decals import DecalImage, Decals, Scene, Sizing, save_scene
 from decals import scatter as scatter_decals
 from decals.apps.commands.options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, Whole, check_count
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.errors import UsageError
-from decals.apps.models.definitions import import_definitions
-from decals.apps.models.loading import load_models
+from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_output
 from decals.apps.views import frame, parse_view
+from decals.errors import InvalidInput
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
@@ -86,7 +85,7 @@ def scatter(
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
     """
     if count is not None and spacing is not None:
-        raise UsageError("expected --count or --spacing, got both; leave one of them out")
+        raise InvalidInput("expected --count or --spacing, got both; leave one of them out")
     if count is None and spacing is None:
         count = 500
     if count is not None:
@@ -97,7 +96,7 @@ def scatter(
     import_definitions(define)
     objects = load_models(model)
     if isinstance(objects, Scene):
-        raise UsageError("a saved scene has its own decals; give its models instead")
+        raise InvalidInput("a saved scene has its own decals; give its models instead")
     with progress_bars() as progress:
         progress(PREPARING, 0.0)
         surfaces = [item.surface for item in objects]

@@ -1,1 +1,1 @@
-"""Sample models, the scenes of the demo, and loading of models and definitions."""
+"""Sample models, and loading of the models and definitions that a command line names."""

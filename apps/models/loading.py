@@ -1,12 +1,16 @@
-"""MODEL arguments: names of samples, and files by `decals.load_model`."""
+"""Arguments that name files: models, samples and scenes, and modules that define custom nodes."""
 
+import importlib
+import importlib.util
+import sys
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
-from decals.apps.errors import UsageError
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh
+from decals.errors import InvalidInput
 from decals.scenes.objects import SceneObject, as_objects
 from decals.validation import is_file
 
@@ -16,13 +20,13 @@ def load_model(model: str) -> SceneObject | Scene:
 
     Raises
     ------
-    UsageError, ImplicitDecalsError
+    InvalidInput
         If it is neither a sample nor a file, or the file cannot be used; the message names it.
     """
     if model in SAMPLES:
         return sample(model)
     if not is_file(Path(model)):
-        raise UsageError(
+        raise InvalidInput(
             f"expected a mesh file, a BlobTree or scene in JSON, or a sample ({', '.join(SAMPLES)}); "
             f"found no file {model!r}"
         )
@@ -31,7 +35,7 @@ def load_model(model: str) -> SceneObject | Scene:
     except ImplicitDecalsError as error:
         if model in str(error):
             raise
-        raise UsageError(f"{model!r}: {error}") from error
+        raise InvalidInput(f"{model!r}: {error}") from error
 
 
 def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
@@ -39,7 +43,7 @@ def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
 
     Raises
     ------
-    UsageError
+    InvalidInput
         If a scene is named together with other models.
     """
     objects: list[SceneObject] = []
@@ -47,9 +51,65 @@ def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
         loaded = load_model(model)
         if isinstance(loaded, Scene):
             if len(models) > 1:
-                raise UsageError(
+                raise InvalidInput(
                     f"expected meshes and BlobTrees, {model!r} is a whole scene; render it alone"
                 )
             return loaded
         objects.append(loaded)
     return as_objects(objects)
+
+
+def import_definitions(modules: Sequence[str] | None) -> None:
+    """Import the modules of ``--define``: Python files, or dotted names of modules.
+
+    Dotted names are searched in the working folder too, imports of a file in its own folder too.
+
+    Raises
+    ------
+    InvalidInput
+        If a module is missing or raises an error; the message names file and line.
+    """
+    for module in modules or ():
+        path = Path(module)
+        if path.suffix == ".py" and not path.is_file():
+            raise InvalidInput(
+                f"--define: expected a Python file or the name of a module, found no file {module!r}"
+            )
+        try:
+            _import(module)
+        except (Exception, SystemExit) as error:
+            raise InvalidInput(
+                f"--define {module}: {_location(error)}{type(error).__name__}: {error}"
+            ) from error
+
+
+def _import(module: str) -> None:
+    """Import a dotted name, or run a file as a module of its name."""
+    path = Path(module)
+    if path.suffix != ".py":
+        _add_search_path(Path.cwd())
+        importlib.import_module(module)
+        return
+    _add_search_path(path.resolve().parent)
+    name = path.stem if path.stem not in sys.modules else f"defined_by_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    assert spec is not None
+    assert spec.loader is not None
+    definitions = sys.modules[name] = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(definitions)
+    except BaseException:
+        del sys.modules[name]
+        raise
+
+
+def _add_search_path(folder: Path) -> None:
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+
+
+def _location(error: BaseException) -> str:
+    """Return "file:line: " of the failed statement, or "" if the message names it or no statement ran."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.name == "<module>"]
+    known = not frames or frames[-1].filename in str(error)
+    return "" if known else f"{frames[-1].filename}:{frames[-1].lineno}: "

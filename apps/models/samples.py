@@ -7,11 +7,9 @@ from functools import partial
 
 from blobtree import Node
 from decals import MeshObject, TreeObject
-from decals.apps.errors import UsageError
-from decals.apps.models.creature import creature
-from decals.apps.models.knot import torus_knot
-from decals.apps.models.spheres import spheres
+from decals.apps.models.shapes import creature, spheres, torus_knot
 from decals.apps.views import UPRIGHT, Axes
+from decals.errors import InvalidInput
 from decals.scenes.objects import SceneObject
 from decals.scenes.records import SAMPLE
 from decals.surfaces.mesh_file import MeshArrays, dataset_triangles
@@ -30,7 +28,7 @@ def _download(name: str) -> MeshArrays:
             surface = getattr(examples, f"download_{name}")()
     except Exception as error:  # no network, no permission, a broken cache, ...
         reason = type(error).__name__
-        raise UsageError(
+        raise InvalidInput(
             f"the sample {name!r} is downloaded by pyvista on first use, and that failed ({reason}); "
             f"connect to the internet, or set PYVISTA_DATA to a copy of {_DATA}"
         ) from error
@@ -58,7 +56,7 @@ def axes_of(model: str) -> Axes:
 def sample_mesh(name: str) -> MeshArrays:
     """Return the vertices and faces of a sample mesh; a `decals.scenes.records.SampleLoader`."""
     if name not in _MESHES:
-        raise UsageError(f"expected a sample mesh ({', '.join(sorted(_MESHES))}), got {name!r}")
+        raise InvalidInput(f"expected a sample mesh ({', '.join(sorted(_MESHES))}), got {name!r}")
     return _MESHES[name]()
 
 
@@ -67,7 +65,7 @@ def sample(name: str) -> SceneObject:
 
     Raises
     ------
-    UsageError
+    InvalidInput
         If the sample does not exist or cannot be downloaded.
     """
     if name in _TREES:

@@ -1,10 +1,149 @@
-"""Meshes of the demo and the gallery: an egg and a rounded box."""
+"""Shapes of the sample models: the spheres and the creature as BlobTrees; knot, egg and box as meshes."""
+
+from typing import Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
+from blobtree import Node, Point, Ricci, Segment, Sum
 from decals.surfaces.mesh_file import MeshArrays
+
+Floats = NDArray[np.floating[Any]]
+
+_COLD, _WARM = (0.36, 0.52, 0.72), (0.85, 0.55, 0.32)
+_BALLS = (
+    ((0.00, 0.00, 0.00), 0.78, _COLD),
+    ((1.05, 0.30, 0.25), 0.50, _WARM),
+    ((-0.85, 0.55, 0.30), 0.46, _WARM),
+    ((0.20, 0.98, -0.15), 0.42, _COLD),
+    ((-0.35, -0.80, 0.45), 0.48, _COLD),
+    ((0.55, -0.62, 0.72), 0.36, _WARM),
+    ((0.10, 0.25, 0.95), 0.38, _WARM),
+    ((0.70, 0.85, 0.80), 0.26, _COLD),
+    ((-0.70, -0.35, -0.75), 0.45, _WARM),
+    ((1.55, -0.35, 0.35), 0.30, _COLD),
+    ((-1.45, 0.75, 0.45), 0.24, _COLD),
+)
+
+
+def spheres() -> Node:
+    """Return a sum of balls that blend into each other."""
+    return Sum(tuple(Point(center, radius=radius, color=color) for center, radius, color in _BALLS))
+
+
+_SKIN = (0.34, 0.50, 0.28)
+_CHEST = (0.82, 0.76, 0.52)
+_SOCKET = (0.17, 0.12, 0.07)
+_HORN = (0.90, 0.85, 0.72)
+
+_BLEND = 3.0
+"""Exponent of the Ricci blend: its joints are smooth and bulge less than those of a sum."""
+
+
+def creature() -> Node:
+    """Return the creature: 3 units long, 2.6 high, facing +x, its feet on y = 0."""
+    parts = [*_trunk(), *_tail(), *_side(1.0), *_side(-1.0)]
+    return Ricci(tuple(parts), exponent=_BLEND)
+
+
+def _trunk() -> list[Node]:
+    return [
+        Point((-0.48, 0.62, 0.0), radius=0.56, color=_SKIN),
+        Point((0.00, 0.82, 0.0), radius=0.48, color=_SKIN),
+        Point((0.36, 1.10, 0.0), radius=0.36, color=_CHEST),
+        Segment((0.48, 1.28, 0.0), (0.62, 1.72, 0.0), radius=0.23, color=_SKIN),
+        Point((0.76, 2.02, 0.0), radius=0.40, color=_SKIN),
+        Segment((0.98, 1.92, 0.0), (1.28, 1.84, 0.0), radius=0.22, color=_SKIN),
+    ]
+
+
+def _tail() -> list[Node]:
+    spine = [
+        (-0.85, 0.45, 0.00),
+        (-1.30, 0.26, 0.12),
+        (-1.66, 0.20, 0.44),
+        (-1.66, 0.19, 0.90),
+        (-1.34, 0.20, 1.16),
+        (-1.00, 0.25, 1.14),
+    ]
+    radii = (0.30, 0.22, 0.16, 0.125, 0.10)
+    return [Segment(spine[i], spine[i + 1], radius=radius, color=_SKIN) for i, radius in enumerate(radii)]
+
+
+def _side(z: float) -> list[Node]:
+    """Return the leg, arm, eye socket, nostril and horn of the left (``z`` = 1) or right side (-1)."""
+    return [
+        Point((-0.42, 0.44, 0.46 * z), radius=0.38, color=_SKIN),
+        Segment((-0.22, 0.20, 0.60 * z), (0.26, 0.13, 0.68 * z), radius=0.17, color=_SKIN),
+        Segment((0.40, 0.98, 0.32 * z), (0.60, 0.62, 0.50 * z), radius=0.16, color=_SKIN),
+        Segment((0.60, 0.62, 0.50 * z), (0.98, 0.70, 0.46 * z), radius=0.14, color=_SKIN),
+        Point((0.92, 2.24, 0.24 * z), radius=0.19, color=_SOCKET),
+        Point((1.42, 1.92, 0.11 * z), radius=0.075, color=_SKIN),
+        Segment((0.58, 2.34, 0.20 * z), (0.30, 2.56, 0.30 * z), radius=0.095, color=_HORN),
+    ]
+
+
+def torus_knot(
+    *,
+    turns: int = 2,
+    windings: int = 3,
+    radius: float = 1.0,
+    bend: float = 0.42,
+    tube: float = 0.23,
+    along: int = 480,
+    around: int = 48,
+) -> MeshArrays:
+    """Make a closed tube around a torus knot.
+
+    Parameters
+    ----------
+    turns, windings : int
+        Turns of the knot around the axis of the torus and through its hole; coprime.
+    radius, bend, tube : float
+        Major and minor radius of the torus, and radius of the tube around the knot, in the model's units.
+    along, around : int
+        Quads along the knot and around its tube.
+
+    Returns
+    -------
+    vertices : float32[along * around, 3]
+    faces : int32[2 * along * around, 3]
+        Counter-clockwise seen from outside.
+    """  # fmt: skip
+    t = np.arange(along) * (2.0 * np.pi / along)
+    centre = _knot(t, turns, windings, radius, bend)
+    ahead = _knot(t + 1e-4, turns, windings, radius, bend) - _knot(t - 1e-4, turns, windings, radius, bend)
+    tangent = _unit(ahead)
+    # The normal of the torus gives a frame that is periodic along the knot.
+    out = _unit(centre - radius * np.stack([np.cos(turns * t), np.sin(turns * t), 0.0 * t], axis=-1))
+    side = _unit(np.cross(tangent, out))
+    out = np.cross(side, tangent)
+    angle = np.arange(around) * (2.0 * np.pi / around)
+    ring = np.cos(angle)[:, None] * out[:, None] + np.sin(angle)[:, None] * side[:, None]
+    vertices = centre[:, None] + tube * ring
+    return vertices.reshape(-1, 3).astype(np.float32), _grid_faces(along, around)
+
+
+def _knot(t: Floats, turns: int, windings: int, radius: float, bend: float) -> Floats:
+    ring = radius + bend * np.cos(windings * t)
+    return np.stack(
+        [ring * np.cos(turns * t), ring * np.sin(turns * t), bend * np.sin(windings * t)], axis=-1
+    )
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _grid_faces(along: int, around: int) -> NDArray[np.int32]:
+    """Return the triangles of a grid that is periodic in both directions."""
+    i, j = (index.reshape(-1) for index in np.indices((along, around)))
+    a, b = i * around + j, (i + 1) % along * around + j
+    c, d = (i + 1) % along * around + (j + 1) % around, i * around + (j + 1) % around
+    faces = np.concatenate([np.stack([a, c, b], axis=-1), np.stack([a, d, c], axis=-1)])
+    return faces.astype(np.int32)
+
 
 _SUBDIVISIONS = 5
 _SQUARES = 48

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.apps.errors import UsageError
-from decals.apps.models.knot import torus_knot
+from decals.apps.models.shapes import torus_knot
 from decals.apps.views import PRESETS, UPRIGHT, View, frame, parse_view
+from decals.errors import InvalidInput
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 
 
@@ -53,5 +53,5 @@ def test_invalid_cameras_are_refused(text: str) -> None:
     if text == "":
         assert parse_view(text, UPRIGHT["y"]) == parse_view("three-quarter", UPRIGHT["y"])
         return
-    with pytest.raises(UsageError, match="--camera"):
+    with pytest.raises(InvalidInput, match="--camera"):
         parse_view(text, UPRIGHT["y"])

@@ -21,11 +21,11 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from decals.apps.errors import UsageError
-from decals.apps.figure_14 import even_decals
-from decals.apps.models.knot import torus_knot
+from decals.apps.commands.bench import even_decals
 from decals.apps.models.samples import axes_of, sample
+from decals.apps.models.shapes import torus_knot
 from decals.apps.views import frame, parse_view
+from decals.errors import InvalidInput
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
 from decals.index.index import DecalIndex
@@ -234,7 +234,7 @@ def model() -> MeshObject:
     """Return the dragon, or a knot if the dragon is not available."""
     try:
         item = sample("dragon")
-    except UsageError:
+    except InvalidInput:
         vertices, faces = torus_knot()
         item = MeshObject("knot", vertices, faces)
     assert isinstance(item, MeshObject)

@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.apps.errors import UsageError
-from decals.errors import InvalidScattering
+from decals.errors import InvalidInput, InvalidScattering
 from decals.scattering.metrics import Spacing, ideal_spacing, spacing_of_distances
 from decals.scattering.neighbors import FacingTree
 from decals.scattering.relaxation import Relaxation
@@ -128,7 +127,7 @@ def bench(
         for name in names:
             try:
                 surfaces, meshes = model(name)
-            except UsageError as error:
+            except InvalidInput as error:
                 print(f"{name}: absent ({error})")
                 continue
             print(f"{name}, {count}\n  {'':38s}   count     rho   cv %  cv6 %  ringed %   seconds")

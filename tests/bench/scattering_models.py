@@ -33,12 +33,12 @@ MODELS = (*TREES, *MESHES)
 
 
 def mesh_arrays(name: str, file: Path | None = None) -> Any:
-    """Return vertices and faces of a mesh, from a file if given; raise `UsageError` without it."""
+    """Return vertices and faces of a mesh, from a file if given; raise `InvalidInput` without it."""
     if file is not None:
         with np.load(file) as arrays:
             return arrays[f"{name}_vertices"], arrays[f"{name}_faces"]
-    from decals.apps.models.knot import torus_knot
     from decals.apps.models.samples import sample_mesh
+    from decals.apps.models.shapes import torus_knot
 
     return torus_knot(along=1042) if name == "knot" else sample_mesh(name)
 

@@ -1,10 +1,10 @@
-"""``implicit-decals bench table``."""
+"""``implicit-decals bench table``: its arguments, its measurements and its table."""
 
 import pytest
 
 from decals.apps.cli import BAD_INPUT, run
-from decals.apps.commands.bench import parse_counts, parse_models
-from decals.apps.errors import UsageError
+from decals.apps.commands.bench import PAPER_ROWS, Row, as_table, measure, parse_counts, parse_models
+from decals.errors import InvalidInput
 from decals.rendering import Renderer
 
 
@@ -12,9 +12,9 @@ def test_lists_are_read() -> None:
     assert parse_counts("100,1000") == [100, 1000]
     assert parse_models("knot,spheres") == ["knot", "spheres"]
     for text in ("", "1,x", "0", "-5", "10000000"):
-        with pytest.raises(UsageError, match="--counts"):
+        with pytest.raises(InvalidInput, match="--counts"):
             parse_counts(text)
-    with pytest.raises(UsageError, match=r"--models: expected samples .*got 'cow'"):
+    with pytest.raises(InvalidInput, match=r"--models: expected samples .*got 'cow'"):
         parse_models("knot,cow")
 
 
@@ -25,3 +25,20 @@ def test_the_command_prints_a_table(renderer: Renderer, capsys: pytest.CaptureFi
     assert "knot" in shown
     assert "(897)" in shown
     assert run([*arguments[:2], "--size", "0x1"]) == BAD_INPUT
+
+
+def test_rows_of_a_measurement(renderer: Renderer) -> None:
+    few, many = measure(renderer, "knot", (20, 200), (48, 36))
+    assert (few.model, few.decals, many.decals) == ("knot", 20, 200)
+    assert 0 < few.cells < many.cells
+    assert 0 < few.memory < many.memory
+    assert 0 < few.build < 10
+    assert 0 < few.frame < 10_000
+    assert few.paper is None
+
+
+def test_the_table_shows_the_papers_numbers() -> None:
+    row = Row("dragon", 1000, 2000, 0.5, 3.25, 200_000)
+    assert row.paper == PAPER_ROWS["dragon", 1000]
+    cells = [next(iter(column.cells)) for column in as_table([row], "here").columns]
+    assert cells == ["dragon", "1,000", "2,000 (5,753)", "0.500 (0.06)", "3.2 (30)", "195 KB (116 KB)"]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from decals.apps.cli import run
-from decals.apps.commands import scatter_options
+from decals.apps.commands import options
 from tests.apps.commands.pictures import small
 
 Capture = pytest.CaptureFixture[str]
@@ -41,7 +41,7 @@ def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture
     def interrupt(*_arguments: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(scatter_options, "scatter", interrupt)
+    monkeypatch.setattr(options, "scatter", interrupt)
     assert run([*small("knot"), "-o", "a.png"]) == 130
     err = capfd.readouterr().err
     assert "interrupted" in err

@@ -11,7 +11,7 @@ Capture = pytest.CaptureFixture[str]
 
 
 def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    monkeypatch.setattr("decals.apps.models.demo_scenes.COUNT", 120)
+    monkeypatch.setattr("decals.apps.commands.demo.COUNT", 120)
     assert run(["demo", "--size", "80x60", "--samples", "1"]) == 0
     names = capsys.readouterr().out.split()
     assert names == ["out/hero.png", "out/contact.png", "out/span.png"]

@@ -11,12 +11,11 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import polygonize
-from decals.apps.errors import UsageError
+from decals.apps.commands.demo import nest_scene, tile_scene
 from decals.apps.gallery import spanning
-from decals.apps.models.demo_scenes import nest_scene, tile_scene
-from decals.apps.models.knot import torus_knot
 from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
-from decals.apps.models.shapes import egg, rounded_box
+from decals.apps.models.shapes import egg, rounded_box, torus_knot
+from decals.errors import InvalidInput
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.surfaces.mesh_file import MeshArrays
 
@@ -75,7 +74,7 @@ def test_all_samples_are_listed_and_generated_ones_need_no_network() -> None:
 
 
 def test_an_unknown_sample_mesh_is_refused() -> None:
-    with pytest.raises(UsageError, match="dragon, horse, knot"):
+    with pytest.raises(InvalidInput, match="dragon, horse, knot"):
         sample_mesh("spheres")
 
 
@@ -85,7 +84,7 @@ def test_all_models_except_the_horse_stand_along_y() -> None:
 
 
 def test_decals_run_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("decals.apps.models.demo_scenes.COUNT", 300)
+    monkeypatch.setattr("decals.apps.commands.demo.COUNT", 300)
     scene = nest_scene(progress=lambda _stage, _fraction: None)
     creature, shell = (item.surface for item in scene.objects)
     distance = [

@@ -1,1 +1,0 @@
-"""Checks of the software and hardware that the project needs."""
