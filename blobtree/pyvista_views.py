@@ -16,6 +16,8 @@ from blobtree.validation import finite_number, finite_vector
 if TYPE_CHECKING:
     import pyvista as pv
 
+    from blobtree.field_slice import FieldSlice
+
 SLICE_RESOLUTION = 256
 """Squares along the longer side of a slice."""
 
@@ -53,10 +55,10 @@ def slice_tree(
     *,
     resolution: int = SLICE_RESOLUTION,
     values: Iterable[float] = LEVELS,
-) -> "pv.MultiBlock":
+) -> "FieldSlice":
     """Return the field on a plane, see `Node.slice`."""
     _require_pyvista()
-    import pyvista as pv
+    from blobtree.field_slice import FieldSlice
 
     levels = _levels(values)
     if not isinstance(resolution, int | np.integer) or not 1 <= resolution <= MAX_SQUARES:
@@ -67,7 +69,7 @@ def slice_tree(
     plane = _plane(tree, corner, sides, counts)
     across = np.cross(*sides)
     step = float(max(np.linalg.norm(side) / count for side, count in zip(sides, counts, strict=True)))
-    blocks = pv.MultiBlock()
+    blocks = FieldSlice()
     blocks["plane"] = plane
     blocks["lines"] = _lines(tree, plane, levels, across, step)
     blocks["surface"] = _lines(tree, plane, [ISO], across, step)

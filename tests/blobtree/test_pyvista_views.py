@@ -142,6 +142,46 @@ def test_resolutions_that_no_slice_can_have(resolution: Any) -> None:
         A.slice(resolution=resolution)
 
 
+def _plot(cut: Any, **options: Any) -> Any:
+    """Return the pixels of a plot from above, (h, w, 3)."""
+    try:
+        pixels = cut.plot(
+            off_screen=True,
+            screenshot=True,
+            window_size=(160, 120),
+            cpos="xy",
+            background="red",
+            show_axes=False,
+            show_scalar_bar=False,
+            **options,
+        )
+    except RuntimeError as error:
+        pytest.skip(f"no window can be opened here: {error}")
+    return np.asarray(pixels)[..., :3].astype(int)
+
+
+def test_a_plotted_slice_has_white_lines_and_a_dark_surface() -> None:
+    """On the plane in grey, lines of the levels are white, and the line of the surface is dark."""
+    pixels = _plot(A.slice(resolution=64, values=[0.2]), cmap=["grey", "grey"])
+    grey = np.abs(pixels - 128).max(axis=2) < 8
+    white = pixels.min(axis=2) > 230
+    dark = pixels.max(axis=2) < 60
+    rows, columns = np.nonzero(grey | white | dark)
+    center = np.array([(rows.min() + rows.max()) / 2, (columns.min() + columns.max()) / 2])
+    unit = (np.ptp(rows) + 1) / float(A.bounds[1][0] - A.bounds[0][0])  # pixels
+    assert white.sum() > 60
+    assert dark.sum() > 40
+    for line, level in ((white, 0.2), (dark, 0.5)):
+        distances = np.linalg.norm(np.argwhere(line) - center, axis=1) / unit
+        expected = 2.2016606 * np.sqrt(1.0 - level ** (1.0 / 3.0))
+        np.testing.assert_allclose(distances, expected, atol=2.0 / unit)
+
+
+def test_a_slice_without_lines_plots() -> None:
+    pixels = _plot(A.slice((0, 0, 1.5), resolution=16, values=[]), cmap=["grey", "grey"])
+    assert (np.abs(pixels - 128).max(axis=2) < 8).any()
+
+
 def test_a_slice_plots_in_one_call(tmp_path: Any) -> None:
     tree: Node = A - B
     try:
