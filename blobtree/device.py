@@ -87,14 +87,38 @@ def known_device(device: Any = None) -> str:
     Raises
     ------
     InvalidDevice
-        There is no such device.
+        There is no such device, or it is a CUDA device of a process whose parent had started Warp (fork).
     """
     start_warp()
     try:
-        return str(wp.get_device(device))
+        warp_device = wp.get_device(device)
     except (TypeError, ValueError):
         names = ", ".join(repr(str(known)) for known in wp.get_devices())
         raise InvalidDevice(f"device: expected a Warp device ({names}), got {device!r}") from None
+    if warp_device.is_cuda and _forked_with_warp:
+        raise InvalidDevice(
+            f"device: expected 'cpu' in a process forked after its parent had started Warp, got {device!r}, "
+            f"which is {warp_device}: CUDA does not survive a fork; use spawn, as in "
+            'multiprocessing.get_context("spawn"), or pass device="cpu"'
+        )
+    return str(warp_device)
+
+
+# -- processes ------------------------------------------------------------------------------------------
+
+_forked_with_warp = False
+"""True in a child made by `os.fork` after its parent had started Warp, and with it CUDA."""
+
+
+def _forget_threads() -> None:
+    """In a forked child: drop the pools, whose threads exist only in the parent."""
+    global _forked_with_warp
+    _cached_pool.cache_clear()
+    _forked_with_warp = _forked_with_warp or wp._src.context.runtime is not None
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_forget_threads)
 
 
 # -- threads and launches -------------------------------------------------------------------------------

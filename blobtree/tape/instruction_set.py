@@ -7,6 +7,7 @@ whose kernels are those in the files.
 """
 
 import hashlib
+import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -34,6 +35,9 @@ _TABLES = (SKELETONS, OPERATORS, WARPS)
 
 _LOCK = RLock()
 """Held while functions are registered: Warp's registry is not safe for threads."""
+
+if hasattr(os, "register_at_fork"):  # a child forked while another thread holds the lock would wait forever
+    os.register_at_fork(before=_LOCK.acquire, after_in_parent=_LOCK.release, after_in_child=_LOCK.release)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any, Self
 import moderngl
 
 from decals.errors import NoGraphics
-from decals.rendering.gl_libraries import hold_display, require_gl
+from decals.rendering.gl_libraries import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.rendering.pixel_pass import (
     COMPUTE_VERSION,
     Defines,
@@ -108,6 +108,7 @@ class Context:
     """
 
     def __init__(self, gl: moderngl.Context, *, owned: bool = False, backend: str | None = None) -> None:
+        mark_drawing()
         self.gl = gl
         self._owned = owned
         self._programs: dict[tuple[str, str], moderngl.Program] = {}
@@ -160,6 +161,7 @@ class Context:
         if not self._owned:
             yield self
             return
+        check_not_forked()
         stack = _entered.contexts
         stack.append(self.gl)
         self.gl.__enter__()  # type: ignore[no-untyped-call]
@@ -227,7 +229,12 @@ class Context:
         self._spare_textures.clear()
 
     def release(self) -> None:
-        """Release the programs, and the context if it is owned. Calling twice is harmless."""
+        """Release the programs, and the context if it is owned. Calling twice is harmless.
+
+        In a forked child nothing is released, as the driver works in the parent alone.
+        """
+        if is_forked():
+            return
         with self.current():
             self.clear_spare_textures()
             programs: list[Program] = [*self._programs.values(), *self._compute_programs.values()]

@@ -5,6 +5,7 @@ calls :func:`require_gl` first.
 """
 
 import ctypes
+import os
 import sys
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -65,8 +66,10 @@ def require_gl(*, load: Loader = ctypes.CDLL, platform: str = sys.platform) -> N
     Raises
     ------
     decals.errors.NoGraphics
-        With what was expected, what is here, and the command that installs the rest.
+        With what was expected, what is here, and the command that installs the rest; also in a process
+        that was forked after its parent had drawn.
     """
+    check_not_forked()
     missing = missing_gl_libraries(load=load, platform=platform)
     if missing:
         raise NoGraphics(
@@ -82,6 +85,45 @@ def _loads(name: str, load: Loader) -> bool:
         return False
     return True
 
+
+class _Process:
+    """State of OpenGL in this process."""
+
+    draws = False
+    forked = False
+
+
+def mark_drawing() -> None:
+    """Record that this process has an OpenGL context, so that no child made by a fork draws."""
+    _Process.draws = True
+
+
+def is_forked() -> bool:
+    """Return True in a child forked after its parent had drawn."""
+    return _Process.forked
+
+
+def check_not_forked() -> None:
+    """Raise an error in a child forked after its parent had drawn: the driver's threads are missing there.
+
+    Raises
+    ------
+    decals.errors.NoGraphics
+        A call of the driver would wait forever.
+    """
+    if _Process.forked:
+        raise NoGraphics(
+            "expected a process of its own for drawing, got one forked after its parent had drawn, in which "
+            'OpenGL does not work; use spawn, as in multiprocessing.get_context("spawn")'
+        )
+
+
+def _after_fork() -> None:
+    _Process.forked = _Process.forked or _Process.draws
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_after_fork)
 
 _held: list[Any] = []
 

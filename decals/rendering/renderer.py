@@ -18,6 +18,7 @@ from decals.rendering.context import Context
 from decals.rendering.decal_data import DecalData
 from decals.rendering.dirty_regions import TargetState
 from decals.rendering.drawables import register
+from decals.rendering.gl_libraries import is_forked
 from decals.rendering.mesh import ColoredMesh, MeshDrawable
 from decals.rendering.options import RenderOptions, SceneLike, check_scene, viewpoint_of
 from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
@@ -325,7 +326,9 @@ class Renderer:
         self._uploads.sweep()
 
     def release(self) -> None:
-        """Release everything. Calling twice is harmless."""
+        """Release everything. Calling twice is harmless. A forked child releases nothing of its parent."""
+        if is_forked():
+            return
         with self.context.current():
             self._targets.release()
             self._uploads.release()

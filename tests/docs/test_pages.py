@@ -2,6 +2,8 @@
 
 import re
 import runpy
+import subprocess
+import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -104,6 +106,19 @@ def check_pyvista(session: Session) -> None:
         assert np.abs(drawn - stored).mean() < 6
 
 
+def check_many_runs(_session: Session) -> None:
+    """Run the page as a script of its own, as its children import it by its name."""
+    subprocess.run([sys.executable, "script.py"], check=True, timeout=240)
+    rows = Path("sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0] == "spacing,seed,count,mean_radius"
+    assert len(rows) == 7
+    for row in rows[1:]:
+        spacing, seed, count, _ = row.split(",")
+        assert len(load_scene(f"run-{spacing}-{seed}.json").decals) == int(count) > 0
+    with Image.open("count-5.png") as picture:
+        assert picture.size == (320, 240)
+
+
 CHECKS: dict[str, Callable[[Session], None]] = {
     "README": check_readme,
     "tour": check_tour,
@@ -115,6 +130,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "scattering": check_scattering,
     "editing": check_editing,
     "pyvista": check_pyvista,
+    "many-runs": check_many_runs,
 }
 """Checks of what is left after a page's code has run, by the page's name."""
 
