@@ -1,9 +1,9 @@
 """Translation of typed functions (`@wp.func`) to GLSL, so that every formula of the project is written once.
 
 The subset: typed scalars and vectors, arithmetic, comparisons, `if`, `for … in range`, `while`, Warp's
-maths, and calls of other such functions. An array becomes a 2D texture, 4096 texels wide, that is read with
-`texelFetch`. A struct of uniforms (`uniform_struct`) becomes the uniforms themselves. Everything else is
-refused with file and line.
+maths, and calls of other such functions; docs/custom-nodes.md lists it for users. An array becomes a 2D
+texture, 4096 texels wide, that is read with `texelFetch`. A struct of uniforms (`uniform_struct`) becomes the
+uniforms themselves. Everything else is refused with file and line.
 """
 
 import ast
@@ -185,8 +185,8 @@ class _Translator:
     def refusal(self, node: ast.AST, reason: str) -> UntranslatableFunction:
         line = self.first_line + getattr(node, "lineno", 1) - 1
         return UntranslatableFunction(
-            f"{self.file}:{line}: {self.function.key}: {reason}; "
-            "stay within the subset that Warp and GLSL share (see blobtree/transpile/glsl.py)"
+            f"{self.file}:{line}: {written_name(self.function)}: {reason}; "
+            "use what the guide 'Custom nodes' lists under 'Language of typed functions'"
         )
 
     # -- statements ---------------------------------------------------------------------------------
@@ -317,8 +317,10 @@ class _Translator:
                 return self.literal(node, self.resolve(node))
             case ast.Call():
                 return self.call(node)
+            case ast.Compare(ops=[_, _, *_]):
+                raise self.refusal(node, f"{ast.unparse(node)} joins comparisons; join them with `and`")
             case _:
-                raise self.refusal(node, f"{type(node).__name__} expression")
+                raise self.refusal(node, f"{ast.unparse(node)} is a {type(node).__name__} expression")
 
     def uniform(self, node: ast.Attribute, struct: str, name: str) -> Expression:
         fields = uniforms_of(self.structs[struct]) or {}
@@ -398,18 +400,17 @@ class _Translator:
             raise self.refusal(node, f"{ast.unparse(node.func)} is not a typed function")
         if callee.is_builtin():
             if callee.key not in BUILTINS:
-                raise self.refusal(node, f"wp.{callee.key} has no twin in GLSL")
+                raise self.refusal(node, f"wp.{callee.key} has no equivalent in GLSL")
             return BUILTINS[callee.key](*arguments)
         if callee not in self.callees:
             self.callees.append(callee)
         if returned is None:
-            raise self.refusal(node, f"{callee.key} does not say what it returns")
+            raise self.refusal(node, f"{written_name(callee)} does not say what it returns")
         expected = [type_name(hint) for hint in hints.values() if uniforms_of(hint) is None]
         types = [argument.type for argument in arguments]
         if expected != types:
-            raise self.refusal(
-                node, f"{callee.key} takes {', '.join(map(str, expected))}, got {', '.join(types)}"
-            )
+            takes = ", ".join(map(str, expected))
+            raise self.refusal(node, f"{written_name(callee)} takes {takes}, got {', '.join(types)}")
         return Expression(f"{callee.key}({codes})", returned)
 
     def passed(self, node: ast.Call, hints: list[Any]) -> Iterator[ast.expr]:
@@ -420,6 +421,11 @@ class _Translator:
                 yield argument
             elif not (isinstance(argument, ast.Name) and self.structs.get(argument.id) is hint):
                 raise self.refusal(node, f"{ast.unparse(argument)} is not the struct of uniforms expected")
+
+
+def written_name(function: wp.Function) -> str:
+    """Return the name of a function in its source; copies of custom functions have other keys."""
+    return str(getattr(function.func, "__name__", function.key))
 
 
 def spell(name: str) -> str:

@@ -15,6 +15,7 @@ import pyvista as pv
 from PIL import Image
 
 from blobtree import Point, polygonize
+from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
 
@@ -56,6 +57,20 @@ def check_custom_nodes(session: Session) -> None:
     page = (DOCS / "custom-nodes.md").read_text(encoding="utf-8")
     (promise,) = re.findall(r"print\(error\)  # ([\w.]+):(\d+): halfway: ", page)
     assert f"{promise[0]}:{promise[1]}: halfway: " in session["printed"]
+
+
+def test_the_page_of_custom_nodes_lists_the_whole_language() -> None:
+    page = (DOCS / "custom-nodes.md").read_text(encoding="utf-8")
+    section = page.split("## Language of typed functions")[1].split("\n## ")[0]
+    listed = set(re.findall(r"`wp\.(\w+)`", section))
+    types = {
+        "float32",
+        "int32",
+        "uint32",
+        "bool",
+        *(f"vec{n}{kind}" for n in (2, 3, 4) for kind in ("", "i")),
+    }
+    assert listed == set(BUILTINS) | types
 
 
 def check_meshing(session: Session) -> None:

@@ -142,6 +142,55 @@ REFUSED_SKELETONS = [
 ]
 
 
+@wp.func
+def names_text(q: wp.vec3) -> wp.vec3:
+    text = "a"
+    return q * text
+
+
+def calls_what_names_text(q: wp.vec3) -> wp.vec3:
+    return names_text(q)
+
+
+def has_a_matrix(q: wp.vec3, size: wp.mat33) -> wp.vec3:
+    return size * q
+
+
+def chains_comparisons(q: wp.vec3) -> wp.vec3:
+    if 0.0 < q[0] < 1.0:
+        return q * 0.0
+    return q
+
+
+def miscounts(q: wp.vec3) -> wp.vec3:
+    return chains_comparisons_of(q, 1)
+
+
+@wp.func
+def chains_comparisons_of(q: wp.vec3, x: wp.float32) -> wp.vec3:
+    return q * x
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (calls_what_names_text, "names_text: 'a' is no number"),
+        (has_a_matrix, "has_a_matrix: parameter 'size' has no type"),
+        (chains_comparisons, "chains_comparisons: 0.0 < q[0] < 1.0 joins comparisons"),
+        (miscounts, "miscounts: chains_comparisons_of takes vec3, float, got vec3, int"),
+    ],
+    ids=["of_a_callee", "of_a_type", "of_an_expression", "of_arguments"],
+)
+def test_a_refusal_shows_the_names_that_the_user_wrote(function: object, message: str) -> None:
+    with pytest.raises(UntranslatableFunction) as refusal:
+        define_skeleton(function)
+    text = str(refusal.value)
+    assert f": {message}" in text
+    assert "custom_" not in text
+    assert ".py" not in text.replace(HERE, "")  # no file of this package
+    assert "'Language of typed functions'" in text
+
+
 @pytest.mark.parametrize(("function", "message"), REFUSED_SKELETONS)
 def test_what_is_no_skeleton_is_refused_before_it_is_compiled(function: object, message: str) -> None:
     with pytest.raises((InvalidDefinition, UntranslatableFunction), match=message) as refusal:
