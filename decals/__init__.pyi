@@ -11,11 +11,10 @@ from .scattering.scatter import scatter
 from .scattering.sizing import Sizing
 from .scenes.camera import Camera
 from .scenes.cover import cover
-from .scenes.load import load_model
+from .scenes.files import load_model, load_scene, save_scene
 from .scenes.objects import MeshObject, TreeObject
 from .scenes.render import render
 from .scenes.scene import DecalImage, Scene
-from .scenes.scene_file import load_scene, save_scene
 from .vtk import show
 from .window import edit
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.formulas.falloff import RIM
-from decals.images.pixels import decode_srgb
+from decals.images.load import decode_srgb
 from decals.validation import (
     bool_array,
     check_range,

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import BoolArray, Float64Array, Int32Array
-from decals.errors import ImplicitDecalsError, InvalidDecals
+from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
+from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
@@ -131,6 +131,16 @@ def function_values(
             f"{name}: expected numbers from the function, but it raised {type(reason).__name__}: {reason}"
         ) from reason
     return real_array(name, values, error)
+
+
+def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = InvalidImage) -> UInt8Array:
+    """Return pixels that are ``uint8[h, w, 4]`` with h, w > 0, or raise an error."""
+    if not isinstance(pixels, np.ndarray):
+        raise error(f"{name}: expected uint8 pixels [h, w, 4], got {describe(pixels)}; use load_image")
+    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
+        got = f"{pixels.dtype}{list(pixels.shape)}"
+        raise error(f"{name}: expected uint8 pixels [h, w, 4], got {got}; use load_image")
+    return pixels
 
 
 def is_file(path: Path) -> bool:

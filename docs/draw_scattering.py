@@ -9,8 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from blobtree._typing import Float64Array
-from decals.scattering.metrics import ideal_spacing
-from decals.scattering.neighbors import FacingTree
+from decals.scattering.neighbors import FacingTree, ideal_spacing
 from decals.scattering.relaxation import Relaxation
 from decals.surfaces.mesh import MeshSurface
 

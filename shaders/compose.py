@@ -14,8 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from decals.shaders.errors import ComposeError
-
 DIRECTORY = Path(__file__).parent
 """Where the project's own shader files lie."""
 
@@ -25,6 +23,14 @@ _DIRECTIVE = re.compile(r"\s*//@\s*(?P<text>.*?)\s*$")
 _INCLUDE = re.compile(r"include\s+(?P<name>\S+)$")
 _SLOT = re.compile(r"slot\s+(?P<name>[A-Za-z_]\w*)(?P<optional>\s+optional)?$")
 _NAME = re.compile(r"[A-Za-z_]\w*$")
+
+
+class ShaderError(Exception):
+    """Any failure of composing or compiling a shader."""
+
+
+class ComposeError(ShaderError, ValueError):
+    """A shader could not be put together from its files and slots."""
 
 
 @dataclass(frozen=True, slots=True)

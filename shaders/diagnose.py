@@ -3,14 +3,17 @@
 import re
 from collections.abc import Mapping
 
-from decals.shaders.compose import Source
-from decals.shaders.errors import CompileError
+from decals.shaders.compose import ShaderError, Source
 
 _COMPLAINTS = (
     re.compile(r"\d+:(?P<line>\d+)\(\d+\):\s*(?P<text>.*)"),  # Mesa       0:12(4): error: ...
     re.compile(r"\d+\((?P<line>\d+)\)\s*:\s*(?P<text>.*)"),  # NVIDIA     0(12) : error C1503: ...
     re.compile(r"(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?P<text>.*)"),  # Apple, Intel, AMD
 )
+
+
+class CompileError(ShaderError, RuntimeError):
+    """The driver refused a composed shader; the message names file and line of every complaint."""
 
 
 def compile_error(log: str, stages: Mapping[str, Source]) -> CompileError:

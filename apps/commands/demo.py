@@ -9,10 +9,10 @@ from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 from rich.console import Console
 
 from blobtree import Progress
+from blobtree._typing import Float32Array, Int32Array
 from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
 from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
@@ -22,8 +22,6 @@ from decals.apps.output import check_output, write_picture
 from decals.errors import InvalidInput
 from decals.rendering import Renderer
 from decals.rendering.options import RenderOptions
-
-Floats = NDArray[np.float32]
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 
@@ -140,14 +138,14 @@ def _egg() -> MeshObject:
     return MeshObject("egg", vertices, faces, color=(0.86, 0.80, 0.68))
 
 
-def _directions(points: Floats) -> Floats:
+def _directions(points: Float32Array) -> Float32Array:
     """Return the directions of the scales: from head to tail on the creature, upward on the egg."""
     sizes = np.array([_EGG_RADIUS, _EGG_HEIGHT, _EGG_RADIUS], np.float32)
     on_egg = np.linalg.norm((points - _EGG_CENTER) / sizes, axis=1, keepdims=True) < _EGG_TOLERANCE
     return np.where(on_egg, _UP, _BACKWARD)
 
 
-def _choose_images(points: Floats) -> NDArray[np.int32]:
+def _choose_images(points: Float32Array) -> Int32Array:
     """Choose an image for each scale: a gradient from the tail to the egg, with random variation."""
     gradient = np.clip((points[:, 0] - 0.25 * points[:, 1] + 2.1) / 3.6, 0.0, 1.0)
     jitter = np.random.default_rng(7).uniform(-0.7, 0.7, len(points))

@@ -1,15 +1,12 @@
 """Shapes of the sample models: the spheres and the creature as BlobTrees; knot, egg and box as meshes."""
 
-from typing import Any
-
 import numpy as np
 import pyvista as pv
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from blobtree import Node, Point, Ricci, Segment, Sum
+from blobtree._typing import Float64Array, FloatArray, Int32Array
 from decals.surfaces.mesh_file import MeshArrays
-
-Floats = NDArray[np.floating[Any]]
 
 _COLD, _WARM = (0.36, 0.52, 0.72), (0.85, 0.55, 0.32)
 _BALLS = (
@@ -125,18 +122,18 @@ def torus_knot(
     return vertices.reshape(-1, 3).astype(np.float32), _grid_faces(along, around)
 
 
-def _knot(t: Floats, turns: int, windings: int, radius: float, bend: float) -> Floats:
+def _knot(t: FloatArray, turns: int, windings: int, radius: float, bend: float) -> FloatArray:
     ring = radius + bend * np.cos(windings * t)
     return np.stack(
         [ring * np.cos(turns * t), ring * np.sin(turns * t), bend * np.sin(windings * t)], axis=-1
     )
 
 
-def _unit(vectors: Floats) -> Floats:
+def _unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-def _grid_faces(along: int, around: int) -> NDArray[np.int32]:
+def _grid_faces(along: int, around: int) -> Int32Array:
     """Return the triangles of a grid that is periodic in both directions."""
     i, j = (index.reshape(-1) for index in np.indices((along, around)))
     a, b = i * around + j, (i + 1) % along * around + j
@@ -185,14 +182,14 @@ def rounded_box(center: ArrayLike, *, half: ArrayLike, rounding: float) -> MeshA
     return (inner + rounding * outward + np.asarray(center)).astype(np.float32), faces
 
 
-def _cube() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def _cube() -> tuple[Float64Array, Int32Array]:
     """Return the surface of the cube from -1 to 1, in equal squares of two triangles."""
     grid = pv.ImageData(dimensions=(_SQUARES + 1,) * 3, spacing=(2.0 / _SQUARES,) * 3, origin=(-1.0,) * 3)
     surface = grid.extract_surface(algorithm="geometry").triangulate()  # the default algorithm leaves seams
     return np.asarray(surface.points, np.float64), surface.regular_faces.astype(np.int32)
 
 
-def _ball() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def _ball() -> tuple[Float64Array, Int32Array]:
     sphere = pv.Icosphere(nsub=_SUBDIVISIONS)
     points = np.asarray(sphere.points, np.float64)
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)

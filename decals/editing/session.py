@@ -11,8 +11,8 @@ from decals.editing.document import Document
 from decals.editing.edit import DecalStates, Edit, SceneParts
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
+from decals.scenes.files import save_scene
 from decals.scenes.scene import Scene
-from decals.scenes.scene_file import save_scene
 from decals.validation import describe, instance
 
 MAX_REPLAYED_DECALS = 500

@@ -31,6 +31,9 @@ MIN_SPAN = 1.0e-7
 MIN_COMPLEMENT = 1.0e-37
 """Smallest divisor whose reciprocal is finite, and which no graphics card flushes to 0."""
 
+ALMOST_ONE = 0.99999994
+"""Largest float32 below 1."""
+
 
 @wp.func
 def log_one_minus(w: wp.float32) -> wp.float32:
@@ -55,6 +58,30 @@ def add_push(push: wp.float32, phi: wp.float32, contact: wp.int32) -> wp.float32
     if contact == Contact.MIN:
         return wp.max(push, phi)
     return push + phi * (1.0 - push)
+
+
+@wp.func
+def push_of(e: wp.float32, least: wp.float32, per_span: wp.float32, per_least: wp.float32) -> wp.float32:
+    """Return the push φ of a neighbour (`contact_push` with given reciprocals); 0 for the owner."""
+    if e <= least or e + least >= 1.0:
+        return 0.0
+    return wp.exp(log_one_minus(wp.min((e - least) * per_span, ALMOST_ONE)) * per_least)
+
+
+@wp.func
+def add_pushes(
+    push: wp.float32,
+    e: wp.vec4,
+    least: wp.float32,
+    per_span: wp.float32,
+    per_least: wp.float32,
+    contact: wp.int32,
+) -> wp.float32:
+    """Extend 1 − ∏(1 − φ), or the largest φ in `Contact.MIN`, by four neighbours."""
+    first = add_push(push, push_of(e[0], least, per_span, per_least), contact)
+    second = add_push(first, push_of(e[1], least, per_span, per_least), contact)
+    third = add_push(second, push_of(e[2], least, per_span, per_least), contact)
+    return add_push(third, push_of(e[3], least, per_span, per_least), contact)
 
 
 @wp.func

@@ -13,12 +13,12 @@ from blobtree.device import known_device
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
-from decals.images.pixels import decode_srgb, require_rgba
+from decals.images.load import decode_srgb
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
 from decals.record import Contact
-from decals.validation import describe, member
+from decals.validation import describe, member, require_rgba
 
 
 @dataclass(frozen=True, eq=False)

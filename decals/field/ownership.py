@@ -3,6 +3,10 @@
 `owner_at` returns the topmost decal, `complement_at` and `uv_at` its field and image coordinates, and
 `owner_below` the next decal below, until NO_OWNER. Shaders have the contact mode and `IndexedDecals.layered`
 as constants, so that compilers remove the branches that are not used.
+
+If all decals are contact decals of one layer, `single_layer_at` finds owner and field in one traversal of the
+index. It keeps the complements of all candidates, so that the pushes of neighbours need no second traversal.
+Shaders keep them in two vectors, which are registers. An indexed array would be memory.
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -11,18 +15,38 @@ as constants, so that compilers remove the branches that are not used.
 
 import warp as wp
 
-from decals.field.contact import add_push, contact_complement, contact_push, contact_uv, rim_distance
+from decals.field.contact import (
+    MIN_COMPLEMENT,
+    MIN_SPAN,
+    add_push,
+    add_pushes,
+    contact_complement,
+    contact_push,
+    contact_uv,
+    rim_distance,
+)
 from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates, unroll
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
-from decals.index.draw_order import ABOVE_ALL, end_of_lower, rank_range
-from decals.index.lookup import IndexedDecals, cell_range
-from decals.record import RECORD, Contact, complement_of, is_contact_rank, rank_of, visible_radius, xyz
+from decals.index.lookup import ABOVE_ALL, IndexedDecals, cell_range, end_of_lower, rank_range
+from decals.record import (
+    NO_FIELD,
+    RECORD,
+    Contact,
+    complement_of,
+    is_contact_rank,
+    rank_of,
+    visible_radius,
+    xyz,
+)
 
 wp.set_module_options({"enable_backward": False})
 
 NO_OWNER = CELL_NO_OWNER
 """Owner of a point outside all rims."""
+
+MAX_KEPT = 8
+"""Number of complements that are kept. Where more decals act, the index is traversed a second time."""
 
 
 @wp.func
@@ -154,3 +178,52 @@ def uv_at(
     arc = unroll(small, normal, n_q)
     drawn = image_distance(rim, wp.length(small), arc[3])
     return contact_uv(tangent_coordinates(xyz(arc), normal, tangent), drawn)
+
+
+@wp.func
+def single_layer_at(
+    q: wp.vec3,
+    n_q: wp.vec3,
+    contact: wp.int32,
+    index: IndexedDecals,
+) -> wp.vec2:
+    """Return (owner, E) at q in the contact modes PRODUCT and MIN; (NO_OWNER, 0) outside all rims.
+
+    They are those of `owner_at` and `complement_at`. The decals must not be layered.
+    """
+    owner = wp.int32(NO_OWNER)
+    least = wp.float32(0.5)
+    ties = wp.int32(0)
+    count = wp.int32(0)
+    a = wp.vec4(NO_FIELD, NO_FIELD, NO_FIELD, NO_FIELD)
+    b = wp.vec4(NO_FIELD, NO_FIELD, NO_FIELD, NO_FIELD)
+    for level in range(index.level_count):
+        span = cell_range(q, level, index)
+        for j in range(span[0], span[1]):
+            decal = index.ids[j]
+            e = complement_of(q, n_q, decal, index.records)
+            if e < 1.0:
+                b = wp.vec4(a[3], b[0], b[1], b[2])
+                a = wp.vec4(e, a[0], a[1], a[2])
+                count += 1
+                if e < least:
+                    ties = 0
+                if e <= least:
+                    ties += 1
+                    if e < least or owner < 0 or decal < owner:
+                        owner = decal
+                    least = e
+    if owner < 0:
+        return wp.vec2(float(NO_OWNER), 0.0)
+    if count > MAX_KEPT:
+        deformed = pushed_complement(q, n_q, owner, contact, index)
+        return wp.vec2(float(owner), deformed)
+    per_span = 1.0 / wp.max(1.0 - 2.0 * least, MIN_SPAN)
+    per_least = 1.0 / wp.max(least, MIN_COMPLEMENT)
+    push = wp.float32(0.0)
+    push = add_pushes(push, a, least, per_span, per_least, contact)
+    if count > 4:
+        push = add_pushes(push, b, least, per_span, per_least, contact)
+    if ties > 1:  # on a contact line
+        push = 1.0
+    return wp.vec2(float(owner), contact_complement(least, push))

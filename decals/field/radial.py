@@ -19,8 +19,7 @@ cell of the decal of least |q − p|² − ρ².
 
 import warp as wp
 
-from decals.index.draw_order import rank_range
-from decals.index.lookup import IndexedDecals
+from decals.index.lookup import IndexedDecals, rank_range
 from decals.record import (
     RECORD,
     RIM_RADIUS,

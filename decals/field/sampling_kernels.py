@@ -7,8 +7,7 @@ import warp as wp
 
 from decals.field.mapping import in_image
 from decals.field.ownership import NO_OWNER, complement_at, owner_at, owner_below, uv_at
-from decals.index.draw_order import next_number_below
-from decals.index.lookup import IndexedDecals
+from decals.index.lookup import IndexedDecals, next_number_below
 from decals.record import RECORD, rank_of
 
 wp.set_module_options({"enable_backward": False})

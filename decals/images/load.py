@@ -1,4 +1,4 @@
-"""Decal images from picture files of any mode, as RGBA."""
+"""Decal images from picture files of any mode, as RGBA, and the decoding of sRGB."""
 
 import warnings
 from pathlib import Path
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
+from blobtree._typing import FloatArray
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
 from decals.validation import is_file
@@ -128,3 +129,8 @@ def _wide_grey(values: NDArray[np.float64], mode: str) -> NDArray[np.uint8]:
         grey = values / 257.0
     level = np.rint(np.clip(grey, 0.0, 255.0)).astype(np.uint8)
     return np.dstack([level, level, level, np.full_like(level, 255)])
+
+
+def decode_srgb(colors: FloatArray) -> FloatArray:
+    """Decode sRGB colours from 0 to 1 to linear light, in the precision of ``colors``."""
+    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)

@@ -16,8 +16,7 @@ from decals.index.decal_cells import (
     power_of_two,
     touches,
 )
-from decals.index.draw_order import end_of_lower
-from decals.index.lookup import IndexedDecals
+from decals.index.lookup import IndexedDecals, end_of_lower
 from decals.record import RECORD, rank_of, xyz
 
 wp.set_module_options({"enable_backward": False})

@@ -11,7 +11,7 @@ have at most 24 on average. Three arrays go to the device:
     levels  float32[l, 4]   each level: (cells per unit length, cell size, lowest rank, highest rank)
     table   int32[2^k, 4]   slots of an open-addressing hash table: (x + level·2²⁴, y, z, head), or x < 0
     ids     int32[m]        lists: ids[head] is the length of a list, followed by the numbers of its decals in
-                            draw order (decals/index/draw_order.py)
+                            draw order (decals/index/lookup.py)
 
 Cell sizes are powers of two, and cells are counted from the origin of the world. The cell of a float32 point
 is therefore exact, at any distance from the origin.
@@ -27,9 +27,8 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int32Array, Int64Array
 from blobtree.device import known_device
 from decals.index.build import build_index
-from decals.index.candidate_kernels import count_candidates, list_candidates
 from decals.index.decal_cells import LEVEL_SHIFT, NO_PARITY
-from decals.index.lookup import IndexedDecals
+from decals.index.lookup import IndexedDecals, count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, LAYER_LIMIT, MAX_COORDINATE, Decals
 from decals.validation import check_range, finite_array, whole_array
 

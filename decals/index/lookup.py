@@ -1,4 +1,8 @@
-"""Look-up of a cell in the index: typed functions for Warp and GLSL, and the arrays that they read."""
+"""Look-up of decals in the index: the arrays that it reads, typed functions for Warp and GLSL, and kernels.
+
+Decals are drawn by rank, then by number; the lists of the index are in this order. The rank of a decal is
+four times its layer, counted from the lowest possible one, plus its `Interaction`.
+"""
 
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
@@ -6,11 +10,15 @@
 import warp as wp
 
 from blobtree.transpile.glsl import uniform_struct
+from decals.record import is_contact_rank, rank_of
 
 wp.set_module_options({"enable_backward": False})
 
 HALF_RANGE = 8388608.0
 """Cell coordinates lie in [−2²³, 2²³), where float32 represents multiples of ½ exactly."""
+
+ABOVE_ALL = 1 << 23
+"""Above every rank."""
 
 MIX_X = wp.constant(wp.uint32(0x1B873593))
 MIX_Y = wp.constant(wp.uint32(0x27D4EB2F))
@@ -87,3 +95,87 @@ def cell_range(
         slot = (slot + 1) & index.mask
         entry = index.table[slot]
     return wp.vec2i(0, 0)
+
+
+@wp.func
+def end_of_lower(
+    span: wp.vec2i,
+    rank: wp.int32,
+    decal: wp.int32,
+    index: IndexedDecals,
+) -> wp.int32:
+    """Return the position in a list after the last decal that is drawn before (rank, decal)."""
+    low = span[0]
+    high = span[1]
+    while low < high:
+        middle = (low + high) >> 1
+        other = rank_of(index.ids[middle], index.records)
+        if other < rank or (other == rank and index.ids[middle] < decal):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@wp.func
+def rank_range(
+    q: wp.vec3,
+    rank: wp.int32,
+    level: wp.int32,
+    index: IndexedDecals,
+) -> wp.vec2i:
+    """Return the range (first, past last) in ids of the decals of one level and rank that may reach q.
+
+    The rank is ignored if the decals are not layered.
+    """
+    if index.layered and (int(index.levels[level][2]) > rank or int(index.levels[level][3]) < rank):
+        return wp.vec2i(0, 0)
+    span = cell_range(q, level, index)
+    first = span[0]
+    last = span[1]
+    if index.layered:
+        if int(index.levels[level][2]) < rank:
+            first = end_of_lower(span, rank, 0, index)
+        if int(index.levels[level][3]) > rank:
+            last = end_of_lower(wp.vec2i(first, last), rank + 1, 0, index)
+    return wp.vec2i(first, last)
+
+
+@wp.func
+def next_number_below(owner: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.int32:
+    """Return the number from which `owner_below` continues; it skips all contact decals of one rank."""
+    if is_contact_rank(rank_of(owner, decals)):
+        return 0
+    return owner
+
+
+@wp.kernel
+def count_candidates(
+    points: wp.array(dtype=wp.vec3),
+    index: IndexedDecals,
+    counts: wp.array(dtype=wp.int32),
+):
+    """Write the number of candidates at each point, over all levels."""
+    i = wp.tid()
+    total = wp.int32(0)
+    for level in range(index.level_count):
+        span = cell_range(points[i], level, index)
+        total += span[1] - span[0]
+    counts[i] = total
+
+
+@wp.kernel
+def list_candidates(
+    points: wp.array(dtype=wp.vec3),
+    index: IndexedDecals,
+    offsets: wp.array(dtype=wp.int32),
+    candidates: wp.array(dtype=wp.int32),
+):
+    """Write the candidates of each point from its offset on, level after level."""
+    i = wp.tid()
+    slot = offsets[i]
+    for level in range(index.level_count):
+        span = cell_range(points[i], level, index)
+        for j in range(span[0], span[1]):
+            candidates[slot] = index.ids[j]
+            slot += 1

@@ -10,11 +10,10 @@ from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
 from decals.errors import TooMuchData
 from decals.field.mapping import in_image, tangent_coordinates, unroll_step
-from decals.field.ownership import complement_at, owner_at, owner_below, uv_at
-from decals.field.single_layer import single_layer_at
-from decals.index.draw_order import next_number_below
+from decals.field.ownership import complement_at, owner_at, owner_below, single_layer_at, uv_at
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
+from decals.index.lookup import next_number_below
 from decals.model import Decals
 from decals.record import Contact
 from decals.rendering.context import Context

@@ -12,8 +12,9 @@ from PIL import Image
 from blobtree._typing import Float32Array, UInt8Array
 from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS
 from decals.errors import TooMuchData
-from decals.images.pixels import decode_srgb, require_rgba
+from decals.images.load import decode_srgb
 from decals.rendering.context import Context
+from decals.validation import require_rgba
 
 MAX_IMAGE_SIZE = 2048
 """Side of an image on the GPU, at most."""

@@ -16,9 +16,8 @@ from blobtree.device import launch
 from decals.model import FACING_LIMIT
 from decals.scattering.boundary_kernels import PLANES_PER_POINT, BoundarySegments, find_mirror_planes
 from decals.scattering.shared_kernels import MirrorPlanes, Particles
-from decals.surfaces.device_surface import Scalars
 from decals.surfaces.mesh import MeshSurface, edges_of
-from decals.surfaces.surface import Surface
+from decals.surfaces.surface import Scalars, Surface
 
 PROBE_DISTANCE = 0.5
 """Distance beyond an open edge, in spacings, at which a continuation of the surface is looked for."""

@@ -13,8 +13,7 @@ from blobtree.device import known_device
 from decals.errors import InvalidScattering
 from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
-from decals.surfaces.device_surface import vectors
-from decals.surfaces.surface import Surface, as_points
+from decals.surfaces.surface import Surface, as_points, vectors
 from decals.validation import function_or_none, function_values, real_number, whole_number
 
 AREA_SAMPLES = 16384

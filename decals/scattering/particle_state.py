@@ -20,7 +20,7 @@ from decals.scattering.step_kernels import (
     propose_moves,
     scatter_rows,
 )
-from decals.surfaces.device_surface import Scalars, Vectors, vectors
+from decals.surfaces.surface import Scalars, Vectors, vectors
 
 MAX_LIST_AGE = 12
 """Steps after which an epoch ends in any case."""

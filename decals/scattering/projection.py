@@ -9,8 +9,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.device import launch
 from decals.scattering.step_kernels import offset_points
-from decals.surfaces.device_surface import DeviceSurface, Scalars, Vectors, on_device
-from decals.surfaces.surface import Surface
+from decals.surfaces.surface import DeviceSurface, Scalars, Surface, Vectors, on_device
 
 HIDING_OFFSET = 1e-4
 """Offset of a point along its normal before the test whether it lies inside another surface, in diagonals of
@@ -54,7 +53,7 @@ class SurfaceProjection:
     ) -> None:
         """Write the closest positions on the points' own surfaces, the normals there, and 1 where forbidden.
 
-        `reaches` bound the distances to the surfaces, as in `decals.surfaces.device_surface`.
+        `reaches` bound the distances to the surfaces, as in `decals.surfaces.surface`.
         """
         for index, first, last in spans:
             rows = slice(first, last)

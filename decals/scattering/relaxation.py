@@ -20,8 +20,7 @@ from decals.scattering.domain import (
     particle_count,
     remaining_counts,
 )
-from decals.scattering.metrics import Spacing, ideal_spacing, spacing_of_points
-from decals.scattering.neighbors import NeighborQuery
+from decals.scattering.neighbors import NeighborQuery, Spacing, ideal_spacing, spacing_of_points
 from decals.scattering.orientation import Direction
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.polish import CLOSE_DISTANCE, polish, relax_near

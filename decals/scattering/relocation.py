@@ -11,7 +11,7 @@ from decals.scattering.domain import Domain, OrientedPoints, apportion, crosses_
 from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import particle_struct
-from decals.surfaces.device_surface import vectors
+from decals.surfaces.surface import vectors
 
 MIN_ENERGY_RATIO = 1.8
 """Energy of a crowded particle, as a multiple of the median energy."""

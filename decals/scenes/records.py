@@ -127,7 +127,7 @@ _OLD_NAMES = {"contact": Interaction.PUSH}
 
 
 class DecalRecord(Struct, forbid_unknown_fields=True):
-    """One decal; `decals.scenes.scene_file` shows it in a file."""
+    """One decal; `decals.scenes.files` shows it in a file."""
 
     position: Vector
     normal: Vector

@@ -11,7 +11,7 @@ from decals.rendering.picture import Picture
 from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Viewpoint
 from decals.scenes.cover import fitting_camera
-from decals.scenes.load import load_model
+from decals.scenes.files import load_model
 from decals.scenes.objects import SceneObject, as_objects
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model

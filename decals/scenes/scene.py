@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from decals import rendering
 from decals.errors import InvalidScene, NoGraphics
 from decals.images import load_image
-from decals.images.pixels import require_rgba
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject, bounds_of, check_names
-from decals.validation import describe, instance
+from decals.validation import describe, instance, require_rgba
 
 NOTEBOOK_SIZE = (640, 480)
 """Size of the picture of a scene in a notebook."""

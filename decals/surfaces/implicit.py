@@ -11,9 +11,17 @@ from blobtree._typing import BoolArray, Float32Array
 from blobtree.device import known_device, launch
 from blobtree.tracing.trace import trace
 from decals.errors import InvalidMesh, InvalidScattering
-from decals.surfaces.device_surface import Scalars, Vectors, contains_host, project_host, vectors
 from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface
-from decals.surfaces.surface import as_points, as_rays, as_reaches
+from decals.surfaces.surface import (
+    Scalars,
+    Vectors,
+    as_points,
+    as_rays,
+    as_reaches,
+    contains_host,
+    project_host,
+    vectors,
+)
 from decals.surfaces.tree_kernels import mark_above, project, project_with_mesh
 from decals.validation import describe, whole_number
 

@@ -13,9 +13,18 @@ from blobtree.device import known_device, launch
 from blobtree.lazy import Lazy
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.model import MAX_COORDINATE
-from decals.surfaces.device_surface import Scalars, Vectors, contains_host, project_host, vectors
 from decals.surfaces.mesh_kernels import closest_faces, closest_points, first_hits, mark_inside
-from decals.surfaces.surface import as_points, as_rays, as_reaches, make_read_only
+from decals.surfaces.surface import (
+    Scalars,
+    Vectors,
+    as_points,
+    as_rays,
+    as_reaches,
+    contains_host,
+    make_read_only,
+    project_host,
+    vectors,
+)
 from decals.validation import whole_number
 
 MIN_FACE_QUALITY = 1e-6

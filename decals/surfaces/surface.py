@@ -1,14 +1,22 @@
-"""`Surface`, the protocol of surfaces for scattering and editing, and checks of points and rays."""
+"""`Surface`, the protocol of surfaces for scattering and editing; checks of points and rays.
 
-from typing import Protocol, runtime_checkable
+A `DeviceSurface` is a surface in the memory of a Warp device: it projects points without a copy to the host.
+"""
+
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from blobtree._typing import BoolArray, Float32Array
 from decals.errors import InvalidPoints
 
-Floats = NDArray[np.float32]
-Flags = NDArray[np.bool_]
+Vectors = Any
+"""``wp.array`` of ``vec3`` on the surface's device."""
+
+Scalars = Any
+"""``wp.array`` of ``float32`` or ``int32`` on the surface's device."""
 
 
 @runtime_checkable
@@ -41,11 +49,11 @@ class Surface(Protocol):
         ...
 
     @property
-    def bounds(self) -> tuple[Floats, Floats]:
+    def bounds(self) -> tuple[Float32Array, Float32Array]:
         """Lower and upper corner of the box around the surface, ``float32[3]`` each."""
         ...
 
-    def sample(self, count: int, seed: int) -> tuple[Floats, Floats]:
+    def sample(self, count: int, seed: int) -> tuple[Float32Array, Float32Array]:
         """Return positions and normals of `count` random points, uniform by area, ``float32[n, 3]`` each.
 
         The samples are stratified: one falls into each ``1/count`` of the area, in the order of the surface.
@@ -53,7 +61,9 @@ class Surface(Protocol):
         """
         ...
 
-    def project(self, points: ArrayLike, *, within: Floats | None = None) -> tuple[Floats, Floats]:
+    def project(
+        self, points: ArrayLike, *, within: Float32Array | None = None
+    ) -> tuple[Float32Array, Float32Array]:
         """Return the points of the surface closest to the given points, and the normals there.
 
         Parameters
@@ -69,11 +79,11 @@ class Surface(Protocol):
         """
         ...
 
-    def normal(self, points: ArrayLike) -> Floats:
+    def normal(self, points: ArrayLike) -> Float32Array:
         """Return the normals of the surface where it is closest to the points."""
         ...
 
-    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Floats:
+    def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
         """Return the distance to the first hit of each ray, ``float32[n]``; infinity for a miss.
 
         Distances are in model units; directions need not be unit vectors. A ray with direction zero misses.
@@ -81,12 +91,37 @@ class Surface(Protocol):
         """
         ...
 
-    def contains(self, points: ArrayLike) -> Flags:
+    def contains(self, points: ArrayLike) -> BoolArray:
         """Return True for each point inside, ``bool[n]``; an open surface contains nothing."""
         ...
 
 
-def as_points(points: ArrayLike, name: str = "points") -> Floats:
+class DeviceSurface(Protocol):
+    """A surface whose queries read and write arrays of one device."""
+
+    def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
+        """Write the surface points closest to the points, and the normals there.
+
+        `reaches` are expected distances to the surface. They only save time: a surface farther away is found
+        too.
+        """
+        ...
+
+    def mark_inside(self, points: Vectors, flags: Scalars) -> None:
+        """Write 1 into the flags of points inside the surface; leave the other flags."""
+        ...
+
+
+@runtime_checkable
+class SupportsDevice(Protocol):
+    """A `Surface` that can be held by a device; this is optional."""
+
+    def on(self, device: str) -> DeviceSurface:
+        """Return the surface in the memory of a device."""
+        ...
+
+
+def as_points(points: ArrayLike, name: str = "points") -> Float32Array:
     """Return points as contiguous finite ``float32[n, 3]``, or raise `InvalidPoints`."""
     try:
         with np.errstate(over="ignore"):  # infinities are refused below
@@ -105,7 +140,7 @@ def as_points(points: ArrayLike, name: str = "points") -> Floats:
     return array
 
 
-def as_reaches(within: ArrayLike | None, count: int) -> Floats:
+def as_reaches(within: ArrayLike | None, count: int) -> Float32Array:
     """Return expected distances to the surface, ``float32[count]``; zeros for None."""
     if within is None:
         return np.zeros(count, np.float32)
@@ -115,7 +150,7 @@ def as_reaches(within: ArrayLike | None, count: int) -> Floats:
     return reaches.astype(np.float32)
 
 
-def as_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
+def as_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Float32Array, Float32Array]:
     """Return origins and unit directions of rays, ``float32[n, 3]`` each; zero directions stay zero."""
     starts, headings = as_points(origins, "origins"), as_points(directions, "directions")
     if len(starts) != len(headings):
@@ -123,14 +158,62 @@ def as_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
     return starts, unit_rows(headings)
 
 
-def unit_rows(vectors: NDArray[np.floating]) -> Floats:
+def unit_rows(vectors: NDArray[np.floating]) -> Float32Array:
     """Scale rows to length 1; zero rows stay zero."""
     wide = vectors.astype(np.float64)
     lengths = np.linalg.norm(wide, axis=1, keepdims=True)
-    units: Floats = (wide / np.where(lengths > 0, lengths, 1.0)).astype(np.float32)
+    units: Float32Array = (wide / np.where(lengths > 0, lengths, 1.0)).astype(np.float32)
     return units
 
 
 def make_read_only(array: NDArray[np.generic]) -> None:
     """Make an array read-only."""
     array.setflags(write=False)
+
+
+class HostSurfaceAdapter:
+    """`DeviceSurface` of a surface that answers only on the host: points are copied there and back."""
+
+    def __init__(self, surface: Surface) -> None:
+        self._surface = surface
+
+    def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
+        """Call `Surface.project`."""
+        host_positions, host_normals = self._surface.project(points.numpy(), within=reaches.numpy())
+        positions.assign(host_positions)
+        normals.assign(host_normals)
+
+    def mark_inside(self, points: Vectors, flags: Scalars) -> None:
+        """Call `Surface.contains`."""
+        flags.assign(np.maximum(flags.numpy(), self._surface.contains(points.numpy()).astype(np.int32)))
+
+
+def on_device(surface: Surface, device: str) -> DeviceSurface:
+    """Return the surface on a device, through the host if it does not support devices."""
+    return surface.on(device) if isinstance(surface, SupportsDevice) else HostSurfaceAdapter(surface)
+
+
+def vectors(rows: Float32Array, device: str) -> Vectors:
+    """Return rows ``[n, 3]`` as an array on a device; on the CPU it shares their memory."""
+    return wp.array(rows, dtype=wp.vec3, device=device, copy=False)
+
+
+def project_host(
+    surface: DeviceSurface, points: Float32Array, reaches: Float32Array, device: str
+) -> tuple[Float32Array, Float32Array]:
+    """Project points of the host; return positions and normals, ``float32[n, 3]`` each."""
+    positions: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
+    normals: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
+    if len(points):
+        max_distances: Any = wp.array(reaches, dtype=wp.float32, device=device, copy=False)
+        surface.project(vectors(points, device), max_distances, positions, normals)
+    return positions.numpy(), normals.numpy()
+
+
+def contains_host(surface: DeviceSurface, points: Float32Array, device: str) -> BoolArray:
+    """Return True for each point of the host that lies inside, ``bool[n]``."""
+    flags: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+    if len(points):
+        surface.mark_inside(vectors(points, device), flags)
+    marked: BoolArray = flags.numpy() == 1
+    return marked

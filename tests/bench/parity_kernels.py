@@ -5,8 +5,7 @@
 import warp as wp
 
 from decals.field.contact import rim_distance
-from decals.field.ownership import NO_OWNER, complement_at, owner_at, uv_at
-from decals.field.single_layer import single_layer_at
+from decals.field.ownership import NO_OWNER, complement_at, owner_at, single_layer_at, uv_at
 from decals.index.lookup import IndexedDecals
 from tests.oracles.parallel import Members, rim_of, wide
 

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from decals.errors import InvalidInput, InvalidScattering
-from decals.scattering.metrics import Spacing, ideal_spacing, spacing_of_distances
-from decals.scattering.neighbors import FacingTree
+from decals.scattering.neighbors import FacingTree, Spacing, ideal_spacing, spacing_of_distances
 from decals.scattering.relaxation import Relaxation
 from decals.surfaces.mesh import MeshSurface
 from tests.bench.scattering_models import MODELS, TREES, meshed, surfaces_of

@@ -16,8 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from decals.model import FACING_LIMIT
-from decals.scattering.metrics import NEIGHBOR_REACH
-from decals.scattering.neighbors import FacingTree
+from decals.scattering.neighbors import NEIGHBOR_REACH, FacingTree
 from decals.scattering.relaxation import Relaxation
 from tests.bench.scattering_models import MODELS, surfaces_of
 

@@ -49,14 +49,14 @@ class Held:
 
 def hold_writing(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Let saves wait until they are let go; the events that say that one has begun, and let it go."""
-    from decals.scenes import scene_file
+    from decals.scenes import files
 
-    begun, go, write = threading.Event(), threading.Event(), scene_file.write_atomically
+    begun, go, write = threading.Event(), threading.Event(), files.write_atomically
 
     def slowly(path: Any, content: Any) -> None:
         begun.set()
         assert go.wait(LONG)
         write(path, content)
 
-    monkeypatch.setattr(scene_file, "write_atomically", slowly)
+    monkeypatch.setattr(files, "write_atomically", slowly)
     return begun, go

@@ -10,7 +10,7 @@ import pytest
 from decals.editing import ScaleDecals
 from decals.editing.background import step_of
 from decals.errors import InvalidScene
-from decals.scenes.scene_file import load_scene
+from decals.scenes.files import load_scene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
 from tests.decals.editing.scenes import scene
 

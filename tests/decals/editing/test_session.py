@@ -8,7 +8,7 @@ import pytest
 
 from decals.editing import AddDecals, DeleteDecals, EditSession, MoveDecals, ScaleDecals, SetValues
 from decals.errors import InvalidDecals, InvalidEdit, InvalidScene
-from decals.scenes.scene_file import load_scene
+from decals.scenes.files import load_scene
 from tests.decals.editing.scenes import digest, one, scene
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
+from decals.field.contact import MIN_COMPLEMENT, MIN_SPAN
 from decals.field.ownership import owner_at
 from decals.index.index import DecalIndex
 from decals.model import RECORD
@@ -84,7 +85,7 @@ BY_NAME: dict[str, Draw] = {
     "limit": whole(-1, DECALS),
     "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
     "p": uniform(-1.5, 1.5, 4), "rate": uniform(0.1, 3.0), "min_influence": uniform(0.3, 2.5),
-    "e_k": uniform(0.0, 0.5), "e_i": share,
+    "e": share, "e_k": uniform(0.0, 0.5), "e_i": share,
     "exponent": among(1.5, 2, 3, 7, 20, 100), "parameter": among(1.5, 2, 3, 7, 20, 100), "f": field,
     "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3),
     "inverse": uniform(-3.0, 3.0, 3), "length": uniform(0.0, 1.5), "m": place,
@@ -112,6 +113,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "gradient_pullback_warp": {"f": uniform(-1.0, 1.0, 4), "q": uniform(-1.0, 1.0, 3)},
     "color_pullback_warp": {"f": four},
     "color_pullback_affine": {"f": four},
+    "add_pushes": {"e": uniform(0.0, 1.0, 4)},
     "power": {"radius": uniform(0.1, 2.0)},
     "balls_nested": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
     "plane_distance": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0)},
@@ -184,6 +186,10 @@ def arguments_of(typed: TypedFunction) -> dict[str, Any]:
     if typed.name == "contact_push":
         least = draws["e_k"](rng, COUNT)
         known |= {"e_k": least, "e_i": least + share(rng, COUNT)}
+    if "per_least" in typed.parameters:
+        least = uniform(0.0, 0.5)(rng, COUNT)
+        spans, divisors = np.maximum(1.0 - 2.0 * least, MIN_SPAN), np.maximum(least, MIN_COMPLEMENT)
+        known |= {"least": least, "per_span": 1.0 / spans, "per_least": 1.0 / divisors}
     if typed.name == "arc_over_chord":
         angle = uniform(0.0, 0.5 * np.pi)(rng, COUNT)
         known |= {"sine_squared": np.sin(angle) ** 2, "cosine": np.cos(angle)}

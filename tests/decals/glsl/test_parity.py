@@ -29,8 +29,6 @@ MODULES = (
     "decals.index.lookup",
     "decals.field.radial",
     "decals.record",
-    "decals.index.draw_order",
-    "decals.field.radial",
     "decals.field.ownership",
 )
 WRITTEN_TWICE = {"closest", "min_influence", "stride", "is_convex", "is_monotone"}

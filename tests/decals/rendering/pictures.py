@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from decals.field.mapping import ImageMapping
-from decals.images.pixels import decode_srgb
+from decals.images.load import decode_srgb
 from decals.model import Decals
 from decals.record import Contact
 from decals.rendering.options import SceneLike

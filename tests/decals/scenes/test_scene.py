@@ -12,9 +12,9 @@ from decals.errors import ImplicitDecalsError, InvalidImage, InvalidMesh, Invali
 from decals.images import generate_image
 from decals.model import Decals
 from decals.scenes.camera import Camera
+from decals.scenes.files import from_json, is_scene, load_scene, save_scene, to_json
 from decals.scenes.objects import MeshObject, TreeObject, bounds_of
 from decals.scenes.scene import DecalImage, Scene
-from decals.scenes.scene_file import from_json, is_scene, load_scene, save_scene, to_json
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32) * np.float32(0.1)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)

@@ -10,7 +10,7 @@ from decals.editing.commands import ScaleDecals
 from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidEdit, InvalidScene
-from decals.scenes.scene_file import load_scene
+from decals.scenes.files import load_scene
 from tests.decals.editing.scenes import scene
 from tests.decals.window.driver import Driver
 

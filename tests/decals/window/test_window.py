@@ -12,8 +12,8 @@ from decals.editing.commands import ScaleDecals
 from decals.editing.scatter_commands import RemoveObject, decals_on
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
+from decals.scenes.files import load_scene
 from decals.scenes.scene import Scene
-from decals.scenes.scene_file import load_scene
 from decals.window import EditWindow
 from tests.decals.window.driver import Driver
 

@@ -7,8 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from decals.field.ownership import complement_at, owner_at
-from decals.field.single_layer import single_layer_at
+from decals.field.ownership import complement_at, owner_at, single_layer_at
 from decals.index.index import index_on
 from decals.index.lookup import IndexedDecals
 from decals.model import Decals

@@ -1,4 +1,4 @@
-"""Scenes as JSON: readable, versioned, saved atomically, and the same bits when loaded again.
+"""Files: models of any kind are loaded, scenes are saved as JSON and loaded with the same bits.
 
 ::
 
@@ -33,6 +33,7 @@ from blobtree.progress import Progress, watched
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
+from decals.scenes.objects import SceneObject, as_object
 from decals.scenes.records import (
     DecalRecord,
     MeshRecord,
@@ -46,6 +47,7 @@ from decals.scenes.records import (
     relative,
 )
 from decals.scenes.scene import DecalImage, Scene
+from decals.validation import describe, is_file
 
 PART = 500
 """Decals that are described at a time."""
@@ -229,3 +231,51 @@ def _camera(record: _CameraRecord) -> Camera:
         return Camera(record.position, record.target, record.up, record.fov)
     except ImplicitDecalsError as error:
         raise InvalidScene(f"camera: {error}") from error
+
+
+def load_model(path: str | os.PathLike[str], *, samples: SampleLoader | None = None) -> SceneObject | Scene:
+    """Load a mesh, a BlobTree or a scene from a file.
+
+    Parameters
+    ----------
+    path : str or path
+        A mesh file of any format that pyvista reads, or a BlobTree or a scene in JSON.
+    samples : callable, optional
+        Function that returns the meshes of a scene whose source is ``"sample:NAME"``.
+
+    Returns
+    -------
+    MeshObject, TreeObject or Scene
+        An object is named after its file.
+
+    Raises
+    ------
+    InvalidScene, InvalidMesh, InvalidFile, InvalidImage
+        If the file is missing, or cannot be used.
+
+    See Also
+    --------
+    decals.load_scene, decals.surfaces.read_mesh, blobtree.load
+
+    Examples
+    --------
+    >>> import tempfile, pathlib, blobtree, decals
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "ball.json"
+    >>> blobtree.save(blobtree.Point((0, 0, 0), radius=1), path)
+    >>> decals.load_model(path).name
+    'ball'
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidScene(f"path: expected the path of a model, got {describe(path)}")
+    if _is_scene_file(Path(path)):
+        return load_scene(path, samples=samples)
+    return as_object(path, "model")
+
+
+def _is_scene_file(path: Path) -> bool:
+    if path.suffix.lower() != ".json" or not is_file(path):
+        return False
+    try:
+        return is_scene(path.read_bytes())
+    except OSError:  # reported by the function that reads the model
+        return False
