@@ -29,7 +29,7 @@ from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.tree import NODE_KINDS, Node
 from blobtree.tape.model import checked_tree
-from blobtree.traversal import postorder
+from blobtree.tape.program import postorder
 from blobtree.validation import Vector
 
 VERSION: Literal[1] = 1

@@ -1,4 +1,4 @@
-"""Parameters and registry of custom kinds: read from typed functions, drawn for trials, found by name."""
+"""Parameters and registry of custom kinds: read from typed functions, found by name."""
 
 import copyreg
 import importlib
@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import warp as wp
 
 from blobtree.custom.source import CustomSource
@@ -24,37 +23,8 @@ _SIZES: dict[Any, int] = {
     wp.vec4: 4,
 }
 
-TRIAL_SPREAD = 2.0
-"""Distance from their limits, or from 0, up to which numbers are drawn for trials."""
-
 Limits = tuple[float | None, float | None]
 """Smallest and largest value of a parameter, None for no limit; of the length of a vector."""
-
-
-def trial_value(parameter: Parameter, rng: np.random.Generator, trial: int) -> Any:
-    """Return a value within the limits for a trial; the first trials take axes, zeros and limits."""
-    if parameter.size == 1:
-        return _trial_number(parameter, rng, trial)
-    size, low, high = parameter.size, parameter.low, parameter.high
-    if trial < size + 1:
-        vector = np.eye(size)[trial] if trial < size else np.zeros(size)
-    else:
-        vector = rng.uniform(-1.0, 1.0, size)
-    length = float(np.linalg.norm(vector))
-    allowed = min(max(length, low), high)
-    if allowed == length:
-        return tuple(vector.tolist())
-    direction = vector / length if length > 0.0 else np.eye(size)[0]
-    return tuple((direction * allowed * (1.0 + 1e-9)).tolist())
-
-
-def _trial_number(parameter: Parameter, rng: np.random.Generator, trial: int) -> float | int:
-    low, high = parameter.low, parameter.high
-    low = low if low > -math.inf else min(high, TRIAL_SPREAD) - 2.0 * TRIAL_SPREAD
-    high = high if high < math.inf else max(low, -TRIAL_SPREAD) + 2.0 * TRIAL_SPREAD
-    near = min(high, low + TRIAL_SPREAD)
-    number = (low, high, near, rng.uniform(low, high), rng.uniform(low, near))[trial % 5]
-    return round(number) if parameter.whole else float(number)
 
 
 def custom_parameters(

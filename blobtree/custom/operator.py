@@ -18,17 +18,19 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast, get_a
 
 import warp as wp
 
-from blobtree.custom.check_operator import Claims, check_operator
+from blobtree.custom.checks import Claims, check_operator
 from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
-from blobtree.custom.operator_kernels import (
+from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.errors import InvalidNode
+from blobtree.formulas.operators import (
+    Operator,
+    Support,
+    blend_choice,
     difference_like_choice,
     intersection_like_choice,
     unclaimed_choice,
     widened_range,
 )
-from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
-from blobtree.errors import InvalidNode
-from blobtree.formulas.operators import Operator, Support, blend_choice
 from blobtree.nodes.parameters import Parameter
 from blobtree.nodes.tree import AssociativeCombination, Node
 from blobtree.validation import finite_number

@@ -24,7 +24,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.custom.bounds_kernels import skeleton_boxes
-from blobtree.custom.check_skeleton import check_skeleton
+from blobtree.custom.checks import check_skeleton
 from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
 from blobtree.errors import InvalidNode

@@ -23,8 +23,7 @@ from blobtree.meshing.crease_kernels import (
     move_onto_creases,
     turn_diagonals,
 )
-from blobtree.meshing.device_mesh import DeviceMesh, patch_tables, vertex_arrays
-from blobtree.meshing.mesh import Mesh
+from blobtree.meshing.mesh import DeviceMesh, Mesh, patch_tables, vertex_arrays
 from blobtree.progress import Progress
 from blobtree.tape.model import ImplicitModel, checked_tree
 

@@ -1,6 +1,13 @@
-"""`Mesh`: triangles in NumPy arrays."""
+"""Meshes: the dual mesh of sparse cells in a device's memory, its update after an edit, and NumPy copies.
 
+Only changed blocks are sampled again. The rows of cells beside them may change too, so the vertices of
+neighbouring blocks are placed again, and the triangles of all blocks that use such vertices. All else is
+copied, in the order of a mesh made from scratch: both meshes are the same bit for bit.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -8,8 +15,40 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int32Array
-from blobtree.device import prefaulted_array
-from blobtree.meshing.device_mesh import DeviceMesh
+from blobtree.cells.grid import CHILDREN
+from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, where_negative
+from blobtree.cells.sparse_cells import SparseCells
+from blobtree.device import demand_memory, launch, prefaulted_array
+from blobtree.meshing.dual_kernels import (
+    SAMPLES,
+    CellPatches,
+    PatchTables,
+    choose_rows,
+    classify_cells,
+    connect_vertices,
+    sample_blocks,
+)
+from blobtree.meshing.patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
+from blobtree.meshing.reuse_kernels import (
+    copy_counts,
+    copy_faces,
+    copy_vertices,
+    copy_words,
+    count_listed,
+    invert_flags,
+    mark_face_neighbors,
+    mark_vertex_users,
+)
+from blobtree.meshing.vertex_kernels import VertexArrays, bisect_unconverged, list_patches, place_vertices
+from blobtree.progress import Progress
+
+WORD_BYTES = 16
+"""Bytes that one thread copies."""
+
+SAMPLE_BYTES = 4
+
+BLOCK_BYTES = 64 * 4 + 13 * (3 * 12 + 4) + 13 * 24
+"""Bytes of a block in the result: codes, rows and offsets of 64 cells, some 13 vertices and 26 triangles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +85,62 @@ class Mesh:
     sheet_counts: NDArray[np.uint8] | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class DeviceMesh:
+    """Triangles in a device's memory, with the patches by block that a later update reuses."""
+
+    cells: SparseCells
+    codes: "wp.array[wp.uint8]"
+    """By cell, the corners that are inside, as bits (64 n)."""
+    rows: "wp.array[wp.int16]"
+    """By cell, its row in the tables of `patches` (64 n)."""
+    offsets: "wp.array[wp.uint8]"
+    """By cell, its first vertex counted from its block's (64 n)."""
+    vertex_starts: "wp.array[wp.int32]"
+    """By block, its first vertex; and the end (n + 1)."""
+    quad_starts: "wp.array[wp.int32]"
+    """By block, its first pair of triangles; and the end (n + 1)."""
+    vertices: "wp.array[wp.vec3]"
+    normals: "wp.array[wp.vec3]"
+    colors: "wp.array[wp.vec3]"
+    faces: "wp.array[wp.vec3i]"
+
+    @property
+    def patches(self) -> Any:
+        """The patches of all cells as an argument of kernels."""
+        return cell_patches(self.rows, self.offsets, self.vertex_starts, self.cells.device)
+
+
+@cache
+def patch_tables(device: str) -> Any:
+    """Return the tables of `patches` in a device's memory, as an argument of kernels."""
+    tables: Any = PatchTables()
+    tables.patch_count = wp.array(PATCH_COUNT, dtype=wp.int8, device=device)
+    tables.patch_of_edge = wp.array(PATCH_OF_EDGE.ravel(), dtype=wp.int8, device=device)
+    tables.knotted_face = wp.array(KNOTTED_FACE, dtype=wp.int8, device=device)
+    return tables
+
+
+def cell_patches(rows: DeviceArray, offsets: DeviceArray, vertex_starts: DeviceArray, device: str) -> Any:
+    """Return the patches of all cells as an argument of kernels."""
+    patches: Any = CellPatches()
+    patches.rows, patches.offsets, patches.vertex_starts = rows, offsets, vertex_starts
+    patches.patch_of_edge = patch_tables(device).patch_of_edge
+    return patches
+
+
+def vertex_arrays(positions: DeviceArray, normals: DeviceArray, colors: DeviceArray) -> Any:
+    """Return the vertices of a mesh as an argument of kernels."""
+    vertices: Any = VertexArrays()
+    vertices.positions, vertices.normals, vertices.colors = positions, normals, colors
+    return vertices
+
+
+def extract_mesh(cells: SparseCells, report: Progress, previous: DeviceMesh | None = None) -> DeviceMesh:
+    """Return the dual mesh of the surface in `cells`; reuse `previous`, the mesh before an edit."""
+    return _Extraction(cells, previous).mesh(report)
+
+
 def download(mesh: DeviceMesh, sheet_counts: NDArray[np.uint8] | None = None) -> Mesh:
     """Return the triangles of a device as NumPy arrays."""
     arrays = [mesh.vertices, mesh.faces, mesh.normals, mesh.colors]
@@ -61,3 +156,160 @@ def _on_host(array: Any) -> Any:
     wp.copy(wp.array(host, dtype=array.dtype, device="cpu", copy=False), array)
     wp.synchronize_device(array.device)
     return host
+
+
+class _Extraction:
+    """The steps from cells to triangles."""
+
+    def __init__(self, cells: SparseCells, previous: DeviceMesh | None) -> None:
+        self._cells, self._old, self._device = cells, previous, cells.device
+        self._arrays, self._sources = cells.arrays, cells.leaves.sources
+        self._count = len(cells.leaves)
+        self._tables = patch_tables(cells.device)
+        self._kernel = cells.tape.instruction_set.kernel_for
+
+    def mesh(self, report: Progress) -> DeviceMesh:
+        """Sample the field, place the vertices, connect them."""
+        report("sampling the field", 0.0)
+        changed, unchanged = self._changed_blocks()
+        needed = len(changed) * SAMPLES * SAMPLE_BYTES + self._count * BLOCK_BYTES
+        demand_memory(needed, self._device, f"the surface in {self._count:,} blocks of cells")
+        values = self._sample(changed, partial(report, "sampling the field"))
+        codes, rows, offsets, vertex_counts, quad_counts = self._classify(changed, unchanged, values)
+        vertex_starts, vertex_total = exclusive_scan(vertex_counts, "vertices")
+        quad_starts, quad_total = exclusive_scan(quad_counts, "triangles")
+        patches = cell_patches(rows, offsets, vertex_starts, self._device)
+        report("sampling the field", 1.0)
+        report("placing vertices", 0.0)
+        vertices, normals, colors = (self._empty(vertex_total, wp.vec3) for _ in range(3))
+        arrays = vertex_arrays(vertices, normals, colors)
+        self._place(changed, values, patches, arrays, partial(report, "placing vertices"))
+        new_index = self._copy_vertices(unchanged, vertex_starts, arrays)
+        report("placing vertices", 1.0)
+        faces = self._empty(2 * quad_total, wp.vec3i)
+        users, others = self._users(changed)
+        inputs = [users, self._arrays, patches, quad_starts, vertices]
+        self._launch(connect_vertices, len(users), inputs, [faces])
+        self._copy_faces(others, quad_starts, new_index, faces)
+        report("connecting vertices", 1.0)
+        return DeviceMesh(
+            self._cells, codes, rows, offsets, vertex_starts, quad_starts, vertices, normals, colors, faces
+        )
+
+    def _empty(self, size: int, dtype: Any) -> DeviceArray:
+        return wp.empty(size, dtype=dtype, device=self._device)
+
+    def _zeros(self, size: int) -> DeviceArray:
+        return wp.zeros(size, dtype=wp.int32, device=self._device)
+
+    def _launch(
+        self,
+        kernel: wp.Kernel,
+        count: int,
+        inputs: list[Any],
+        outputs: list[Any],
+        step: Callable[[float], None] | None = None,
+    ) -> None:
+        launch(kernel, count, inputs, outputs, self._device, step=step)
+
+    def _changed_blocks(self) -> tuple[DeviceArray, DeviceArray]:
+        """Return the blocks whose cells or rows may have changed, and the others."""
+        if self._old is None:
+            return arange(self._count, self._device), arange(0, self._device)
+        return self._marked(mark_face_neighbors, where_negative(self._sources))
+
+    def _users(self, changed: DeviceArray) -> tuple[DeviceArray, DeviceArray]:
+        """Return the blocks whose triangles use vertices of changed blocks, and the others."""
+        if self._old is None:
+            return changed, arange(0, self._device)
+        return self._marked(mark_vertex_users, changed)
+
+    def _marked(self, mark: wp.Kernel, listed: DeviceArray) -> tuple[DeviceArray, DeviceArray]:
+        """Return the blocks that the kernel `mark` flags, and the others."""
+        flags, others = self._zeros(self._count + 1), self._zeros(self._count + 1)
+        self._launch(mark, len(listed), [listed, self._arrays], [flags])
+        self._launch(invert_flags, self._count, [flags], [others])
+        return compact(flags), compact(others)
+
+    def _sample(self, changed: DeviceArray, step: Callable[[float], None]) -> DeviceArray:
+        """Return the field at the samples of changed blocks."""
+        count = len(changed) * SAMPLES
+        values = self._empty(count, wp.float32)
+        cells = self._arrays
+        inputs = [changed, cells.blocks, cells.spans, cells.tape, cells.base, cells.corner, cells.cell]
+        self._launch(self._kernel(sample_blocks), count, inputs, [values], step)
+        return values
+
+    def _classify(
+        self, changed: DeviceArray, unchanged: DeviceArray, values: DeviceArray
+    ) -> tuple[DeviceArray, ...]:
+        """Return codes, rows and offsets by cell, and the numbers of vertices and quads by block."""
+        cells = self._count * CHILDREN
+        codes, rows, offsets = (self._empty(cells, dtype) for dtype in (wp.uint8, wp.int16, wp.uint8))
+        vertex_counts, quad_counts = self._zeros(self._count + 1), self._zeros(self._count + 1)
+        self._copy_cells(unchanged, [codes, rows, offsets], [vertex_counts, quad_counts])
+        self._launch(classify_cells, len(changed), [changed, values], [codes, quad_counts])
+        inputs = [changed, self._arrays, codes, self._tables]
+        self._launch(choose_rows, len(changed), inputs, [rows, offsets, vertex_counts])
+        return codes, rows, offsets, vertex_counts, quad_counts
+
+    def _copy_cells(
+        self, unchanged: DeviceArray, arrays: list[DeviceArray], counts: list[DeviceArray]
+    ) -> None:
+        """Copy codes, rows, offsets, and the numbers of vertices and quads of unchanged blocks."""
+        if self._old is None:
+            return
+        old = self._old
+        for before, after in zip((old.codes, old.rows, old.offsets), arrays, strict=True):
+            words = CHILDREN * after.strides[0] // WORD_BYTES
+            inputs = [words, unchanged, self._sources, _as_words(before)]
+            self._launch(copy_words, len(unchanged) * words, inputs, [_as_words(after)])
+        for starts, numbers in zip((old.vertex_starts, old.quad_starts), counts, strict=True):
+            self._launch(copy_counts, len(unchanged), [unchanged, self._sources, starts], [numbers])
+
+    def _place(
+        self,
+        changed: DeviceArray,
+        values: DeviceArray,
+        patches: Any,
+        vertices: Any,
+        step: Callable[[float], None],
+    ) -> None:
+        """Place the vertices of changed blocks."""
+        counts = self._zeros(len(changed) + 1)
+        self._launch(count_listed, len(changed), [changed, patches.vertex_starts], [counts])
+        list_starts, total = exclusive_scan(counts, "vertices")
+        identifiers = self._empty(total, wp.int32)
+        inputs = [changed, patches.rows, self._tables.patch_count, list_starts]
+        self._launch(list_patches, len(changed), inputs, [identifiers])
+        inputs = [identifiers, changed, self._arrays, values, patches]
+        unconverged = self._zeros(1)
+        self._launch(self._kernel(place_vertices), total, inputs, [vertices, unconverged], step)
+        if total and unconverged.numpy()[0]:
+            self._launch(self._kernel(bisect_unconverged), total, inputs, [vertices])
+
+    def _copy_vertices(self, unchanged: DeviceArray, starts: DeviceArray, vertices: Any) -> DeviceArray:
+        """Copy the vertices of unchanged blocks, and return the new indices of old ones."""
+        if self._old is None:
+            return None
+        old = self._old
+        new_index = self._empty(len(old.vertices), wp.int32)
+        before = vertex_arrays(old.vertices, old.normals, old.colors)
+        inputs = [unchanged, self._sources, old.vertex_starts, starts, before]
+        self._launch(copy_vertices, len(unchanged), inputs, [vertices, new_index])
+        return new_index
+
+    def _copy_faces(
+        self, others: DeviceArray, starts: DeviceArray, new_index: DeviceArray, faces: DeviceArray
+    ) -> None:
+        """Copy the triangles of blocks that use unchanged vertices alone."""
+        if self._old is None:
+            return
+        inputs = [others, self._sources, self._old.quad_starts, starts, self._old.faces, new_index]
+        self._launch(copy_faces, len(others), inputs, [faces])
+
+
+def _as_words(array: DeviceArray) -> DeviceArray:
+    """Return the memory of an array as words of WORD_BYTES."""
+    size = len(array) * array.strides[0] // WORD_BYTES
+    return wp.array(ptr=array.ptr, dtype=wp.vec4i, shape=size, device=array.device)

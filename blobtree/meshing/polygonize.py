@@ -3,26 +3,28 @@
 Dual marching cubes (Nielson 2004) on sparse cells: one vertex per patch of surface in a cell, projected onto
 the surface by Newton's method. The cost grows with the area of the surface, and vertices lie on the surface
 as exactly as float32 can tell.
+
+The chord error is the distance of the triangles to the surface. Samples are the middles of triangles and of
+their edges, and points between. Each is projected onto the surface by steps whose length bounds the distance.
+Between samples the error is not bounded: a surface that bends within a third of a triangle may lie farther
+away. Parts of a model that fall between all cells are not measured.
 """
 
+import math
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.cells.grid import Grid, aligned_grid
 from blobtree.cells.sparse_cells import build_cells
+from blobtree.device import launch
 from blobtree.errors import InvalidResolution
-from blobtree.meshing.chord import (
-    FIRST_RESOLUTION,
-    MAX_PASSES,
-    MIN_RELATIVE_ERROR,
-    largest_chord_error,
-    next_cell_size,
-)
 from blobtree.meshing.creases import sharpened
-from blobtree.meshing.device_mesh import DeviceMesh, extract_mesh
-from blobtree.meshing.mesh import Mesh, download
+from blobtree.meshing.distance_kernels import measure_triangles
+from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.progress import Cancel, Progress, watched
 from blobtree.tape.model import ImplicitModel, checked_tree
 
@@ -33,6 +35,20 @@ MAX_RESOLUTION = 1 << 20
 
 MIN_MODEL_SIZE, MAX_MODEL_SIZE = 1e-15, 1e15
 """Sizes between which squared distances, in cells too, neither vanish nor overflow in float32."""
+
+FIRST_RESOLUTION = 32
+"""Cells along the model's longest side in the first pass, the coarsest one."""
+
+ERROR_MARGIN = 0.8
+"""Error that a pass aims at, over the allowed one: a pass that misses costs a whole pass."""
+
+MIN_SIZE_RATIO = 0.2
+"""Smallest ratio of the cell sizes of two passes: estimates hold no farther."""
+
+MAX_PASSES = 8
+
+MIN_RELATIVE_ERROR = 2.0**-20
+"""Smallest error that float32 can resolve, over the largest coordinate."""
 
 _STAGES = (
     "finding the surface",
@@ -141,15 +157,41 @@ def _within_chord_error(
     for number in range(1, MAX_PASSES + 1):
         pass_report = _numbered(report, number)
         polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=pass_report)
-        error = largest_chord_error(polygonizer.device_mesh, pass_report)
+        error = _largest_chord_error(polygonizer.device_mesh, pass_report)
         if error <= chord_error:
             return polygonizer.mesh
         passes.append((size, error))
-        size = next_cell_size(passes, chord_error)
+        size = _next_cell_size(passes, chord_error)
     raise InvalidResolution(
         f"chord_error: {chord_error:g} was not reached in {MAX_PASSES} passes, the last with cells of "
         f"{passes[-1][0]:g} came to {passes[-1][1]:g}; allow more, or ask for creases where CSG cuts edges"
     )
+
+
+def _largest_chord_error(mesh: DeviceMesh, report: Progress) -> float:
+    """Return the largest distance of the samples on the triangles to the surface."""
+    device, count = mesh.cells.device, len(mesh.faces)
+    errors = wp.zeros(count, dtype=wp.float32, device=device)
+    kernel = mesh.cells.tape.instruction_set.kernel_for(measure_triangles)
+    inputs = [mesh.cells.arrays, mesh.vertices, mesh.faces]
+    launch(kernel, count, inputs, [errors], device, step=partial(report, "measuring chords"))
+    return float(np.max(errors.numpy(), initial=0.0))
+
+
+def _next_cell_size(passes: list[tuple[float, float]], allowed: float) -> float:
+    """Return the cell size to try after `passes`, pairs of a cell size and its error.
+
+    The error of a smooth surface falls with the square of the cell size, that of a crease with the size
+    itself. The last two passes show the exponent.
+    """
+    size, error = passes[-1]
+    power = 2.0
+    if len(passes) > 1:
+        size_before, error_before = passes[-2]
+        power = math.log(error_before / error) / math.log(size_before / size)
+    power = min(max(power, 1.0), 2.0)
+    ratio: float = (ERROR_MARGIN * allowed / error) ** (1.0 / power)
+    return size * max(ratio, MIN_SIZE_RATIO)
 
 
 def _numbered(report: Progress, number: int) -> Progress:

@@ -9,15 +9,15 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
 import numpy as np
+import warp as wp
 from numpy.typing import ArrayLike
 
-from blobtree import affine
 from blobtree._typing import Float32Array
-from blobtree.cells.interval import range_over
-from blobtree.errors import InvalidNode
+from blobtree.cells.prune_kernels import measure_range
+from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
 from blobtree.meshing.creases import split_creases
@@ -29,13 +29,16 @@ from blobtree.pyvista_views import LEVELS, SLICE_RESOLUTION, slice_tree, to_poly
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.program import Placement
 from blobtree.tracing.trace import Hits, raycast
-from blobtree.validation import Matrix, affine_matrix, finite_number, finite_vector
+from blobtree.validation import Matrix, affine_matrix, finite_number, finite_vector, point_array
 
 if TYPE_CHECKING:
     import pyvista as pv
 
 LARGEST_EXPONENT = 100.0
 """Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
+
+COORDINATE_MARGIN = 2.0**-21
+"""Margin around a box of `Node.interval`, over its largest coordinate, for the rounding of its centre."""
 
 NODE_KINDS: dict[str, type["Node"]] = {}
 """Every built-in class of nodes by its name in files."""
@@ -346,6 +349,8 @@ class Node(ImplicitModel):
     def interval(self, lower: ArrayLike, upper: ArrayLike) -> tuple[float, float]:
         """Return bounds on the field over a box, by interval arithmetic.
 
+        They hold for the cube around the box too, so a box of equal sides gives the tightest ones.
+
         Parameters
         ----------
         lower, upper : array-like (3,)
@@ -367,7 +372,18 @@ class Node(ImplicitModel):
         >>> Point((0, 0, 0), radius=1.0).interval((5, 5, 5), (6, 6, 6))
         (0.0, 0.0)
         """
-        return range_over(self.tape, lower, upper)
+        corners = point_array(cast(Any, [lower, upper])).astype(np.float64)
+        if (corners[0] > corners[1]).any():
+            raise InvalidPoints(f"box: expected lower ≤ upper, got {lower!r} and {upper!r}")
+        center, half = corners.mean(axis=0), float((corners[1] - corners[0]).max()) / 2.0
+        pad = float(np.abs(corners).max()) * COORDINATE_MARGIN
+        uploaded = self.tape.on("cpu")
+        out = wp.empty(1, dtype=wp.vec4, device="cpu")
+        inputs = [wp.vec3(*center), half + pad, uploaded.data, uploaded.span]
+        kernel = self.tape.instruction_set.kernel_for(measure_range)
+        wp.launch(kernel, dim=1, inputs=inputs, outputs=[out], device="cpu")
+        smallest, largest, _, _ = out.numpy()[0].tolist()
+        return smallest, largest
 
     def raycast(self, origins: ArrayLike, directions: ArrayLike, *, device: str | None = None) -> Hits:
         """Return the first intersections of rays with the surface.
@@ -656,8 +672,9 @@ class Transform(Placed):
 
     def child_placement(self, placement: Placement) -> Placement:
         """Return the placement of the child: this map below those above."""
-        matrix = affine.square(self.matrix)
-        growth = placement.growth / affine.mean_scale(matrix) if placement.growth else 0.0
+        matrix = np.vstack([self.matrix, (0.0, 0.0, 0.0, 1.0)])
+        volume_scale = abs(float(np.linalg.det(matrix[:3, :3])))
+        growth = placement.growth / float(np.cbrt(volume_scale)) if placement.growth else 0.0
         return Placement(placement.matrix @ matrix, growth)
 
 

@@ -7,8 +7,7 @@ functions walk the tree with a list. A shared subtree is compared, hashed and pi
 from dataclasses import fields
 from typing import Any
 
-from blobtree.tape.program import ProgramNode
-from blobtree.traversal import postorder
+from blobtree.tape.program import ProgramNode, postorder
 
 HASH = "_hash"
 """Attribute that caches a node's hash; it is not part of the value."""

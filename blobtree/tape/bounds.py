@@ -4,7 +4,6 @@ from itertools import product
 
 import numpy as np
 
-from blobtree import affine
 from blobtree._typing import Box, Float32Array
 from blobtree.formulas.operators import Operator, Support
 from blobtree.tape.program import (
@@ -83,7 +82,8 @@ def _warped(box: Box, entry: EnterWarp) -> Box:
         return box
     lower, upper = entry.warp.box(*box, entry.parameters)
     corners = np.array(list(product(*zip(lower, upper, strict=True))))
-    placed = affine.apply(entry.placement.matrix, corners)
+    matrix = entry.placement.matrix
+    placed = corners @ matrix[:3, :3].T + matrix[:3, 3]
     return placed.min(axis=0), placed.max(axis=0)
 
 

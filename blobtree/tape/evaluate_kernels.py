@@ -1,4 +1,4 @@
-"""Kernels of `evaluate`, and the projection of a point onto the surface."""
+"""Kernels that evaluate a tape at many points, and the projection of a point onto the surface."""
 
 import warp as wp
 

@@ -8,13 +8,12 @@ Affine maps and offsets fold into the primitives below them.
 The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state what it reads of a node.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from blobtree import affine
 from blobtree._typing import Float64Array, IndexArray
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
@@ -22,11 +21,13 @@ from blobtree.formulas.operators import RICCI, SUM, Operator, Support
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.lazy import Lazy
-from blobtree.traversal import branches
 from blobtree.validation import Vector
 
 MAX_PRIMITIVES = 1 << 24
 """Beyond it a float32 cannot count the primitives of a run."""
+
+SIMILARITY_TOLERANCE = 1e-6
+"""Relative deviation from rotation × scale below which a map counts as a similarity."""
 
 SIMPLE = -1
 """Weight of a node that folds into the accumulator without one of its own."""
@@ -44,7 +45,12 @@ class Placement:
     @Lazy
     def uniform_scale(self) -> float | None:
         """Return the factor by which the map scales all lengths, None if directions differ."""
-        return affine.uniform_scale(self.matrix)
+        linear = self.matrix[:3, :3]
+        gram = linear.T @ linear
+        squared = float(np.trace(gram)) / 3.0
+        if np.abs(gram - squared * np.eye(3)).max() > SIMILARITY_TOLERANCE * squared:
+            return None
+        return float(np.sqrt(squared))
 
     def folds_into(self, skeleton: Skeleton) -> bool:
         """Return True if the map folds into the parameters of a skeleton; else primitives carry it."""
@@ -85,6 +91,36 @@ class ProgramNode:
     def child_placement(self, placement: Placement) -> Placement:
         """Return the placement of the child of a node that itself has `placement`."""
         return placement
+
+
+AnyNode = TypeVar("AnyNode", bound=ProgramNode)
+
+
+def postorder(
+    root: AnyNode, *, into: Callable[[AnyNode], bool] = lambda _node: True, leaves: bool = True
+) -> list[AnyNode]:
+    """Return every distinct node object from `root` down, children before parents.
+
+    The walk does not recurse, so memory alone limits the depth of a tree. Nodes below a node for which `into`
+    is False are left out, unless another path leads to them. So are nodes without children if `leaves` is
+    False.
+    """
+    order: list[AnyNode] = []
+    seen: set[int] = set()
+    pending: list[tuple[AnyNode, bool]] = [(root, False)]
+    while pending:
+        node, children_done = pending.pop()
+        if children_done:
+            order.append(node)
+        elif id(node) not in seen:
+            seen.add(id(node))
+            children: tuple[Any, ...] = node.children
+            if children and into(node):
+                pending.append((node, True))
+                pending.extend([(child, False) for child in reversed(children) if leaves or child.children])
+            elif children or leaves:
+                order.append(node)
+    return order
 
 
 class ProgramPrimitive(ProgramNode):
@@ -257,7 +293,7 @@ def _weights(root: ProgramNode) -> dict[int, int]:
     """Return the weight of every node with children; raise `InvalidNode` for too many primitives."""
     weights: dict[int, int] = {}
     counts: dict[int, int] = {}
-    for node in branches(root):
+    for node in postorder(root, leaves=False):
         children = [id(child) for child in node.children]
         counts[id(node)] = sum([counts.get(child, 1) for child in children])
         weights[id(node)] = _weight(node, [weights.get(child, SIMPLE) for child in children])

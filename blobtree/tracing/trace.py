@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float32Array
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints
 from blobtree.tape.model import ImplicitModel
-from blobtree.tracing.trace_kernels import shade_hits, trace_rays
+from blobtree.tracing.ray_kernels import shade_hits, trace_rays
 from blobtree.tracing.tree_cells import device_cells
 from blobtree.validation import point_array
 

@@ -15,7 +15,7 @@ from blobtree.device import known_device
 from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.tape import Tape
-from blobtree.tracing.rays import EMPTY, RayCells
+from blobtree.tracing.ray_kernels import EMPTY, RayCells
 
 RELATIVE_TOLERANCE = 1e-5
 """Distance to the surface at which a ray hits, over the diagonal of the model's box."""
@@ -39,7 +39,7 @@ class TracingCells:
         float32[m, 4]: the whole tape and the blocks' pruned ones, each behind a texel with its length.
     blocks
         int32[nx ny nz], the last axis fastest: for each block the texel in front of its tape, SURELY_INSIDE,
-        or the number of empty layers around it (see `rays.EMPTY`).
+        or the number of empty layers around it (see `ray_kernels.EMPTY`).
     lower, block_size, counts
         The grid: lowest corner (3,), side of the blocks, number of blocks along each axis.
     tolerance
@@ -63,7 +63,7 @@ class DeviceCells:
 
     tape: "wp.array[wp.vec4]"
     arrays: Any
-    """`rays.RayCells`, the argument of kernels."""
+    """`ray_kernels.RayCells`, the argument of kernels."""
     instruction_set: InstructionSet
 
 

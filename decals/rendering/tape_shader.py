@@ -14,7 +14,7 @@ from blobtree.tape.evaluators import BOUND, COLOR, GRADIENT, Evaluator, directio
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
 from blobtree.tape.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
-from blobtree.tracing.rays import trace_ray
+from blobtree.tracing.ray_kernels import trace_ray
 from blobtree.transpile.glsl import translate_choice, translate_library
 from decals.rendering.pixel_pass import GROUP, PassBackend
 from decals.shaders import Source, compose

@@ -31,8 +31,7 @@ from numpy.typing import NDArray
 from blobtree import RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Union
 from blobtree.cells.grid import BRANCHING, aligned_grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
-from blobtree.meshing.device_mesh import DeviceMesh, extract_mesh
-from blobtree.meshing.mesh import download
+from blobtree.meshing.mesh import DeviceMesh, download, extract_mesh
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import trace
 from tests.bench.marching_cubes import marching_cubes

@@ -5,11 +5,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from blobtree import Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygonize
-from blobtree.cells.cull import split_tape
 from blobtree.cells.grid import BRANCHING, aligned_grid
-from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.cells.sparse_cells import SparseCells, build_cells, split_tape
 from blobtree.formulas.falloff import ISO, RIM
-from blobtree.tape.evaluate import bounds_at, values_at
+from blobtree.tape.model import bounds_at, values_at
 from tests.blobtree.custom_kinds import CUSTOM
 from tests.blobtree.meshing.edits import edited
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid

@@ -9,8 +9,8 @@ from warp._src.context import user_modules
 from blobtree import ISO, Node, Point, Polygonizer, polygonize
 from blobtree.formulas.falloff import RIM
 from blobtree.tape.instruction_set import BUILT_IN
+from blobtree.tape.program import postorder
 from blobtree.tracing.trace import trace
-from blobtree.traversal import postorder
 from tests.blobtree.custom_kinds import CUSTOM, CUSTOM_TREES, EVERYTHING, KINDS, Brick, Mean, Path, Ring, Soft
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, MoreKinds, points_around, random_trees

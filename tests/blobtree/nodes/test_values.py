@@ -14,7 +14,7 @@ from hypothesis import given, settings
 
 import blobtree
 from blobtree import Difference, Node, Point, Ricci, Segment, Sum, Union, from_json, to_json
-from blobtree.traversal import postorder
+from blobtree.tape.program import postorder
 from tests.blobtree.trees import random_trees, trees
 
 NAMES: dict[str, Any] = {name: getattr(blobtree, name) for name in blobtree.__all__}

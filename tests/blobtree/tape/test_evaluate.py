@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import InvalidPoints, Point, Segment, Transform
-from blobtree.tape.evaluate import bounds_along, bounds_at, colors_at, gradients_at, values_at
-from blobtree.traversal import postorder
+from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at, values_at
+from blobtree.tape.program import postorder
 from tests.blobtree.tree_sets import BATCH, BUILT_IN_TREES, EVERY_BATCH, FIRST_BATCHES, POINTS, Batch
 from tests.blobtree.trees import KINDS, points_around
 from tests.oracles import blobtree as oracle

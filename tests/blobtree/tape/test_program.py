@@ -9,8 +9,7 @@ from hypothesis import given, settings
 
 from blobtree import InvalidNode, Node, Point, Ricci, Segment, Sum, Union
 from blobtree.formulas.operators import INTERSECTION, SUM, UNION
-from blobtree.tape.program import Pop, Push, Run, compile_program, registers_needed
-from blobtree.traversal import postorder
+from blobtree.tape.program import Pop, Push, Run, compile_program, postorder, registers_needed
 from tests.blobtree.trees import trees
 
 

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import InvalidPoints, Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
-from blobtree.tracing.rays import MAX_DISTANCE, box_interval, exit_distance, reciprocal
+from blobtree.tracing.ray_kernels import MAX_DISTANCE, box_interval, exit_distance, reciprocal
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance
 from tests.blobtree.transpile.warp_functions import call

@@ -7,9 +7,9 @@ from scipy.ndimage import distance_transform_cdt
 from blobtree import ISO, Node, Point
 from blobtree._typing import Int32Array
 from blobtree.cells.refine_kernels import SURELY_INSIDE
-from blobtree.tape.evaluate import values_at
+from blobtree.tape.model import values_at
 from blobtree.tape.tape import Tape
-from blobtree.tracing.rays import EMPTY
+from blobtree.tracing.ray_kernels import EMPTY
 from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, tracing_cells
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle

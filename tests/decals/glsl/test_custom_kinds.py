@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import Point
-from blobtree.tape.evaluate import bounds_at, colors_at, gradients_at
+from blobtree.tape.model import bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions

@@ -22,7 +22,7 @@ MODULES = (
     "blobtree.formulas.operators",
     "blobtree.tape.dispatch",
     "blobtree.tape.evaluators",
-    "blobtree.tracing.rays",
+    "blobtree.tracing.ray_kernels",
     "blobtree.formulas.warps",
     "decals.field.contact",
     "decals.field.mapping",

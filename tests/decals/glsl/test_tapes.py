@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blobtree import Node, Point, Segment
-from blobtree.tape.evaluate import bounds_along, bounds_at, colors_at, gradients_at
+from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions

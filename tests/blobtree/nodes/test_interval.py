@@ -1,4 +1,4 @@
-"""Bounds over boxes, and the outline of a tree."""
+"""Bounds of nodes over boxes, and the outline of a tree."""
 
 import numpy as np
 import pytest
