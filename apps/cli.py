@@ -69,6 +69,14 @@ implicit-decals polygonize blob.json --cell-size 0.02 -o blob.obj
 
 implicit-decals polygonize part.json --chord-error 0.001 --creases -o part.stl
 """,
+    "bake": """Write a scene as a GLB file, with the decals in a texture or in vertex colours.
+
+For example:
+
+implicit-decals bake scene.json -o model.glb --size 4096
+
+implicit-decals bake scene.json -o small.glb --vertex-colors
+""",
     "doctor": "Check the software and hardware of this machine, and print advice.",
 }
 

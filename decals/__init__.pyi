@@ -1,5 +1,6 @@
 from . import editing, errors, field, images, index, rendering, scattering, scenes, surfaces, vtk, window
 from ._version import __version__
+from .baking.bake import bake
 from .errors import ImplicitDecalsError
 from .field.evaluate import evaluate
 from .field.mapping import ImageMapping
@@ -33,6 +34,7 @@ __all__ = [
     "Sizing",
     "TreeObject",
     "__version__",
+    "bake",
     "cover",
     "edit",
     "editing",

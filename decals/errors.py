@@ -14,7 +14,14 @@
     └── NoGraphics(RuntimeError)              no usable OpenGL; the message says what to install
 """
 
-from blobtree.errors import Cancelled, ImplicitDecalsError, InvalidDevice, InvalidInput, InvalidPoints
+from blobtree.errors import (
+    Cancelled,
+    ImplicitDecalsError,
+    InvalidDevice,
+    InvalidInput,
+    InvalidPoints,
+    MissingPackage,
+)
 
 __all__ = [
     "Cancelled",
@@ -28,6 +35,7 @@ __all__ = [
     "InvalidPoints",
     "InvalidScattering",
     "InvalidScene",
+    "MissingPackage",
     "NoGraphics",
     "TooMuchData",
 ]

@@ -3,14 +3,16 @@
 import math
 from collections.abc import Callable
 from enum import Enum
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
-from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage
+from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, MissingPackage
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
@@ -66,9 +68,14 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
 
 
 def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
-    """Return a finite number as a float; True and False count as 1 and 0."""
-    number = int(value) if isinstance(value, bool) else value
-    return real_number(name, number, "a finite number", math.isfinite, error)
+    """Return a finite number as a float."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number) or isinstance(value, str | bytes):
+        raise error(f"{name}: expected a finite number, got {describe(value)}")
+    return number
 
 
 def real_number(
@@ -144,6 +151,16 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def optional_package(name: str, extra: str) -> ModuleType:
+    """Return a package of an extra of this project; raise MissingPackage if it is not installed."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingPackage(
+            f"expected the package {name}, which is not installed; run pip install 'implicit-decals[{extra}]'"
+        ) from error
 
 
 # -- columns of decals: InvalidDecals -------------------------------------------------------------------

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Int64Array
 from blobtree.progress import Progress
-from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.editing.edit import Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
@@ -19,6 +18,7 @@ from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names
+from decals.surfaces.surface import as_points
 from decals.validation import describe, finite_vector, whole_number
 
 SPACING = 3.0**0.5 / 1.03
@@ -178,7 +178,7 @@ class RelaxDecals:
 
     def compute(self, document: Document) -> Edit:
         """Return the edit; radii stay."""
-        center = point_array(finite_vector("point", self.point, InvalidEdit)[None])[0]
+        center = as_points(finite_vector("point", self.point, InvalidEdit)[None])[0]
         numbers, decals = document.decals.numbers, document.decals.decals
         if not len(decals) or not document.objects:
             return Edit()

@@ -149,12 +149,13 @@ def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array
         An array that is not ``uint8[h, w, 4]``.
     """
     extents, parts, first = [], [], 0
+    levels = np.arange(256, dtype=np.float32) / np.float32(255)
+    linear = decode_srgb(levels.astype(np.float64)).astype(np.float32)
     for number, image in enumerate(images):
         height, width = require_rgba(f"image {number}", image).shape[:2]
         extents.append((first, width, height))
-        colors = image.reshape(-1, 4).astype(np.float32) / np.float32(255)
-        linear = decode_srgb(colors[:, :3].astype(np.float64)).astype(np.float32)
-        parts.append(np.column_stack([linear * colors[:, 3:], colors[:, 3]]))
+        pixels = image.reshape(-1, 4)
+        parts.append(np.column_stack([linear[pixels[:, :3]] * levels[pixels[:, 3:]], levels[pixels[:, 3]]]))
         first += width * height
     texels = np.concatenate([np.zeros((0, 4), np.float32), *parts]).astype(np.float32)
     return np.array(extents, np.int32).reshape(-1, 3), texels

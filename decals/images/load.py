@@ -48,15 +48,9 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
     >>> decals.load_image("scale").shape
     (256, 256, 4)
     """
-    if is_builtin(reference) or _has_invalid_color(reference, folder):
+    if is_builtin(reference):
         return generate_image(reference)
     return read_image((folder or Path()) / reference)
-
-
-def _has_invalid_color(reference: str, folder: Path | None) -> bool:
-    """Return True for the name of a generated image with another text than a colour, unless it is a file."""
-    name, mark, _ = reference.partition("#")
-    return bool(mark) and name in BUILTIN_IMAGES and not is_file((folder or Path()) / reference)
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
@@ -140,3 +134,9 @@ def _wide_grey(values: NDArray[np.float64], mode: str) -> NDArray[np.uint8]:
 def decode_srgb(colors: FloatArray) -> FloatArray:
     """Decode sRGB colours from 0 to 1 to linear light, in the precision of ``colors``."""
     return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+
+
+def encode_srgb(colors: FloatArray) -> FloatArray:
+    """Encode linear light, clamped to [0, 1], as sRGB colours, in the precision of ``colors``."""
+    light = np.clip(colors, 0.0, 1.0)
+    return np.where(light <= 0.0031308, light * 12.92, 1.055 * light ** (1 / 2.4) - 0.055)

@@ -11,7 +11,6 @@ from numpy.typing import DTypeLike, NDArray
 from PIL import Image
 
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
-from blobtree.files import write_atomically
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.targets import Targets
@@ -60,7 +59,7 @@ class Picture:
         return f"Picture({self.shape[1]} × {self.shape[0]} pixels)"
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the picture to a file, whole or not at all.
+        """Write the picture to a file.
 
         Parameters
         ----------
@@ -86,12 +85,10 @@ class Picture:
                 f"path: expected a picture file such as {path.stem + '.png'!r}, got {str(path)!r}"
             )
         image = Image.fromarray(self.pixels)
-        content = BytesIO()
         try:
             if file_format in ("JPEG", "BMP", "PPM"):
                 image = _on_white(image)
-            image.save(content, file_format)
-            write_atomically(path, content.getvalue())
+            image.save(path)
         except OSError as error:
             raise InvalidScene(
                 f"could not write the picture {str(path)!r} ({error.strerror or error})"

@@ -28,7 +28,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Raw, Struct
 
-from blobtree.files import write_atomically
+from blobtree.io import write_atomically
 from blobtree.progress import Progress, watched
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.model import Decals
@@ -186,16 +186,12 @@ def from_json(text: bytes, *, folder: Path, samples: SampleLoader | None = None)
     )
 
 
-HEADER_BYTES = 200
-"""Length of the beginning of a file that names its format."""
-
-
 def is_scene(text: bytes) -> bool:
-    """Return True if JSON has the format of a scene; damaged JSON if it begins like one."""
+    """Return True if JSON has the format of a scene."""
     try:
         return msgspec.json.decode(text, type=_Header).format == FORMAT
     except msgspec.MsgspecError:
-        return f'"{FORMAT}"'.encode() in text[:HEADER_BYTES]
+        return False
 
 
 def _decode(text: bytes) -> _SceneRecord:

@@ -14,8 +14,8 @@ PACKAGES = [
 ]  # fmt: skip
 NAMES = [
     "Camera", "Contact", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError", "Interaction",
-    "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__", "cover", "edit",
-    "evaluate", "load_image", "load_model", "load_scene", "render", "save_scene", "scatter", "show",
+    "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__", "bake", "cover",
+    "edit", "evaluate", "load_image", "load_model", "load_scene", "render", "save_scene", "scatter", "show",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["Samples"],

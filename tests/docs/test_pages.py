@@ -18,6 +18,7 @@ from blobtree import Point, polygonize
 from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from tests.decals.baking.glb import need
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -91,6 +92,12 @@ def check_decals(session: Session) -> None:
     assert not np.array_equal(pictures[0], pictures[1])
 
 
+def check_baking(session: Session) -> None:
+    for name in ("ball.glb", "ball-colors.glb"):
+        assert Path(name).read_bytes()[:4] == b"glTF"
+    assert len(session["scene"].decals) == 100
+
+
 def check_rendering(session: Session) -> None:
     assert session["picture"].shape == (480, 640, 4)
     assert (session["buffers"].owner >= 0).any()
@@ -142,6 +149,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "meshing": check_meshing,
     "decals": check_decals,
     "rendering": check_rendering,
+    "baking": check_baking,
     "scattering": check_scattering,
     "editing": check_editing,
     "pyvista": check_pyvista,
@@ -158,6 +166,8 @@ def test_the_python_of_a_page_runs(
     script = code(page)
     if DRAWS.search(script) and (missing := missing_gl_libraries()):
         pytest.skip(f"no OpenGL here: {install_advice(missing)}")
+    if "decals.bake(" in script:
+        need("trimesh", "xatlas")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pv, "OFF_SCREEN", True)
     Path("script.py").write_text(script, encoding="utf-8")

@@ -1,0 +1,71 @@
+"""``implicit-decals bake``: a scene as a GLB file for other programs."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from decals import Contact, ImageMapping
+from decals import bake as bake_scene
+from decals.apps.commands.options import MAX_SAMPLES, Definitions, OptionalWhole, Whole, check_count
+from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.models.loading import import_definitions, load_model
+from decals.apps.output import check_output
+
+
+def bake(
+    scene: str,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    size: Whole = 2048,
+    samples: Whole = 2,
+    vertex_colors: Annotated[bool, Parameter(negative=())] = False,
+    contact: Literal["product", "min", "radial"] = "product",
+    mapping: Literal["corrected", "chord"] = "corrected",
+    resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
+    creases: Annotated[bool, Parameter(negative=())] = False,
+    define: Definitions = None,
+) -> None:
+    """Write a scene as a GLB file, with the decals in a texture or in vertex colours.
+
+    Parameters
+    ----------
+    scene
+        A saved scene. Models that render takes are written without decals.
+    output
+        The file: glb.
+    size
+        Width and height of the texture in texels, from 16 to 8192.
+    samples
+        Samples per texel along each axis: 1 is fast, 2 smooth, 4 fine.
+    vertex_colors
+        Write colours at the vertices instead of a texture.
+    contact
+        Contact mode, as for render.
+    mapping
+        Image mapping, as for render.
+    resolution
+        Cells along the longest side of each implicit object. Default: 64.
+    creases
+        Keep the edges that unions, intersections and differences leave.
+    define
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+    """
+    check_output(output, (".glb",))
+    check_count("--samples", samples, 1, MAX_SAMPLES)
+    import_definitions(define)
+    loaded = load_model(scene)
+    with progress_bars() as progress:
+        bake_scene(
+            loaded,
+            output,
+            size=size,
+            samples=samples,
+            vertex_colors=vertex_colors,
+            contact=Contact[contact.upper()],
+            mapping=ImageMapping[mapping.upper()],
+            resolution=resolution,
+            creases=creases,
+            progress=progress,
+        )

@@ -1,0 +1,231 @@
+"""`bake`: a scene as a GLB file whose texture or vertex colours show the decals."""
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from blobtree._typing import Float32Array, Float64Array, UInt8Array
+from blobtree.io import write_atomically
+from blobtree.progress import Cancel, Progress, watched
+from decals.baking.atlas import Unwrapped, unwrap
+from decals.baking.glb import Node, glb_bytes
+from decals.baking.meshes import BakeMesh, bake_mesh
+from decals.baking.texture import BLOCK_SAMPLES, bake_texture
+from decals.errors import InvalidScene
+from decals.field.evaluate import evaluate
+from decals.field.mapping import ImageMapping
+from decals.images.load import decode_srgb
+from decals.index.editor import DecalEditor
+from decals.index.index import DecalIndex
+from decals.model import Decals
+from decals.record import Contact
+from decals.rendering.options import SceneLike, is_scene_like
+from decals.scenes.files import load_model
+from decals.scenes.objects import SceneObject, as_objects
+from decals.surfaces.convert import Model
+from decals.validation import describe, member, optional_package, whole_number
+
+SUFFIX = ".glb"
+
+MIN_SIZE, MAX_SIZE = 16, 8192
+"""Sides of a texture in texels: graphics cards read larger ones badly, or not at all."""
+
+MAX_SAMPLES = 16
+"""Samples along each axis of a texel, at most."""
+
+
+def bake(
+    scene: SceneLike | SceneObject | Model,
+    path: str | os.PathLike[str],
+    *,
+    size: int = 2048,
+    samples: int = 2,
+    vertex_colors: bool = False,
+    contact: Contact = Contact.PRODUCT,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+    resolution: int | None = None,
+    creases: bool = False,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> None:
+    """Write a scene as a GLB file for other programs, with the decals in a texture or in vertex colours.
+
+    The file has a node for each object, with normals. All nodes share one texture and one material, whose
+    base colour is that of decals and objects without light. Coordinates are those of the scene. No OpenGL is
+    needed.
+
+    Parameters
+    ----------
+    scene : Scene, SceneObject or Model
+        A scene; or a model as `decals.cover` takes it, or the path of a model or a scene.
+    path : str or path
+        The file, which ends in ``.glb``; its folder must exist.
+    size : int
+        Width and height of the texture in texels, from 16 to 8192.
+    samples : int
+        Samples along each axis of a texel; 2 means 4 samples a texel.
+    vertex_colors : bool
+        Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
+        not needed.
+    contact : Contact
+        Contact mode: how decals that push each other share the surface.
+    mapping : ImageMapping
+        Image mapping: how images lie on curved surface.
+    resolution : int, optional
+        Cells along the longest side of a tree's box, for the triangles of implicit objects; 64 by default.
+    creases : bool
+        Keep the edges that unions, intersections and differences leave on implicit objects.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``, with the stage in plain words and the fraction done.
+    cancel : callable, optional
+        Called often; the work stops if it returns True.
+
+    Raises
+    ------
+    InvalidScene, InvalidMesh, InvalidFile, InvalidResolution
+        If the scene, the path or an option cannot be used, or the file cannot be written.
+    MissingPackage
+        If a package of the extra ``bake`` is not installed; the message has the command.
+    Cancelled
+        `cancel` returned True; no file was written.
+
+    See Also
+    --------
+    decals.evaluate : colours at any points.
+    decals.save_scene : a scene as a file for this package.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
+    >>> decals.bake(scene, "ball.glb", size=64, resolution=16)
+    """
+    path = _checked_path(path)
+    size = whole_number("size", size, MIN_SIZE, MAX_SIZE, InvalidScene)
+    samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+    contact = member("contact", contact, Contact, InvalidScene)
+    mapping = member("mapping", mapping, ImageMapping, InvalidScene)
+    report = watched(progress, cancel)
+    for package in ("trimesh",) if vertex_colors else ("trimesh", "xatlas"):
+        optional_package(package, "bake")
+    objects, decals, images = _parts(scene)
+    if not objects:
+        raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
+    meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
+    colors = SurfaceColors(meshes, decals, images, contact, mapping)
+    texture = None
+    if vertex_colors:
+        nodes = _colored_nodes(meshes, colors, report)
+    else:
+        report("unwrapping the surface", 0.0)
+        unwrapped = unwrap(meshes, size)
+        texture = bake_texture(meshes, unwrapped, size, samples, colors.at, report)
+        nodes = [_textured_node(mesh, part, size) for mesh, part in zip(meshes, unwrapped, strict=True)]
+    report("writing the file", 0.0)
+    content = glb_bytes(nodes, texture)
+    report("writing the file", 0.5)
+    try:
+        write_atomically(path, content)
+    except OSError as error:
+        raise InvalidScene(
+            f"could not write {str(path)!r} ({error.strerror}); choose another folder"
+        ) from error
+    if progress is not None:  # without the check of `cancel`, as the file is written
+        progress("writing the file", 1.0)
+
+
+class SurfaceColors:
+    """Colours of the objects of a scene with the decals on them, without light.
+
+    Parameters
+    ----------
+    meshes : sequence of BakeMesh
+        The objects.
+    decals : Decals or DecalEditor
+        The decals on them.
+    images : sequence of uint8[h, w, 4]
+        Images of the decals.
+    contact, mapping
+        See `bake`.
+    """
+
+    def __init__(
+        self,
+        meshes: Sequence[BakeMesh],
+        decals: Decals | DecalEditor,
+        images: Sequence[UInt8Array],
+        contact: Contact,
+        mapping: ImageMapping,
+    ) -> None:
+        self._meshes, self._decals, self._images = meshes, decals, images
+        self._contact, self._mapping = contact, mapping
+        self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
+
+    def at(self, number: int, points: Float32Array, normals: Float32Array) -> Float64Array:
+        """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals."""
+        base = decode_srgb(np.asarray(self._meshes[number].base_colors(points), np.float64))
+        over = evaluate(
+            self._decals,
+            points,
+            normals,
+            mapping=self._mapping,
+            contact=self._contact,
+            index=self._index,
+            images=self._images,
+        ).color
+        assert over is not None  # there are images, if only an empty list of them
+        colors: Float64Array = base * (1.0 - over[:, 3:]) + over[:, :3]
+        return colors
+
+
+def _textured_node(mesh: BakeMesh, part: Unwrapped, size: int) -> Node:
+    uv = part.places / np.float32(size)
+    uv[:, 1] = 1.0 - uv[:, 1]
+    return Node(mesh.name, mesh.vertices[part.rows], part.faces, mesh.normals[part.rows], uv=uv)
+
+
+def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Progress) -> list[Node]:
+    nodes = []
+    for number, mesh in enumerate(meshes):
+        parts = []
+        for first in range(0, len(mesh.vertices), BLOCK_SAMPLES):
+            report("colouring vertices", (number + first / len(mesh.vertices)) / len(meshes))
+            rows = slice(first, first + BLOCK_SAMPLES)
+            parts.append(colors.at(number, mesh.vertices[rows], mesh.normals[rows]))
+        linear = np.clip(np.concatenate(parts), 0.0, 1.0).astype(np.float32)
+        nodes.append(Node(mesh.name, mesh.vertices, mesh.faces, mesh.normals, colors=linear))
+    return nodes
+
+
+def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[UInt8Array]]:
+    """Return objects, decals and images of a scene, of a model or of the file of either."""
+    loaded = load_model(scene) if isinstance(scene, str | os.PathLike) else scene
+    if not is_scene_like(loaded):
+        return as_objects([loaded]), Decals.empty(), []
+    known = cast(SceneLike, loaded)
+    return known.objects, known.decals, [image.pixels for image in known.images]
+
+
+def _checked_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a GLB file that can be written, or raise InvalidScene."""
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidScene(f"path: expected the path of a {SUFFIX} file, got {describe(path)}")
+    path = Path(path)
+    if path.suffix.lower() != SUFFIX:
+        raise InvalidScene(f"path: expected a file that ends in {SUFFIX}, got {str(path)!r}; rename it")
+    if path.is_dir():
+        raise InvalidScene(f"path: expected a file, {str(path)!r} is a folder; add a file name")
+    folder = path.parent
+    if not folder.is_dir():
+        raise InvalidScene(f"path: the folder {str(folder)!r} does not exist; create it first")
+    try:
+        tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof
+    except OSError as error:
+        raise InvalidScene(
+            f"path: the folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
+        ) from error
+    return path

@@ -1,0 +1,90 @@
+"""Objects of a scene as meshes with normals and base colours, ready to be unwrapped and coloured."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from blobtree import Node
+from blobtree._typing import Float32Array, Int32Array
+from blobtree.meshing.creases import split_creases
+from blobtree.meshing.polygonize import polygonize
+from blobtree.progress import Progress
+from decals.errors import InvalidMesh, InvalidScene
+from decals.rendering.mesh import vertex_normals
+from decals.scenes.objects import MeshObject, TreeObject
+from decals.surfaces.mesh import MeshSurface
+from decals.validation import describe
+
+
+@dataclass(frozen=True, eq=False)
+class BakeMesh:
+    """A triangle mesh of which every vertex and every face is used, without degenerate faces.
+
+    Attributes
+    ----------
+    name : str
+        Name of the object.
+    vertices : float32[n, 3]
+        Positions in the scene's units.
+    faces : int32[m, 3]
+        Corner indices, counter-clockwise seen from outside.
+    normals : float32[n, 3]
+        Unit normals, those with which the renderer draws the object.
+    base_colors : callable
+        Function from points ``float32[k, 3]`` to sRGB colours without decals, ``float32[k, 3]``.
+    """
+
+    name: str
+    vertices: Float32Array
+    faces: Int32Array
+    normals: Float32Array
+    base_colors: Callable[[Float32Array], Float32Array]
+
+
+def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Progress) -> BakeMesh:
+    """Return an object of a scene as a mesh; a tree is polygonized.
+
+    Raises
+    ------
+    InvalidScene
+        If the object is neither a MeshObject nor a TreeObject.
+    InvalidMesh
+        If a tree has no surface at this resolution.
+    InvalidResolution
+        If polygonization refuses the resolution.
+    """
+    if isinstance(item, MeshObject):
+        normals = vertex_normals(item.vertices, item.faces)
+        return _used_parts(item.name, item.surface, normals, _constant(item.color))
+    if isinstance(item, TreeObject):
+        return _tree_mesh(item.name, item.tree, resolution, creases, report)
+    raise InvalidScene(f"expected an object of a scene, got {describe(item)}; wrap it in a MeshObject")
+
+
+def _tree_mesh(name: str, tree: Node, resolution: int | None, creases: bool, report: Progress) -> BakeMesh:
+    mesh = polygonize(tree, resolution=resolution, creases=creases, progress=report)
+    if len(mesh.faces) == 0:
+        raise InvalidMesh(
+            f"object {name!r}: expected a tree with a surface, got none in cells of this size; "
+            "increase the resolution"
+        )
+    shown = split_creases(tree, mesh)
+    return _used_parts(name, MeshSurface(shown.vertices, shown.faces), shown.normals, tree.colors)
+
+
+def _used_parts(
+    name: str,
+    surface: MeshSurface,
+    normals: Float32Array,
+    base_colors: Callable[[Float32Array], Float32Array],
+) -> BakeMesh:
+    """Return the faces with area, and the vertices that they use."""
+    rows, faces = np.unique(surface.faces[surface.sound], return_inverse=True)
+    corners: Int32Array = faces.reshape(-1, 3).astype(np.int32)
+    return BakeMesh(name, surface.vertices[rows], corners, normals[rows], base_colors)
+
+
+def _constant(color: tuple[float, float, float]) -> Callable[[Float32Array], Float32Array]:
+    """Return a function that gives every point the same colour."""
+    return lambda points: np.broadcast_to(np.asarray(color, np.float32), points.shape)

@@ -1,0 +1,111 @@
+"""Texture of unwrapped meshes: texels to surface points, their colours, and gutters around charts."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from blobtree._typing import Float32Array, Float64Array, Int64Array, UInt8Array
+from blobtree.progress import Progress
+from decals.baking.atlas import Unwrapped
+from decals.baking.meshes import BakeMesh
+from decals.images.load import encode_srgb
+from decals.surfaces.mesh import MeshSurface
+
+BLOCK_SAMPLES = 1 << 19
+"""Points that are coloured at once, which bounds the memory besides that of the texture."""
+
+MIN_GUTTER = 4.0
+GUTTER_SHARE = 1 / 256
+"""Width of the gutters: so many texels, or this part of the texture if that is more."""
+
+ROUNDING = 1e-2
+"""Distance in texels below which a texel counts as inside a chart."""
+
+ColorFunction = Callable[[int, Float32Array, Float32Array], Float64Array]
+"""Linear colours ``float64[n, 3]`` of the surface of the mesh with a number, at points with unit normals."""
+
+
+def bake_texture(
+    meshes: Sequence[BakeMesh],
+    unwrapped: Sequence[Unwrapped],
+    size: int,
+    samples: int,
+    color_at: ColorFunction,
+    report: Progress,
+) -> UInt8Array:
+    """Return the texture ``uint8[size, size, 3]``, sRGB, first row at the top.
+
+    A texel is the mean colour of ``samples`` × ``samples`` points on it. Texels outside all charts take the
+    colours of the closest points of charts within the gutter, and the mean colour of the charts beyond it, so
+    that smaller mip levels mix in no foreign colour.
+    """
+    sheet = _Sheet(meshes, unwrapped)
+    gutter = max(MIN_GUTTER, GUTTER_SHARE * size)
+    image = np.zeros((size, size, 3), np.uint8)
+    empty = np.ones((size, size), np.bool_)
+    total, count = np.zeros(3), 0
+    steps = (np.arange(samples) + 0.5) / samples - 0.5
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    height = max(1, BLOCK_SAMPLES // (size * samples**2))
+    for top in range(0, size, height):
+        report("colouring texels", top / size)
+        rows, columns = np.mgrid[top : min(top + height, size), 0:size].reshape(2, -1)
+        centers = np.stack([columns, rows], axis=1) + 0.5
+        distances = sheet.distances(centers)
+        near = distances <= gutter
+        if not near.any():
+            continue
+        points = (centers[near, None] + offsets).reshape(-1, 2)
+        colors = sheet.colors(points, color_at).reshape(-1, len(offsets), 3).mean(axis=1)
+        image[rows[near], columns[near]] = np.rint(255.0 * encode_srgb(colors))
+        empty[rows[near], columns[near]] = False
+        inside = distances[near] < ROUNDING
+        total, count = total + colors[inside].sum(axis=0), count + int(inside.sum())
+    if count:
+        image[empty] = np.rint(255.0 * encode_srgb(total / count))
+    return image
+
+
+class _Sheet:
+    """All unwrapped meshes as one flat mesh on the texture."""
+
+    def __init__(self, meshes: Sequence[BakeMesh], unwrapped: Sequence[Unwrapped]) -> None:
+        counts = [len(part.rows) for part in unwrapped]
+        starts = np.cumsum([0, *counts[:-1]])
+        places = np.concatenate([part.places for part in unwrapped])
+        faces = np.concatenate([part.faces + start for part, start in zip(unwrapped, starts, strict=True)])
+        self._flat = MeshSurface(np.column_stack([places, np.zeros(len(places))]), faces)
+        pairs = list(zip(meshes, unwrapped, strict=True))
+        self._vertices = np.concatenate([mesh.vertices[part.rows] for mesh, part in pairs])
+        self._normals = np.concatenate([mesh.normals[part.rows] for mesh, part in pairs])
+        self._mesh_of_face = np.repeat(np.arange(len(meshes)), [len(part.faces) for part in unwrapped])
+
+    def distances(self, points: Float64Array) -> Float64Array:
+        """Return distances in texels to the closest points of charts, 0 inside up to rounding."""
+        faces, weights = self._locate(points)
+        closest = self._mixed(self._flat.vertices, faces, weights)[:, :2]
+        distances: Float64Array = np.linalg.norm(closest - points, axis=1)
+        return distances
+
+    def colors(self, points: Float64Array, color_at: ColorFunction) -> Float64Array:
+        """Return linear colours of the surface at points of the texture, ``float64[n, 3]``."""
+        faces, weights = self._locate(points)
+        positions = self._mixed(self._vertices, faces, weights).astype(np.float32)
+        normals = self._mixed(self._normals, faces, weights)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        units = (normals / np.maximum(lengths, 1e-30)).astype(np.float32)
+        meshes = self._mesh_of_face[faces]
+        colors = np.empty((len(points), 3))
+        for number in np.unique(meshes):
+            rows = meshes == number
+            colors[rows] = color_at(int(number), positions[rows], units[rows])
+        return colors
+
+    def _locate(self, points: Float64Array) -> tuple[Int64Array, Float64Array]:
+        return self._flat.locate(np.column_stack([points, np.zeros(len(points))]))
+
+    def _mixed(self, values: Float32Array, faces: Int64Array, weights: Float64Array) -> Float64Array:
+        """Return values at the vertices, interpolated in faces."""
+        corners = self._flat.faces[faces]
+        mixed: Float64Array = np.einsum("ij,ijk->ik", weights, values[corners].astype(np.float64))
+        return mixed

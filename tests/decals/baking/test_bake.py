@@ -1,0 +1,333 @@
+"""Baked textures and vertex colours against the decals in float64, and against a picture of the scene."""
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+import decals
+from blobtree import Point
+from decals import MeshObject, Scene, TreeObject
+from decals.baking import bake as bake_module
+from decals.baking import texture as texture_module
+from decals.baking.atlas import unwrap
+from decals.baking.meshes import bake_mesh
+from decals.baking.texture import bake_texture
+from decals.errors import NoGraphics
+from decals.rendering import Lighting
+from tests.decals.baking.glb import (
+    BALL,
+    CUBE,
+    Array,
+    ReadMesh,
+    ball_and_cube,
+    bilinear,
+    expected_colors,
+    linear,
+    need,
+    read_attribute,
+    read_glb,
+    read_json,
+)
+
+SIZE = 256
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The ball and the cube with one sample a texel."""
+    need("trimesh", "xatlas")
+    path = tmp_path_factory.mktemp("baked") / "scene.glb"
+    decals.bake(ball_and_cube(), path, size=SIZE, samples=1)
+    return path
+
+
+@pytest.mark.parametrize(("name", "color"), [("ball", BALL), ("cube", CUBE)])
+def test_texels_have_the_colours_of_the_surface_below_them(baked: Path, name: str, color: Any) -> None:
+    node = read_glb(baked)[name]
+    assert node.uv is not None
+    assert node.texture is not None
+    assert node.texture.shape == (SIZE, SIZE, 3)
+    rng = np.random.default_rng(5)
+    faces = node.faces[rng.integers(0, len(node.faces), 3000)]
+    places = np.stack([node.uv[..., 0], 1 - node.uv[..., 1]], axis=-1) * SIZE
+    corners = places[faces]
+    weights = rng.dirichlet((1, 1, 1), len(faces))
+    texels = np.floor((corners * weights[..., None]).sum(axis=1))
+    sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    inner = np.linalg.solve(sides, (texels + 0.5 - corners[:, 0])[..., None])[..., 0]
+    weights = np.column_stack([1 - inner.sum(axis=1), inner])
+    inside = weights.min(axis=1) > 0.01
+    assert inside.sum() > 300
+    points, normals = (
+        (values[faces] * weights[..., None]).sum(axis=1)[inside] for values in (node.vertices, node.normals)
+    )
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    want = expected_colors(ball_and_cube(), color, points, normals)
+    columns, rows = texels[inside].astype(int).T
+    got = linear(node.texture[rows, columns] / 255)
+    off = np.abs(got - want).max(axis=1) > 0.006  # half a step of sRGB in the lights, and float32
+    assert off.mean() < 0.02  # texels on a rim or a line of contact
+    assert want.std(axis=0).min() > 0.02
+
+
+@pytest.mark.parametrize(("name", "color"), [("ball", BALL), ("cube", CUBE)])
+def test_points_of_the_surface_find_their_colours_through_texture_coordinates(
+    tmp_path: Path, name: str, color: Any
+) -> None:
+    need("trimesh", "xatlas")
+    scene = ball_and_cube()
+    decals.bake(scene, tmp_path / "fine.glb", size=512)
+    node = read_glb(tmp_path / "fine.glb")[name]
+    points, normals, uv = node.on_surface(3000)
+    assert node.texture is not None
+    got = bilinear(linear(node.texture / 255), uv)
+    around = neighborhoods(points, normals, 1.5 * texel_length(node))
+    samples = decals.evaluate(
+        scene.decals,
+        around.reshape(-1, 3),
+        np.repeat(normals, around.shape[1], axis=0),
+        images=[image.pixels for image in scene.images],
+    )
+    assert samples.color is not None
+    want = linear(np.asarray(color)) * (1 - samples.color[:, 3:]) + samples.color[:, :3]
+    want = want.reshape(*around.shape)
+    errors = np.abs(got - want[:, 0]).max(axis=1)
+    assert np.median(errors) < 0.004
+    outside = np.maximum(want.min(axis=1) - got, got - want.max(axis=1)).max(axis=1)
+    assert (outside > 0.01).mean() < 0.005  # a filtered colour is a mean of those within its texels
+    assert (np.abs(got - want[:, 0].mean(axis=0)).max(axis=1) > 0.05).mean() > 0.5
+
+
+def texel_length(node: ReadMesh) -> float:
+    """Length of a texel on the surface."""
+    assert node.uv is not None
+    assert node.texture is not None
+    solid, flat = (
+        np.linalg.norm(values[node.faces[:, 1]] - values[node.faces[:, 0]], axis=1).sum()
+        for values in (node.vertices, node.uv * len(node.texture))
+    )
+    return float(solid / flat)
+
+
+def neighborhoods(points: Array, normals: Array, reach: float) -> Array:
+    """Each point, then a grid of points of its tangent plane up to a distance along each axis."""
+    across = np.cross(normals, np.where(np.abs(normals[:, :1]) < 0.8, [[1.0, 0, 0]], [[0, 1.0, 0]]))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    frame = np.stack([across, np.cross(normals, across)], axis=1)
+    steps = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 2), axis=-1).reshape(-1, 2)
+    return points[:, None] + np.concatenate([np.zeros((1, 2)), steps]) @ frame
+
+
+def test_the_textured_meshes_look_like_the_picture_of_the_scene(baked: Path) -> None:
+    """Both without light: decals.render against VTK's own textures."""
+    scene, size = ball_and_cube(), (240, 180)
+    try:
+        picture = decals.render(scene, size=size, samples=2, lights=Lighting(()))
+    except NoGraphics as error:
+        pytest.skip(str(error))
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting=None)
+    for node in read_glb(baked).values():
+        mesh = pv.PolyData.from_regular_faces(node.vertices, node.faces)
+        mesh.active_texture_coordinates = node.uv
+        plotter.add_mesh(mesh, texture=pv.Texture(node.texture), lighting=False)
+    camera = scene.camera
+    plotter.camera_position = [camera.position, camera.target, camera.up]
+    plotter.camera.view_angle = camera.fov
+    plotter.set_background("white")
+    shown = np.asarray(plotter.screenshot(return_img=True), float)
+    plotter.close()
+    drawn = np.asarray(picture)[..., :3].astype(float)
+    on_both = (shown.min(axis=2) < 250) & (np.abs(drawn - drawn[0, 0]).max(axis=2) > 8)
+    assert on_both.mean() > 0.15
+    assert np.abs(shown - drawn)[on_both].mean() < 9
+    assert np.abs(shown - drawn[:, ::-1])[on_both].mean() > 25  # the measure tells other pictures apart
+
+
+def border_points(node: Any) -> Array:
+    """Texture coordinates along the borders of all charts."""
+    edges = np.concatenate([node.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    _, first, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    ends = node.uv[edges[first[counts == 1]]]
+    share = np.linspace(0, 1, 5)[:, None, None]
+    points: Array = (ends[:, 0] * (1 - share) + ends[:, 1] * share).reshape(-1, 2)
+    return points
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_seams_show_no_colour_from_outside_their_chart(tmp_path: Path, samples: int) -> None:
+    """Two plain colours: filtered at any border of a chart, also on a smaller mip level, each stays pure."""
+    need("trimesh", "xatlas")
+    plain = ball_and_cube().replace(decals=decals.Decals.empty())
+    decals.bake(plain, tmp_path / "plain.glb", size=SIZE, samples=samples)
+    nodes = read_glb(tmp_path / "plain.glb")
+    for name, color in (("ball", BALL), ("cube", CUBE)):
+        texture, points = nodes[name].texture, border_points(nodes[name])
+        assert texture is not None
+        assert len(points) > 50
+        half = texture.reshape(SIZE // 2, 2, SIZE // 2, 2, 3).mean(axis=(1, 3))
+        for level in (texture.astype(float), half):
+            colors = bilinear(level, points)
+            assert np.abs(colors - 255 * np.asarray(color)).max() <= 1.0
+    if samples == 1:
+        colors = np.unique(texture.reshape(-1, 3), axis=0)
+        assert len(colors) == 3  # both colours, and their mean far from all charts
+
+
+def test_borders_of_charts_continue_the_decals(baked: Path) -> None:
+    node = read_glb(baked)["ball"]
+    edges = np.concatenate([node.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    _, first, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    ends = edges[first[counts == 1]]
+    assert node.uv is not None
+    assert node.texture is not None
+    uv, points, normals = (values[ends].mean(axis=1) for values in (node.uv, node.vertices, node.normals))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    want = expected_colors(ball_and_cube(), BALL, points, normals)
+    errors = np.abs(bilinear(linear(node.texture / 255), uv) - want).max(axis=1)
+    assert len(errors) > 50
+    assert np.median(errors) < 0.02
+
+
+def test_vertex_colours_are_linear_and_need_no_xatlas(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    need("trimesh")
+    monkeypatch.setitem(__import__("sys").modules, "xatlas", None)
+    scene, path = ball_and_cube(), tmp_path / "colors.glb"
+    decals.bake(scene, path, vertex_colors=True)
+    for number, (item, color) in enumerate(zip(scene.objects, (BALL, CUBE), strict=True)):
+        points, normals, colors = (
+            read_attribute(path, number, name).astype(float) for name in ("POSITION", "NORMAL", "COLOR_0")
+        )
+        assert isinstance(item, MeshObject)
+        assert np.array_equal(points, item.vertices)
+        want = expected_colors(scene, color, points, normals)
+        assert (np.abs(colors - want).max(axis=1) > 1e-3).mean() < 0.02
+    tree = read_json(path)
+    assert "images" not in tree
+    assert tree["materials"][0]["pbrMetallicRoughness"]["metallicFactor"] == 0.0
+
+
+def test_nodes_materials_and_normals(baked: Path) -> None:
+    tree = read_json(baked)
+    assert {node["name"] for node in tree["nodes"] if "mesh" in node} == {"ball", "cube"}
+    assert len(tree["materials"]) == len(tree["textures"]) == len(tree["images"]) == 1
+    assert tree["samplers"][tree["textures"][0]["sampler"]]["wrapS"] == 33071
+    material = tree["materials"][0]
+    assert material["doubleSided"]
+    assert material["pbrMetallicRoughness"]["metallicFactor"] == 0.0
+    ball = read_glb(baked)["ball"]
+    assert np.abs(ball.normals - ball.vertices).max() < 0.02
+    assert {tuple(row) for row in np.round(ball.vertices, 5)} == {
+        tuple(row) for row in np.round(ball_and_cube().objects[0].surface.vertices.astype(float), 5)
+    }
+
+
+@pytest.mark.parametrize("names", [("world", "scene"), ("scene", "scene-"), ("Kürbis 🎃", "a/b")])
+def test_any_name_of_an_object_is_kept(tmp_path: Path, names: tuple[str, str]) -> None:
+    need("trimesh")
+    first, second = ball_and_cube().objects
+    objects = [
+        MeshObject(name, item.surface.vertices, item.surface.faces)
+        for name, item in zip(names, (first, second), strict=True)
+    ]
+    scene = ball_and_cube().replace(objects=objects)
+    decals.bake(scene, tmp_path / "names.glb", vertex_colors=True)
+    assert {node["name"] for node in read_json(tmp_path / "names.glb")["nodes"] if "mesh" in node} == set(
+        names
+    )
+
+
+@pytest.mark.parametrize("creases", [False, True], ids=["smooth", "creases"])
+def test_a_tree_is_polygonized_and_keeps_its_colours(tmp_path: Path, creases: bool) -> None:
+    need("trimesh", "xatlas")
+    red, blue = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
+    lens = Point((0, 0, 0), radius=1.0, color=red) | Point((1.2, 0, 0), radius=1.0, color=blue)
+    decals.bake(lens, tmp_path / "lens.glb", size=128, resolution=24, creases=creases)
+    (node,) = read_glb(tmp_path / "lens.glb").values()
+    points, _, uv = node.on_surface(500)
+    assert np.abs(lens(points.astype(np.float32)) - 0.5).max() < 0.05
+    assert node.texture is not None
+    colors = bilinear(node.texture / 255, uv)
+    side = np.abs(points[:, 0] - 0.6) > 0.1
+    want = np.where(points[:, :1] < 0.6, red, blue)
+    assert np.abs(colors - want)[side].max() < 0.02
+    copies = len(node.vertices) - len(np.unique(np.round(node.vertices, 5), axis=0))
+    assert copies > 0
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6], ids=["tiny", "huge"])
+def test_the_size_of_a_model_does_not_matter(baked: Path, tmp_path: Path, scale: float) -> None:
+    decals.bake(ball_and_cube(scale=scale), tmp_path / "scaled.glb", size=SIZE, samples=1)
+    same, scaled = read_glb(baked)["ball"], read_glb(tmp_path / "scaled.glb")["ball"]
+    assert same.texture is not None
+    assert scaled.texture is not None
+    assert len(scaled.faces) == len(same.faces)
+    assert scaled.texture.std(axis=(0, 1)) == pytest.approx(same.texture.std(axis=(0, 1)), rel=0.2)
+
+
+def test_degenerate_faces_and_unused_vertices_are_left_out(tmp_path: Path) -> None:
+    need("trimesh", "xatlas")
+    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [9e9, 0, 0], [0.5, 0, 0]]
+    scrap = MeshObject("scrap", vertices, [[0, 1, 2], [0, 0, 1], [0, 4, 1], [2, 2, 2]])
+    for vertex_colors in (False, True):
+        decals.bake(scrap, tmp_path / "scrap.glb", size=32, vertex_colors=vertex_colors)
+        (node,) = read_glb(tmp_path / "scrap.glb").values()
+        assert len(node.faces) == 1
+        assert node.vertices.max() == 1.0
+
+
+def textured(size: int, samples: int = 1) -> Array:
+    """The texture of the ball and the cube, without a file."""
+    scene = ball_and_cube()
+    meshes = [
+        bake_mesh(item, resolution=None, creases=False, report=lambda *_: None) for item in scene.objects
+    ]
+    colors = bake_module.SurfaceColors(
+        meshes,
+        scene.decals,
+        [image.pixels for image in scene.images],
+        decals.Contact.PRODUCT,
+        decals.ImageMapping.CORRECTED,
+    )
+    return bake_texture(meshes, unwrap(meshes, size), size, samples, colors.at, lambda *_: None)
+
+
+def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    need("xatlas")
+    whole = textured(512)
+    monkeypatch.setattr(texture_module, "BLOCK_SAMPLES", 1 << 13)
+    tracemalloc.start()
+    try:
+        parts = textured(512)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert np.array_equal(parts, whole)
+    assert peak < 8 * whole.nbytes
+
+
+def test_several_samples_smooth_the_rims() -> None:
+    need("xatlas")
+    rough, smooth, exact = textured(64, 1), textured(64, 4), textured(256, 1)
+    reduced = exact.reshape(64, 4, 64, 4, 3).astype(float).mean(axis=(1, 3))
+    assert np.abs(smooth - reduced).mean() < np.abs(rough - reduced).mean()
+
+
+def test_stages_are_reported_in_order(tmp_path: Path) -> None:
+    need("trimesh", "xatlas")
+    seen: list[tuple[str, float]] = []
+    scene = Scene(
+        objects=(TreeObject("ball", Point((0, 0, 0), radius=1.0)),), camera=decals.Camera((0, 0, 5))
+    )
+    decals.bake(
+        scene, tmp_path / "a.glb", size=64, resolution=16, progress=lambda *report: seen.append(report)
+    )
+    stages = list(dict.fromkeys(stage for stage, _ in seen))
+    assert stages[-3:] == ["unwrapping the surface", "colouring texels", "writing the file"]
+    assert seen[-1] == ("writing the file", 1.0)
+    assert all(0.0 <= fraction <= 1.0 for _, fraction in seen)
