@@ -15,7 +15,7 @@ from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.device import launch
 from decals.model import FACING_LIMIT
 from decals.scattering.boundary_kernels import PLANES_PER_POINT, BoundarySegments, find_mirror_planes
-from decals.scattering.shared_kernels import MirrorPlanes, Particles
+from decals.scattering.search_kernels import MirrorPlanes, Particles
 from decals.surfaces.mesh import MeshSurface, edges_of
 from decals.surfaces.surface import Scalars, Surface
 

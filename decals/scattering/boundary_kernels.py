@@ -5,7 +5,7 @@
 
 import warp as wp
 
-from decals.scattering.shared_kernels import MirrorPlanes, Particles
+from decals.scattering.search_kernels import MirrorPlanes, Particles
 
 wp.set_module_options({"enable_backward": False})
 

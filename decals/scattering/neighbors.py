@@ -14,8 +14,13 @@ from blobtree.device import launch
 from decals.model import FACING_LIMIT
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
-from decals.scattering.search_kernels import mark_local_maxima, nearest_distances, ring_distances
-from decals.scattering.shared_kernels import MirrorPlanes, Particles
+from decals.scattering.search_kernels import (
+    MirrorPlanes,
+    Particles,
+    mark_local_maxima,
+    nearest_distances,
+    ring_distances,
+)
 from decals.surfaces.surface import Scalars, vectors
 
 MIN_PARALLEL_QUERIES = 4000

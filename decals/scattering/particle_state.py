@@ -12,7 +12,7 @@ from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.projection import spans_of
 from decals.scattering.repulsion import CUTOFF, SKIN, Law, Repulsion, particle_struct
 from decals.scattering.repulsion_kernels import StepTerms
-from decals.scattering.shared_kernels import MirrorPlanes, Particles
+from decals.scattering.search_kernels import MirrorPlanes, Particles
 from decals.scattering.step_kernels import (
     accept_or_backtrack,
     compare_energy,

@@ -18,7 +18,7 @@ from decals.scattering.repulsion_kernels import (
     measure_rings,
     repel,
 )
-from decals.scattering.shared_kernels import MirrorPlanes, NeighborSearch, Particles
+from decals.scattering.search_kernels import MirrorPlanes, NeighborSearch, Particles
 
 CUTOFF = 2.0
 """Distance beyond which particles do not repel each other, in spacings."""

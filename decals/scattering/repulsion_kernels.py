@@ -16,7 +16,7 @@ not depend on scheduling.
 
 import warp as wp
 
-from decals.scattering.shared_kernels import (
+from decals.scattering.search_kernels import (
     MirrorPlanes,
     NeighborSearch,
     Particles,

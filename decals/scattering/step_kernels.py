@@ -6,7 +6,7 @@
 import warp as wp
 
 from decals.scattering.repulsion_kernels import StepTerms
-from decals.scattering.shared_kernels import Particles
+from decals.scattering.search_kernels import Particles
 
 wp.set_module_options({"enable_backward": False})
 

@@ -19,7 +19,7 @@ from decals.scattering.relaxation import Relaxation
 from decals.scattering.repulsion import CORE, CUTOFF, DAMPING, MAX_MOVE, Law
 from decals.scattering.repulsion_kernels import CLOSEST, ISOTROPY, MAX_RING_DEVIATION, MIRROR_DEPTH
 from decals.scattering.scatter import scatter
-from decals.scattering.shared_kernels import MirrorPlanes
+from decals.scattering.search_kernels import MirrorPlanes
 from decals.surfaces.mesh import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.decals.scattering.evaluation import device_particles, evaluate
