@@ -2,6 +2,7 @@
 
 from typing import Any, TypeAlias
 
+import numpy as np
 import warp as wp
 
 from blobtree.cells.scan_kernels import enumerate_indices, flag_sign, gather, summarize
@@ -10,6 +11,9 @@ from blobtree.errors import InvalidResolution
 
 DeviceArray: TypeAlias = Any
 """A Warp array; the name of the variable says of what."""
+
+MAX_TOTAL = (1 << 31) - 1
+"""Largest int32."""
 
 
 def exclusive_scan(counts: DeviceArray, noun: str) -> tuple[DeviceArray, int]:
@@ -24,9 +28,13 @@ def exclusive_scan(counts: DeviceArray, noun: str) -> tuple[DeviceArray, int]:
     """
     starts = wp.empty_like(counts)
     wp.utils.array_scan(counts, starts, inclusive=False)
-    summary: DeviceArray = wp.zeros(2, dtype=wp.int32, device=counts.device)
-    launch(summarize, len(counts) - 1, [starts], [summary], str(counts.device))
-    total, overflow = summary.numpy().tolist()
+    if counts.device.is_cpu:  # a launch would take longer than the sum
+        total = int(counts.numpy().sum(dtype=np.int64))
+        overflow = total > MAX_TOTAL
+    else:
+        summary: DeviceArray = wp.zeros(2, dtype=wp.int32, device=counts.device)
+        launch(summarize, len(counts) - 1, [starts], [summary], str(counts.device))
+        total, overflow = summary.numpy().tolist()
     if overflow:
         raise InvalidResolution(f"{noun}: more than 32 bits can number; take larger cells")
     return starts, total
