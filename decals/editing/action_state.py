@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
-from decals.editing.edit import Edit
+from decals.editing.document import Edit
 from decals.editing.queries import SurfacePick
 from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int64Array
-from decals.editing.document import Document
-from decals.editing.edit import Edit
+from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers

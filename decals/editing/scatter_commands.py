@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Int64Array
 from blobtree.progress import Progress
-from decals.editing.document import Document
-from decals.editing.edit import Edit
+from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.model import Decals

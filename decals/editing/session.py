@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from blobtree.progress import Progress
-from decals.editing.document import Document
-from decals.editing.edit import DecalStates, Edit, SceneParts
+from decals.editing.document import DecalStates, Document, Edit, SceneParts
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.files import save_scene

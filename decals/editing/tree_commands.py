@@ -19,8 +19,7 @@ from blobtree.nodes.paths import (
     world_matrix,
 )
 from blobtree.nodes.surgery import Join
-from decals.editing.document import Document
-from decals.editing.edit import Edit
+from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit

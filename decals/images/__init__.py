@@ -1,6 +1,8 @@
-"""Decal images: generated ones, and pictures from files."""
+"""Decal images: generated ones, and pictures from files.
 
-from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
-from decals.images.load import MAX_IMAGE_EDGE, load_image, read_image
+The public names are listed in `__init__.pyi` and are loaded at first use.
+"""
 
-__all__ = ["BUILTIN_IMAGES", "MAX_IMAGE_EDGE", "generate_image", "is_builtin", "load_image", "read_image"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.errors import InvalidImage, InvalidScattering
-from decals.images import load_image
+from decals.images.load import load_image
 from decals.scattering.image_projections import Projection
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import as_points

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from blobtree.io import TreeFile, from_tree_file, to_tree_file
 from decals.errors import ImplicitDecalsError, InvalidScene
-from decals.images import is_builtin
+from decals.images.builtin import is_builtin
 from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from decals import rendering
 from decals.errors import InvalidScene, NoGraphics
-from decals.images import load_image
+from decals.images.load import load_image
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject, bounds_of, check_names

@@ -1,7 +1,8 @@
-"""The editing window; `decals.editing` has the edits without a window."""
+"""The editing window; `decals.editing` has the edits without a window.
 
-from decals.window.browser import browser_keys, press_key
-from decals.window.frame_budget import FrameBudget
-from decals.window.window import EditWindow, edit
+The public names are listed in `__init__.pyi` and are loaded at first use.
+"""
 
-__all__ = ["EditWindow", "FrameBudget", "browser_keys", "edit", "press_key"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

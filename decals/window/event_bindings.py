@@ -1,5 +1,9 @@
-"""VTK events to pointer tools; events that the tools do not use go on to the camera."""
+"""Events of a window: those of VTK go to the pointer tools, and ticks come from timers or an asyncio loop.
 
+Events that the tools do not use go on to the camera.
+"""
+
+import asyncio
 import weakref
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -161,3 +165,67 @@ class EventBindings:
             window.tools.move(*pixel)
             window.tools.release(*pixel, ctrl=ctrl, shift=shift)
             window.redraw(whole=True)
+
+
+TICK_MILLISECONDS = 20
+"""Time between two ticks of a window."""
+
+
+class Ticking(Protocol):
+    """An object with work to do in small steps."""
+
+    @property
+    def busy(self) -> bool:
+        """True while there is work."""
+        ...
+
+    def tick(self) -> None:
+        """Do one step."""
+        ...
+
+
+def running_loop() -> asyncio.AbstractEventLoop | None:
+    """Return the asyncio loop that runs in this thread, or None."""
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
+
+
+class AsyncTicker:
+    """Calls ``tick`` from a task of the running asyncio loop, while there is work.
+
+    Parameters
+    ----------
+    target
+        The object with work. It is not kept alive.
+    """
+
+    def __init__(self, target: Ticking) -> None:
+        self._target = weakref.ref(target)
+        self._task: asyncio.Task[None] | None = None
+
+    def wake(self) -> None:
+        """Start the task, if an asyncio loop runs and no task does."""
+        loop, task = running_loop(), self._task
+        if loop is not None and (task is None or task.done() or task.get_loop() is not loop):
+            self._task = loop.create_task(_tick_while_busy(self._target), name="ticks of an EditWindow")
+
+    def stop(self) -> None:
+        """Cancel the task."""
+        if self._task is not None and not self._task.get_loop().is_closed():
+            self._task.cancel()
+        self._task = None
+
+
+async def _tick_while_busy(target: "weakref.ref[Ticking]") -> None:
+    while _tick(target()):
+        await asyncio.sleep(TICK_MILLISECONDS / 1000)
+
+
+def _tick(target: Ticking | None) -> bool:
+    """Do one step, and return True if there is more work."""
+    if target is None or not target.busy:
+        return False
+    target.tick()
+    return target.busy

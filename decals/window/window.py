@@ -19,9 +19,8 @@ from decals.validation import describe, whole_number
 from decals.vtk.settings import MAX_SAMPLES
 from decals.vtk.subplot import SubplotRenderer
 from decals.vtk.weak_callback import weak_callback
-from decals.window.event_bindings import EventBindings
-from decals.window.frames import FrameController, FrameState
-from decals.window.handle import PrimitiveHandle
+from decals.window.event_bindings import TICK_MILLISECONDS, AsyncTicker, EventBindings, running_loop
+from decals.window.frames import STATUS_INTERVAL, FrameController, FrameState, RateLimit, Warmup
 from decals.window.host_plotter import (
     DEFAULT_SIZE,
     HostPlotter,
@@ -34,15 +33,7 @@ from decals.window.host_plotter import (
     ray_through,
     require_screen,
 )
-from decals.window.overlay import Overlay
-from decals.window.scheduling import (
-    STATUS_INTERVAL,
-    TICK_MILLISECONDS,
-    AsyncTicker,
-    RateLimit,
-    Warmup,
-    running_loop,
-)
+from decals.window.overlay import Overlay, PrimitiveHandle
 
 
 class EditWindow:

@@ -7,7 +7,7 @@ import pytest
 
 from blobtree import Point, Segment
 from decals.editing.document import Document
-from decals.editing.outlines import ANGLES, LIFT, outline, undisturbed_rims
+from decals.editing.queries import ANGLES, LIFT, outline, undisturbed_rims
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact

@@ -8,8 +8,7 @@ import pytest
 from blobtree import Point
 from decals.editing import EditSession
 from decals.editing.document import Document
-from decals.editing.outlines import LIFT, outline, undisturbed_rims
-from decals.editing.queries import pick
+from decals.editing.queries import LIFT, outline, pick, undisturbed_rims
 from decals.field.evaluate import evaluate
 from decals.model import Interaction
 from decals.rendering.options import RenderOptions

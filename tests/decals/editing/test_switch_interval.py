@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from decals.editing.worker import SWITCH_INTERVAL, ShortSwitchInterval
+from decals.editing.background import SWITCH_INTERVAL, ShortSwitchInterval
 
 
 def test_turns_are_short_inside_and_as_before_outside() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from blobtree import device as launch
-from decals.editing.worker import Job, Worker
+from decals.editing.background import Job, Worker
 
 
 def nothing() -> None:

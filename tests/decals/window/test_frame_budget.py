@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.window.frame_budget import SCALES, TARGET_SECONDS, FrameBudget
+from decals.window.frames import SCALES, TARGET_SECONDS, FrameBudget
 
 
 def settled(fixed: Any, each: Any, frames: Any = 12) -> Any:

@@ -94,7 +94,7 @@ def test_a_window_opens_empty_and_ends_with_the_picture_of_one_drawn_at_once(
 
 
 def test_each_piece_is_a_chance_to_listen(waiting: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("decals.window.scheduling.SLICE_SECONDS", 0.0)
+    monkeypatch.setattr("decals.window.frames.SLICE_SECONDS", 0.0)
     window = waiting()
     pieces = window.subplot.renderer.warmup(window.document, _options(window)).tasks
     heard = slices(window, 100_000)
@@ -158,7 +158,7 @@ def test_a_whole_frame_may_be_asked_for_at_once(waiting: Any, opened: Any) -> No
 def test_a_window_closed_in_between_gives_everything_back(
     waiting: Any, monkeypatch: pytest.MonkeyPatch, ticks: Any
 ) -> None:
-    monkeypatch.setattr("decals.window.scheduling.SLICE_SECONDS", 0.0)
+    monkeypatch.setattr("decals.window.frames.SLICE_SECONDS", 0.0)
     window = waiting()
     for _ in range(ticks):
         window.tick()
@@ -182,7 +182,7 @@ def test_what_needs_no_graphics_is_made_in_a_thread_while_the_window_listens(
         return decal_library(*arguments, **options)
 
     monkeypatch.setattr(scene_warmup, "decal_library", slow)
-    monkeypatch.setattr("decals.window.scheduling.SLICE_SECONDS", 0.0)
+    monkeypatch.setattr("decals.window.frames.SLICE_SECONDS", 0.0)
     window = waiting()
     for _ in range(20):
         window.tick()

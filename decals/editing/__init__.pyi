@@ -1,0 +1,66 @@
+from .actions import KEYS, Actions
+from .commands import (
+    AddDecals,
+    AddImage,
+    DeleteDecals,
+    DuplicateDecals,
+    MapValues,
+    MoveDecals,
+    RemoveImage,
+    ReplaceImage,
+    ScaleDecals,
+    SetCamera,
+    SetValues,
+    TurnDecals,
+)
+from .document import Document
+from .pointer_tools import PointerTools
+from .queries import first_hit, nearest_points, outline, pick
+from .scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
+from .session import EditSession, UndoEntry
+from .tree_commands import (
+    AddPrimitive,
+    DuplicatePrimitive,
+    JoinPrimitive,
+    MovePrimitive,
+    PaintPrimitive,
+    RemovePrimitive,
+    ResizePrimitive,
+)
+
+__all__ = [
+    "KEYS",
+    "Actions",
+    "AddDecals",
+    "AddImage",
+    "AddObject",
+    "AddPrimitive",
+    "DeleteDecals",
+    "Document",
+    "DuplicateDecals",
+    "DuplicatePrimitive",
+    "EditSession",
+    "JoinPrimitive",
+    "MapValues",
+    "MoveDecals",
+    "MovePrimitive",
+    "PaintPrimitive",
+    "PointerTools",
+    "RelaxDecals",
+    "RemoveImage",
+    "RemoveObject",
+    "RemovePrimitive",
+    "ReplaceDecals",
+    "ReplaceImage",
+    "ResizePrimitive",
+    "ScaleDecals",
+    "ScatterDecals",
+    "SetCamera",
+    "SetValues",
+    "TurnDecals",
+    "UndoEntry",
+    "first_hit",
+    "nearest_points",
+    "outline",
+    "pick",
+]
