@@ -20,10 +20,10 @@ from decals.scenes.objects import CLAY, Color, MeshObject, SceneObject, TreeObje
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.convert import Model, as_shape
 from decals.validation import describe, instance
+from decals.vtk.adapters import Lights
 from decals.vtk.context import WindowContext
-from decals.vtk.lights import Lights
+from decals.vtk.exports import restore_exports, warn_of_exports
 from decals.vtk.subplot import SubplotRenderer
-from decals.vtk.unsupported import restore_exports, warn_of_exports
 
 Image = str | os.PathLike[str] | DecalImage | NDArray[np.uint8]
 """The name of a generated image, a path, an image, or ``uint8[h, w, 4]``."""
@@ -204,7 +204,7 @@ class DecalsComponent:
         return scene
 
     def clear(self) -> None:
-        """Remove everyitem from the active subplot."""
+        """Remove everything from the active subplot."""
         self.subplot.scene = None
 
     # -- how --------------------------------------------------------------------------------------------

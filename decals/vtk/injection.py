@@ -21,7 +21,7 @@ from decals.rendering.regions import Rectangle
 from decals.rendering.textures import ImageArray
 from decals.rendering.tiles import CameraBuffer, PictureView
 from decals.shaders import compose
-from decals.vtk.camera import matrix_of, vtk_projection
+from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper
 
 POSITION, NORMAL, MODEL = "decalPositionVSOutput", "decalNormalVSOutput", "decalModel"
@@ -74,7 +74,7 @@ class InjectionTarget(Protocol):
     def mapping(self) -> ImageMapping: ...  # noqa: D102
     @property
     def contact(self) -> Contact: ...  # noqa: D102
-    def frame(self) -> Float64Array: ...  # noqa: D102
+    def world_matrix(self) -> Float64Array: ...  # noqa: D102
     def viewport(self) -> tuple[int, int, int, int]: ...  # noqa: D102
     def current(self) -> AbstractContextManager[None]: ...  # noqa: D102
     def current_if_present(self) -> AbstractContextManager[None]: ...  # noqa: D102
@@ -162,9 +162,9 @@ class Injection:
         if source is None or not source[0].applied.in_frame:  # another renderer may draw the actor
             return
         subplot, data, images = source
-        frame = self._frame(subplot)
-        self._use_camera(subplot, frame)
-        model = np.linalg.inv(frame) @ matrix_of(self.actor)
+        world = self._world_matrix(subplot)
+        self._use_camera(subplot, world)
+        model = np.linalg.inv(world) @ matrix_of(self.actor)
         program.SetUniformMatrix(MODEL, _vtk_matrix(model))
         units = subplot.applied.texture_units()
         uniforms = data.bind(units[1:])
@@ -182,14 +182,14 @@ class Injection:
         data, images = subplot.renderer.uploads(subplot.scene)
         return None if data is None or images is None else (subplot, data, images)
 
-    def _frame(self, subplot: InjectionTarget) -> Float64Array:
+    def _world_matrix(self, subplot: InjectionTarget) -> Float64Array:
         """Return the matrix from the decals' space to the world."""
-        return matrix_of(self.actor) if self._follow else subplot.frame()
+        return matrix_of(self.actor) if self._follow else subplot.world_matrix()
 
-    def _use_camera(self, subplot: InjectionTarget, frame: Float64Array) -> None:
+    def _use_camera(self, subplot: InjectionTarget, world: Float64Array) -> None:
         """Fill the uniform block of the camera; VTK's frame may be larger than the window."""
         x, y, width, height = subplot.viewport()
-        view = vtk_projection(subplot.vtk_renderer, frame)
+        view = vtk_projection(subplot.vtk_renderer, world)
         whole = PictureView.of(view, (width, height), UNIT_BOX)
         subplot.camera.use(whole.part(Rectangle(-x, -y, width, height)))
 

@@ -11,7 +11,7 @@ from blobtree._typing import Float64Array
 from blobtree.tracing.tree_cells import tracing_cells
 from decals.rendering.viewpoint import Bounds
 from decals.scenes.objects import Box, SceneObject, TreeObject, bounds_of
-from decals.vtk.camera import matrix_of
+from decals.vtk.adapters import matrix_of
 
 
 def box_around(objects: Iterable[SceneObject]) -> Box:

@@ -1,10 +1,12 @@
-"""The renderer of a subplot: a scene among the actors of one of pyvista's renderers."""
+"""The renderer of a subplot: a scene among the actors of a pyvista renderer, its settings, and picks."""
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any, cast
 
@@ -14,25 +16,163 @@ from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkActor
 
-from blobtree._typing import Float64Array
-from decals.errors import InvalidPoints
+from blobtree._typing import Float32Array, Float64Array
+from decals.errors import InvalidPoints, InvalidScene
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
+from decals.rendering.dirty_regions import same_objects
 from decals.rendering.lights import Lighting
 from decals.rendering.options import check_scene
 from decals.rendering.tiles import CameraBuffer
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, bounds_of
-from decals.validation import finite_number
-from decals.vtk.camera import vtk_projection
+from decals.validation import describe, finite_number, member, whole_number
+from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.context import WindowContext
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer
 from decals.vtk.injection import InjectedDecals
-from decals.vtk.lights import TOO_MANY, Lights, too_many_lights, vtk_lamps
-from decals.vtk.picking import PickResult, is_occluded, pick_at
 from decals.vtk.proxy_actor import ProxyActor, box_around
-from decals.vtk.settings import SubplotSettings
-from decals.vtk.unsupported import complaints
-from decals.vtk.weak_callback import weak_callback
+
+MAX_SAMPLES = 16
+"""Samples per pixel along each axis, at most: graphics cards have no larger targets for usual windows."""
+
+
+class SubplotSettings:
+    """Settings of a subplot, which apply from the next frame on.
+
+    Attributes
+    ----------
+    wait_for_gpu : bool
+        If True, frames end when the graphics card has finished, so that they can be timed.
+    keep_previous_frame : bool
+        If True, the previous frame stays while shaders compile; see `SubplotRenderer.warm`.
+    """
+
+    def __init__(self) -> None:
+        self._samples, self._draw_scale = 2, 1.0
+        self._mapping, self._contact = ImageMapping.CORRECTED, Contact.PRODUCT
+        self._lights = Lights.SCENE
+        self.wait_for_gpu = self.keep_previous_frame = False
+
+    @property
+    def draw_scale(self) -> float:
+        """Size of the picture relative to the window, in (0, 1].
+
+        Below 1, the picture has one sample per texel and is magnified.
+        """
+        return self._draw_scale
+
+    @draw_scale.setter
+    def draw_scale(self, scale: float) -> None:
+        number = finite_number("draw_scale", scale, InvalidScene)
+        if not 0.0 < number <= 1.0:
+            raise InvalidScene(f"draw_scale: expected a number above 0 and at most 1, got {number}")
+        self._draw_scale = number
+
+    @property
+    def samples(self) -> int:
+        """Samples per pixel along each axis; one in screenshots that VTK draws larger than the window."""
+        return self._samples
+
+    @samples.setter
+    def samples(self, samples: int) -> None:
+        self._samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+
+    @property
+    def mapping(self) -> ImageMapping:
+        """Image mapping; see `decals.ImageMapping`."""
+        return self._mapping
+
+    @mapping.setter
+    def mapping(self, mapping: ImageMapping) -> None:
+        self._mapping = member("mapping", mapping, ImageMapping, InvalidScene)
+
+    @property
+    def contact(self) -> Contact:
+        """Contact mode; see `decals.Contact`."""
+        return self._contact
+
+    @contact.setter
+    def contact(self, contact: Contact) -> None:
+        self._contact = member("contact", contact, Contact, InvalidScene)
+
+    @property
+    def lights(self) -> Lights:
+        """Lights: the studio light, or the plotter's lights; see `Lights`."""
+        return self._lights
+
+    @lights.setter
+    def lights(self, lights: Lights | str) -> None:
+        try:
+            self._lights = Lights(lights)
+        except ValueError as error:
+            raise InvalidScene(f"lights must be 'scene' or 'vtk'; got {describe(lights)}") from error
+
+
+DEPTH_TOLERANCE = 1e-6
+"""Difference of equal depths: depth buffers have 24 bits, matrices are float32."""
+
+
+@dataclass(frozen=True, eq=False)
+class PickResult:
+    """The surface point at a pixel.
+
+    Attributes
+    ----------
+    object_id : int
+        Index of the object in the scene.
+    owner : int
+        Number of the decal that shows there; −1 for none.
+    position, normal : float32, shape (3,)
+        Point and unit normal, in scene coordinates.
+    uv : (float, float)
+        Coordinates in the owner's image, from 0 to 1; zero without an owner.
+    field : float
+        The owner's field after contact; zero without an owner.
+    depth : float
+        Depth in the window, from 0 to 1, as in VTK's depth buffer.
+
+    Examples
+    --------
+    >>> import decals, pyvista
+    >>> from blobtree import Point
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=20, images=["eye"])
+    >>> plotter = pyvista.Plotter(off_screen=True, window_size=(80, 60))
+    >>> scene = plotter.decals.add_scene(scene)
+    >>> plotter.show(auto_close=False)
+    >>> pick = plotter.decals.subplot.at(40, 30)
+    >>> pick.position.shape, 0 < pick.depth < 1
+    ((3,), True)
+    >>> plotter.close()
+    """
+
+    object_id: int
+    owner: int
+    position: Float32Array
+    normal: Float32Array
+    uv: tuple[float, float]
+    field: float
+    depth: float
+
+
+def depth_of(matrix: Float64Array, position: ArrayLike) -> float:
+    """Return the depth in the window, from 0 to 1, of a point; the matrix maps it to clip space."""
+    clip = matrix @ np.append(np.asarray(position, np.float64), 1.0)
+    return float(0.5 * clip[2] / clip[3] + 0.5)
+
+
+def _pixel(x: float, y: float) -> tuple[int, int]:
+    """Return the pixel that contains a position in the window, or raise `InvalidPoints`."""
+    return math.floor(finite_number("x", x, InvalidPoints)), math.floor(finite_number("y", y, InvalidPoints))
+
+
+def _writes_depth(prop: Any) -> bool:
+    """Return True if a prop may write depth; text and translucent actors do not."""
+    if not prop.GetVisibility() or prop.IsA("vtkActor2D"):
+        return False
+    return not (prop.IsA("vtkActor") and prop.HasTranslucentPolygonalGeometry())
+
 
 MAX_COORDINATE = 2.0**30
 """Largest pixel coordinate that VTK accepts."""
@@ -132,10 +272,7 @@ class SubplotRenderer(SubplotSettings):
         if self._scene is None:
             return
         objects = tuple(self._scene.objects)
-        same = len(objects) == len(self._enclosed) and all(
-            a is b for a, b in zip(objects, self._enclosed, strict=True)
-        )
-        if same and self._proxy_actor.present:
+        if same_objects(objects, self._enclosed) and self._proxy_actor.present:
             return
         self._enclosed = objects
         self._proxy_actor.enclose(box(cast(Sequence[SceneObject], objects)) if objects else None)
@@ -150,17 +287,17 @@ class SubplotRenderer(SubplotSettings):
 
     # -- coordinates ------------------------------------------------------------------------------------
 
-    def frame(self) -> Float64Array:
+    def world_matrix(self) -> Float64Array:
         """Return the matrix from scene to world coordinates, (4, 4): the proxy actor's."""
         return self._proxy_actor.matrix()
 
     def viewpoint(self) -> Projection:
         """Return VTK's camera for the renderer."""
-        return vtk_projection(self.vtk_renderer, self.frame())
+        return vtk_projection(self.vtk_renderer, self.world_matrix())
 
-    def lamps(self) -> Lighting | None:
+    def lighting(self) -> Lighting | None:
         """Return the lights for the renderer; None for the studio light."""
-        return vtk_lamps(self.vtk_renderer, self.frame()) if self.lights is Lights.VTK else None
+        return vtk_lighting(self.vtk_renderer, self.world_matrix()) if self.lights is Lights.VTK else None
 
     @property
     def actor(self) -> vtkActor:
@@ -191,7 +328,29 @@ class SubplotRenderer(SubplotSettings):
         InvalidPoints
             The coordinates are not finite numbers.
         """
-        return pick_at(self, x, y)
+        column, row = _pixel(x, y)
+        left, low = self.vtk_renderer.GetOrigin()
+        width, height = self.vtk_renderer.GetSize()
+        inside = 0 <= column - left < width and 0 <= row - low < height
+        if self.scene is None or not inside:
+            return None
+        options = RenderOptions(size=(width, height), mapping=self.mapping, contact=self.contact)
+        with self.current():
+            buffers = self.renderer.buffers_at(
+                self.scene, column - left, row - low, options, viewpoint=self.viewpoint()
+            )
+        position = buffers.position[0, 0]
+        if buffers.object_id[0, 0] < 0 or self.hidden(column, row, position):
+            return None
+        return PickResult(
+            object_id=int(buffers.object_id[0, 0]),
+            owner=int(buffers.owner[0, 0]),
+            position=position,
+            normal=buffers.normal[0, 0],
+            uv=(float(buffers.uv[0, 0, 0]), float(buffers.uv[0, 0, 1])),
+            field=float(buffers.field[0, 0]),
+            depth=depth_of(self.viewpoint().matrix, position),
+        )
 
     def covers(self, x: int, y: int) -> bool:
         """Return True if a pixel of the window is in this subplot."""
@@ -199,9 +358,29 @@ class SubplotRenderer(SubplotSettings):
         column, row = (int(np.clip(value, -1.0, MAX_COORDINATE)) for value in coordinates)
         return bool(self.vtk_renderer.IsInViewport(column, row))
 
-    def hidden(self, x: int, y: int, position: ArrayLike) -> bool:
-        """Return True if an actor of VTK hid a surface point at a pixel of the last frame."""
-        return is_occluded(self, x, y, position)
+    def hidden(self, x: float, y: float, position: ArrayLike) -> bool:
+        """Return True if an actor of VTK hid a surface point at a pixel of the last frame.
+
+        VTK's depth is compared with the subplot's own: at a grazing angle, or in a coarse frame, that depth
+        may be far in front of the point. Text has depth zero and hides nothing.
+        """
+        column, row = _pixel(x, y)
+        if not self._others_write_depth(column, row):
+            return False
+        left, low = self.vtk_renderer.GetOrigin()
+        own = self.depth_at(column - left, row - low)
+        if own == 0.0:
+            return False
+        depth = float(self.vtk_renderer.GetZ(column, row))
+        return 0.0 < depth < min(own, depth_of(self.viewpoint().matrix, position)) - DEPTH_TOLERANCE
+
+    def _others_write_depth(self, x: int, y: int) -> bool:
+        """Return True if other actors may have written depth at a pixel; reading depth stalls the card."""
+        own = self.vtk_renderer
+        others = (other for other in own.GetRenderWindow().GetRenderers() if other is not own)
+        if any(other.GetDraw() and other.IsInViewport(x, y) for other in others):
+            return True
+        return any(prop is not self.actor and _writes_depth(prop) for prop in own.GetViewProps())
 
     def depth_at(self, x: int, y: int) -> float:
         """Return the least depth that the subplot wrote at a pixel of the renderer: 1 for no object.
@@ -281,10 +460,7 @@ class SubplotRenderer(SubplotSettings):
 
     def _warn_of_unsupported(self) -> None:
         """Warn once of each mode of VTK that the subplot does not support."""
-        messages = complaints(self.vtk_renderer)
-        if self.lights is Lights.VTK and too_many_lights(self.vtk_renderer):
-            messages.append(TOO_MANY)
-        for message in messages:
+        for message in unsupported_modes(self.vtk_renderer, self.lights):
             if message not in self._warned:
                 self._warned.add(message)
                 warnings.warn(message, stacklevel=2)
@@ -324,7 +500,7 @@ class SubplotRenderer(SubplotSettings):
         return FrameOptions(self._render_options(size, 1 if supersampled else samples))
 
     def _render_options(self, size: Size, samples: int) -> RenderOptions:
-        return RenderOptions(size, samples, self.contact, self.mapping, lights=self.lamps())
+        return RenderOptions(size, samples, self.contact, self.mapping, lights=self.lighting())
 
     def prepare(self, samples: int, seconds: float) -> float | None:
         """Draw a slice of a later frame of the window's size, without showing it.

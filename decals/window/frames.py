@@ -9,8 +9,8 @@ from enum import Enum, auto
 
 from decals.errors import InvalidScene
 from decals.validation import finite_number
+from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import SubplotRenderer
-from decals.vtk.weak_callback import weak_callback
 
 SLICE_SECONDS = 0.04
 """Time for which the window computes or draws before it handles input again."""

@@ -16,7 +16,7 @@ from decals.editing.queries import outline, undisturbed_rims
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.scenes.objects import bounds_of
-from decals.vtk.weak_callback import weak_callback
+from decals.vtk.adapters import weak_callback
 
 MAX_OUTLINES = 64
 """Number of outlined decals, at most."""

@@ -16,9 +16,8 @@ from decals.errors import InvalidEdit, InvalidScene
 from decals.rendering.gl_libraries import require_gl
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
-from decals.vtk.settings import MAX_SAMPLES
-from decals.vtk.subplot import SubplotRenderer
-from decals.vtk.weak_callback import weak_callback
+from decals.vtk.adapters import weak_callback
+from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
 from decals.window.event_bindings import TICK_MILLISECONDS, AsyncTicker, EventBindings, running_loop
 from decals.window.frames import STATUS_INTERVAL, FrameController, FrameState, RateLimit, Warmup
 from decals.window.host_plotter import (

@@ -105,7 +105,7 @@ def test_the_batch_renderer_gives_the_same_pixels_under_the_same_lights(plotter:
     with subplot.current():
         batch = subplot.renderer.render(
             both(),
-            RenderOptions(size=(160, 120), background=TRANSPARENT, lights=subplot.lamps()),
+            RenderOptions(size=(160, 120), background=TRANSPARENT, lights=subplot.lighting()),
             viewpoint=subplot.viewpoint(),
         )
     inside = binary_erosion(lying_behind(subplot).object_id >= 0, iterations=2)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import pyvista as pv
 
-from decals.vtk import unsupported as modes
+from decals.vtk.adapters import Lights, unsupported_modes
 from tests.decals.vtk.conftest import Factory
 from tests.decals.vtk.scenes import both, shot
 from tests.decals.vtk.test_undisturbed import translucent
@@ -53,7 +53,7 @@ def test_nobody_warns_who_draws_nothing(plotter: Factory, mode: str) -> None:
     pl = plotter()
     pl.add_mesh(pv.Sphere())
     MODES[mode][0](pl)
-    assert modes.complaints(pl.renderer)
+    assert unsupported_modes(pl.renderer, Lights.SCENE)
     shot(pl)
 
 

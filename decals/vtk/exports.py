@@ -1,9 +1,9 @@
-"""Modes and exports of VTK and pyvista that do not support decals: warnings."""
+"""Exports of pyvista, and its views in a browser, that omit decals: warnings."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from contextvars import ContextVar
 from functools import wraps
@@ -11,19 +11,6 @@ from typing import Any
 
 import pyvista as pv
 
-PASSES = {
-    "vtkShadowMapPass": (
-        "shadows: objects of plotter.decals cast shadows but receive none; "
-        "`disable_shadows()` lights all actors alike"
-    ),
-    "vtkSSAOPass": (
-        "screen space ambient occlusion covers VTK's own actors only, not the objects of plotter.decals"
-    ),
-}
-PEELING = (
-    "with some drivers depth peeling draws no translucent actors where there is multisampling, "
-    "with decals or without; call `disable_anti_aliasing()` or `enable_anti_aliasing('ssaa')`"
-)
 WATCHED = "add_on_render_callback"
 """Method of a plotter that every view of trame-pyvista calls."""
 CLIENTS = {
@@ -34,27 +21,6 @@ CLIENTS = {
 """Views that draw in the browser."""
 EXPORTS = ("export_html", "export_vtksz", "export_gltf", "export_obj", "export_vrml")
 """Methods of a plotter that write VTK's actors to a file."""
-
-
-def complaints(renderer: Any) -> list[str]:
-    """Return a warning for each mode of a vtkRenderer that does not support decals."""
-    names = set(_names(renderer.GetPass()))
-    messages = [words for name, words in PASSES.items() if name in names]
-    multisampled = renderer.GetRenderWindow().GetMultiSamples() > 1 and "vtkSSAAPass" not in names
-    return [*messages, PEELING] if multisampled and renderer.GetUseDepthPeeling() else messages
-
-
-def _names(render_pass: Any) -> Iterator[str]:
-    """Yield the class names of a render pass and of its delegates."""
-    if render_pass is None:
-        return
-    yield render_pass.GetClassName()
-    if hasattr(render_pass, "GetDelegatePass"):
-        yield from _names(render_pass.GetDelegatePass())
-    passes = render_pass.GetPasses() if hasattr(render_pass, "GetPasses") else None
-    if passes is not None:
-        for i in range(passes.GetNumberOfItems()):
-            yield from _names(passes.GetItemAsObject(i))
 
 
 _exporting = ContextVar("exporting", default=False)
