@@ -1,6 +1,6 @@
 """Dispatch by a code on the tape: functions that call the functions of one row of a table.
 
-`decals/rendering/tape_shader.py` writes the same dispatch in GLSL, over the kinds in use alone.
+`decals/rendering/tree.py` writes the same dispatch in GLSL, over the kinds in use alone.
 """
 
 import warp as wp

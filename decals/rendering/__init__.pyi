@@ -1,9 +1,9 @@
 from .context import Context
-from .drawables import Drawable, register
 from .lights import Light, Lighting
 from .options import STUDIO, TRANSPARENT, Background, RenderOptions, SceneLike, Size
 from .picture import Buffers, Picture
 from .renderer import Renderer
+from .uploads import Drawable, register
 from .viewpoint import Projection, Viewpoint
 
 __all__ = [

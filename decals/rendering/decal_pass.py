@@ -1,19 +1,29 @@
 """The decal pass: colours all pixels at once, for any number of decals and objects."""
 
 from collections.abc import Mapping
+from functools import cache
 
 import moderngl
 
 from blobtree._typing import Float32Array
-from decals.field.mapping import ImageMapping
+from blobtree.formulas.falloff import RIM
+from blobtree.transpile.glsl import translate_library
+from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
+from decals.field.ownership import complement_at, owner_at, owner_below, single_layer_at, uv_at
+from decals.index.lookup import next_number_below
 from decals.record import Contact
 from decals.rendering.context import Context
-from decals.rendering.decal_data import DecalData, decal_library
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.pixel_pass import PixelPass, Program, pixel_pass
-from decals.rendering.regions import WHOLE, Part, Rectangle
-from decals.rendering.textures import ImageArray
-from decals.rendering.tiles import Tile, attach_camera, read_floats, set_uniform
+from decals.rendering.pixel_pass import (
+    PixelPass,
+    Program,
+    attach_camera,
+    pixel_pass,
+    read_floats,
+    set_uniform,
+)
+from decals.rendering.uploads import DecalData, ImageArray
+from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 
 BODY = "decal_pass.glsl"
 FIRST_DECAL_UNIT = 3
@@ -94,3 +104,34 @@ def use_textures(program: Program, textures: Mapping[str, moderngl.Texture]) -> 
     for unit, (name, texture) in enumerate(textures.items()):
         texture.use(unit)
         set_uniform(program, name, unit)
+
+
+LIBRARY_FUNCTIONS = (
+    single_layer_at,
+    owner_at,
+    owner_below,
+    next_number_below,
+    complement_at,
+    uv_at,
+    in_image,
+    tangent_coordinates,
+    unroll_step,
+)
+"""Functions that ``shaders/decals.glsl`` calls."""
+
+
+@cache
+def decal_library(contact: Contact, *, layered: bool) -> str:
+    """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode."""
+    constants = (
+        f"const float RIM = {float(RIM)!r};\n"
+        f"const int decal_contact = {int(contact)};\n"
+        f"const bool decal_layered = {str(layered).lower()};\n"
+        f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
+    )
+    return constants + _translated_functions()
+
+
+@cache
+def _translated_functions() -> str:
+    return translate_library(LIBRARY_FUNCTIONS)

@@ -5,9 +5,16 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from decals.rendering.context import DEPTH, Context
-from decals.rendering.pixel_pass import GROUP, PassBackend, run_pixels, scissor_of
-from decals.rendering.regions import WHOLE, Part, Rectangle
-from decals.rendering.tiles import Tile, attach_camera, read_floats, set_uniform
+from decals.rendering.pixel_pass import (
+    GROUP,
+    PassBackend,
+    attach_camera,
+    read_floats,
+    run_pixels,
+    scissor_of,
+    set_uniform,
+)
+from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 from decals.shaders import compose
 
 

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int32Array
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.regions import WHOLE, Part
-from decals.rendering.tiles import Tile, attach_camera, set_uniform
-from decals.rendering.viewpoint import Bounds
+from decals.rendering.pixel_pass import attach_camera, set_uniform
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
 

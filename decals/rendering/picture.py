@@ -13,8 +13,8 @@ from PIL import Image
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Size
-from decals.rendering.targets import Targets
-from decals.rendering.tiles import Tile
+from decals.rendering.progressive import Targets
+from decals.rendering.viewpoint import Tile
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""Passes over all pixels of a target, as fragment or as compute shaders, from the same text.
+"""Programs and their uniforms; passes over all pixels, as fragment or as compute shaders from the same text.
 
 Neither backend is faster on every driver. Data-centre GPUs, which have few units for fragments, run compute
 shaders much faster. Software rasterisers run them as fast or several times slower. `choose_backend` measures
@@ -9,13 +9,14 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
-from typing import Protocol, TypeAlias
+from typing import Protocol, Self, TypeAlias, TypeVar
 
 import moderngl
 import numpy as np
 
+from blobtree._typing import Float32Array
 from decals.errors import NoGraphics
-from decals.rendering.regions import Rectangle
+from decals.rendering.viewpoint import Rectangle, Tile
 from decals.shaders import Source, compile_error, compose
 
 BACKEND_VARIABLE = "IMPLICIT_DECALS_ENTRY"
@@ -30,6 +31,9 @@ GROUP = 8
 MIN_COMPUTE_GAIN = 1.5
 """Gain in speed from which compute is chosen: near 1 the choice would change from run to run."""
 
+CAMERA_BINDING = 0
+"""Binding point of the uniform block in ``shaders/camera.glsl``."""
+
 _PROBE_SIZE = (256, 256)
 _PROBE_RUNS = 3
 _NOISE_SIZE = 64
@@ -43,6 +47,8 @@ Defines: TypeAlias = Mapping[str, bool]
 Slots: TypeAlias = Mapping[str, str | Source]
 Program: TypeAlias = moderngl.Program | moderngl.ComputeShader
 """A compiled program, which takes the uniforms of a pass."""
+
+Compiled = TypeVar("Compiled", bound=Program)
 
 
 class PassBackend(StrEnum):
@@ -93,6 +99,49 @@ def pass_source(
         all_defines["GROUP"] = GROUP
         return compose("pixels.comp", slots=all_slots, defines=all_defines, version="430 core")
     return compose("pixels.frag", slots=all_slots, defines=all_defines)
+
+
+# -- uniforms and targets -------------------------------------------------------------------------------
+
+
+class CameraBuffer:
+    """The uniform block from which every program reads the tile's camera."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._buffer = gl.buffer(reserve=128)
+
+    def use(self, tile: Tile) -> Self:
+        """Fill the block for a tile and bind it."""
+        self._buffer.write(tile.block())
+        self._buffer.bind_to_uniform_block(CAMERA_BINDING)
+        return self
+
+    def release(self) -> None:
+        """Release the memory."""
+        self._buffer.release()
+
+
+def attach_camera(program: Compiled) -> Compiled:
+    """Connect a program's ``CameraBlock``, if it has one, with the bound buffer."""
+    block = program.get("CameraBlock", None)
+    if isinstance(block, moderngl.UniformBlock):
+        block.binding = CAMERA_BINDING
+    return program
+
+
+def set_uniform(program: Program, name: str, value: object) -> None:
+    """Set a uniform; a name that the driver removed as unused is ignored."""
+    uniform = program.get(name, None)
+    if isinstance(uniform, moderngl.Uniform):
+        uniform.value = value
+
+
+def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) -> Float32Array:
+    """Read the inner part of a tile from a target, ``float32[h, w, 4]``, the lowest row first."""
+    inner = tile.inner
+    part = inner.x - tile.x, inner.y - tile.y, inner.width, inner.height
+    data = framebuffer.read(part, components=4, attachment=attachment, alignment=1, dtype="f4")
+    return np.frombuffer(data, np.float32).reshape(inner.height, inner.width, 4)
 
 
 # -- passes ---------------------------------------------------------------------------------------------

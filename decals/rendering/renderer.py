@@ -14,33 +14,40 @@ import numpy as np
 
 from blobtree._typing import UInt8Array
 from decals.errors import InvalidPoints, InvalidScene
+from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
-from decals.rendering.decal_data import DecalData
-from decals.rendering.dirty_regions import TargetState
-from decals.rendering.drawables import register
+from decals.rendering.decal_pass import decal_library, decal_program
+from decals.rendering.gbuffer import depth_program
 from decals.rendering.gl_libraries import is_forked
+from decals.rendering.light_pass import light_file, light_program, resolve_program
 from decals.rendering.mesh import ColoredMesh, MeshDrawable
 from decals.rendering.options import RenderOptions, SceneLike, check_scene, viewpoint_of
 from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
-from decals.rendering.pixel_pass import PassBackend
-from decals.rendering.progressive import FramePlan, FrameRequest, ProgressiveFrame, plan_frame
-from decals.rendering.regions import Rectangle
-from decals.rendering.scene_warmup import scene_warmup
-from decals.rendering.targets import BUFFERS_SLOT, WHOLE_SLOT, TargetPool, Targets
-from decals.rendering.textures import ImageArray
-from decals.rendering.tiles import (
+from decals.rendering.pixel_pass import CameraBuffer, PassBackend
+from decals.rendering.progressive import (
+    BUFFERS_SLOT,
+    WHOLE_SLOT,
+    FramePlan,
+    FrameRequest,
+    ProgressiveFrame,
+    TargetPool,
+    Targets,
+    TargetState,
+    plan_frame,
+)
+from decals.rendering.tree import TreeDrawable, TreeHolder
+from decals.rendering.uploads import DecalData, ImageArray, UploadedScene, Uploads, register, warmup_of
+from decals.rendering.viewpoint import (
     MAX_TILE,
     TILE_MARGIN,
-    CameraBuffer,
     PictureView,
+    Rectangle,
     Tile,
+    Viewpoint,
     largest_tile,
     tiles,
 )
-from decals.rendering.tree import TreeDrawable, TreeHolder
-from decals.rendering.uploads import UploadedScene, Uploads
-from decals.rendering.viewpoint import Viewpoint
-from decals.rendering.warmup import WarmupPlan, with_status
+from decals.rendering.warmup import DECALS, IMAGES, SHADERS, SHAPES, WarmupPlan, WarmupTask, with_status
 from decals.validation import instance, whole_number
 
 DEFAULT_OPTIONS = RenderOptions()
@@ -90,7 +97,7 @@ class Renderer:
         self._targets = TargetPool(self.context)
         self._warm: set[Hashable] = set()
         with self.context.current():
-            self._camera = CameraBuffer(self.context)
+            self._camera = CameraBuffer(self.context.gl)
 
     # -- pictures -----------------------------------------------------------------------------------------
 
@@ -354,3 +361,46 @@ def one_sample(options: RenderOptions) -> RenderOptions:
     """Return options with one sample a pixel."""
     check_options(options)
     return options if options.samples == 1 else replace(options, samples=1)
+
+
+def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> WarmupPlan:
+    """Return the warm-up plan of a picture of a scene.
+
+    Raises
+    ------
+    InvalidScene
+        If the scene holds an object of unknown kind.
+    """
+    context = uploads.context
+    objects = [warmup_of(context, item) for item in scene.objects]
+    has_decals, light = len(scene.decals) > 0, light_file(options.lights)
+    formulas = (options.contact, scene.decals.layered) if has_decals else None
+    tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
+    tasks += [task for plan in objects for task in plan.tasks]
+    tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in scene.objects]
+    if has_decals:
+        tasks += _decal_tasks(uploads, scene, options)
+    tasks += [
+        WarmupTask(SHADERS, lambda: decal_program(context, _library(scene, options))),
+        WarmupTask(SHADERS, lambda: light_program(context, light)),
+        WarmupTask(SHADERS, partial(depth_program, context)),
+        WarmupTask(SHADERS, partial(resolve_program, context)),
+    ]
+    return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light), tasks)
+
+
+def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
+    decals = scene.decals
+    index = [WarmupTask(DECALS, lambda: decals.index)] if isinstance(decals, DecalEditor) else []
+    translate = partial(decal_library, options.contact, layered=decals.layered)
+    return [
+        *index,
+        WarmupTask(DECALS, partial(uploads.decals, scene)),
+        WarmupTask(IMAGES, partial(uploads.images, scene)),
+        WarmupTask(SHADERS, translate, threaded=True),
+    ]
+
+
+def _library(scene: SceneLike, options: RenderOptions) -> str:
+    """Return the formulas of the decals; nothing for a scene without decals."""
+    return decal_library(options.contact, layered=scene.decals.layered) if len(scene.decals) else ""

@@ -1,29 +1,267 @@
-"""BlobTrees in the G-buffer: traced, one ray per pixel of their box."""
+"""BlobTrees in the G-buffer: traced, one ray per pixel of their box, by a shader for their kinds of nodes.
 
-from typing import Protocol, runtime_checkable
+An unused case of a shader costs as much as a used one on some drivers, and a compile takes tens of
+milliseconds: so one program per set of kinds, none per tree.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol, runtime_checkable
 
 import moderngl
 import numpy as np
 
 from blobtree import Node
 from blobtree._typing import Float64Array
+from blobtree.tape.dispatch import is_monotone, partials, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.tape.evaluators import BOUND, COLOR, GRADIENT, Evaluator, direction_to_local, to_local
+from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
+from blobtree.tape.interpreter import field_bound, field_gradient
+from blobtree.tape.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
+from blobtree.tracing.ray_kernels import trace_ray
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
+from blobtree.transpile.glsl import translate_choice, translate_library
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.pixel_pass import GROUP, PassBackend, Program
-from decals.rendering.regions import WHOLE, Part, Rectangle
-from decals.rendering.tape_shader import Kinds, tracing_shader
-from decals.rendering.textures import DataTexture
-from decals.rendering.tiles import Tile, attach_camera, set_uniform
-from decals.rendering.viewpoint import Bounds
+from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, set_uniform
+from decals.rendering.uploads import DataTexture
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.rendering.warmup import SHADERS, SHAPES, WarmupPlan, WarmupTask
-from decals.shaders import compose
+from decals.shaders import Source, compose
 
 BOX_VERTICES = 36
 """Vertices of the triangles in ``box.vert``."""
 
-POSITION, NORMAL, COLOR = range(3)
+POSITION_UNIT, NORMAL_UNIT, COLOR_UNIT = range(3)
 """Image units of ``trace.comp``."""
+
+_EVALUATORS: dict[str, tuple[Evaluator, str]] = {
+    "bound": (BOUND, "vec3"),
+    "gradient": (GRADIENT, "vec4"),
+    "color": (COLOR, "vec4"),
+}
+"""The evaluators that a ray needs, and their types in GLSL."""
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """What a tracing shader is specialised to."""
+
+    skeletons: tuple[int, ...]
+    operators: tuple[int, ...]
+    registers: int
+    stretched: bool
+    warps: tuple[int, ...]
+    warp_registers: int
+    instruction_set: InstructionSet = BUILT_IN
+
+    @classmethod
+    def of(cls, tape: Tape) -> "Kinds":
+        """Return the kinds that `tape` uses."""
+        return cls(
+            tape.skeletons,
+            tape.operators,
+            tape.registers,
+            tape.stretched,
+            tape.warps,
+            tape.warp_registers,
+            tape.instruction_set,
+        )
+
+
+@lru_cache(maxsize=256)
+def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) -> Source:
+    """``trace.frag`` or ``trace.comp`` with the cases of `kinds`."""
+    evaluators = [
+        _interpreter(name, evaluator, glsl_type, kinds)
+        for name, (evaluator, glsl_type) in _EVALUATORS.items()
+    ]
+    slots: dict[str, str | Source] = {
+        "library": _library(kinds),
+        "dispatch": _dispatch(kinds),
+        "evaluators": _joined(evaluators),
+    }
+    if backend is PassBackend.COMPUTE:
+        return compose("trace.comp", slots=slots, defines={"GROUP": GROUP}, version="430 core")
+    return compose("trace.frag", slots=slots)
+
+
+def _library(kinds: Kinds) -> str:
+    """Every typed function that the shader calls, from the sources that Warp runs."""
+    evaluators = [evaluator for evaluator, _ in _EVALUATORS.values()]
+    skeletons = [kinds.instruction_set.skeletons[code] for code in kinds.skeletons]
+    functions = [
+        *(f for skeleton in skeletons for f in (skeleton.closest, skeleton.min_influence)),
+        *(f for choices in _choices(kinds).values() for f in choices.values()),
+        *(
+            f
+            for evaluator in evaluators
+            for f in (evaluator.leaf, evaluator.pullback_affine, evaluator.combine)
+        ),
+        *(evaluator.pullback_warp for evaluator in evaluators if kinds.warps),
+        to_local,
+        direction_to_local,
+        trace_ray,
+    ]
+    return translate_library(functions, provided=[*_choices(kinds), is_monotone, field_bound, field_gradient])
+
+
+def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
+    """Return the functions that choose by a code on the tape, and their alternatives."""
+    operators, warps = kinds.instruction_set.operators, kinds.instruction_set.warps
+    choices: dict[Any, dict[int, Any]] = {
+        partials: {code: operators[code].partials for code in kinds.operators},
+        slope: {code: operators[code].slope for code in kinds.operators},
+        warp_forward: {code: warps[code].forward for code in kinds.warps},
+        warp_pullback: {code: warps[code].pullback for code in kinds.warps},
+        warp_stretch: {code: warps[code].stretch for code in kinds.warps},
+    }
+    return {chooser: among for chooser, among in choices.items() if among}
+
+
+def _dispatch(kinds: Kinds) -> str:
+    """Those functions, each knowing the kinds in use alone."""
+    monotone = [code for code in kinds.operators if kinds.instruction_set.operators[code].monotone]
+    test = " || ".join(f"operator == {code}" for code in monotone) or "false"
+    if len(monotone) == len(kinds.operators):
+        test = "true"
+    choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
+    return "\n".join([*choices, f"bool is_monotone(int operator) {{ return {test}; }}"])
+
+
+def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) -> Source:
+    """Return the loop of ``interpreter.glsl`` closed over one evaluator."""
+    return compose(
+        "interpreter.glsl",
+        version=None,
+        defines={
+            "INTERPRET": f"interpret_{name}",
+            "FIELD": glsl_type,
+            "LEAF": evaluator.leaf.key,
+            "PULLBACK_AFFINE": evaluator.pullback_affine.key,
+            "PULLBACK_WARP": evaluator.pullback_warp.key,
+            "COMBINE": evaluator.combine.key,
+            "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)" if evaluator is COLOR else "vec4(0.0)",
+        },
+        slots={
+            "registers": "".join(
+                [
+                    *(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
+                    *(f"vec4 w{i} = vec4(0.0);\n" for i in range(kinds.warp_registers)),
+                ]
+            ),
+            "runs": "".join(_run_cases(kinds)),
+            "stack": _stack_cases(kinds.registers) if kinds.registers else "",
+            "warps": _warp_cases(kinds.warp_registers) if kinds.warps else "",
+        },
+    )
+
+
+def _run_cases(kinds: Kinds) -> Iterable[str]:
+    """Return one loop per kind of skeleton, so that no loop branches on the kind."""
+    for code in kinds.skeletons:
+        skeleton = kinds.instruction_set.skeletons[code]
+        names = {
+            "closest": skeleton.closest.key,
+            "min_influence": skeleton.min_influence.key,
+            "direction": "local_direction" if skeleton.convex else "vec3(0.0)",
+            "mapped": "direction_to_local(local_direction, tape, map)" if skeleton.convex else "vec3(0.0)",
+        }
+        yield _RUN.format(code=code, stride=skeleton.parameters + 1, **names)
+        if kinds.stretched:
+            yield _STRETCHED_RUN.format(
+                code=code + STRETCHED,
+                **names,
+                stride=skeleton.parameters + PREFIX + 1,
+                prefix=PREFIX,
+            )
+
+
+_RUN = """\
+case {code}:
+    for (int i = 0; i < count; i++) {{
+        vec4 c = {closest}(point, tape, at);
+        float rate = speed / {min_influence}(tape, at);
+        at += {stride};
+        FIELD field = LEAF(point, c, PRIMITIVE_COLOR, {direction}, reach, rate);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w);
+    }}
+    break;
+"""
+
+_STRETCHED_RUN = """\
+case {code}:
+    for (int i = 0; i < count; i++) {{
+        int map = at;
+        vec3 local = to_local(point, tape, map);
+        vec4 c = {closest}(local, tape, map + {prefix});
+        float local_speed = speed * tape_texel(tape, map + {prefix} - 1).x;
+        float rate = local_speed / {min_influence}(tape, map + {prefix});
+        at += {stride};
+        FIELD field = LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate);
+        accumulator = COMBINE(operator_, accumulator, PULLBACK_AFFINE(field, tape, map), reach, header.w);
+    }}
+    break;
+"""
+
+
+def _stack_cases(registers: int) -> str:
+    """Return registers as scalars behind a switch: an indexed array costs several times as much."""
+    store = " ".join(f"case {i}: r{i} = accumulator; break;" for i in range(registers))
+    load = " ".join(f"case {i}: kept = r{i}; break;" for i in range(registers))
+    return f"""\
+case {PUSH}:
+    switch (count) {{ {store} }}
+    accumulator = FIELD(0.0);
+    break;
+case {POP}:
+case {POP_SWAPPED}: {{
+    FIELD kept = r0;
+    switch (count) {{ {load} }}
+    accumulator = int(header.x) == {POP}
+        ? COMBINE(operator_, kept, accumulator, reach, header.w)
+        : COMBINE(operator_, accumulator, kept, reach, header.w);
+    break;
+}}
+"""
+
+
+def _warp_cases(registers: int) -> str:
+    """Entering keeps the point and the speed; leaving returns to them and takes the field along."""
+    store = " ".join(f"case {i}: w{i} = vec4(point, speed); break;" for i in range(registers))
+    load = " ".join(f"case {i}: kept = w{i}; break;" for i in range(registers))
+    return f"""\
+case {WARP}: {{
+    switch (count) {{ {store} }}
+    vec4 p = tape_texel(tape, at + {PREFIX} - 1);
+    vec3 local = to_local(point, tape, at);
+    speed *= p.x * warp_stretch(operator_, local, reach * speed * p.x, p);
+    local_direction = vec3(0.0);
+    point = warp_forward(operator_, local, p);
+    at += {PREFIX};
+    break;
+}}
+case {UNWARP}: {{
+    vec4 kept = w0;
+    switch (count) {{ {load} }}
+    point = kept.xyz;
+    speed = kept.w;
+    local_direction = count == 0 ? direction : vec3(0.0);
+    accumulator = PULLBACK_WARP(operator_, accumulator, point, tape, at);
+    at += {PREFIX};
+    break;
+}}
+"""
+
+
+def _joined(sources: Iterable[Source]) -> Source:
+    """Several sources one after the other, every line keeping its origin."""
+    parts = list(sources)
+    return Source(
+        tuple(line for part in parts for line in part.lines),
+        tuple(origin for part in parts for origin in part.origins),
+    )
 
 
 @runtime_checkable
@@ -140,9 +378,9 @@ class _ComputeTracer:
             return
         assert isinstance(self.program, moderngl.ComputeShader)
         set_uniform(self.program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
-        gbuffer.position.bind_to_image(POSITION, read=True, write=True)
-        gbuffer.normal.bind_to_image(NORMAL, read=False, write=True)
-        gbuffer.color.bind_to_image(COLOR, read=False, write=True)
+        gbuffer.position.bind_to_image(POSITION_UNIT, read=True, write=True)
+        gbuffer.normal.bind_to_image(NORMAL_UNIT, read=False, write=True)
+        gbuffer.color.bind_to_image(COLOR_UNIT, read=False, write=True)
         self._gl.memory_barrier()
         self.program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
         self._gl.memory_barrier()

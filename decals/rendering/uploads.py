@@ -1,19 +1,413 @@
-"""Scenes on the GPU: caches of their drawables, decals and images."""
+"""Scenes on the GPU: the drawables of objects, the decals' records and index, images, and their caches."""
 
-from collections.abc import Callable, Hashable
+import math
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
+import moderngl
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
+from blobtree._typing import Float32Array, Int64Array, UInt8Array
+from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS
+from decals.errors import InvalidScene, TooMuchData
+from decals.images.load import decode_srgb
 from decals.index.editor import DecalEditor
+from decals.index.index import DecalIndex
+from decals.model import Decals
 from decals.rendering.context import Context
-from decals.rendering.decal_data import DecalData
-from decals.rendering.drawables import Drawable, drawable_for
+from decals.rendering.gbuffer import GBuffer
 from decals.rendering.options import SceneLike, check_scene
-from decals.rendering.textures import ImageArray
-from decals.rendering.viewpoint import Bounds
+from decals.rendering.pixel_pass import Program, set_uniform
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
+from decals.rendering.warmup import WarmupPlan
+from decals.validation import require_rgba
+
+MAX_IMAGE_SIZE = 2048
+"""Side of an image on the GPU, at most."""
+MAX_IMAGE_BYTES = 1 << 29
+"""Memory of all images without mip levels, at most; for more, all become smaller."""
+_TEXEL_BYTES = 8  # four half floats
+
+
+class ImageArray:
+    """Images for one shader: layer ``i`` is image ``i``, its first row at v = 1.
+
+    Images are sRGB. They are converted to linear light with premultiplied alpha in half floats, so filtering
+    and compositing are sums. All layers have one size, with mip levels. An empty list gives one transparent
+    layer.
+
+    Raises
+    ------
+    InvalidImage
+        If an array is not ``uint8[h, w, 4]``.
+    """
+
+    def __init__(self, context: Context, images: Sequence[UInt8Array]) -> None:
+        for number, image in enumerate(images):
+            require_rgba(f"image {number}", image)
+        size = common_size(
+            [image.shape[:2] for image in images], limit=min(MAX_IMAGE_SIZE, context.max_texture_size)
+        )
+        layers = [linear_premultiplied(resized(image, size)) for image in images] or [
+            np.zeros((size, size, 4), np.float32)
+        ]
+        data = np.stack(layers)[:, ::-1].astype(np.float16)
+        self.size = size
+        self.texture = context.gl.texture_array((size, size, len(layers)), 4, data.tobytes(), dtype="f2")
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.texture.build_mipmaps()
+        self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self.texture.anisotropy = context.anisotropy
+
+    def use(self, unit: int) -> None:
+        """Bind the array to a unit."""
+        self.texture.use(unit)
+
+    def release(self) -> None:
+        """Release the memory."""
+        self.texture.release()
+
+
+def common_size(shapes: Sequence[tuple[int, ...]], *, limit: int = MAX_IMAGE_SIZE) -> int:
+    """Return the power of two from the largest side upward, within the limits of size and memory."""
+    largest = max((max(shape) for shape in shapes), default=1)
+    size = min(1 << (largest - 1).bit_length(), 1 << (limit.bit_length() - 1))
+    while len(shapes) * size * size * _TEXEL_BYTES > MAX_IMAGE_BYTES and size > 1:
+        size //= 2
+    return size
+
+
+def linear_premultiplied(image: UInt8Array) -> Float32Array:
+    """Return an sRGB image in linear light, colours multiplied by alpha."""
+    levels = np.arange(256, dtype=np.float32) / 255
+    decoded = decode_srgb(levels)
+    alpha = levels[image[..., 3:]]
+    return np.concatenate([decoded[image[..., :3]] * alpha, alpha], axis=-1)
+
+
+def resized(image: UInt8Array, size: int) -> UInt8Array:
+    """Return an image as a square, colours weighted by alpha so that hidden colours do not show."""
+    if image.shape[:2] == (size, size):
+        return image
+    picture = Image.fromarray(np.ascontiguousarray(image))
+    return np.asarray(picture.resize((size, size), Image.Resampling.LANCZOS))
+
+
+ROW_TEXELS = 1 << TEXTURE_WIDTH_BITS
+"""Texels in a row of a data texture; 16,384 rows, a usual limit, hold 67 million elements."""
+
+_KINDS = {
+    (np.dtype(np.float32), (4,)): "f4",
+    (np.dtype(np.int32), ()): "i4",
+    (np.dtype(np.int32), (4,)): "i4",
+}
+
+
+class DataTexture:
+    """A ``float32[n, 4]``, ``int32[n]`` or ``int32[n, 4]`` array as a texture.
+
+    Parameters
+    ----------
+    context
+        Where the texture lives.
+    array
+        Its contents; an empty array takes one row of zeros, because no texture has size 0.
+
+    Raises
+    ------
+    ValueError
+        If the array has another shape or type.
+    TooMuchData
+        If the array has more elements than a texture on this GPU.
+    """
+
+    def __init__(self, context: Context, array: NDArray[Any]) -> None:
+        components, dtype = _kind(array)
+        rows = max(1, -(-len(array) // ROW_TEXELS))
+        if rows > context.max_texture_size:
+            raise TooMuchData(
+                f"{len(array):,} elements do not fit into one texture here; expected at most "
+                f"{context.max_texture_size * ROW_TEXELS:,}; take fewer decals or a smaller tree"
+            )
+        self.count = len(array)
+        self.texture = context.gl.texture(
+            (ROW_TEXELS, rows), components, _rows(array, rows, components), dtype=dtype
+        )
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._shape, self._kind = array.shape[1:], array.dtype
+
+    def read(self) -> NDArray[Any]:
+        """Read the array back: the same shape, type and bits."""
+        flat = np.frombuffer(self.texture.read(), self._kind)
+        return flat[: self.count * math.prod(self._shape)].reshape(-1, *self._shape)
+
+    def write(self, first: int, array: NDArray[Any]) -> None:
+        """Overwrite the elements from ``first`` on; only their bytes are uploaded."""
+        done = 0
+        while done < len(array):
+            x, y = (first + done) % ROW_TEXELS, (first + done) // ROW_TEXELS
+            left = len(array) - done
+            whole_rows = x == 0 and left >= ROW_TEXELS
+            width, height = (ROW_TEXELS, left // ROW_TEXELS) if whole_rows else (min(ROW_TEXELS - x, left), 1)
+            part = np.ascontiguousarray(array[done : done + width * height], self._kind)
+            self.texture.write(part, viewport=(x, y, width, height))
+            done += width * height
+
+    def use(self, unit: int) -> None:
+        """Bind the texture to a unit."""
+        self.texture.use(unit)
+
+    def release(self) -> None:
+        """Release the memory."""
+        self.texture.release()
+
+
+def _kind(array: NDArray[Any]) -> tuple[int, str]:
+    """Return the components of a texel, and their moderngl type."""
+    kind = _KINDS.get((array.dtype, array.shape[1:]))
+    if kind is None or not array.ndim:
+        raise ValueError(
+            f"expected float32[n, 4], int32[n] or int32[n, 4], got {array.dtype}{list(array.shape)}"
+        )
+    return math.prod(array.shape[1:]), kind
+
+
+def _rows(array: NDArray[Any], rows: int, components: int) -> NDArray[Any]:
+    padded = np.zeros(rows * ROW_TEXELS * components, array.dtype)
+    padded[: array.size] = array.reshape(-1)
+    return padded
+
+
+WALKS_PER_CANDIDATE = 8
+"""Greatest number of walks over all candidates of a pixel."""
+
+SEARCH_OVERHEAD = 3
+"""Iterations of a binary search besides its halvings."""
+
+
+class LoopLimit:
+    """The greatest number of loop iterations that a driver allows a pixel; None for no limit.
+
+    Measuring the lists of an index takes as long as many edits. A result therefore stays valid for as many
+    versions as cannot reach the limit: each edit adds at most one entry to a list.
+    """
+
+    def __init__(self, max_iterations: int | None) -> None:
+        self._max_iterations = max_iterations
+        self._table = np.zeros((0, 4), np.int32)
+        self._shape = (0, False)
+        self._valid_until = 0
+
+    def check(self, index: DecalIndex, *, layered: bool, version: int = 0) -> None:
+        """Raise TooMuchData if an index needs more iterations; ``version`` counts its edits."""
+        shape = index.level_count, layered
+        valid = index.table is self._table and shape == self._shape and version <= self._valid_until
+        if self._max_iterations is None or valid:
+            return
+        lengths = index.longest_lists
+        candidates, allowed = (
+            int(lengths.sum()),
+            self._max_iterations // _iterations(lengths, layered=layered),
+        )
+        if candidates > allowed:
+            raise TooMuchData(
+                f"{candidates:,} decals reach the same place; expected at most {allowed:,}: "
+                "software rendering cuts off the rest; spread them, draw on a graphics card, or use evaluate"
+            )
+        spare = allowed - candidates
+        while (
+            spare
+            and _iterations(lengths + spare, layered=layered) * (candidates + spare) > self._max_iterations
+        ):
+            spare //= 2
+        self._table, self._shape, self._valid_until = index.table, shape, version + spare
+
+
+def _iterations(lengths: Int64Array, *, layered: bool) -> int:
+    """Return the iterations for each candidate; with layers, each candidate takes a search in every list."""
+    searches = sum(int(length).bit_length() + SEARCH_OVERHEAD for length in lengths)
+    return WALKS_PER_CANDIDATE + searches * layered
+
+
+class DecalData:
+    """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
+
+    def __init__(self, context: Context, decals: Decals | DecalEditor) -> None:
+        self._context = context
+        self._version = 0
+        self._loop_limit = LoopLimit(context.max_loop_iterations)
+        if isinstance(decals, DecalEditor):
+            self._version = decals.version
+            arrays, index = decals.arrays, decals.index
+        else:
+            index = DecalIndex.of(decals)
+            arrays = {
+                "decal_records": decals.packed(),
+                "index_levels": index.levels,
+                "index_table": index.table,
+                "index_ids": index.ids,
+            }
+        self._loop_limit.check(index, layered=decals.layered, version=self._version)
+        self._textures = {name: DataTexture(context, array) for name, array in arrays.items()}
+        self._read_uniforms(decals, index)
+
+    def _read_uniforms(self, decals: Decals | DecalEditor, index: DecalIndex) -> None:
+        self.layered = decals.layered
+        self._uniforms = {"index_level_count": index.level_count, "index_mask": index.mask}
+
+    def update(self, editor: DecalEditor) -> int:
+        """Upload the changes of an editor since the last call; return the number of bytes.
+
+        The data must have been made of the same editor. Several data may follow one editor.
+
+        Raises
+        ------
+        TooMuchData
+            If more decals reach one point than the driver allows; nothing is uploaded.
+        """
+        index = editor.index
+        self._loop_limit.check(index, layered=editor.layered, version=editor.version)
+        byte_count, since, self._version = 0, self._version, editor.version
+        for name, ranges in editor.changed_rows(since).items():
+            array = editor.arrays[name]
+            if self._textures[name].count != len(array):
+                self._textures[name].release()
+                self._textures[name] = DataTexture(self._context, array)
+                byte_count += array.nbytes
+                continue
+            for first, end in ranges:
+                self._textures[name].write(first, array[first:end])
+                byte_count += array[first:end].nbytes
+        self._read_uniforms(editor, index)
+        return byte_count
+
+    def use(self, program: Program, first_unit: int) -> None:
+        """Bind all textures to the units from ``first_unit`` on, and set the uniforms of a program."""
+        units = range(first_unit, first_unit + len(self._textures))
+        for name, value in self.bind(units).items():
+            set_uniform(program, name, value)
+
+    def bind(self, units: Sequence[int]) -> dict[str, int]:
+        """Bind the textures to four units; return the uniforms of a program by their names."""
+        samplers = dict(zip(self._textures, units, strict=True))
+        for name, unit in samplers.items():
+            self._textures[name].use(unit)
+        return samplers | self._uniforms
+
+    def release(self) -> None:
+        """Release the memory."""
+        for texture in self._textures.values():
+            texture.release()
+
+
+class Drawable(Protocol):
+    """One object of the scene on the GPU; it owns its handles.
+
+    Examples
+    --------
+    Annotate a factory for `register`:
+
+    >>> import pyvista
+    >>> from decals.rendering import Context, Drawable
+    >>> from decals.rendering.mesh import MeshDrawable
+    >>> from decals.scenes.objects import as_object
+    >>> def draw_cube(context: Context, item: object) -> Drawable:
+    ...     return MeshDrawable(context, as_object(pyvista.Cube(), "cube"))
+    """
+
+    @property
+    def bounds(self) -> Bounds:
+        """Box around everything that `draw` can draw."""
+        ...
+
+    @property
+    def rasterised(self) -> bool:
+        """True if `draw` uses the depth test; all other drawables are drawn after those that do."""
+        ...
+
+    def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
+        """Put the object, or a part of it, into the G-buffer wherever it is nearer than the surface there.
+
+        The tile's camera is bound already, see `attach_camera`. A rasterised object is written by
+        ``write_surface`` of ``shaders/gbuffer.glsl``, with true depth. Any other writes to the textures and
+        leaves the depth unchanged; `GBuffer.complete_depth` adds it. OpenGL state other than that of
+        `GBuffer.use` must be restored. Each call must draw the same: the renderer leaves it out for targets
+        that hold the same objects.
+        """
+        ...
+
+    def release(self) -> None:
+        """Release the memory."""
+        ...
+
+
+Factory = Callable[[Context, Any], Drawable]
+WarmupFactory = Callable[[Context, Any], WarmupPlan]
+
+_KINDS: dict[type, tuple[Factory, WarmupFactory]] = {}
+
+
+def _no_warmup(_context: Context, item: object) -> WarmupPlan:
+    return WarmupPlan(repr(type(item)), ())
+
+
+def register(kind: type, factory: Factory, warmup: WarmupFactory = _no_warmup) -> None:
+    """Draw objects of a type by ``factory(context, object)``, a `Drawable`.
+
+    Parameters
+    ----------
+    kind : type
+        A class, also for its subclasses; or a runtime-checkable protocol, for objects of no registered class.
+    factory : callable
+        Function of the context and the object that returns its `Drawable`.
+    warmup : callable, optional
+        Function of the same arguments that returns the `WarmupPlan` of the drawable.
+
+    Examples
+    --------
+    Draw dice as cubes:
+
+    >>> import pyvista
+    >>> from decals.rendering import register
+    >>> from decals.rendering.mesh import MeshDrawable
+    >>> from decals.scenes.objects import as_object
+    >>> class Die: ...
+    >>> register(Die, lambda context, die: MeshDrawable(context, as_object(pyvista.Cube(), "die")))
+    """
+    _KINDS[kind] = factory, warmup
+
+
+def drawable_for(context: Context, item: object) -> Drawable:
+    """Return the drawable of a scene's object.
+
+    Raises
+    ------
+    InvalidScene
+        If no factory was registered for its type.
+    """
+    return _kind_of(item)[0](context, item)
+
+
+def warmup_of(context: Context, item: object) -> WarmupPlan:
+    """Return the warm-up plan of a scene's object; errors are those of `drawable_for`."""
+    return _kind_of(item)[1](context, item)
+
+
+def _kind_of(item: object) -> tuple[Factory, WarmupFactory]:
+    for kind in type(item).__mro__:
+        if kind in _KINDS:
+            return _KINDS[kind]
+    for kind, factories in _KINDS.items():
+        if getattr(kind, "_is_protocol", False) and isinstance(item, kind):
+            return factories
+    raise InvalidScene(
+        f"cannot draw a {type(item).__name__}; expected a MeshObject, a TreeObject "
+        "or an object of a type given to decals.rendering.register"
+    )
 
 
 class Releasable(Protocol):

@@ -1,17 +1,64 @@
-"""Viewpoints of pictures: the matrix to clip space, and the rays of the pixels.
+"""Viewpoints of pictures: matrices to clip space and rays, and the rectangles and tiles of a picture.
 
 Matrices act on columns, ``M @ (x, y, z, 1)``, as in OpenGL, and are float64.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A range of rows or faces of a drawing step, as fractions from 0 to 1."""
+
+    begin: float = 0.0
+    end: float = 1.0
+
+    def of(self, count: int) -> tuple[int, int]:
+        """Return the index of the first of ``count`` rows, and that after the last."""
+        return round(self.begin * count), round(self.end * count)
+
+
+WHOLE = Part()
+
+Step = Callable[[Part], None]
+"""A drawing step. Its parts, drawn in order, give the same as the whole."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """A rectangle by its lower left corner and size, in samples."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def area(self) -> int:
+        """Number of samples."""
+        return self.width * self.height
+
+    def rows(self, part: Part) -> "Rectangle":
+        """Return a part of the rows."""
+        first, last = part.of(self.height)
+        return Rectangle(self.x, self.y + first, self.width, last - first)
+
+    def around(self, other: "Rectangle") -> "Rectangle":
+        """Return the smallest rectangle that encloses both."""
+        x, y = min(self.x, other.x), min(self.y, other.y)
+        right = max(self.x + self.width, other.x + other.width)
+        top = max(self.y + self.height, other.y + other.height)
+        return Rectangle(x, y, right - x, top - y)
+
 
 Bounds = tuple[ArrayLike, ArrayLike]
 """Lower and upper corner of a box, ``[3]`` each."""
@@ -143,3 +190,86 @@ def _rays_of(projection: Projection, width: int, height: int) -> Rays:
 
 def _solve(matrix: Float64Array, values: Float64Array) -> Float64Array:
     return np.asarray(np.linalg.solve(matrix, values), np.float64)
+
+
+MAX_TILE = 2560
+"""Samples along each side of a tile without its margin, at most; it bounds the memory."""
+TILE_MARGIN = 320
+"""Samples around a tile that are drawn too, so that passes which read neighbouring pixels show no seam."""
+
+
+@dataclass(frozen=True, slots=True)
+class PictureView:
+    """View of a whole picture: its size in samples, the matrix to clip space, and the rays of the samples."""
+
+    size: tuple[int, int]
+    matrix: Float64Array
+    rays: Rays
+
+    @classmethod
+    def of(cls, viewpoint: Viewpoint, size: tuple[int, int], bounds: Bounds) -> Self:
+        """Return the view of a viewpoint in a picture of this size, in samples, of objects in a box."""
+        return cls(size, viewpoint.clip_matrix(size, bounds), viewpoint.rays(*size))
+
+    def whole(self) -> "Tile":
+        """Return the picture as a single tile."""
+        return self.part(Rectangle(0, 0, *self.size))
+
+    def part(self, inner: Rectangle) -> "Tile":
+        """Return a rectangle as a tile without margin."""
+        return Tile(self, inner.x, inner.y, inner.width, inner.height, inner)
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A rectangle of a picture's samples, counted from the picture's lower left corner.
+
+    All of it is drawn; its inner rectangle (in the same coordinates) becomes pixels.
+    """
+
+    view: PictureView
+    x: int
+    y: int
+    width: int
+    height: int
+    inner: Rectangle
+
+    def matrix(self) -> Float64Array:
+        """Return the matrix from the world to this tile's clip space, acting on columns."""
+        width, height = self.view.size
+        crop = np.eye(4)
+        crop[0, 0], crop[1, 1] = width / self.width, height / self.height
+        crop[0, 3] = (width - 2 * self.x) / self.width - 1
+        crop[1, 3] = (height - 2 * self.y) / self.height - 1
+        return np.asarray(crop @ self.view.matrix)
+
+    def block(self) -> bytes:
+        """Return the contents of ``CameraBlock`` in ``shaders/camera.glsl`` (std140)."""
+        rays = self.view.rays
+        rows = np.zeros((8, 4), np.float32)
+        rows[:4] = self.matrix().T
+        rows[4:, :3] = rays.origins(self.x, self.y), rays.directions(self.x, self.y), rays.right, rays.up
+        rows[4, 3] = not rays.parallel
+        return rows.tobytes()
+
+
+def tiles(view: PictureView, samples: int, *, limit: int = MAX_TILE) -> Iterator[Tile]:
+    """Divide a picture with ``samples`` along each axis of a pixel; no tile divides a pixel."""
+    width, height = view.size
+    step = _step(samples, limit)
+    for y in range(0, height, step):
+        for x in range(0, width, step):
+            inner = Rectangle(x, y, min(step, width - x), min(step, height - y))
+            left, right = max(x - TILE_MARGIN, 0), min(x + inner.width + TILE_MARGIN, width)
+            low, high = max(y - TILE_MARGIN, 0), min(y + inner.height + TILE_MARGIN, height)
+            yield Tile(view, left, low, right - left, high - low, inner)
+
+
+def largest_tile(size: tuple[int, int], samples: int, *, limit: int = MAX_TILE) -> tuple[int, int]:
+    """Return the size, in samples, of the largest tile of a picture with its margin."""
+    longest = _step(samples, limit) + 2 * TILE_MARGIN
+    return min(size[0] * samples, longest), min(size[1] * samples, longest)
+
+
+def _step(samples: int, limit: int) -> int:
+    return max(limit // samples, 1) * samples

@@ -11,12 +11,9 @@ import moderngl
 
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.context import Context
-from decals.rendering.dirty_regions import TargetState, decal_version, same_objects
-from decals.rendering.progressive import ProgressiveFrame
-from decals.rendering.regions import Rectangle
-from decals.rendering.targets import Targets
-from decals.rendering.tiles import CameraBuffer, set_uniform
-from decals.rendering.viewpoint import Projection
+from decals.rendering.pixel_pass import CameraBuffer, set_uniform
+from decals.rendering.progressive import ProgressiveFrame, Targets, TargetState, decal_version, same_objects
+from decals.rendering.viewpoint import Projection, Rectangle
 from decals.rendering.warmup import WarmupPlan, WarmupThread
 from decals.shaders import compose
 from decals.vtk.context import WindowContext
@@ -176,7 +173,7 @@ class FrameRenderer:
         with context.current():
             self.renderer = Renderer(context)
             self._composite = Composite(context)
-            self.camera = CameraBuffer(context)
+            self.camera = CameraBuffer(context.gl)
 
     def draw(self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's targets; with ``wait``, until the graphics card has finished."""

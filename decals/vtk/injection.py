@@ -16,10 +16,10 @@ from blobtree._typing import Float64Array
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering import Renderer, SceneLike
-from decals.rendering.decal_data import DecalData, decal_library
-from decals.rendering.regions import Rectangle
-from decals.rendering.textures import ImageArray
-from decals.rendering.tiles import CameraBuffer, PictureView
+from decals.rendering.decal_pass import decal_library
+from decals.rendering.pixel_pass import CameraBuffer
+from decals.rendering.uploads import DecalData, ImageArray
+from decals.rendering.viewpoint import PictureView, Rectangle
 from decals.shaders import compose
 from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper

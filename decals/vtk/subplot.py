@@ -21,10 +21,10 @@ from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
-from decals.rendering.dirty_regions import same_objects
 from decals.rendering.lights import Lighting
 from decals.rendering.options import check_scene
-from decals.rendering.tiles import CameraBuffer
+from decals.rendering.pixel_pass import CameraBuffer
+from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, bounds_of
 from decals.validation import describe, finite_number, member, whole_number

@@ -24,9 +24,9 @@ from decals.rendering import context as context_module
 from decals.rendering.context import Context
 from decals.rendering.mesh import mesh_rows
 from decals.rendering.options import RenderOptions
-from decals.rendering.pixel_pass import ComputePass, FragmentPass, PassBackend
+from decals.rendering.pixel_pass import CameraBuffer, ComputePass, FragmentPass, PassBackend
 from decals.rendering.renderer import Renderer
-from decals.rendering.tiles import CameraBuffer, Tile
+from decals.rendering.viewpoint import Tile
 from decals.scenes.objects import MeshObject
 from decals.scenes.scene import Scene
 from decals.shaders import Source, compose

@@ -14,8 +14,8 @@ from blobtree.formulas.warps import WARPS
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
 from decals.rendering.context import Context
-from decals.rendering.tape_shader import Kinds
-from decals.rendering.textures import ROW_TEXELS, DataTexture
+from decals.rendering.tree import Kinds
+from decals.rendering.uploads import ROW_TEXELS, DataTexture
 from tests.blobtree.transpile.warp_functions import TypedFunction
 
 AGREEMENT = 1e-5

@@ -11,7 +11,7 @@ from blobtree.formulas.warps import WARPS
 from blobtree.tape.dispatch import is_monotone, partials, slope, warp_forward, warp_pullback, warp_stretch
 from blobtree.transpile.glsl import translate_library
 from decals.rendering.context import Context
-from decals.rendering.tape_shader import _dispatch
+from decals.rendering.tree import _dispatch
 from tests.blobtree.transpile.warp_functions import TypedFunction, call, typed_functions
 from tests.decals.glsl.arguments import COUNT, arguments_of
 from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, through_glsl

@@ -9,7 +9,7 @@ from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
-from decals.rendering.tape_shader import tracing_shader
+from decals.rendering.tree import tracing_shader
 from decals.scenes.camera import Camera
 from tests.blobtree.trees import SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units

@@ -8,7 +8,7 @@ import pytest
 
 from decals.errors import InvalidImage, TooMuchData
 from decals.rendering.context import Context
-from decals.rendering.textures import (
+from decals.rendering.uploads import (
     ROW_TEXELS,
     DataTexture,
     ImageArray,

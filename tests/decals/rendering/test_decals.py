@@ -9,7 +9,7 @@ from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
-from decals.rendering import tiles as tile
+from decals.rendering import viewpoint as tile
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer

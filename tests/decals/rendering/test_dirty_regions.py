@@ -6,11 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree._typing import Float64Array
-from decals.rendering.dirty_regions import MAX_RECTANGLES, ball_extents, joined, regions_of
 from decals.rendering.pixel_pass import GROUP
-from decals.rendering.regions import Rectangle
-from decals.rendering.tiles import PictureView
-from decals.rendering.viewpoint import Projection
+from decals.rendering.progressive import MAX_RECTANGLES, ball_extents, joined, regions_of
+from decals.rendering.viewpoint import PictureView, Projection, Rectangle
 from decals.scenes.camera import Camera
 
 SIZE = (300, 200)

@@ -8,8 +8,7 @@ import pytest
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.rendering.context import Context
-from decals.rendering.decal_data import DecalData
-from decals.rendering.textures import DataTexture
+from decals.rendering.uploads import DataTexture, DecalData
 
 
 def some(rng: np.random.Generator, count: int) -> Decals:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from decals.rendering.context import Context
-from decals.rendering.tiles import CameraBuffer, PictureView, attach_camera, set_uniform
-from decals.rendering.viewpoint import Projection, Viewpoint
+from decals.rendering.pixel_pass import CameraBuffer, attach_camera, set_uniform
+from decals.rendering.viewpoint import PictureView, Projection, Viewpoint
 from decals.scenes.camera import Camera
 from decals.shaders import compose
 from decals.shaders.compose import DIRECTORY
@@ -61,7 +61,7 @@ def test_a_footprint_is_the_way_to_the_next_pixel(
     framebuffer = context.gl.framebuffer(targets)
     framebuffer.use()
     context.gl.enable_only(moderngl.NOTHING)
-    CameraBuffer(context).use(PictureView.of(viewpoint, SIZE, BOX).whole())
+    CameraBuffer(context.gl).use(PictureView.of(viewpoint, SIZE, BOX).whole())
     context.gl.vertex_array(program, []).render(vertices=3)
     right, up = (np.frombuffer(t.read(), np.float32).reshape(SIZE[1], SIZE[0], 4)[..., :3] for t in targets)
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)

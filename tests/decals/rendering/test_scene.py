@@ -12,7 +12,7 @@ from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.rendering import STUDIO, TRANSPARENT, Renderer
-from decals.rendering import tiles as tile
+from decals.rendering import viewpoint as tile
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.viewpoint import Projection

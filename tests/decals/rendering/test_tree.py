@@ -10,9 +10,8 @@ from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import COMPUTE_VERSION
 from decals.rendering.renderer import Buffers, Renderer
-from decals.rendering.tiles import PictureView, tiles
 from decals.rendering.tree import covered_rectangle
-from decals.rendering.viewpoint import Projection, Viewpoint
+from decals.rendering.viewpoint import PictureView, Projection, Viewpoint, tiles
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from tests.blobtree.trees import random_trees

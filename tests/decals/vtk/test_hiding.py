@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from decals.rendering.options import RenderOptions
-from decals.rendering.regions import Rectangle
+from decals.rendering.viewpoint import Rectangle
 from decals.vtk.frame import texels_of
 from tests.decals.vtk.conftest import Factory
 from tests.decals.vtk.scenes import both, shot

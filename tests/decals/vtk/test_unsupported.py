@@ -9,6 +9,7 @@ import pytest
 import pyvista as pv
 
 from decals.vtk.adapters import Lights, unsupported_modes
+from decals.vtk.exports import CLIENTS
 from tests.decals.vtk.conftest import Factory
 from tests.decals.vtk.scenes import both, shot
 from tests.decals.vtk.test_undisturbed import translucent
@@ -142,7 +143,7 @@ def test_trames_own_views_say_what_they_leave_out(plotter: Factory) -> None:
     pl = plotter()
     pl.decals.add_scene(both())
     said: dict[str, int] = {}
-    local = modes.CLIENTS.keys() - {"PyVistaWasmView"}  # that one is fetched from the network
+    local = CLIENTS.keys() - {"PyVistaWasmView"}  # that one is fetched from the network
     for name in ("PyVistaRemoteView", "PyVistaRCAView", *local):
         with VAppLayout(server, template_name=name), warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")

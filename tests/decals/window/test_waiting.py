@@ -9,8 +9,7 @@ import pytest
 
 from decals.editing import EditSession, ScaleDecals
 from decals.errors import TooMuchData
-from decals.rendering import scene_warmup
-from decals.rendering.decal_data import decal_library
+from decals.rendering.decal_pass import decal_library
 from decals.rendering.options import RenderOptions
 from decals.rendering.progressive import DRAWING
 from decals.rendering.warmup import with_status
@@ -181,7 +180,7 @@ def test_what_needs_no_graphics_is_made_in_a_thread_while_the_window_listens(
         assert go.wait(60)
         return decal_library(*arguments, **options)
 
-    monkeypatch.setattr(scene_warmup, "decal_library", slow)
+    monkeypatch.setattr("decals.rendering.renderer.decal_library", slow)
     monkeypatch.setattr("decals.window.frames.SLICE_SECONDS", 0.0)
     window = waiting()
     for _ in range(20):
@@ -199,7 +198,7 @@ def test_what_goes_wrong_in_the_thread_is_raised_where_the_window_listens(
     def refuse(*_arguments: Any, **_options: Any) -> None:
         raise TooMuchData("no room")
 
-    monkeypatch.setattr(scene_warmup, "decal_library", refuse)
+    monkeypatch.setattr("decals.rendering.renderer.decal_library", refuse)
     window = waiting()
     with pytest.raises(TooMuchData, match="no room"):
         slices(window)
@@ -218,7 +217,7 @@ def test_what_went_wrong_in_the_thread_is_tried_again_once_something_changed(
             raise failures.pop()
         return decal_library(*arguments, **options)
 
-    monkeypatch.setattr(scene_warmup, "decal_library", refuse)
+    monkeypatch.setattr("decals.rendering.renderer.decal_library", refuse)
     window = waiting(session)
     with pytest.raises(TooMuchData, match="no room"):
         slices(window)
@@ -239,7 +238,7 @@ def test_a_shader_that_is_refused_is_said_once_and_clearly(
     def refuse(*_: Any) -> None:
         raise CompileError("decal_pass.glsl:7: nonsense")
 
-    monkeypatch.setattr(scene_warmup, "decal_program", refuse)
+    monkeypatch.setattr("decals.rendering.renderer.decal_program", refuse)
     window = waiting()
     with pytest.raises(CompileError, match=r"decal_pass\.glsl:7"):
         slices(window)
