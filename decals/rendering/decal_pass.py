@@ -1,9 +1,6 @@
 """The decal pass: colours all pixels at once, for any number of decals and objects."""
 
-from collections.abc import Mapping
 from functools import cache
-
-import moderngl
 
 from blobtree._typing import Float32Array
 from blobtree.formulas.falloff import RIM
@@ -18,9 +15,9 @@ from decals.rendering.pixel_pass import (
     PixelPass,
     Program,
     attach_camera,
-    pixel_pass,
     read_floats,
     set_uniform,
+    use_textures,
 )
 from decals.rendering.uploads import DecalData, ImageArray
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
@@ -81,7 +78,7 @@ class DecalPass:
         """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
         if library not in self._passes:
             program = decal_program(self._context, library, len(self._targets))
-            self._passes[library] = pixel_pass(self._context.gl, program, self._targets)
+            self._passes[library] = PixelPass(self._context.gl, program, self._targets)
         return self._passes[library]
 
     def release(self) -> None:
@@ -97,13 +94,6 @@ def decal_program(context: Context, library: str, targets: int = 1) -> Program:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
     slots = {"decals": "//@ include decals.glsl", "functions": library} if library else {}
     return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines={"DECALS": bool(library)}))
-
-
-def use_textures(program: Program, textures: Mapping[str, moderngl.Texture]) -> None:
-    """Bind textures to the units from 0 on, and set the samplers of these names."""
-    for unit, (name, texture) in enumerate(textures.items()):
-        texture.use(unit)
-        set_uniform(program, name, unit)
 
 
 LIBRARY_FUNCTIONS = (

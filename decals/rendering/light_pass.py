@@ -5,11 +5,10 @@ import numpy as np
 
 from blobtree._typing import UInt8Array
 from decals.rendering.context import Context
-from decals.rendering.decal_pass import use_textures
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background
-from decals.rendering.pixel_pass import PixelPass, Program, attach_camera, pixel_pass, set_uniform
+from decals.rendering.pixel_pass import PixelPass, Program, attach_camera, set_uniform, use_textures
 from decals.rendering.viewpoint import TILE_MARGIN, WHOLE, Part, Rectangle, Tile
 from decals.shaders import compose
 
@@ -66,7 +65,7 @@ class LightPass:
     def _pass(self, file: str) -> PixelPass:
         if file not in self._passes:
             program = light_program(self._context, file)
-            self._passes[file] = pixel_pass(self._context.gl, program, [self.light])
+            self._passes[file] = PixelPass(self._context.gl, program, [self.light])
         return self._passes[file]
 
     def release(self) -> None:

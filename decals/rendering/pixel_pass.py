@@ -9,7 +9,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
-from typing import Protocol, Self, TypeAlias, TypeVar
+from typing import Self, TypeAlias, TypeVar
 
 import moderngl
 import numpy as np
@@ -136,6 +136,13 @@ def set_uniform(program: Program, name: str, value: object) -> None:
         uniform.value = value
 
 
+def use_textures(program: Program, textures: Mapping[str, moderngl.Texture]) -> None:
+    """Bind textures to the units from 0 on, and set the samplers of these names."""
+    for unit, (name, texture) in enumerate(textures.items()):
+        texture.use(unit)
+        set_uniform(program, name, unit)
+
+
 def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) -> Float32Array:
     """Read the inner part of a tile from a target, ``float32[h, w, 4]``, the lowest row first."""
     inner = tile.inner
@@ -147,77 +154,37 @@ def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) 
 # -- passes ---------------------------------------------------------------------------------------------
 
 
-class PixelPass(Protocol):
-    """A compiled pass over all pixels."""
+class PixelPass:
+    """A program that fills textures of floats: a triangle over all pixels, or invocations for each pixel."""
 
-    @property
-    def program(self) -> Program:
-        """The program, which takes the uniforms."""
-        ...
+    def __init__(self, gl: moderngl.Context, program: Program, targets: Sequence[moderngl.Texture]) -> None:
+        self.program = program
+        self._targets, self._gl = tuple(targets), gl
+        self._owned: tuple[moderngl.VertexArray, moderngl.Framebuffer] | None = None
+        if isinstance(program, moderngl.Program):
+            self._owned = gl.vertex_array(program, []), gl.framebuffer(list(targets))
 
     def run(self, rectangle: Rectangle) -> None:
         """Fill a rectangle of all targets."""
-        ...
+        if self._owned is None:
+            assert isinstance(self.program, moderngl.ComputeShader)
+            for unit, target in enumerate(self._targets):
+                target.bind_to_image(unit, read=False, write=True)
+            run_pixels(self.program, rectangle)
+            self._gl.memory_barrier()
+            return
+        triangle, framebuffer = self._owned
+        right, top = rectangle.x + rectangle.width, rectangle.y + rectangle.height
+        framebuffer.viewport = (0, 0, right, top)
+        framebuffer.scissor = scissor_of(rectangle)
+        framebuffer.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        triangle.render(vertices=3)
 
     def release(self) -> None:
         """Release the memory, except targets and program."""
-        ...
-
-
-def pixel_pass(gl: moderngl.Context, program: Program, targets: Sequence[moderngl.Texture]) -> PixelPass:
-    """Return the pass by which a program fills textures of floats."""
-    if isinstance(program, moderngl.ComputeShader):
-        return ComputePass(gl, program, targets)
-    return FragmentPass(gl, program, targets)
-
-
-class FragmentPass:
-    """One triangle over all pixels."""
-
-    def __init__(
-        self, gl: moderngl.Context, program: moderngl.Program, targets: Sequence[moderngl.Texture]
-    ) -> None:
-        self.program: Program = program
-        self._array = gl.vertex_array(program, [])
-        self._framebuffer = gl.framebuffer(list(targets))
-        self._gl = gl
-
-    def run(self, rectangle: Rectangle) -> None:
-        """Fill a rectangle of all targets."""
-        right, top = rectangle.x + rectangle.width, rectangle.y + rectangle.height
-        self._framebuffer.viewport = (0, 0, right, top)
-        self._framebuffer.scissor = scissor_of(rectangle)
-        self._framebuffer.use()
-        self._gl.enable_only(moderngl.NOTHING)
-        self._array.render(vertices=3)
-
-    def release(self) -> None:
-        """Release the memory."""
-        self._array.release()
-        self._framebuffer.release()
-
-
-class ComputePass:
-    """A group of invocations for every square of pixels."""
-
-    def __init__(
-        self, gl: moderngl.Context, program: moderngl.ComputeShader, targets: Sequence[moderngl.Texture]
-    ) -> None:
-        self.program: Program = program
-        self._targets = tuple(targets)
-        self._gl = gl
-
-    def run(self, rectangle: Rectangle) -> None:
-        """Fill a rectangle of all targets."""
-        for unit, target in enumerate(self._targets):
-            target.bind_to_image(unit, read=False, write=True)
-        program = self.program
-        assert isinstance(program, moderngl.ComputeShader)
-        run_pixels(program, rectangle)
-        self._gl.memory_barrier()
-
-    def release(self) -> None:
-        """Do nothing: the pass owns neither targets nor program."""
+        for resource in self._owned or ():
+            resource.release()
 
 
 def scissor_of(rectangle: Rectangle) -> tuple[int, int, int, int]:
@@ -320,7 +287,7 @@ def measure(gl: moderngl.Context, backend: PassBackend) -> float:
     shader = pass_source(backend, "probe.glsl", 1)
     compute = backend is PassBackend.COMPUTE
     program = compile_compute(gl, shader) if compute else compile_program(gl, compose("screen.vert"), shader)
-    probe = pixel_pass(gl, program, [target])
+    probe = PixelPass(gl, program, [target])
     source.use(0)
     program["noise"] = 0
     times = [_seconds(gl, probe) for _ in range(_PROBE_RUNS + 1)]

@@ -285,8 +285,11 @@ class TreeDrawable:
         self._bounds = tree.bounds
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
-        tracer = _ComputeTracer if context.backend is PassBackend.COMPUTE else _FragmentTracer
-        self._tracer: _FragmentTracer | _ComputeTracer = tracer(context, Kinds.of(tree.tape), tree.bounds)
+        self._gl = context.gl
+        self._program = tracing_program(context, Kinds.of(tree.tape))
+        self._box: moderngl.VertexArray | None = None
+        if isinstance(self._program, moderngl.Program):
+            self._box = context.gl.vertex_array(self._program, [])
 
     @staticmethod
     def warmup(context: Context, item: TreeHolder) -> WarmupPlan:
@@ -307,19 +310,46 @@ class TreeDrawable:
     @property
     def rasterised(self) -> bool:
         """True if a fragment shader traces the rays."""
-        return isinstance(self._tracer, _FragmentTracer)
+        return self._box is not None
 
     def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
         """Trace the rays of all pixels that the box covers, or of a part of their rows."""
         for unit, texture in enumerate(self._textures):
             texture.use(unit)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
-            set_uniform(self._tracer.program, name, value)
-        self._tracer.run(tile, gbuffer, part)
+            set_uniform(self._program, name, value)
+        if self._box is not None:
+            gbuffer.use(tile.width, tile.height, part)
+            self._draw_box(self._box)
+        else:
+            self._trace_rows(covered_rectangle(self._bounds, tile).rows(part), gbuffer)
+
+    def _draw_box(self, box: moderngl.VertexArray) -> None:
+        """Trace a ray for every pixel that the back of the box covers, in a fragment shader."""
+        for name, corner in zip(("box_lower", "box_upper"), self._bounds, strict=True):
+            set_uniform(self._program, name, tuple(np.asarray(corner).tolist()))
+        self._gl.enable(moderngl.CULL_FACE)
+        self._gl.cull_face = "front"
+        box.render(vertices=BOX_VERTICES)
+        self._gl.cull_face = "back"
+        self._gl.disable(moderngl.CULL_FACE)
+
+    def _trace_rows(self, rows: Rectangle, gbuffer: GBuffer) -> None:
+        """Trace a ray for every pixel of a rectangle, in a compute shader."""
+        if rows.area == 0:
+            return
+        assert isinstance(self._program, moderngl.ComputeShader)
+        set_uniform(self._program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
+        gbuffer.position.bind_to_image(POSITION_UNIT, read=True, write=True)
+        gbuffer.normal.bind_to_image(NORMAL_UNIT, read=False, write=True)
+        gbuffer.color.bind_to_image(COLOR_UNIT, read=False, write=True)
+        self._gl.memory_barrier()
+        self._program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
+        self._gl.memory_barrier()
 
     def release(self) -> None:
         """Release the memory."""
-        for resource in (self._tracer, *self._textures):
+        for resource in (*self._textures, *([self._box] if self._box is not None else [])):
             resource.release()
 
 
@@ -339,54 +369,6 @@ def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
         "grid_counts": cells.counts,
         "tolerance": cells.tolerance,
     }
-
-
-class _FragmentTracer:
-    """Traces a ray for every pixel that the back of the box covers."""
-
-    def __init__(self, context: Context, kinds: Kinds, bounds: Bounds) -> None:
-        self.program: Program = tracing_program(context, kinds)
-        self._array = context.gl.vertex_array(self.program, [])
-        self._box = {"box_lower": bounds[0], "box_upper": bounds[1]}
-        self._gl = context.gl
-
-    def run(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
-        gbuffer.use(tile.width, tile.height, part)
-        for name, corner in self._box.items():
-            set_uniform(self.program, name, tuple(np.asarray(corner).tolist()))
-        self._gl.enable(moderngl.CULL_FACE)
-        self._gl.cull_face = "front"
-        self._array.render(vertices=BOX_VERTICES)
-        self._gl.cull_face = "back"
-        self._gl.disable(moderngl.CULL_FACE)
-
-    def release(self) -> None:
-        self._array.release()
-
-
-class _ComputeTracer:
-    """Runs an invocation for every pixel of the rectangle around the box."""
-
-    def __init__(self, context: Context, kinds: Kinds, bounds: Bounds) -> None:
-        self.program: Program = tracing_program(context, kinds)
-        self._bounds = bounds
-        self._gl = context.gl
-
-    def run(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
-        rows = covered_rectangle(self._bounds, tile).rows(part)
-        if rows.area == 0:
-            return
-        assert isinstance(self.program, moderngl.ComputeShader)
-        set_uniform(self.program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
-        gbuffer.position.bind_to_image(POSITION_UNIT, read=True, write=True)
-        gbuffer.normal.bind_to_image(NORMAL_UNIT, read=False, write=True)
-        gbuffer.color.bind_to_image(COLOR_UNIT, read=False, write=True)
-        self._gl.memory_barrier()
-        self.program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
-        self._gl.memory_barrier()
-
-    def release(self) -> None:
-        """Do nothing: the tracer owns nothing but the program."""
 
 
 def covered_rectangle(bounds: Bounds, tile: Tile) -> Rectangle:

@@ -100,7 +100,7 @@ def resized(image: UInt8Array, size: int) -> UInt8Array:
 ROW_TEXELS = 1 << TEXTURE_WIDTH_BITS
 """Texels in a row of a data texture; 16,384 rows, a usual limit, hold 67 million elements."""
 
-_KINDS = {
+_TEXTURE_KINDS = {
     (np.dtype(np.float32), (4,)): "f4",
     (np.dtype(np.int32), ()): "i4",
     (np.dtype(np.int32), (4,)): "i4",
@@ -168,7 +168,7 @@ class DataTexture:
 
 def _kind(array: NDArray[Any]) -> tuple[int, str]:
     """Return the components of a texel, and their moderngl type."""
-    kind = _KINDS.get((array.dtype, array.shape[1:]))
+    kind = _TEXTURE_KINDS.get((array.dtype, array.shape[1:]))
     if kind is None or not array.ndim:
         raise ValueError(
             f"expected float32[n, 4], int32[n] or int32[n, 4], got {array.dtype}{list(array.shape)}"
@@ -348,7 +348,7 @@ class Drawable(Protocol):
 Factory = Callable[[Context, Any], Drawable]
 WarmupFactory = Callable[[Context, Any], WarmupPlan]
 
-_KINDS: dict[type, tuple[Factory, WarmupFactory]] = {}
+_DRAWABLE_KINDS: dict[type, tuple[Factory, WarmupFactory]] = {}
 
 
 def _no_warmup(_context: Context, item: object) -> WarmupPlan:
@@ -378,7 +378,7 @@ def register(kind: type, factory: Factory, warmup: WarmupFactory = _no_warmup) -
     >>> class Die: ...
     >>> register(Die, lambda context, die: MeshDrawable(context, as_object(pyvista.Cube(), "die")))
     """
-    _KINDS[kind] = factory, warmup
+    _DRAWABLE_KINDS[kind] = factory, warmup
 
 
 def drawable_for(context: Context, item: object) -> Drawable:
@@ -399,9 +399,9 @@ def warmup_of(context: Context, item: object) -> WarmupPlan:
 
 def _kind_of(item: object) -> tuple[Factory, WarmupFactory]:
     for kind in type(item).__mro__:
-        if kind in _KINDS:
-            return _KINDS[kind]
-    for kind, factories in _KINDS.items():
+        if kind in _DRAWABLE_KINDS:
+            return _DRAWABLE_KINDS[kind]
+    for kind, factories in _DRAWABLE_KINDS.items():
         if getattr(kind, "_is_protocol", False) and isinstance(item, kind):
             return factories
     raise InvalidScene(

@@ -11,7 +11,7 @@ import moderngl
 
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.context import Context
-from decals.rendering.pixel_pass import CameraBuffer, set_uniform
+from decals.rendering.pixel_pass import CameraBuffer, set_uniform, use_textures
 from decals.rendering.progressive import ProgressiveFrame, Targets, TargetState, decal_version, same_objects
 from decals.rendering.viewpoint import Projection, Rectangle
 from decals.rendering.warmup import WarmupPlan, WarmupThread
@@ -57,13 +57,7 @@ class Composite:
         state.vtkglDisable(CULL_FACE)
         state.vtkglEnable(BLEND)
         state.vtkglBlendFuncSeparate(SOURCE_ALPHA, REST_OF_ALPHA, ONE, REST_OF_ALPHA)
-        textures: dict[str, moderngl.Texture] = {
-            "light": targets.light_pass.light,
-            "depth": targets.gbuffer.depth,
-        }
-        for unit, (name, texture) in enumerate(textures.items()):
-            texture.use(unit)
-            set_uniform(array.program, name, unit)
+        use_textures(array.program, {"light": targets.light_pass.light, "depth": targets.gbuffer.depth})
         set_uniform(array.program, "corner", (float(x), float(y)))
         set_uniform(array.program, "size", (float(width), float(height)))
         array.render(vertices=3)

@@ -37,79 +37,6 @@ from decals.vtk.proxy_actor import ProxyActor, box_around
 MAX_SAMPLES = 16
 """Samples per pixel along each axis, at most: graphics cards have no larger targets for usual windows."""
 
-
-class SubplotSettings:
-    """Settings of a subplot, which apply from the next frame on.
-
-    Attributes
-    ----------
-    wait_for_gpu : bool
-        If True, frames end when the graphics card has finished, so that they can be timed.
-    keep_previous_frame : bool
-        If True, the previous frame stays while shaders compile; see `SubplotRenderer.warm`.
-    """
-
-    def __init__(self) -> None:
-        self._samples, self._draw_scale = 2, 1.0
-        self._mapping, self._contact = ImageMapping.CORRECTED, Contact.PRODUCT
-        self._lights = Lights.SCENE
-        self.wait_for_gpu = self.keep_previous_frame = False
-
-    @property
-    def draw_scale(self) -> float:
-        """Size of the picture relative to the window, in (0, 1].
-
-        Below 1, the picture has one sample per texel and is magnified.
-        """
-        return self._draw_scale
-
-    @draw_scale.setter
-    def draw_scale(self, scale: float) -> None:
-        number = finite_number("draw_scale", scale, InvalidScene)
-        if not 0.0 < number <= 1.0:
-            raise InvalidScene(f"draw_scale: expected a number above 0 and at most 1, got {number}")
-        self._draw_scale = number
-
-    @property
-    def samples(self) -> int:
-        """Samples per pixel along each axis; one in screenshots that VTK draws larger than the window."""
-        return self._samples
-
-    @samples.setter
-    def samples(self, samples: int) -> None:
-        self._samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
-
-    @property
-    def mapping(self) -> ImageMapping:
-        """Image mapping; see `decals.ImageMapping`."""
-        return self._mapping
-
-    @mapping.setter
-    def mapping(self, mapping: ImageMapping) -> None:
-        self._mapping = member("mapping", mapping, ImageMapping, InvalidScene)
-
-    @property
-    def contact(self) -> Contact:
-        """Contact mode; see `decals.Contact`."""
-        return self._contact
-
-    @contact.setter
-    def contact(self, contact: Contact) -> None:
-        self._contact = member("contact", contact, Contact, InvalidScene)
-
-    @property
-    def lights(self) -> Lights:
-        """Lights: the studio light, or the plotter's lights; see `Lights`."""
-        return self._lights
-
-    @lights.setter
-    def lights(self, lights: Lights | str) -> None:
-        try:
-            self._lights = Lights(lights)
-        except ValueError as error:
-            raise InvalidScene(f"lights must be 'scene' or 'vtk'; got {describe(lights)}") from error
-
-
 DEPTH_TOLERANCE = 1e-6
 """Difference of equal depths: depth buffers have 24 bits, matrices are float32."""
 
@@ -189,7 +116,7 @@ class FrameStatus(Enum):
     """The frame was drawn."""
 
 
-class SubplotRenderer(SubplotSettings):
+class SubplotRenderer:
     """Draws a scene among the actors of one of pyvista's renderers; ``plotter.decals.subplot`` is one.
 
     Everything may be changed at any time. The plotter's next ``render()`` shows it.
@@ -209,6 +136,10 @@ class SubplotRenderer(SubplotSettings):
         Result of the last frame.
     applied : InjectedDecals
         VTK's actors that show the decals.
+    wait_for_gpu : bool
+        If True, frames end when the graphics card has finished, so that they can be timed.
+    keep_previous_frame : bool
+        If True, the previous frame stays while shaders compile; see `warm`.
 
     Examples
     --------
@@ -226,8 +157,11 @@ class SubplotRenderer(SubplotSettings):
     def __init__(
         self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]
     ) -> None:
-        super().__init__()
         self.plotter, self.vtk_renderer = plotter, renderer
+        self._samples, self._draw_scale = 2, 1.0
+        self._mapping, self._contact = ImageMapping.CORRECTED, Contact.PRODUCT
+        self._lights = Lights.SCENE
+        self.wait_for_gpu = self.keep_previous_frame = False
         self.status = FrameStatus.EMPTY
         self._scene: SceneLike | None = None
         self._context = context
@@ -284,6 +218,62 @@ class SubplotRenderer(SubplotSettings):
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor; an actor without decals stays as it is."""
         self.applied.remove(actor)
+
+    # -- settings, from the next frame on ---------------------------------------------------------------
+
+    @property
+    def draw_scale(self) -> float:
+        """Size of the picture relative to the window, in (0, 1].
+
+        Below 1, the picture has one sample per texel and is magnified.
+        """
+        return self._draw_scale
+
+    @draw_scale.setter
+    def draw_scale(self, scale: float) -> None:
+        number = finite_number("draw_scale", scale, InvalidScene)
+        if not 0.0 < number <= 1.0:
+            raise InvalidScene(f"draw_scale: expected a number above 0 and at most 1, got {number}")
+        self._draw_scale = number
+
+    @property
+    def samples(self) -> int:
+        """Samples per pixel along each axis; one in screenshots that VTK draws larger than the window."""
+        return self._samples
+
+    @samples.setter
+    def samples(self, samples: int) -> None:
+        self._samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+
+    @property
+    def mapping(self) -> ImageMapping:
+        """Image mapping; see `decals.ImageMapping`."""
+        return self._mapping
+
+    @mapping.setter
+    def mapping(self, mapping: ImageMapping) -> None:
+        self._mapping = member("mapping", mapping, ImageMapping, InvalidScene)
+
+    @property
+    def contact(self) -> Contact:
+        """Contact mode; see `decals.Contact`."""
+        return self._contact
+
+    @contact.setter
+    def contact(self, contact: Contact) -> None:
+        self._contact = member("contact", contact, Contact, InvalidScene)
+
+    @property
+    def lights(self) -> Lights:
+        """Lights: the studio light, or the plotter's lights; see `Lights`."""
+        return self._lights
+
+    @lights.setter
+    def lights(self, lights: Lights | str) -> None:
+        try:
+            self._lights = Lights(lights)
+        except ValueError as error:
+            raise InvalidScene(f"lights must be 'scene' or 'vtk'; got {describe(lights)}") from error
 
     # -- coordinates ------------------------------------------------------------------------------------
 

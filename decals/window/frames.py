@@ -141,40 +141,6 @@ class FrameBudget:
         return SCALES[-1]
 
 
-class FrameTimer:
-    """Records the durations of a subplot's frames in a budget.
-
-    Parameters
-    ----------
-    subplot
-        The subplot.
-    budget
-        The budget.
-    """
-
-    def __init__(self, subplot: SubplotRenderer, budget: FrameBudget) -> None:
-        self._subplot, self._budget, self._began_at = subplot, budget, 0.0
-        renderer = subplot.vtk_renderer
-        self._tags = [
-            renderer.AddObserver("StartEvent", weak_callback(self._begin)),
-            renderer.AddObserver("EndEvent", weak_callback(self._end)),
-        ]
-
-    def _begin(self) -> None:
-        self._began_at = time.perf_counter()
-
-    def _end(self) -> None:
-        part = self._subplot.drawn_fraction
-        if part:
-            size = self._subplot.draw_scale * self._subplot.samples
-            self._budget.record(size, time.perf_counter() - self._began_at, part)
-
-    def release(self) -> None:
-        """Stop recording."""
-        for tag in self._tags:
-            self._subplot.vtk_renderer.RemoveObserver(tag)
-
-
 def _positive(name: str, value: float) -> float:
     """Return a number in (0, MAX_VALUE], or raise `InvalidScene`."""
     number = finite_number(name, value, InvalidScene)
@@ -240,7 +206,11 @@ class FrameController:
     ) -> None:
         self._subplot, self.samples, self._render, self._version = subplot, samples, render, version
         self.budget = FrameBudget()
-        self._timer = FrameTimer(subplot, self.budget)
+        self._frame_began_at = 0.0
+        self._tags = [
+            subplot.vtk_renderer.AddObserver("StartEvent", weak_callback(self._begin_timing)),
+            subplot.vtk_renderer.AddObserver("EndEvent", weak_callback(self._end_timing)),
+        ]
         self.state = FrameState.WHOLE
         self._changed_at = 0.0
         self._drawn_version = version()
@@ -248,7 +218,17 @@ class FrameController:
 
     def release(self) -> None:
         """Stop timing frames."""
-        self._timer.release()
+        for tag in self._tags:
+            self._subplot.vtk_renderer.RemoveObserver(tag)
+
+    def _begin_timing(self) -> None:
+        self._frame_began_at = time.perf_counter()
+
+    def _end_timing(self) -> None:
+        part = self._subplot.drawn_fraction
+        if part:
+            size = self._subplot.draw_scale * self._subplot.samples
+            self.budget.record(size, time.perf_counter() - self._frame_began_at, part)
 
     @property
     def outdated(self) -> bool:

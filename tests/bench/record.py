@@ -24,7 +24,7 @@ from decals.rendering import context as context_module
 from decals.rendering.context import Context
 from decals.rendering.mesh import mesh_rows
 from decals.rendering.options import RenderOptions
-from decals.rendering.pixel_pass import CameraBuffer, ComputePass, FragmentPass, PassBackend
+from decals.rendering.pixel_pass import CameraBuffer, PassBackend, PixelPass
 from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Tile
 from decals.scenes.objects import MeshObject
@@ -88,9 +88,8 @@ def _recording_calls(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
     with ExitStack() as stack:
         for texture in (moderngl.Texture, moderngl.TextureArray):
             stack.enter_context(patch.object(texture, "use", _recording_use(texture.use, units)))
-        for pixel_pass in (FragmentPass, ComputePass):
-            recording = _recording_run(pixel_pass.run, units, sources, arrays, passes)
-            stack.enter_context(patch.object(pixel_pass, "run", recording))
+        recording = _recording_run(PixelPass.run, units, sources, arrays, passes)
+        stack.enter_context(patch.object(PixelPass, "run", recording))
         stack.enter_context(patch.object(context_module, "pass_source", pass_source))
         stack.enter_context(patch.object(Context, "program", program))
         stack.enter_context(patch.object(Context, "compute_program", compute_program))
