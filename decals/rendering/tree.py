@@ -349,8 +349,10 @@ class TreeDrawable:
 
     def release(self) -> None:
         """Release the memory."""
-        for resource in (*self._textures, *([self._box] if self._box is not None else [])):
-            resource.release()
+        for texture in self._textures:
+            texture.release()
+        if self._box is not None:
+            self._box.release()
 
 
 def tracing_program(context: Context, kinds: Kinds) -> Program:
