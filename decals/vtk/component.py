@@ -21,8 +21,8 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.convert import Model, as_shape
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
-from decals.vtk.context import WindowContext
 from decals.vtk.exports import restore_exports, warn_of_exports
+from decals.vtk.frame import WindowContext
 from decals.vtk.subplot import SubplotRenderer
 
 Image = str | os.PathLike[str] | DecalImage | NDArray[np.uint8]

@@ -29,8 +29,7 @@ from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, bounds_of
 from decals.validation import describe, finite_number, member, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
-from decals.vtk.context import WindowContext
-from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer
+from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.injection import InjectedDecals
 from decals.vtk.proxy_actor import ProxyActor, box_around
 

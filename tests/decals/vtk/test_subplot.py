@@ -253,8 +253,8 @@ def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pyte
     pl = plotter()
     pl.add_mesh(pv.Sphere())
     shot(pl)
-    monkeypatch.setattr("decals.vtk.context._idle", {})
-    monkeypatch.setattr("decals.vtk.context.DefaultLoader", none)
+    monkeypatch.setattr("decals.vtk.frame._idle", {})
+    monkeypatch.setattr("decals.vtk.frame.DefaultLoader", none)
     pl.decals.subplot.scene = both()
     with pytest.raises(NoGraphics, match=r"EGL, GLX, WGL or macOS, got a vtk\w+Window"):
         pl.decals.subplot.at(80, 60)
