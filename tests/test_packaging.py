@@ -19,7 +19,7 @@ FORBIDDEN = {
     "shaders": {"blobtree", "decals", "decals.apps", *DRAWING},
     "apps": {"tests"},
 }
-PYVISTA_FILES = ("tree.py", "pyvista_views.py")
+PYVISTA_FILES = ("tree.py", "pyvista_views.py", "field_slice.py")
 """The files of `blobtree` that return pyvista objects; another test checks that they import it late."""
 
 
