@@ -8,8 +8,8 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import reference
-from vtkmodules.vtkCommonDataModel import vtkDataObject
+from vtkmodules.vtkCommonCore import reference, vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkPointSet
 from vtkmodules.vtkRenderingCore import vtkDataSetMapper, vtkProp, vtkRenderer
 from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
 
@@ -125,10 +125,15 @@ _Filter: Any = VTKPythonAlgorithmBase
 
 
 class SmoothNormals(_Filter):  # type: ignore[misc]
-    """A filter before a mapper that adds the point data NORMALS; the pipeline before it stays."""
+    """A filter before a mapper that adds the point data NORMALS; the pipeline before it stays.
+
+    The output has its own points. VTK uploads an array of points once for all mappers of a window, shifted
+    and scaled as its first mapper asks, but decals need the unchanged points.
+    """
 
     def __init__(self) -> None:
         super().__init__(nInputPorts=1, inputType="vtkDataSet", nOutputPorts=1, outputType="vtkDataSet")
+        self._output: pv.DataSet | None = None
 
     def insert_before(self, mapper: Any) -> bool:
         """Insert the filter before a mapper, or return False if such a filter is there already."""
@@ -152,14 +157,19 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
         given = self.GetInputData(inputs, 0, 0)
         made = outputs.GetInformationObject(0).Get(vtkDataObject.DATA_OBJECT())
         if given is not None and (made is None or made.GetClassName() != given.GetClassName()):
-            outputs.GetInformationObject(0).Set(vtkDataObject.DATA_OBJECT(), given.NewInstance())
+            self._output = pv.wrap(given.NewInstance())  # kept, as pyvista's pickers return it
+            outputs.GetInformationObject(0).Set(vtkDataObject.DATA_OBJECT(), self._output)
         return 1
 
     def RequestData(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
         """Copy the input and add the normals."""
-        out = self.GetOutputData(outputs, 0)
+        out = pv.wrap(self.GetOutputData(outputs, 0))
         out.ShallowCopy(self.GetInputData(inputs, 0, 0))
-        normals: Any = smooth_normals(pv.wrap(out))
+        if isinstance(out, vtkPointSet) and out.GetPoints() is not None:
+            points = vtkPoints()
+            points.DeepCopy(out.GetPoints())
+            out.SetPoints(points)
+        normals: Any = smooth_normals(out)
         array = pv.convert_array(normals, name=NORMALS)
         out.GetPointData().AddArray(array)
         return 1

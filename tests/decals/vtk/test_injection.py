@@ -246,6 +246,56 @@ def test_a_mesh_that_changes_keeps_true_normals(plotter: Factory) -> None:
     np.testing.assert_array_equal(shot(pl), shot(again))
 
 
+@pytest.mark.parametrize("center", [(0.0, 0.0, 0.0), (500.0, 0.0, 0.0)], ids=["near", "far_away"])
+@pytest.mark.parametrize("first", [True, False], ids=["before", "after"])
+def test_decals_stay_if_another_actor_shows_the_same_mesh(
+    plotter: Factory, center: tuple[float, float, float], first: bool
+) -> None:
+    """VTK shares the points of a mesh between actors, and shifts and scales those of a large or far one."""
+    mesh = pv.Sphere(radius=16, center=center)
+    decals = decals_over(pv.Sphere(radius=1.0), 60)
+    decals = decals.replace(positions=16 * decals.positions + np.float32(center), radii=16 * decals.radii)
+
+    def owners(*, others: int) -> np.ndarray:
+        pl = plotter(window_size=SIZE)
+        pl.disable_anti_aliasing()
+        for _ in range(others if first else 0):
+            pl.add_mesh(mesh, style="wireframe", color="red", lighting=False)
+        actor = pl.add_mesh(mesh, lighting=False)
+        for _ in range(0 if first else others):
+            pl.add_mesh(mesh, style="wireframe", color="red", lighting=False)
+        pl.decals.add(decals, images=["scale"])
+        subplot = pl.decals.subplot
+        subplot.applied._injections.append(injection.Injection(subplot, actor, paint=OWNER))
+        pl.camera_position = [np.add(center, (40.0, -50.0, 30.0)), center, (0, 0, 1)]
+        pl.reset_camera_clipping_range()
+        return shot(pl)
+
+    alone = owners(others=0)
+    assert ((alone[..., 2] == 128) & (alone[..., 0] > 0)).sum() > 3000
+    both = owners(others=1)
+    same = (both == alone).all(axis=-1)
+    assert (same | (both == (255, 0, 0)).all(axis=-1)).mean() > 0.98
+
+
+def test_pyvistas_pickers_return_pyvistas_mesh(plotter: Factory) -> None:
+    """The picked mesh of an actor with decals has pyvista's type and the arrays of the user."""
+    mesh = torus()
+    mesh["height"] = mesh.points[:, 2]
+    pl, actor = subplot_with(plotter, mesh, decals_over(mesh))
+    picked: list[pv.DataSet] = []
+    pl.enable_mesh_picking(picked.append, show=False, show_message=False)
+    row, column = np.argwhere((shot(pl) != 255).any(axis=-1))[500]
+    pl.iren.picker.Pick(int(column), SIZE[1] - 1 - int(row), 0, pl.renderer)
+    assert pl.picked_actor is actor
+    assert [type(one) for one in picked] == [pv.PolyData]
+    np.testing.assert_array_equal(picked[0].points, mesh.points)
+    np.testing.assert_array_equal(picked[0]["height"], mesh["height"])
+    picked[0].points[:] += 1.0
+    assert actor.mapper.dataset is mesh
+    np.testing.assert_allclose(mesh["height"], mesh.points[:, 2])
+
+
 def test_solids_take_decals_on_their_surface(plotter: Factory) -> None:
     grid = pv.ImageData(
         dimensions=(5, 5, 5), spacing=(0.25,) * 3, origin=(-0.5,) * 3
