@@ -13,6 +13,7 @@ from .errors import (
     MissingPackage,
     UnknownKind,
     UntranslatableFunction,
+    UnusableCache,
 )
 from .formulas.falloff import ISO, RIM
 from .io import from_json, load, save, to_json
@@ -62,6 +63,7 @@ __all__ = [
     "Union",
     "UnknownKind",
     "UntranslatableFunction",
+    "UnusableCache",
     "__version__",
     "define_operator",
     "define_skeleton",

@@ -1,4 +1,4 @@
-"""Warp devices: start of Warp, kernel options, launches on every core, and memory.
+"""Warp devices: start of Warp, launches on every core, and memory.
 
 Warp runs a CPU launch on one thread, but runs several launches at once. `launch` therefore divides the
 indices of a launch into slices, and runs these on a pool of threads.
@@ -21,13 +21,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.errors import InvalidDevice, InvalidResolution
+from blobtree.kernels import loaded, unusable_cache
 
 wp.config.log_level = wp.LOG_WARNING  # no banner when Warp starts, no line per compiled module
-
-KERNEL_OPTIONS: dict[str, Any] = {"enable_backward": False, "max_unroll": 4}
-"""Options for `wp.set_module_options`: no adjoint code, and no unrolling of long loops.
-
-Kernels that call whole formulas in unrolled loops compile several times as long, and run no faster."""
 
 SLICES_PER_THREAD = 4
 """Slices of a launch per thread; several of them even out slices of unequal cost."""
@@ -60,6 +56,11 @@ def start_warp() -> None:
     """Initialise Warp without its warning that there is no CUDA driver, which no setting turns off.
 
     All kernels also run without CUDA. Other lines that Warp writes to stderr are repeated.
+
+    Raises
+    ------
+    UnusableCache
+        The folder for compiled kernels cannot be made.
     """
     try:
         stderr = os.dup(2)
@@ -72,6 +73,10 @@ def start_warp() -> None:
         os.dup2(captured.fileno(), 2)
         try:
             wp.init()
+        except OSError as error:
+            if error.filename is None:  # not from Warp's cache: a library that cannot be loaded
+                raise
+            raise unusable_cache(error) from error
         finally:
             os.dup2(stderr, 2)
             os.close(stderr)
@@ -185,13 +190,13 @@ def launch(
     if count == 0:
         return
     start_warp()
+    loaded(kernel, device)
     if not wp.get_device(device).is_cpu:
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
     per_thread = SLICES_PER_THREAD if step is None else REPORTED_SLICES_PER_THREAD
     slices = min(_thread_count() * per_thread, -(-count // MIN_SLICE))
     bounds = [count * i // slices for i in range(slices + 1)]
-    wp.load_module(kernel.module, device=device)
 
     def run(first: int, last: int) -> None:
         wp.launch(kernel, dim=last - first, inputs=[first, *inputs], outputs=[*outputs], device=device)

@@ -14,6 +14,7 @@
     │   ├── UntranslatableFunction            a typed function outside the subset that GLSL shares
     │   └── (decals.errors adds its own)
     ├── MissingPackage(ImportError)           an optional package is not installed
+    ├── UnusableCache                         the folder of compiled kernels cannot be written
     └── Cancelled                             the caller's `cancel` stopped the work
 
 A message says what was expected, what came, and what to do.
@@ -62,6 +63,10 @@ class UntranslatableFunction(InvalidInput):
 
 class MissingPackage(ImplicitDecalsError, ImportError):
     """An optional package is not installed."""
+
+
+class UnusableCache(ImplicitDecalsError):
+    """The folder of compiled kernels cannot be written."""
 
 
 class Cancelled(ImplicitDecalsError):

@@ -3,7 +3,7 @@
 import warp as wp
 
 from blobtree.cells.grid import BRANCHING, BRANCHING_BITS, CHILDREN, KEY_DIGITS
-from blobtree.device import KERNEL_OPTIONS
+from blobtree.kernels import KERNEL_OPTIONS
 
 wp.set_module_options(KERNEL_OPTIONS)
 

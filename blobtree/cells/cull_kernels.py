@@ -11,8 +11,8 @@ import warp as wp
 from blobtree.cells.block_kernels import ChildGrid, LevelBlocks, block_center, child_offset
 from blobtree.cells.prune_kernels import primitive_range, range_in_ball
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE, write_block
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.skeletons import HALF_DIAGONAL
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.evaluators import to_local
 from blobtree.tape.tape import PREFIX, STRETCHED
 

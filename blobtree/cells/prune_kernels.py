@@ -8,10 +8,10 @@ the same value, gradient and colour as the whole one.
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import falloff_range
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
 from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import closest, min_influence, stride, warp_forward, warp_stretch
 from blobtree.tape.evaluators import to_local
 from blobtree.tape.tape import POP_SWAPPED, PREFIX, PUSH, REGISTERS, STRETCHED, UNWARP, WARP, WARP_REGISTERS

@@ -16,8 +16,8 @@ from blobtree.cells.block_kernels import (
 )
 from blobtree.cells.grid import CHILDREN
 from blobtree.cells.prune_kernels import prune
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 
 wp.set_module_options(KERNEL_OPTIONS)
 

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
+from blobtree.kernels import KERNEL_OPTIONS
 
 wp.set_module_options(KERNEL_OPTIONS)
 

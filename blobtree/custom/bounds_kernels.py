@@ -12,8 +12,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.device import KERNEL_OPTIONS, known_device, launch
+from blobtree.device import known_device, launch
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import closest, stride
 from blobtree.tape.instruction_set import single_skeleton_set
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import closest, partials, stride, warp_forward, warp_pullback
 from blobtree.tape.evaluators import (
     gradient_combine,

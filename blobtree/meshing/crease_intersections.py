@@ -11,8 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.crease_branches import branch_at
 
 wp.set_module_options(KERNEL_OPTIONS)

@@ -7,8 +7,8 @@ import warp as wp
 
 from blobtree.cells.block_kernels import CellBlocks, child_offset, grid_point
 from blobtree.cells.grid import CHILDREN
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.crease_branches import branch_at, has_choice
 from blobtree.meshing.crease_intersections import (
     CONVERGED_STEP,

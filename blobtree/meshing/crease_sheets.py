@@ -4,8 +4,8 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.crease_branches import branch_at
 from blobtree.meshing.crease_intersections import MAX_BRANCHES, MIN_SINE
 from blobtree.meshing.vertex_kernels import EDGE_FIRST, EDGE_LAST

@@ -17,12 +17,6 @@ from blobtree._typing import Float32Array, IndexArray
 from blobtree.cells.grid import CHILDREN
 from blobtree.device import launch
 from blobtree.errors import InvalidPoints
-from blobtree.meshing.crease_kernels import (
-    SMOOTH_VERTEX,
-    find_choices,
-    move_onto_creases,
-    turn_diagonals,
-)
 from blobtree.meshing.mesh import DeviceMesh, Mesh, patch_tables, vertex_arrays
 from blobtree.progress import Progress
 from blobtree.tape.model import ImplicitModel, checked_tree
@@ -40,6 +34,14 @@ def sharpened(mesh: DeviceMesh, report: Progress) -> tuple[DeviceMesh, NDArray[n
     The number is 1 on a smooth part, 2 on a crease, 3 or 4 in a corner. It is 0 if the sheets of a patch do
     not meet nearby; the vertex then keeps its position.
     """
+    # Imported here, because all imported kernels of a package compile together; these are the largest.
+    from blobtree.meshing.crease_kernels import (
+        SMOOTH_VERTEX,
+        find_choices,
+        move_onto_creases,
+        turn_diagonals,
+    )
+
     report("finding creases", 0.0)
     cells, device, kernel = mesh.cells.arrays, mesh.cells.device, mesh.cells.tape.instruction_set.kernel_for
     count = len(mesh.cells.leaves)

@@ -6,8 +6,8 @@ import warp as wp
 
 from blobtree.cells.block_kernels import CellBlocks, find_block
 from blobtree.cells.grid import BRANCHING
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_gradient, field_value
 
 wp.set_module_options(KERNEL_OPTIONS)

@@ -9,8 +9,8 @@ import warp as wp
 
 from blobtree.cells.block_kernels import CellBlocks, child_number, child_offset, find_block, grid_point
 from blobtree.cells.grid import BRANCHING, CHILDREN
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.patches import FLIPPED
 from blobtree.tape.interpreter import field_value
 

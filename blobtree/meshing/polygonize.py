@@ -23,7 +23,6 @@ from blobtree.cells.sparse_cells import build_cells
 from blobtree.device import launch
 from blobtree.errors import InvalidResolution
 from blobtree.meshing.creases import sharpened
-from blobtree.meshing.distance_kernels import measure_triangles
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.progress import Cancel, Progress, watched
 from blobtree.tape.model import ImplicitModel, checked_tree
@@ -170,6 +169,9 @@ def _within_chord_error(
 
 def _largest_chord_error(mesh: DeviceMesh, report: Progress) -> float:
     """Return the largest distance of the samples on the triangles to the surface."""
+    # Imported here, because all imported kernels of a package compile together.
+    from blobtree.meshing.distance_kernels import measure_triangles
+
     device, count = mesh.cells.device, len(mesh.faces)
     errors = wp.zeros(count, dtype=wp.float32, device=device)
     kernel = mesh.cells.tape.instruction_set.kernel_for(measure_triangles)

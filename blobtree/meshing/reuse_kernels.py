@@ -3,7 +3,7 @@
 import warp as wp
 
 from blobtree.cells.block_kernels import CellBlocks, find_block
-from blobtree.device import KERNEL_OPTIONS
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.vertex_kernels import VertexArrays
 
 wp.set_module_options(KERNEL_OPTIONS)

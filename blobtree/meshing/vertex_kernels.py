@@ -7,8 +7,8 @@ import warp as wp
 
 from blobtree.cells.block_kernels import CellBlocks, child_offset, grid_point
 from blobtree.cells.grid import CHILDREN
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.dual_kernels import SAMPLES, CellPatches, corner_sample, sample_index
 from blobtree.meshing.patches import EDGES, MAX_PATCHES
 from blobtree.tape.evaluate_kernels import STALLED, project_to_surface

@@ -20,6 +20,7 @@ from blobtree.cells.prune_kernels import measure_range
 from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
+from blobtree.kernels import loaded
 from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
@@ -381,7 +382,7 @@ class Node(ImplicitModel):
         out = wp.empty(1, dtype=wp.vec4, device="cpu")
         inputs = [wp.vec3(*center), half + pad, uploaded.data, uploaded.span]
         kernel = self.tape.instruction_set.kernel_for(measure_range)
-        wp.launch(kernel, dim=1, inputs=inputs, outputs=[out], device="cpu")
+        wp.launch(loaded(kernel, "cpu"), dim=1, inputs=inputs, outputs=[out], device="cpu")
         smallest, largest, _, _ = out.numpy()[0].tolist()
         return smallest, largest
 

@@ -5,10 +5,10 @@
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.specialize import unrolled
 
 wp.set_module_options(KERNEL_OPTIONS)

@@ -2,8 +2,8 @@
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_bound, field_color, field_gradient, field_value
 
 wp.set_module_options(KERNEL_OPTIONS)

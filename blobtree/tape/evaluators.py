@@ -23,7 +23,6 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import (
     falloff,
     falloff_derivative,
@@ -31,6 +30,7 @@ from blobtree.formulas.falloff import (
     falloff_slope_bound,
     falloff_steepest,
 )
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import is_monotone, partials, slope, warp_pullback, warp_stretch
 
 wp.set_module_options(KERNEL_OPTIONS)

@@ -18,10 +18,10 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.lazy import Lazy
 from blobtree.transpile.specialize import (
     original_function,

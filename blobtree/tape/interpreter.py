@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import closest, is_convex, min_influence, stride, warp_forward
 from blobtree.tape.evaluators import (
     BOUND,

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
+from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
 from blobtree.tape.bounds import influence_bounds
 from blobtree.tape.evaluate_kernels import (
@@ -109,7 +110,7 @@ def project(tape: Tape, points: ArrayLike, longest_step: float) -> tuple[Float32
     start: wp.array[Any] = wp.array(point_array(points), dtype=wp.vec3)
     positions, normals = wp.empty_like(start), wp.empty_like(start)
     wp.launch(
-        tape.instruction_set.kernel_for(project_points),
+        loaded(tape.instruction_set.kernel_for(project_points)),
         dim=len(start),
         inputs=[start, longest_step, uploaded.data, uploaded.span],
         outputs=[positions, normals],
@@ -124,6 +125,7 @@ def _evaluate(
     uploaded = tape.on()
     out: wp.array[Any] = wp.empty(len(points), dtype=dtype)
     inputs = [wp.array(points, dtype=wp.vec3), *extra, uploaded.data, uploaded.span]
-    wp.launch(tape.instruction_set.kernel_for(kernel), dim=len(points), inputs=inputs, outputs=[out])
+    instance = loaded(tape.instruction_set.kernel_for(kernel))
+    wp.launch(instance, dim=len(points), inputs=inputs, outputs=[out])
     result: Float32Array = out.numpy()
     return result

@@ -11,8 +11,8 @@ itself, and a ray converges as in Newton's method.
 import warp as wp
 
 from blobtree.cells.refine_kernels import SURELY_INSIDE
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_bound, field_color, field_gradient
 from blobtree.transpile.glsl import uniform_struct
 

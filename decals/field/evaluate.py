@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.device import known_device
+from blobtree.kernels import loaded
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
@@ -128,7 +129,7 @@ def evaluate(
         int(contact),
         indexed,
     ]
-    wp.launch(sample_points, count, inputs, [owner, uv, field], device=device)
+    wp.launch(loaded(sample_points, device), count, inputs, [owner, uv, field], device=device)
     color = None if images is None else _colors(decals, images, [*inputs, owner], device)
     return Samples(owner.numpy(), uv.numpy(), field.numpy(), color)
 
@@ -193,7 +194,7 @@ def _colors(
         wp.array(extents, dtype=wp.vec3i, device=device),
         wp.array(texels, dtype=wp.vec4, device=device),
     ]
-    wp.launch(color_points, len(inputs[0]), [*inputs, *arrays], [colors], device=device)
+    wp.launch(loaded(color_points, device), len(inputs[0]), [*inputs, *arrays], [colors], device=device)
     result: Float32Array = colors.numpy()
     return result
 

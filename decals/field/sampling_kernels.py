@@ -5,12 +5,13 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.mapping import in_image
 from decals.field.ownership import NO_OWNER, complement_at, owner_at, owner_below, uv_at
 from decals.index.lookup import IndexedDecals, next_number_below
 from decals.record import RECORD, rank_of
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 OPAQUE_ALPHA = 0.9999
 """Alpha above which decals below are left out."""

@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from blobtree.kernels import loaded
 from decals.index import build_kernels as kernels
 from decals.index.decal_cells import EMPTY, EXPONENT_OF_ONE, EXPONENTS, NO_PARITY
 
@@ -132,7 +133,7 @@ class _Builder:
         return table, ids
 
     def launch(self, kernel: Any, count: int, inputs: list[Any], outputs: list[Any]) -> None:
-        wp.launch(kernel, count, inputs, outputs, device=self.device)
+        wp.launch(loaded(kernel, self.device), count, inputs, outputs, device=self.device)
 
     def empty_ints(self, count: int) -> Any:
         return wp.empty(count, dtype=wp.int32, device=self.device)

@@ -6,6 +6,7 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.index.decal_cells import (
     EMPTY,
     EXPONENT_OF_ONE,
@@ -20,7 +21,7 @@ from decals.index.decal_cells import (
     touches,
 )
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.kernel

@@ -5,6 +5,7 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.index.decal_cells import (
     EMPTY,
     cell_key,
@@ -19,7 +20,7 @@ from decals.index.decal_cells import (
 from decals.index.lookup import IndexedDecals, end_of_lower
 from decals.record import RECORD, rank_of, xyz
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 INITIAL_ROOM = 4
 """Room of a new list, in decals. A full list moves to the end, with twice the room."""

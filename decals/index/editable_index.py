@@ -8,6 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int64Array
+from blobtree.kernels import loaded
 from decals.index import edit_kernels as kernels
 from decals.index.change_log import ChangeLog
 from decals.index.decal_cells import FINEST, MAX_CELLS_OF_DECAL, NO_PARITY, REACH_WITH_SLACK
@@ -88,7 +89,7 @@ class EditableIndex:
         self._widen_level(exponent, float(rank), log)
         inputs = [number, exponent, self._level_of[exponent], self._indexed(records), self._list_rooms]
         inputs += [self._state_on_cpu, self._ranges_on_cpu, self._slots_on_cpu]
-        wp.launch(kernels.insert_decal, 1, inputs, device="cpu")
+        wp.launch(loaded(kernels.insert_decal, "cpu"), 1, inputs, device="cpu")
         if not self._state[3]:
             return False
         for slot in self._slots[: self._state[2]].tolist():
@@ -102,7 +103,7 @@ class EditableIndex:
         exponent = self._exponent(records, number)
         inputs = [number, exponent, self._level_of[exponent], self._indexed(records)]
         inputs += [self._state_on_cpu, self._ranges_on_cpu]
-        wp.launch(kernels.remove_decal, 1, inputs, device="cpu")
+        wp.launch(loaded(kernels.remove_decal, "cpu"), 1, inputs, device="cpu")
         self._log_lists(log)
 
     def _indexed(self, records: Float32Array) -> Any:

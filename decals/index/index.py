@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int32Array, Int64Array
 from blobtree.device import known_device
+from blobtree.kernels import loaded
 from decals.index.build import build_index
 from decals.index.decal_cells import LEVEL_SHIFT, NO_PARITY
 from decals.index.lookup import IndexedDecals, count_candidates, list_candidates
@@ -162,11 +163,11 @@ class DecalIndex:
         queries: Any = wp.array(np.asarray(points, np.float32).reshape(-1, 3), dtype=wp.vec3, device="cpu")
         index = self.on("cpu", records=np.zeros((0, 4), np.float32), layered=True, copy=False)
         counts = wp.zeros(len(queries), dtype=wp.int32, device="cpu")
-        wp.launch(count_candidates, len(queries), [queries, index, counts], device="cpu")
+        wp.launch(loaded(count_candidates, "cpu"), len(queries), [queries, index, counts], device="cpu")
         offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
         ids = wp.zeros(int(offsets[-1]), dtype=wp.int32, device="cpu")
         starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device="cpu")
-        wp.launch(list_candidates, len(queries), [queries, index, starts, ids], device="cpu")
+        wp.launch(loaded(list_candidates, "cpu"), len(queries), [queries, index, starts, ids], device="cpu")
         return offsets, ids.numpy()
 
 

@@ -9,10 +9,11 @@ four times its layer, counted from the lowest possible one, plus its `Interactio
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.glsl import uniform_struct
 from decals.record import is_contact_rank, rank_of
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 HALF_RANGE = 8388608.0
 """Cell coordinates lie in [−2²³, 2²³), where float32 represents multiples of ½ exactly."""

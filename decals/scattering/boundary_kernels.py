@@ -5,9 +5,10 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.scattering.search_kernels import MirrorPlanes, Particles
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 PLANES_PER_POINT = 2
 """Mirror planes of one point at most, as in a corner or on a narrow strip."""

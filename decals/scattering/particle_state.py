@@ -7,6 +7,7 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import launch
+from blobtree.kernels import loaded
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.projection import spans_of
@@ -205,7 +206,8 @@ class ParticleState:
     def _accept_step(self) -> None:
         """Make the proposed state the current one, unless the total energy rose."""
         energies = [self._proposed_energy, self._accepted_energy]
-        wp.launch(compare_energy, dim=1, inputs=[*energies, self._rejected], device=self.device)
+        kernel = loaded(compare_energy, self.device)
+        wp.launch(kernel, dim=1, inputs=[*energies, self._rejected], device=self.device)
         inputs = [self._rejected, *self._proposed]
         outputs = [*self._current, self._step_scales]
         launch(accept_or_backtrack, self.count, inputs, outputs, device=self.device)

@@ -16,6 +16,7 @@ not depend on scheduling.
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.scattering.search_kernels import (
     MirrorPlanes,
     NeighborSearch,
@@ -26,7 +27,7 @@ from decals.scattering.search_kernels import (
     mirrored,
 )
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 CLOSEST = 0.6
 """Least distance that the energy is evaluated at, in spacings; below it the energy continues linearly."""

@@ -5,7 +5,9 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from blobtree.kernels import KERNEL_OPTIONS
+
+wp.set_module_options(KERNEL_OPTIONS)
 
 Six = wp.types.vector(6, wp.float32)
 """Distances to the six nearest particles, ascending."""

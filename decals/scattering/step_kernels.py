@@ -5,10 +5,11 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.scattering.repulsion_kernels import StepTerms
 from decals.scattering.search_kernels import Particles
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 BACKTRACKING_FACTOR, RECOVERY_FACTOR = 0.5, 1.25
 """Factors of a particle's step scale after a step that raised its energy, and after an accepted step."""

@@ -5,7 +5,9 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from blobtree.kernels import KERNEL_OPTIONS
+
+wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.kernel

@@ -5,8 +5,8 @@
 
 import warp as wp
 
-from blobtree.device import KERNEL_OPTIONS
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.evaluate_kernels import project_to_surface
 from blobtree.tape.interpreter import field_value
 

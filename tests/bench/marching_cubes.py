@@ -18,8 +18,9 @@ from blobtree.cells.block_kernels import child_number, child_offset, find_block,
 from blobtree.cells.grid import BRANCHING, CHILDREN
 from blobtree.cells.scan import arange, exclusive_scan
 from blobtree.cells.sparse_cells import SparseCells
-from blobtree.device import KERNEL_OPTIONS, launch
+from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
+from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.dual_kernels import (
     SAMPLES,
     classify_cells,

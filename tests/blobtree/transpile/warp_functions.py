@@ -126,7 +126,7 @@ def _kernels(module_name: str) -> dict[str, tuple[wp.Kernel, TypedFunction]]:
 
 
 _HEAD = (
-    "import warp as wp\n\nfrom blobtree.device import KERNEL_OPTIONS\n\n"
+    "import warp as wp\n\nfrom blobtree.kernels import KERNEL_OPTIONS\n\n"
     "wp.set_module_options(KERNEL_OPTIONS)\n"
 )
 

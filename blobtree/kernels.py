@@ -1,0 +1,225 @@
+"""Warp kernels: how they are compiled, where they are kept, and how they are loaded.
+
+Warp compiles all kernels of a file at the first launch of one of them, and keeps the result in its kernel
+cache on disk, under a hash of the source. `loaded` does more than that:
+
+* Kernels that were compiled ahead of time lie in the installed package (`SHIPPED`). They are copied to the
+  cache. Their names hold Warp's version and the hash, so kernels of other sources are never taken.
+* Where there are none, all files of kernels that the package of the launched kernel has imported compile at
+  the same time, one per core, and report their progress.
+* A damaged file of the cache is removed, and its kernels are compiled again.
+"""
+
+import logging
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+from blobtree.errors import UnusableCache
+
+KERNEL_OPTIONS: dict[str, Any] = {
+    "enable_backward": False,
+    "max_unroll": 4,
+    "cpu_compiler_flags": "-mllvm=-inline-threshold=1000",
+}
+"""Options for `wp.set_module_options`: no adjoint code, no unrolling of long loops, code for any processor.
+
+Kernels that call whole formulas in unrolled loops compile several times as long, and run no faster. The same
+holds for functions that are inlined beyond this threshold; below it, kernels run slower. Code for the
+instruction set of one processor runs no faster either, and could not be shipped to others.
+"""
+
+SHIPPED = Path(__file__).with_name("compiled")
+"""Folder of kernels compiled ahead of time: ``<Warp version>/<module and hash>/``, as in Warp's cache."""
+
+CUDA_BLOCK = 256
+"""Threads of a block, where a module of kernels sets no other number; Warp's default."""
+
+REPORT_SECONDS = 2.0
+"""Time after which a compilation that nothing displays is logged as a warning, which Python prints."""
+
+CompilationReport = Callable[[int, int], None]
+"""A function (files of kernels compiled by this process, files it has to compile so far)."""
+
+_MESSAGE = "Compiling kernels for this machine (once): %d of %d"
+
+_logger = logging.getLogger(__name__)
+
+
+class _State:
+    """What this process has loaded and compiled."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.loaded: dict[tuple[str, str], bytes] = {}
+        self.compiled = 0
+        self.displays: list[CompilationReport] = []
+
+
+_state = _State()
+
+
+def _renew_lock() -> None:
+    """In a forked child: the parent's lock may be held by a thread that the child does not have."""
+    _state.lock = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_renew_lock)
+
+
+def kernel_cache() -> Path:
+    """Return the folder in which Warp keeps compiled kernels; Warp must have been started."""
+    return Path(str(wp.config.kernel_cache_dir))
+
+
+@contextmanager
+def compilation_displayed(display: CompilationReport) -> Iterator[None]:
+    """Within a ``with`` block, call `display` before kernels compile, and after each file of them."""
+    _state.displays.append(display)
+    try:
+        yield
+    finally:
+        _state.displays.remove(display)
+
+
+def loaded(kernel: wp.Kernel, device: Any = None) -> wp.Kernel:
+    """Return `kernel`, once it is compiled and loaded on `device`.
+
+    Raises
+    ------
+    UnusableCache
+        The kernel cache cannot be written.
+    """
+    warp_device = wp.get_device(device)
+    module = kernel.module
+    key = module.name, str(warp_device)
+    if _state.loaded.get(key) != _module_hash(module, warp_device):
+        with _state.lock:
+            missing = [other for other in _neighbors(module) if not _is_cached(other, warp_device)]
+            if missing:
+                _compile([module, *(other for other in missing if other is not module)], warp_device)
+            _load(module, warp_device)
+            _state.loaded[key] = _module_hash(module, warp_device)
+    return kernel
+
+
+def _block_size(module: wp.Module, device: wp.Device) -> int:
+    """Return the block size of a launch, which is part of the hash of a module."""
+    return 1 if device.is_cpu else module.options["block_dim"] or CUDA_BLOCK
+
+
+def _module_hash(module: wp.Module, device: wp.Device) -> bytes:
+    return bytes(module.get_module_hash(_block_size(module, device)))
+
+
+def _folder_name(module: wp.Module, device: wp.Device) -> str:
+    return str(module.get_module_identifier(_block_size(module, device)))
+
+
+def _neighbors(module: wp.Module) -> list[wp.Module]:
+    """Return `module`, and the other modules with kernels that its Python package has imported."""
+    package = module.name.rpartition(".")[0]
+    found = {module.name: module}
+    for name, python_module in list(sys.modules.items()):
+        if name.rpartition(".")[0] == package:
+            for value in list(vars(python_module).values()):
+                if isinstance(value, wp.Kernel) and value.module.name == name:
+                    found[name] = value.module
+    return list(found.values())
+
+
+def _is_cached(module: wp.Module, device: wp.Device) -> bool:
+    """Return True if the cache has the kernels of `module`, after those of the package were copied there."""
+    folder = kernel_cache() / _folder_name(module, device)
+    suffixes = (".o",) if device.is_cpu else (".ptx", ".cubin")
+    if not _has_file(folder, suffixes):
+        _copy_shipped(folder)
+    return _has_file(folder, suffixes)
+
+
+def _has_file(folder: Path, suffixes: tuple[str, ...]) -> bool:
+    return folder.is_dir() and any(file.suffix in suffixes for file in folder.iterdir())
+
+
+def _copy_shipped(folder: Path) -> None:
+    """Copy the shipped kernels that belong into this folder of the cache; other processes may do so too."""
+    shipped = SHIPPED / wp.config.version / folder.name
+    if not shipped.is_dir():
+        return
+    with _cache_errors():
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in shipped.iterdir():
+            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as copy:
+                copy.write(file.read_bytes())
+            Path(copy.name).replace(folder / file.name)
+
+
+def _load(module: wp.Module, device: wp.Device) -> None:
+    """Load a module; remove it from the cache and compile it again if its files are damaged."""
+    folder = kernel_cache() / _folder_name(module, device)
+    was_cached = folder.is_dir()
+    with _cache_errors():
+        try:
+            wp.load_module(module, device=device)
+        except Exception as error:
+            if not was_cached or isinstance(error, OSError):
+                raise
+            _logger.info("removing damaged kernels from %s: %s", folder, error)
+            shutil.rmtree(folder)
+            _copy_shipped(folder)
+            wp.load_module(module, device=device)
+
+
+def _compile(modules: list[wp.Module], device: wp.Device) -> None:
+    """Compile and load modules at the same time, and report the progress."""
+    total = _state.compiled + len(modules)
+    _report(_state.compiled, total)
+    with ThreadPoolExecutor(os.cpu_count() or 1, "blobtree compiler") as threads:
+        pending = {threads.submit(_load, module, device) for module in modules}
+        start, warned = time.monotonic(), -1
+        while pending:
+            done, pending = wait(pending, REPORT_SECONDS, FIRST_COMPLETED)
+            for future in done:
+                future.result()
+            _state.compiled += len(done)
+            if done:
+                _report(_state.compiled, total)
+            late = time.monotonic() - start > REPORT_SECONDS
+            if late and pending and not _state.displays and warned != _state.compiled:
+                _logger.warning(_MESSAGE, _state.compiled, total)
+                warned = _state.compiled
+
+
+def _report(done: int, total: int) -> None:
+    _logger.info(_MESSAGE, done, total)
+    for display in _state.displays:
+        display(done, total)
+
+
+@contextmanager
+def _cache_errors() -> Iterator[None]:
+    """Raise errors of the file system as `UnusableCache`."""
+    try:
+        yield
+    except OSError as error:
+        raise unusable_cache(error) from error
+
+
+def unusable_cache(error: OSError) -> UnusableCache:
+    """Return the exception for an error of the file system in the kernel cache."""
+    folder = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH") or error.filename
+    return UnusableCache(
+        f"compiled kernels cannot be kept in {str(folder)!r} ({error.strerror}); "
+        "set the environment variable WARP_CACHE_PATH to a folder that can be written, or free space there"
+    )

@@ -1,0 +1,133 @@
+"""Kernels are compiled once, taken from the package if they fit, and compiled again if a file is damaged."""
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+
+import blobtree.kernels as kernels
+from blobtree.device import start_warp
+from blobtree.errors import UnusableCache
+from blobtree.kernels import KERNEL_OPTIONS, compilation_displayed, loaded
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+
+@wp.kernel
+def _double(values: wp.array(dtype=wp.float32)):  # type: ignore[no-untyped-def, valid-type]
+    i = wp.tid()
+    values[i] = 2.0 * values[i]
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty kernel cache, and no shipped kernels."""
+    start_warp()
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "cache"))
+    monkeypatch.setattr(kernels, "SHIPPED", tmp_path / "shipped")
+    _forget()
+    yield tmp_path / "cache"
+    _forget()
+
+
+def _forget() -> None:
+    _double.module.unload()
+    kernels._state.loaded.clear()
+
+
+def _doubled() -> list[float]:
+    values: wp.array[wp.float32] = wp.array(np.float32([1.0, 2.5]), device="cpu")
+    wp.launch(loaded(_double, "cpu"), dim=2, inputs=[values], device="cpu")
+    return [float(value) for value in values.numpy()]
+
+
+def _object_file(cache: Path) -> Path:
+    (file,) = cache.glob(f"wp_{_double.module.name}_*/*.o")
+    return file
+
+
+def test_a_second_process_would_compile_nothing(cache: Path) -> None:
+    reports: list[tuple[int, int]] = []
+    with compilation_displayed(lambda done, total: reports.append((done, total))):
+        assert _doubled() == [2.0, 5.0]
+        before = kernels._state.compiled
+        assert reports == [(before - 1, before), (before, before)]
+        written = _object_file(cache).stat().st_mtime_ns
+        _forget()
+        assert _doubled() == [2.0, 5.0]
+    assert len(reports) == 2
+    assert _object_file(cache).stat().st_mtime_ns == written
+    assert kernels._state.compiled == before
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.3, 0.9], ids=["empty", "short", "nearly-whole"])
+def test_a_truncated_object_file_is_compiled_again(cache: Path, kept: float) -> None:
+    _doubled()
+    file = _object_file(cache)
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(kept * len(whole))])
+    _forget()
+    assert _doubled() == [2.0, 5.0]
+    assert _object_file(cache).stat().st_size == len(whole)
+
+
+def test_a_damaged_description_is_compiled_again(cache: Path) -> None:
+    _doubled()
+    (meta,) = cache.glob("*/*.meta")
+    meta.write_text("{")
+    _forget()
+    assert _doubled() == [2.0, 5.0]
+
+
+def test_shipped_kernels_are_copied_and_not_compiled(cache: Path) -> None:
+    _doubled()
+    shipped = kernels.SHIPPED / str(wp.config.version)
+    shipped.parent.mkdir()
+    cache.rename(shipped)
+    _forget()
+    before = kernels._state.compiled
+    assert _doubled() == [2.0, 5.0]
+    assert kernels._state.compiled == before
+    assert _object_file(cache).read_bytes() == _object_file(shipped).read_bytes()
+
+
+def test_shipped_kernels_of_another_version_of_warp_are_left(cache: Path) -> None:
+    _doubled()
+    shipped = kernels.SHIPPED / "1.0.0"
+    shipped.parent.mkdir()
+    cache.rename(shipped)
+    _forget()
+    before = kernels._state.compiled
+    assert _doubled() == [2.0, 5.0]
+    assert kernels._state.compiled == before + 1
+
+
+def test_a_cache_that_cannot_be_written_is_named(cache: Path) -> None:
+    cache.write_text("a file, where a folder should be")
+    with pytest.raises(UnusableCache, match="set the environment variable WARP_CACHE_PATH") as raised:
+        _doubled()
+    assert repr(str(cache)) in str(raised.value)
+
+
+def test_a_long_compilation_is_logged_as_a_warning(
+    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernels, "REPORT_SECONDS", 0.0)
+    with caplog.at_level(logging.WARNING, "blobtree.kernels"):
+        _doubled()
+    done = kernels._state.compiled
+    assert [record.getMessage() for record in caplog.records] == [
+        f"Compiling kernels for this machine (once): {done - 1} of {done}"
+    ]
+
+
+def test_a_display_takes_the_place_of_the_log(
+    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernels, "REPORT_SECONDS", 0.0)
+    with caplog.at_level(logging.WARNING), compilation_displayed(lambda done, total: None):
+        _doubled()
+    assert not caplog.records
