@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.custom.bounds_kernels import FARTHEST
 from blobtree.custom.source import CustomSource
 from blobtree.nodes.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
@@ -34,6 +35,9 @@ TOLERANCE = 1e-6
 
 SINGLE_TOLERANCE = 1e-5
 """The same in single precision."""
+
+FAR_SHARE = 0.1
+"""Distance of a closest point, relative to that of its far query, at which a skeleton counts as unbounded."""
 
 SETTINGS = 6
 """Number of values of the parameter that are sampled."""
@@ -112,6 +116,7 @@ def check_skeleton(source: CustomSource, parameters: tuple[Parameter, ...], *, c
                 f"{_format(closest_points[j])}, which it returns for {_format(queries[j])}, is nearer; "
                 f"return the closest point{hint}"
             )
+        _try_bounds(source, closest, arguments, values)
 
 
 def _try_single_precision(
@@ -156,6 +161,23 @@ def _in_single(value: Any) -> Any:
     if isinstance(value, tuple):
         return vector(*value, precision=np.float32)
     return np.float32(value) if isinstance(value, float) else value
+
+
+def _try_bounds(
+    source: CustomSource, closest: Callable[..., Any], arguments: list[Any], values: dict[str, Any]
+) -> None:
+    """Check that the closest points to far queries are not far away too."""
+    largest = max((float(np.abs(value).max()) for value in arguments), default=1.0)
+    distance = FARTHEST * max(largest, 1.0)
+    for signs in product((-1.0, 0.0, 1.0), repeat=3):
+        if any(signs):
+            q = distance * np.array(signs) / np.linalg.norm(signs)
+            c = _point(source, closest, q, arguments, values)
+            if np.linalg.norm(c) > FAR_SHARE * distance:
+                raise source.refusal(
+                    f"for q = {_format(q)} it returns {_format(c)}, so its skeleton seems to be unbounded; "
+                    f"end the skeleton at a finite distance, with {values}"
+                )
 
 
 def _hint(parameters: tuple[Parameter, ...]) -> str:

@@ -257,13 +257,19 @@ def generate_image(reference: str, size: int = 256) -> NDArray[np.uint8]:
     (64, 64, 4)
     """
     match = _REFERENCE.fullmatch(reference)
+    name, mark, color = reference.partition("#")
+    if match is None and mark and name in _PAINTERS:
+        raise InvalidImage(
+            f"expected a colour of six hexadecimal digits, such as {name + '#b0413e'!r}, got {reference!r}; "
+            f"or leave it out; images are {', '.join(BUILTIN_IMAGES)}"
+        )
     if match is None or match["name"] not in _PAINTERS:
         names = ", ".join(BUILTIN_IMAGES)
         raise InvalidImage(f"expected one of the images {names} (or NAME#rrggbb), got {reference!r}")
     if not 1 <= size <= MAX_GENERATED_EDGE:
         raise InvalidImage(f"expected an image edge of 1 to {MAX_GENERATED_EDGE} pixels, got {size}")
     paint, default = _PAINTERS[match["name"]]
-    color: Color = rgb(match["color"]) if match["color"] else default
-    pixels = draw(partial(paint, base=color), size)
+    base: Color = rgb(color) if color else default
+    pixels = draw(partial(paint, base=base), size)
     pixels.flags.writeable = False
     return pixels

@@ -48,9 +48,15 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
     >>> decals.load_image("scale").shape
     (256, 256, 4)
     """
-    if is_builtin(reference):
+    if is_builtin(reference) or _has_invalid_color(reference, folder):
         return generate_image(reference)
     return read_image((folder or Path()) / reference)
+
+
+def _has_invalid_color(reference: str, folder: Path | None) -> bool:
+    """Return True for the name of a generated image with another text than a colour, unless it is a file."""
+    name, mark, _ = reference.partition("#")
+    return bool(mark) and name in BUILTIN_IMAGES and not is_file((folder or Path()) / reference)
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:

@@ -186,12 +186,16 @@ def from_json(text: bytes, *, folder: Path, samples: SampleLoader | None = None)
     )
 
 
+HEADER_BYTES = 200
+"""Length of the beginning of a file that names its format."""
+
+
 def is_scene(text: bytes) -> bool:
-    """Return True if JSON has the format of a scene."""
+    """Return True if JSON has the format of a scene; damaged JSON if it begins like one."""
     try:
         return msgspec.json.decode(text, type=_Header).format == FORMAT
     except msgspec.MsgspecError:
-        return False
+        return f'"{FORMAT}"'.encode() in text[:HEADER_BYTES]
 
 
 def _decode(text: bytes) -> _SceneRecord:

@@ -101,11 +101,13 @@ def test_an_order_free_operator_takes_any_number_of_operands() -> None:
     assert Swell((balls[0],))([[0.5, 0.3, 0]]) == balls[0]([[0.5, 0.3, 0]])
 
 
-def test_a_skeleton_without_end_is_refused_when_its_box_is_asked_for() -> None:
-    def floor_plane(q: wp.vec3, height: wp.float32) -> wp.vec3:
-        return wp.vec3(q[0], q[1], height)
+def test_a_skeleton_that_the_checks_took_for_bounded_is_refused_with_its_box() -> None:
+    def high_plane(q: wp.vec3, height: wp.float32) -> wp.vec3:
+        if height > 50.0:
+            return wp.vec3(q[0], q[1], height)
+        return wp.vec3(0.0, 0.0, height)
 
-    plane = define_skeleton(floor_plane)(0.0, radius=0.1)
+    plane = define_skeleton(high_plane)(60.0, radius=0.1)
     with pytest.raises(InvalidNode, match="a skeleton must be bounded"):
         plane.bounds  # noqa: B018
 

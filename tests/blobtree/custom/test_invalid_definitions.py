@@ -1,6 +1,7 @@
 """What a definition is refused for, before anything is compiled."""
 
 from pathlib import Path as File
+from typing import Any
 
 import pytest
 import warp as wp
@@ -199,6 +200,29 @@ def test_what_is_no_skeleton_is_refused_before_it_is_compiled(function: object, 
     if callable(function) and name not in ("print", "turns_in_circles", "takes_text"):
         assert f"{HERE}:" in str(refusal.value)
     assert registry.registered(name) is None
+
+
+def endless_line(q: wp.vec3, axis: wp.vec3) -> wp.vec3:
+    n = wp.normalize(axis)
+    return n * wp.dot(q, n)
+
+
+def everywhere_below(q: wp.vec3) -> wp.vec3:
+    return wp.vec3(q[0], q[1], wp.min(q[2], 1.0))
+
+
+def half_a_line(q: wp.vec3) -> wp.vec3:
+    return wp.vec3(0.0, wp.max(q[1], 0.0), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "limits"),
+    [(endless_line, {"axis": (0.1, None)}), (everywhere_below, None), (half_a_line, None)],
+    ids=["line", "half_space", "half_line"],
+)
+def test_an_unbounded_skeleton_is_refused_when_it_is_defined(function: object, limits: Any) -> None:
+    with pytest.raises(InvalidDefinition, match="seems to be unbounded"):
+        define_skeleton(function, limits=limits)
 
 
 def test_a_circle_must_answer_on_its_axis_too() -> None:

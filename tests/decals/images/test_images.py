@@ -92,6 +92,20 @@ def test_unknown_names_say_what_there_is(reference: str) -> None:
         generate_image(reference)
 
 
+@pytest.mark.parametrize("color", ["red", "12345", "1234567", "ggbb00", "", "b0413e "])
+def test_a_wrong_colour_of_a_generated_image_is_named(color: str) -> None:
+    for make in (load_image, generate_image):
+        with pytest.raises(
+            InvalidImage, match=r"colour of six hexadecimal digits.*'tile#b0413e', got 'tile#"
+        ):
+            make(f"tile#{color}")
+
+
+def test_a_file_may_be_named_like_an_image_with_a_wrong_colour(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 3)).save(tmp_path / "tile#1", format="PNG")
+    assert load_image("tile#1", folder=tmp_path).shape == (3, 2, 4)
+
+
 @pytest.mark.parametrize("size", [0, -1, 5000])
 def test_absurd_sizes_are_refused(size: int) -> None:
     with pytest.raises(InvalidImage, match="1 to 4096"):

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import blobtree
 from blobtree import Node, Point, Segment
 from decals.errors import ImplicitDecalsError, InvalidImage, InvalidMesh, InvalidScene
 from decals.images import generate_image
 from decals.model import Decals
 from decals.scenes.camera import Camera
-from decals.scenes.files import from_json, is_scene, load_scene, save_scene, to_json
+from decals.scenes.files import from_json, is_scene, load_model, load_scene, save_scene, to_json
 from decals.scenes.objects import MeshObject, TreeObject, bounds_of
 from decals.scenes.scene import DecalImage, Scene
 
@@ -239,6 +240,23 @@ def test_no_scene_at_all(tmp_path: Path, text: bytes) -> None:
     with pytest.raises(InvalidScene, match=r"scene\.json"):
         load_scene(path)
     assert not is_scene(text)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.99], ids=["early", "middle", "late"])
+def test_a_truncated_scene_is_reported_as_a_scene(tmp_path: Path, share: float) -> None:
+    text = to_json(_scene(), folder=tmp_path)
+    path = tmp_path / "cut.json"
+    path.write_bytes(text[: int(share * len(text))])
+    with pytest.raises(InvalidScene, match=r"cut\.json.*: expected a scene, but input data was truncated"):
+        load_model(path)
+
+
+def test_a_truncated_tree_is_reported_as_a_tree(tmp_path: Path) -> None:
+    path = tmp_path / "cut.json"
+    blobtree.save(blobtree.Point((0, 0, 0), radius=1.0), path)
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(blobtree.InvalidFile, match="BlobTree"):
+        load_model(path)
 
 
 def test_truncated_at_every_place(tmp_path: Path) -> None:
