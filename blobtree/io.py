@@ -14,8 +14,6 @@ to equal trees.
 """
 
 import os
-import shutil
-import uuid
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast, get_type_hints
@@ -26,6 +24,7 @@ from blobtree.custom.definition import find_kind
 from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.errors import ImplicitDecalsError, InvalidFile
+from blobtree.files import write_atomically
 from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.tree import NODE_KINDS, Node
 from blobtree.tape.model import checked_tree
@@ -242,7 +241,7 @@ def save(root: Node, path: str | os.PathLike[str]) -> None:
     >>> load(path)
     Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8))
     """
-    write_atomically(Path(path), to_json(root))
+    write_atomically(path, to_json(root))
 
 
 def load(path: str | os.PathLike[str]) -> Node:
@@ -280,22 +279,6 @@ def load(path: str | os.PathLike[str]) -> Node:
         return from_json(Path(path).read_bytes())
     except InvalidFile as error:
         raise InvalidFile(f"{path}: {error}") from None
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write `content` to `path` so that a crash leaves either the old file or the new one."""
-    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex}.tmp")
-    try:
-        with temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        if path.exists():
-            shutil.copymode(path, temporary)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:

@@ -1,6 +1,10 @@
 """Meshes and slices as pyvista objects; only these functions import pyvista."""
 
+import errno
+import os
+import re
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -8,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidPoints, InvalidResolution, MissingPackage
+from blobtree.files import replacing, write_atomically
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.mesh import Mesh
 from blobtree.tape.model import ImplicitModel
@@ -26,6 +31,12 @@ MAX_SQUARES = 1 << 14
 
 LEVELS = tuple(level / 10.0 for level in range(1, 11))
 """Field values that get lines by default."""
+
+STL_HEADER, STL_FACE = 84, 50
+"""Bytes of the header and of a triangle of a binary STL file."""
+
+PLY_SIZES = {"uchar": 1, "float": 4, "int": 4}
+"""Bytes of the types in PLY files that VTK writes."""
 
 NEWTON_STEPS = 8
 LEVEL_TOLERANCE = 1e-6
@@ -46,6 +57,75 @@ def to_polydata(mesh: Mesh) -> "pv.PolyData":
     if mesh.sheet_counts is not None:
         surface.point_data["sheet_counts"] = mesh.sheet_counts
     return surface
+
+
+def write_polydata(path: str | os.PathLike[str], surface: "pv.PolyData") -> None:
+    """Write a surface of triangles to a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The file; its suffix is the format: ply (with "RGB", if the surface has it), obj, stl or vtp.
+    surface : pyvista.PolyData
+        The surface.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written in full; an existing file stays as it was.
+    """
+    if Path(path).suffix.lower() == ".vtp":
+        write_atomically(path, _vtp(surface))
+        return
+    from blobtree.vtk_errors import vtk_errors
+
+    copy = surface.copy(deep=False)  # pyvista adds normals to the surface that it saves
+    with replacing(path) as temporary:
+        texture = "RGB" if temporary.suffix.lower() == ".ply" and "RGB" in copy.point_data else None
+        with vtk_errors() as errors:
+            copy.save(temporary, texture=texture)
+        if errors or not _is_whole(temporary, copy):
+            raise OSError(
+                errno.EIO, "the file could not be written in full; is the disk full?", os.fspath(path)
+            )
+
+
+def _is_whole(path: Path, surface: "pv.PolyData") -> bool:
+    """Return True if a file has the length and the end that its format gives the surface.
+
+    VTK's writers do not report every failure of the disk.
+    """
+    content = path.read_bytes()
+    match path.suffix.lower():
+        case ".stl":
+            return len(content) == STL_HEADER + STL_FACE * surface.n_cells
+        case ".obj":
+            lines = content.count(b"\nf ") + content.startswith(b"f ")
+            return content.endswith(b"\n") and lines == surface.n_cells
+        case _:
+            header, found, body = content.partition(b"end_header\n")
+            return bool(found) and len(body) == _ply_length(header.decode("ascii"), surface)
+
+
+def _vtp(surface: "pv.PolyData") -> bytes:
+    """Return a surface as a VTP file; on a full disk, VTK's own writing to the file kills the process."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(surface)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    return writer.GetOutputString().encode("ascii")
+
+
+def _ply_length(header: str, surface: "pv.PolyData") -> int:
+    """Return the bytes of the rows that the header of a binary PLY file announces."""
+    sizes = [
+        PLY_SIZES[line.split()[1]] for line in header.splitlines() if re.match(r"property (?!list)", line)
+    ]
+    (count, index) = re.findall(r"property list (\w+) (\w+)", header)[0]
+    return surface.n_points * sum(sizes) + surface.n_cells * (PLY_SIZES[count] + 3 * PLY_SIZES[index])
 
 
 def slice_tree(

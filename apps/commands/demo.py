@@ -18,9 +18,9 @@ from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, 
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.gallery import spanning
 from decals.apps.models.shapes import creature, egg
-from decals.apps.output import check_output, write_picture
+from decals.apps.output import check_output
 from decals.errors import InvalidInput
-from decals.rendering import Renderer
+from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
 
 PICTURES = ("hero.png", "contact.png", "span.png")
@@ -85,7 +85,7 @@ def demo(
         nest = nest_scene(progress=progress)
         for name, scene in zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True):
             progress(f"Drawing {name}", 0.0)
-            write_picture(output / name, renderer.render(scene, RenderOptions(size=pixels, samples=samples)))
+            Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
     for name in PICTURES:
         Console().print(str(output / name), soft_wrap=True, highlight=False)
 

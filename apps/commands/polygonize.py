@@ -3,14 +3,14 @@
 from pathlib import Path
 from typing import Annotated
 
-import pyvista as pv
 from cyclopts import Parameter
 
+from blobtree.pyvista_views import write_polydata
 from decals import TreeObject
 from decals.apps.commands.options import Definitions, OptionalWhole
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_model
-from decals.apps.output import MESH_SUFFIXES, check_output, replacing
+from decals.apps.output import MESH_SUFFIXES, check_output
 from decals.errors import InvalidInput
 
 OptionalLength = Annotated[float | None, Parameter(show_default=False)]
@@ -68,13 +68,4 @@ def polygonize(
                 f"{model!r} has no surface in cells of this size: its parts may be smaller than a cell, or "
                 "the tree may be empty; increase --resolution"
             )
-        write_mesh(output, surface)
-
-
-def write_mesh(path: Path, surface: pv.PolyData) -> None:
-    """Write a mesh in the format of the file's extension; an error leaves no partial file."""
-    with replacing(path) as temporary:
-        if path.suffix.lower() == ".ply":
-            surface.save(temporary, texture=surface.point_data["RGB"])
-        else:
-            surface.save(temporary)
+        write_polydata(output, surface)

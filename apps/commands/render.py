@@ -19,10 +19,10 @@ from decals.apps.commands.options import (
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
-from decals.apps.output import PICTURE_SUFFIXES, check_output, write_picture
+from decals.apps.output import PICTURE_SUFFIXES, check_output
 from decals.apps.views import UPRIGHT, frame, parse_view
 from decals.errors import InvalidInput
-from decals.rendering import Renderer
+from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
 
 
@@ -108,4 +108,4 @@ def render(
                 mapping=ImageMapping[mapping.upper()],
             ),
         )
-        write_picture(output, picture)
+        Picture(picture).save(output)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from blobtree.io import write_atomically
+from blobtree.files import write_atomically
 from decals import DecalImage, Decals, Scene, Sizing, save_scene
 from decals import scatter as scatter_decals
 from decals.apps.commands.options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, Whole, check_count

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from decals import Camera, Contact, DecalImage, Decals, ImageMapping, MeshObject, Scene
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.models.shapes import rounded_box
-from decals.apps.output import write_picture
 from decals.apps.views import frame, parse_view
-from decals.rendering import Renderer
+from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
 
 __all__ = [
@@ -93,7 +92,7 @@ def main(panels: Callable[[], Sequence[Panel]]) -> None:
     parser.add_argument("--side", type=int, default=SIDE, help="width and height of a panel, in pixels")
     options = parser.parse_args()
     with Renderer() as renderer:
-        write_picture(options.output, draw(renderer, panels(), side=options.side))
+        Picture(draw(renderer, panels(), side=options.side)).save(options.output)
 
 
 def camera_above(height: float = 4.2) -> Camera:

@@ -11,6 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from PIL import Image
 
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree.files import write_atomically
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.progressive import Targets
@@ -59,7 +60,7 @@ class Picture:
         return f"Picture({self.shape[1]} × {self.shape[0]} pixels)"
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the picture to a file.
+        """Write the picture to a file, whole or not at all.
 
         Parameters
         ----------
@@ -85,10 +86,12 @@ class Picture:
                 f"path: expected a picture file such as {path.stem + '.png'!r}, got {str(path)!r}"
             )
         image = Image.fromarray(self.pixels)
+        content = BytesIO()
         try:
             if file_format in ("JPEG", "BMP", "PPM"):
                 image = _on_white(image)
-            image.save(path)
+            image.save(content, file_format)
+            write_atomically(path, content.getvalue())
         except OSError as error:
             raise InvalidScene(
                 f"could not write the picture {str(path)!r} ({error.strerror or error})"

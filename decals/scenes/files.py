@@ -28,7 +28,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Raw, Struct
 
-from blobtree.io import write_atomically
+from blobtree.files import write_atomically
 from blobtree.progress import Progress, watched
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.model import Decals

@@ -1,9 +1,5 @@
 """Meshes from files and from pyvista datasets: PLY by our own reader, every other format by pyvista's."""
 
-import logging
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,9 +7,9 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
-from vtkmodules.vtkCommonCore import vtkLogger
 
 from blobtree._typing import Float32Array, Int32Array
+from blobtree.vtk_errors import vtk_errors
 from decals.errors import InvalidMesh
 from decals.surfaces.ply import Polygons, read_ply
 from decals.validation import describe, is_file
@@ -106,7 +102,7 @@ def _check_indices(corners: Any, count: int, name: str) -> None:
 
 def _read_dataset(path: Path) -> pv.DataSet | pv.MultiBlock:
     try:
-        with _vtk_errors() as errors:
+        with vtk_errors() as errors:
             dataset = pv.read(path)
     except Exception as error:  # readers and their plugins raise all sorts of exceptions
         raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(str(error))})") from error
@@ -120,26 +116,3 @@ def _read_dataset(path: Path) -> pv.DataSet | pv.MultiBlock:
 def _reason(text: str) -> str:
     line = (text.strip().splitlines() or [""])[0].rstrip(".")
     return "it is damaged or of another format" if not line or line.startswith("Algorithm vtk") else line
-
-
-@contextmanager
-def _vtk_errors() -> Iterator[list[str]]:
-    """Collect the errors that VTK reports, instead of letting it print them."""
-    messages: list[str] = []
-    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
-    root_level = logging.root.manager.disable
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    logging.disable(logging.CRITICAL)  # pyvista's readers send VTK's errors there as well
-    try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            with pv.VtkErrorCatcher(send_to_logging=False) as catcher:
-                yield messages
-        messages.extend(event.alert for event in catcher.error_events)
-        # An error inside one of pyvista's readers comes as a warning that quotes it.
-        messages.extend(
-            str(w.message).partition('"')[2] for w in caught if "raised an error" in str(w.message)
-        )
-    finally:
-        logging.disable(root_level)
-        vtkLogger.SetStderrVerbosity(verbosity)

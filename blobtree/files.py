@@ -1,0 +1,125 @@
+"""Files that are written whole or not at all; every writer of the project goes through `replacing`.
+
+A writer fills a temporary file in the folder of its target, which then takes the target's place. A crash, a
+kill or a full disk leaves the old file. The next save into the folder removes what a killed process left.
+"""
+
+import errno
+import hashlib
+import os
+import platform
+import re
+import shutil
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+PREFIX = ".implicit-decals-"
+"""Start of the name of a temporary file; the machine, the process and a random part follow."""
+
+NAME = re.compile(re.escape(PREFIX) + r"(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{12}(\.\w+)?")
+
+MAX_AGE = 86_400.0
+"""Seconds after which a temporary file of another machine counts as left behind."""
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary path with the suffix of ``path``; on success, move its file to ``path``.
+
+    The file gets the permissions, and where allowed the owner, of the file that it replaces. If ``path`` is a
+    symbolic link, its target is replaced. On an error the temporary file is removed.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; the error names ``path``, not the temporary file.
+    """
+    name = os.fspath(path)
+    temporary: Path | None = None
+    try:
+        target = Path(os.path.realpath(name))
+        _check_target(target)
+        _remove_abandoned(target.parent)
+        process = f"{_machine()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
+        temporary = target.with_name(f"{PREFIX}{process}{target.suffix}")
+        yield temporary
+        _finish(temporary, target)
+    except OSError as error:
+        foreign = error.filename is not None and str(error.filename) not in (str(temporary), str(target))
+        if foreign:  # of another file that the caller used
+            raise
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), name) from error
+    except ValueError as error:
+        if temporary is not None:
+            raise
+        raise OSError(errno.EINVAL, f"not a possible path ({error})", name) from error
+    finally:
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write `content` to `path` so that a crash leaves the old file or the new one; see `replacing`."""
+    with replacing(path) as temporary, temporary.open("xb") as file:
+        file.write(content)
+
+
+def _check_target(target: Path) -> None:
+    """Raise an error unless a regular file can be, or become, the target."""
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    if target.exists() and not target.is_file():
+        raise OSError(errno.EINVAL, "a device or pipe cannot be replaced by a file", str(target))
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, "the file is read-only", str(target))
+
+
+def _finish(temporary: Path, target: Path) -> None:
+    """Move a temporary file to its target once all of it is on the disk."""
+    with temporary.open("r+b") as file:
+        os.fsync(file.fileno())
+    if target.exists():
+        known = target.stat()
+        if hasattr(os, "chown") and known.st_uid != temporary.stat().st_uid:
+            with suppress(PermissionError):
+                os.chown(temporary, known.st_uid, known.st_gid)
+        shutil.copymode(target, temporary)
+    temporary.replace(target)
+
+
+@cache
+def _machine() -> str:
+    """Return a digest of the machine, and of the container if it counts its processes by itself."""
+    parts = [platform.node()]
+    with suppress(OSError):
+        parts.append(str(Path("/proc/self/ns/pid").readlink()))
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:8]
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove the temporary files of processes that ended before they could."""
+    with suppress(OSError):
+        for entry in os.scandir(folder):
+            match = NAME.fullmatch(entry.name)
+            if match is None:
+                continue
+            with suppress(OSError):
+                known = match["machine"] == _machine() and os.name == "posix"
+                old = time.time() - entry.stat().st_mtime > MAX_AGE
+                if old or (known and not _is_running(int(match["process"]))):
+                    Path(entry.path).unlink()
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)  # signal 0 only asks
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True

@@ -1,0 +1,225 @@
+"""Files are whole or absent: full disks, kills, links, permissions, and what killed processes leave."""
+
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from blobtree.files import PREFIX, replacing, write_atomically
+
+posix = pytest.mark.skipif(os.name != "posix", reason="permissions and signals of POSIX")
+
+
+def files_of(folder: Path) -> set[str]:
+    return {entry.name for entry in folder.iterdir()}
+
+
+def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    write_atomically(path, b"old")
+    write_atomically(str(path), b"new")
+    assert path.read_bytes() == b"new"
+    assert files_of(tmp_path) == {"a.txt"}
+
+
+def test_an_error_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"old")
+
+    def interrupted() -> None:
+        with replacing(path) as temporary:
+            assert temporary.parent == tmp_path
+            assert temporary.suffix == ".txt"
+            temporary.write_bytes(b"half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert path.read_bytes() == b"old"
+    assert files_of(tmp_path) == {"a.txt"}
+
+
+@posix
+def test_links_and_permissions_stay(tmp_path: Path) -> None:
+    target, link = tmp_path / "deep" / "target.txt", tmp_path / "link.txt"
+    target.parent.mkdir()
+    target.write_bytes(b"old")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    write_atomically(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+    assert files_of(target.parent) == {"target.txt"}
+
+
+@posix
+def test_a_new_file_has_the_usual_permissions(tmp_path: Path) -> None:
+    write_atomically(tmp_path / "a.txt", b"")
+    (tmp_path / "b.txt").write_bytes(b"")
+    assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "b.txt").stat().st_mode
+
+
+@posix
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("none/a.txt", "No such file or directory"),
+        ("folder", "Is a directory"),
+        ("pipe", "a device or pipe"),
+        ("x" * 300, "File name too long"),
+        ("nul\0", "not a possible path"),
+        ("\ud800", "not a possible path"),
+        ("a.txt/b.txt", "Not a directory"),
+    ],
+    ids=["no folder", "folder", "pipe", "long", "nul", "surrogate", "file as folder"],
+)
+def test_an_error_names_the_path(tmp_path: Path, name: str, reason: str) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "a.txt").write_bytes(b"")
+    os.mkfifo(tmp_path / "pipe")
+    before = files_of(tmp_path)
+    path = os.path.join(tmp_path, name)  # noqa: PTH118 - a Path refuses some of the names
+    with pytest.raises(OSError, match=re.escape(reason)) as raised:
+        write_atomically(path, b"new")
+    assert raised.value.filename == path
+    assert files_of(tmp_path) == before
+
+
+def test_temporary_files_of_ended_processes_are_removed(tmp_path: Path) -> None:
+    child = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import os, sys\nfrom blobtree.files import replacing\n"
+            "with replacing(sys.argv[1]) as temporary:\n    temporary.write_bytes(b'half')\n    os._exit(0)",
+            str(tmp_path / "a.txt"),
+        ],
+        check=True,
+    )
+    assert child.returncode == 0
+    (left,) = files_of(tmp_path)
+    assert left.startswith(PREFIX)
+    foreign = tmp_path / f"{PREFIX}00000000-1-0123456789ab.txt"
+    ancient = tmp_path / f"{PREFIX}00000000-1-0123456789ac.txt"
+    mine = tmp_path / f"{PREFIX}notes.txt"
+    for path in (foreign, ancient, mine):
+        path.write_bytes(b"")
+    yesterday = time.time() - 90_000
+    os.utime(ancient, (yesterday, yesterday))
+    with replacing(tmp_path / "b.txt") as temporary:
+        temporary.write_bytes(b"whole")
+        write_atomically(tmp_path / "c.txt", b"")  # keeps the file of this process
+    assert files_of(tmp_path) == {"b.txt", "c.txt", foreign.name, mine.name}
+
+
+FULL_DISK = """
+    import resource
+    import sys
+    from pathlib import Path
+
+    import numpy as np
+
+    import blobtree
+    import decals
+    from blobtree.errors import ImplicitDecalsError
+    from blobtree.pyvista_views import write_polydata
+    from decals.apps.commands.scatter import write_table
+    from decals.rendering import Picture
+
+    folder = sys.argv[1]
+    tree = blobtree.Point((0, 0, 0), radius=1.0) + blobtree.Point((1, 0, 0), radius=1.0)
+    surface = tree.to_pyvista(resolution=24)
+    mesh = decals.MeshObject("ball", surface.points, surface.regular_faces)
+    spots = decals.Decals([[0, 0, 1]] * 99, [[0, 0, 1]] * 99, [[1, 0, 0]] * 99, [0.1] * 99, images=[-1] * 99)
+    scene = decals.Scene(objects=(mesh,), camera=decals.Camera((0, 0, 4), (0, 0, 0)), decals=spots)
+    noise = Picture(np.random.default_rng(0).integers(0, 255, (64, 64, 4), np.uint8))
+    writers = {
+        "tree.json": lambda path: blobtree.save(tree, path),
+        "scene.json": lambda path: decals.save_scene(scene, path),
+        "decals.csv": lambda path: write_table(spots, path),
+        "picture.png": noise.save,
+        "picture.jpg": noise.save,
+    }
+    for suffix in ("ply", "obj", "stl", "vtp"):
+        writers[f"mesh.{suffix}"] = lambda path: write_polydata(path, surface)
+    for name, write in writers.items():
+        write(f"{folder}/{name}")
+        whole = Path(folder, name).read_bytes()
+        outcomes = set()
+        for limit in sorted({0, 1, 100, 4096, len(whole) // 2, len(whole) - 1}):
+            if limit >= len(whole):
+                continue
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+            try:
+                write(f"{folder}/{name}")
+                outcomes.add("written")
+            except (OSError, ImplicitDecalsError) as error:
+                outcomes.add("named" if f"{folder}/{name}" in str(error) else str(error))
+            resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+            if Path(folder, name).read_bytes() != whole:
+                outcomes.add("torn")
+        print(name, *outcomes)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sets the largest size of a file")
+def test_a_full_disk_leaves_every_file_as_it_was(tmp_path: Path) -> None:
+    """In a child process whose files must not grow beyond a limit, as a stand-in for a full disk."""
+    script = textwrap.dedent(FULL_DISK)
+    command = [sys.executable, "-W", "error", "-c", script, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=240)
+    lines = done.stdout.splitlines()
+    assert len(lines) == 9
+    assert [line for line in lines if line.split(" ", 1)[1] != "named"] == []
+    assert files_of(tmp_path) == {line.split()[0] for line in lines}
+    assert done.stderr == ""
+
+
+KILLED = """
+    import sys
+
+    import blobtree
+    from blobtree.pyvista_views import write_polydata
+
+    surfaces = [
+        blobtree.Point((0, 0, 0), radius=1.0).to_pyvista(resolution=resolution) for resolution in (24, 48)
+    ]
+    trees = [blobtree.Point((0, 0, 0), radius=radius) for radius in (1.0, 2.0)]
+    print("ready", flush=True)
+    while True:
+        for tree, surface in zip(trees, surfaces):
+            blobtree.save(tree, sys.argv[1] + "/a.json")
+            write_polydata(sys.argv[1] + "/a.ply", surface)
+"""
+
+
+@posix
+def test_a_kill_while_saving_leaves_one_of_the_files(tmp_path: Path) -> None:
+    import pyvista as pv
+
+    import blobtree
+
+    sizes: set[int] = set()
+    for delay in (0.0, 0.011):
+        command = [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+            assert child.stdout is not None
+            assert child.stdout.readline() == "ready\n"
+            while not (tmp_path / "a.ply").exists():
+                time.sleep(0.001)
+            time.sleep(delay)
+            child.send_signal(signal.SIGKILL)
+        assert blobtree.load(tmp_path / "a.json").radius in (1.0, 2.0)  # type: ignore[attr-defined]
+        sizes.add(pv.read(tmp_path / "a.ply").n_cells)
+    expected = {blobtree.Point((0, 0, 0), radius=1.0).to_pyvista(resolution=n).n_cells for n in (24, 48)}
+    assert sizes <= expected
+    write_atomically(tmp_path / "b.txt", b"")
+    assert files_of(tmp_path) == {"a.json", "a.ply", "b.txt"}
