@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from blobtree.errors import InvalidNode, InvalidPoints
+from blobtree._typing import Float32Array
+from blobtree.errors import ImplicitDecalsError, InvalidNode, InvalidPoints
 
 Vector = tuple[float, float, float]
 Matrix = tuple[tuple[float, ...], ...]
@@ -89,22 +90,27 @@ def affine_matrix(value: ArrayLike) -> Matrix:
     return tuple(tuple(float(number) for number in row) for row in matrix)
 
 
-def point_array(points: ArrayLike) -> NDArray[np.float32]:
-    """Return `points` as float32[n, 3], finite up to LARGEST_NUMBER; raise `InvalidPoints` otherwise."""
+def point_array(
+    points: ArrayLike,
+    name: str = "points",
+    error: type[ImplicitDecalsError] = InvalidPoints,
+    limit: float = LARGEST_NUMBER,
+) -> Float32Array:
+    """Return points as contiguous float32[n, 3], finite up to a limit; raise an error otherwise."""
     try:
         with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused below
-            array = np.asarray(points, dtype=np.float32)
-    except (TypeError, ValueError):
-        raise InvalidPoints(
-            f"points: expected an array of shape (n, 3), got {reprlib.repr(points)}"
-        ) from None
+            array = np.ascontiguousarray(points, dtype=np.float32)
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{name}: expected an array of shape (n, 3), got {reprlib.repr(points)}") from None
     if array.shape == (0,):
         array = array.reshape(0, 3)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidPoints(f"points: expected an array of shape (n, 3), got shape {array.shape}")
-    if not (np.abs(array) <= LARGEST_NUMBER).all():
-        raise InvalidPoints(
-            f"points: expected finite coordinates within ±{LARGEST_NUMBER:g}, got NaN, infinity or more; "
-            "drop those points first"
+        raise error(f"{name}: expected an array of shape (n, 3), got shape {np.shape(points)}")
+    bad = ~(np.abs(array) <= limit).all(axis=1)
+    if bad.any():
+        row = int(bad.argmax())
+        raise error(
+            f"{name}: expected finite coordinates within ±{limit:g}, got {array[row]} in row {row}; "
+            "drop such rows, or rescale the model"
         )
-    return np.ascontiguousarray(array)
+    return array

@@ -68,14 +68,9 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
 
 
 def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
-    """Return a finite number as a float."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number) or isinstance(value, str | bytes):
-        raise error(f"{name}: expected a finite number, got {describe(value)}")
-    return number
+    """Return a finite number as a float; True and False count as 1 and 0."""
+    number = int(value) if isinstance(value, bool) else value
+    return real_number(name, number, "a finite number", math.isfinite, error)
 
 
 def real_number(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int64Array
+from blobtree.validation import point_array
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
@@ -15,7 +16,7 @@ from decals.index.rows import as_numbers
 from decals.model import NO_IMAGE, Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage
-from decals.surfaces.surface import as_points, unit_rows
+from decals.surfaces.surface import unit_rows
 from decals.validation import describe, finite_number, finite_vector, instance, whole_number
 
 DUPLICATE_OFFSET = 1.0
@@ -445,7 +446,7 @@ def _checked_point(position: ArrayLike, normal: ArrayLike) -> tuple[Float32Array
     direction = finite_vector("normal", normal, InvalidEdit)
     if not direction.any():
         raise InvalidEdit("normal: expected a direction, got a zero vector")
-    return as_points(point[None]), unit_rows(direction[None])
+    return point_array(point[None]), unit_rows(direction[None])
 
 
 def _broadcast(decals: Decals, name: str, value: ArrayLike) -> Any:

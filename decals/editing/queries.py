@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
 from decals.field.evaluate import evaluate
@@ -14,7 +15,7 @@ from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
 from decals.scenes.objects import SceneObject
-from decals.surfaces.surface import as_points, unit_rows
+from decals.surfaces.surface import unit_rows
 from decals.validation import describe, finite_vector, instance, whole_number
 
 OPPOSITE_COSINE = -0.999999
@@ -62,7 +63,7 @@ def nearest_points(objects: Sequence[SceneObject], points: ArrayLike) -> Surface
     >>> nearest_points([ball], [[0, 0, 3]]).positions.round(3)
     array([[0., 0., 1.]], dtype=float32)
     """
-    queries = as_points(points)
+    queries = point_array(points)
     _check_objects(objects)
     best = SurfacePoints(queries.copy(), np.zeros_like(queries), np.full(len(queries), -1, np.int32))
     if len(queries) == 0:
@@ -102,7 +103,7 @@ def first_hit(objects: Sequence[SceneObject], origin: ArrayLike, direction: Arra
     >>> first_hit([ball], (0, 0, 5), (0, 0, -1)).positions.round(3)
     array([[0., 0., 1.]], dtype=float32)
     """
-    origins = as_points(finite_vector("origin", origin, InvalidPoints)[None])
+    origins = point_array(finite_vector("origin", origin, InvalidPoints)[None])
     directions = unit_rows(finite_vector("direction", direction, InvalidPoints)[None])
     _check_objects(objects)
     distances = [float(item.surface.raycast(origins, directions)[0]) for item in objects]

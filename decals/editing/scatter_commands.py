@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Int64Array
 from blobtree.progress import Progress
+from blobtree.validation import point_array
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
@@ -17,7 +18,6 @@ from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names
-from decals.surfaces.surface import as_points
 from decals.validation import describe, finite_vector, whole_number
 
 SPACING = 3.0**0.5 / 1.03
@@ -177,7 +177,7 @@ class RelaxDecals:
 
     def compute(self, document: Document) -> Edit:
         """Return the edit; radii stay."""
-        center = as_points(finite_vector("point", self.point, InvalidEdit)[None])[0]
+        center = point_array(finite_vector("point", self.point, InvalidEdit)[None])[0]
         numbers, decals = document.decals.numbers, document.decals.decals
         if not len(decals) or not document.objects:
             return Edit()

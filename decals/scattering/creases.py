@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from blobtree.validation import point_array
 from decals.errors import InvalidScattering
 from decals.scattering.domain import MAX_PARTICLES
 from decals.surfaces.mesh import MeshSurface, edges_of
-from decals.surfaces.surface import as_points
 from decals.validation import instance, real_number
 
 MIN_LINE_SAMPLES = 4000
@@ -92,7 +92,7 @@ class Creases:
 
     def distance(self, points: ArrayLike) -> Float64Array:
         """Return the distance of each point to the nearest line, ``float64[n]``; infinity without lines."""
-        wide = as_points(points).astype(np.float64)
+        wide = point_array(points).astype(np.float64)
         if len(self.segments) == 0 or len(wide) == 0:
             return np.full(len(wide), np.inf)
         samples = self._samples

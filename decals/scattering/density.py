@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from blobtree.validation import point_array
 from decals.errors import InvalidImage, InvalidScattering
 from decals.images.load import load_image
 from decals.scattering.image_projections import Projection
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import as_points
 from decals.validation import describe, function_values, instance, real_array, real_number
 
 BLENDED_VERTICES = 3
@@ -52,7 +52,7 @@ def vertex_density(
     >>> density([[0, 0, 0], [0.5, 0, 0], [1, 0, 0]]).round(2)
     array([1. , 2.5, 4. ])
     """
-    positions = vertices.vertices if isinstance(vertices, MeshSurface) else as_points(vertices, "vertices")
+    positions = vertices.vertices if isinstance(vertices, MeshSurface) else point_array(vertices, "vertices")
     densities = real_array("values", values, InvalidScattering)
     if densities.shape != (len(positions),) or len(positions) == 0:
         raise InvalidScattering(

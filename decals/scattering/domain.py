@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
+from blobtree.validation import point_array
 from decals.errors import InvalidScattering
 from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
-from decals.surfaces.surface import Surface, as_points, vectors
+from decals.surfaces.surface import Surface, vectors
 from decals.validation import function_or_none, function_values, real_number, whole_number
 
 AREA_SAMPLES = 16384
@@ -182,7 +183,7 @@ class Domain:
             return OrientedPoints.empty()
         if not self.surfaces:
             raise InvalidScattering("fixed: expected a surface for them to lie on, got none")
-        points = as_points(fixed, "fixed")
+        points = point_array(fixed, "fixed")
         candidates = [surface.project(points) for surface in self.surfaces]
         gaps = np.stack([np.linalg.norm(positions - points, axis=1) for positions, _ in candidates])
         nearest = gaps.argmin(axis=0)

@@ -16,7 +16,7 @@ from decals.errors import InvalidScattering
 from decals.scattering.domain import as_surfaces
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Surface
-from decals.validation import describe, instance, real_array
+from decals.validation import describe, finite_vector, instance, real_array
 
 Projection: TypeAlias = Callable[[Float32Array], Float64Array]
 """``points[n, 3]`` to ``uv[n, 2]``."""
@@ -34,13 +34,6 @@ def box_of(surfaces: Surface | Sequence[Surface]) -> Box:
         raise InvalidScattering("surfaces: expected at least one to project an image onto, got none")
     boxes = np.array([surface.bounds for surface in several], dtype=np.float64)
     return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-
-
-def _vector(name: str, value: ArrayLike) -> Float64Array:
-    vector = real_array(name, value, InvalidScattering)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InvalidScattering(f"{name}: expected three finite numbers, got {describe(value)}")
-    return vector
 
 
 def _axis(name: str) -> tuple[int, int, int]:
@@ -79,8 +72,10 @@ class Planar:
     up: Vector
 
     def __post_init__(self) -> None:
-        _vector("origin", self.origin)
-        sides = np.stack([_vector("right", self.right), _vector("up", self.up)])
+        finite_vector("origin", self.origin, InvalidScattering)
+        sides = np.stack(
+            [finite_vector(name, getattr(self, name), InvalidScattering) for name in ("right", "up")]
+        )
         if np.linalg.matrix_rank(sides) < 2:
             raise InvalidScattering(
                 "right, up: expected sides of a parallelogram, got parallel or zero vectors"
@@ -135,7 +130,7 @@ class Cylindrical:
 
     def __post_init__(self) -> None:
         for name in ("base", "top", "front"):
-            _vector(name, getattr(self, name))
+            finite_vector(name, getattr(self, name), InvalidScattering)
         axis = np.subtract(self.top, self.base)
         if not np.linalg.norm(np.cross(axis, self.front)) > 1e-9 * np.linalg.norm(axis) > 0:
             raise InvalidScattering("expected an axis with length, and a front that is not along it")
@@ -188,7 +183,7 @@ class Spherical:
 
     def __post_init__(self) -> None:
         for name in ("center", "up", "front"):
-            _vector(name, getattr(self, name))
+            finite_vector(name, getattr(self, name), InvalidScattering)
         if not np.linalg.norm(np.cross(self.up, self.front)) > 1e-9:
             raise InvalidScattering("up, front: expected two directions that differ")
 

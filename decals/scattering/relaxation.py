@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.progress import Progress
+from blobtree.validation import point_array
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.appearance import Appearance
@@ -28,7 +29,7 @@ from decals.scattering.relocation import CandidatePoints, DensityAnchors, crowde
 from decals.scattering.repulsion import CUTOFF, law_at
 from decals.scattering.sizing import Sizing
 from decals.scattering.variation import ImageChoice, Jitter
-from decals.surfaces.surface import Surface, as_points
+from decals.surfaces.surface import Surface
 from decals.validation import function_or_none, real_array, real_number, whole_number
 
 RELOCATION_SCHEDULE = (0.1, 0.8, 0.05)
@@ -199,7 +200,7 @@ class Relaxation:
 
     def sizes_at(self, positions: Float32Array) -> Float32Array:
         """Return the spacing that the density asks for at positions, ``float32[n]``."""
-        densities = self.domain.density(as_points(positions, "positions"))
+        densities = self.domain.density(point_array(positions, "positions"))
         sizes: Float32Array = (self.spacing / np.sqrt(densities)).astype(np.float32)
         return sizes
 

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike
 
 import blobtree
 from blobtree import Node
+from blobtree.validation import point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
+from decals.model import MAX_COORDINATE
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, polygon_triangles, read_mesh
@@ -144,12 +146,7 @@ def _is_array_pair(model: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
 
 
 def _array_triangles(vertices: ArrayLike, faces: ArrayLike | Sequence[Any], name: str) -> MeshArrays:
-    try:
-        points = np.asarray(vertices, np.float32)
-    except (TypeError, ValueError, OverflowError):
-        points = np.zeros(0, np.float32)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InvalidMesh(f"{name}: expected vertices of shape [n, 3], got {describe(vertices)}")
+    points = point_array(vertices, f"{name}: vertices", InvalidMesh, MAX_COORDINATE)
     return polygon_triangles(points, _polygons(faces, name), name=name)
 
 

@@ -10,14 +10,13 @@ from blobtree import ISO, Node, polygonize
 from blobtree._typing import BoolArray, Float32Array
 from blobtree.device import known_device, launch
 from blobtree.tracing.trace import trace
+from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface
 from decals.surfaces.surface import (
     Scalars,
     Vectors,
-    as_points,
     as_rays,
-    as_reaches,
     contains_host,
     project_host,
     vectors,
@@ -122,9 +121,7 @@ class ImplicitSurface:
         self, points: ArrayLike, *, within: Float32Array | None = None
     ) -> tuple[Float32Array, Float32Array]:
         """Return surface points near the points, and the normals there."""
-        queries = as_points(points)
-        reaches = as_reaches(within, len(queries))
-        return project_host(self.on(self.device), queries, reaches, self.device)
+        return project_host(self.on(self.device), points, within, self.device)
 
     def normal(self, points: ArrayLike) -> Float32Array:
         """Return the normals of the surface where it is closest to the points."""
@@ -141,7 +138,7 @@ class ImplicitSurface:
 
     def contains(self, points: ArrayLike) -> BoolArray:
         """Return True for each point whose field is above the iso value, ``bool[n]``."""
-        return contains_host(self.on(self.device), as_points(points), self.device)
+        return contains_host(self.on(self.device), points, self.device)
 
 
 class DeviceImplicitSurface:
@@ -186,7 +183,7 @@ def project_without_mesh(
     positions, normals : float32[n, 3]
         None if there are no points, or if a point does not reach the surface.
     """
-    positions = as_points(points).copy()
+    positions = point_array(points).copy()
     normals = np.zeros_like(positions)
     rows = np.arange(len(positions))
     for _ in range(MAX_PROJECTION_ROUNDS):

@@ -11,15 +11,14 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device, launch
 from blobtree.lazy import Lazy
+from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.model import MAX_COORDINATE
 from decals.surfaces.mesh_kernels import closest_faces, closest_points, first_hits, mark_inside
 from decals.surfaces.surface import (
     Scalars,
     Vectors,
-    as_points,
     as_rays,
-    as_reaches,
     contains_host,
     make_read_only,
     project_host,
@@ -149,13 +148,11 @@ class MeshSurface:
         self, points: ArrayLike, *, within: Float32Array | None = None
     ) -> tuple[Float32Array, Float32Array]:
         """Return the closest points of the mesh, and the normals of their faces."""
-        queries = as_points(points)
-        reaches = as_reaches(within, len(queries))
-        return project_host(self.on(self.device), queries, reaches, self.device)
+        return project_host(self.on(self.device), points, within, self.device)
 
     def locate(self, points: ArrayLike) -> tuple[Int64Array, Float64Array]:
         """Return rows of the closest faces, ``int64[n]``, and barycentric weights, ``float64[n, 3]``."""
-        queries = as_points(points)
+        queries = point_array(points)
         faces: Any = wp.zeros(len(queries), dtype=wp.int32, device=self.device)
         weights: Any = wp.zeros(len(queries), dtype=wp.vec2, device=self.device)
         if len(queries):
@@ -178,31 +175,14 @@ class MeshSurface:
 
     def contains(self, points: ArrayLike) -> BoolArray:
         """Return True for each point that a closed mesh winds around, ``bool[n]``."""
-        return contains_host(self.on(self.device), as_points(points), self.device)
+        return contains_host(self.on(self.device), points, self.device)
 
 
 def _as_vertices(vertices: ArrayLike) -> Float32Array:
-    try:
-        with np.errstate(over="ignore"):  # infinities are refused below
-            array = np.array(vertices, dtype=np.float32, order="C")
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidMesh(
-            f"vertices: expected numbers of shape [n, 3], got {type(vertices).__name__}"
-        ) from error
-    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
-        raise InvalidMesh(f"vertices: expected shape [n, 3] with n > 0, got {list(array.shape)}")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise InvalidMesh(
-            f"vertices: expected finite numbers, got {array[row]} in row {row}; repair the mesh"
-        )
-    if np.abs(array).max() > MAX_COORDINATE:
-        row = int(np.abs(array).max(axis=1).argmax())
-        raise InvalidMesh(
-            f"vertices: expected coordinates within ±{MAX_COORDINATE:g}, got {array[row]} in row {row}; "
-            "rescale the model"
-        )
-    return array
+    array = point_array(vertices, "vertices", InvalidMesh, MAX_COORDINATE)
+    if len(array) == 0:
+        raise InvalidMesh("vertices: expected an array of shape (n, 3) with n > 0, got none")
+    return array.copy()
 
 
 def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array
+from blobtree.validation import point_array
 from decals.errors import InvalidPoints
 
 Vectors = Any
@@ -121,25 +122,6 @@ class SupportsDevice(Protocol):
         ...
 
 
-def as_points(points: ArrayLike, name: str = "points") -> Float32Array:
-    """Return points as contiguous finite ``float32[n, 3]``, or raise `InvalidPoints`."""
-    try:
-        with np.errstate(over="ignore"):  # infinities are refused below
-            array = np.ascontiguousarray(points, dtype=np.float32)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidPoints(
-            f"{name}: expected numbers of shape [n, 3], got {type(points).__name__}"
-        ) from error
-    if array.size == 0:
-        return np.zeros((0, 3), np.float32)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidPoints(f"{name}: expected shape [n, 3], got {list(array.shape)}; pass one row per point")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise InvalidPoints(f"{name}: expected finite numbers, got {array[row]} in row {row}; drop such rows")
-    return array
-
-
 def as_reaches(within: ArrayLike | None, count: int) -> Float32Array:
     """Return expected distances to the surface, ``float32[count]``; zeros for None."""
     if within is None:
@@ -152,7 +134,7 @@ def as_reaches(within: ArrayLike | None, count: int) -> Float32Array:
 
 def as_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Float32Array, Float32Array]:
     """Return origins and unit directions of rays, ``float32[n, 3]`` each; zero directions stay zero."""
-    starts, headings = as_points(origins, "origins"), as_points(directions, "directions")
+    starts, headings = point_array(origins, "origins"), point_array(directions, "directions")
     if len(starts) != len(headings):
         raise InvalidPoints(f"expected as many directions as origins, got {len(headings)} for {len(starts)}")
     return starts, unit_rows(headings)
@@ -199,21 +181,24 @@ def vectors(rows: Float32Array, device: str) -> Vectors:
 
 
 def project_host(
-    surface: DeviceSurface, points: Float32Array, reaches: Float32Array, device: str
+    surface: DeviceSurface, points: ArrayLike, within: Float32Array | None, device: str
 ) -> tuple[Float32Array, Float32Array]:
-    """Project points of the host; return positions and normals, ``float32[n, 3]`` each."""
-    positions: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
-    normals: Any = wp.zeros(len(points), dtype=wp.vec3, device=device)
-    if len(points):
+    """Project points of the host, as `Surface.project`."""
+    queries = point_array(points)
+    reaches = as_reaches(within, len(queries))
+    positions: Any = wp.zeros(len(queries), dtype=wp.vec3, device=device)
+    normals: Any = wp.zeros(len(queries), dtype=wp.vec3, device=device)
+    if len(queries):
         max_distances: Any = wp.array(reaches, dtype=wp.float32, device=device, copy=False)
-        surface.project(vectors(points, device), max_distances, positions, normals)
+        surface.project(vectors(queries, device), max_distances, positions, normals)
     return positions.numpy(), normals.numpy()
 
 
-def contains_host(surface: DeviceSurface, points: Float32Array, device: str) -> BoolArray:
-    """Return True for each point of the host that lies inside, ``bool[n]``."""
-    flags: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
-    if len(points):
-        surface.mark_inside(vectors(points, device), flags)
+def contains_host(surface: DeviceSurface, points: ArrayLike, device: str) -> BoolArray:
+    """Return True for each point of the host that lies inside, as `Surface.contains`."""
+    queries = point_array(points)
+    flags: Any = wp.zeros(len(queries), dtype=wp.int32, device=device)
+    if len(queries):
+        surface.mark_inside(vectors(queries, device), flags)
     marked: BoolArray = flags.numpy() == 1
     return marked

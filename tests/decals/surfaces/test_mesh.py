@@ -139,11 +139,11 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], float)
 @pytest.mark.parametrize(
     ("vertices", "faces", "says"),
     [
-        (np.zeros((0, 3)), np.zeros((0, 3), int), "vertices: expected shape"),
+        (np.zeros((0, 3)), np.zeros((0, 3), int), "vertices: expected an array of shape .* with n > 0"),
         (SQUARE, np.zeros((0, 3), int), "faces: expected shape"),
         (SQUARE, [[0, 1, 2, 0]], "triangulate"),
-        (SQUARE[:, :2], [[0, 1, 2]], "vertices: expected shape"),
-        ("no mesh", [[0, 1, 2]], "vertices: expected numbers"),
+        (SQUARE[:, :2], [[0, 1, 2]], r"vertices: expected an array of shape \(n, 3\), got shape \(3, 2\)"),
+        ("no mesh", [[0, 1, 2]], "vertices: expected an array of shape"),
         (SQUARE * np.nan, [[0, 1, 2]], "finite"),
         (SQUARE / [[1e-300, 1, 1]], [[0, 1, 2]], "finite"),
         (SQUARE, [[0, 1, 3]], "indices from 0 to 2, got 3"),
