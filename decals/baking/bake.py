@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, UInt8Array
-from blobtree.io import write_atomically
+from blobtree.files import write_atomically
 from blobtree.progress import Cancel, Progress, watched
 from decals.baking.atlas import Unwrapped, unwrap
 from decals.baking.glb import Node, glb_bytes

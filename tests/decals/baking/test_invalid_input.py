@@ -105,3 +105,13 @@ def test_a_stopped_bake_leaves_the_old_file(tmp_path: Path, stage: str) -> None:
             cancel=lambda: stage in stages,
         )
     assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("a.glb", b"old")]
+
+
+def test_a_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
+    need("trimesh")
+    target, link = tmp_path / "target.glb", tmp_path / "link.glb"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    decals.bake(ball_and_cube(count=4), link, vertex_colors=True)
+    assert link.is_symlink()
+    assert target.read_bytes()[:4] == b"glTF"
