@@ -174,10 +174,21 @@ class DecalsComponent:
         return actor
 
     def remove(self, actor: pv.Actor) -> None:
-        """Remove the decals from an actor."""
+        """Remove the decals from an actor.
+
+        Parameters
+        ----------
+        actor
+            An actor that `apply` has received in the active subplot.
+
+        Raises
+        ------
+        InvalidScene
+            The actor has no decals of the subplot.
+        """
         self.subplot.remove(actor)
 
-    def add_scene(self, scene: Scene, *, camera: bool = True) -> Scene:
+    def add_scene(self, scene: Scene, *, camera: bool = False) -> Scene:
         """Replace the scene of the subplot.
 
         Parameters
@@ -185,7 +196,7 @@ class DecalsComponent:
         scene
             The scene.
         camera
-            If True, the subplot gets the scene's camera.
+            If True, the subplot gets the scene's camera. If False, it keeps the plotter's, as for any actor.
         """
         instance("scene", scene, Scene, InvalidScene, "decals.cover makes one; for others set `scene`")
         instance("camera", camera, bool, InvalidScene, "True to use the scene's camera")
@@ -334,7 +345,7 @@ def show(scene: Scene, **options: Any) -> Any:
     instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
     plotter = pv.Plotter()
     component: DecalsComponent = plotter.decals
-    component.add_scene(scene)
+    component.add_scene(scene, camera=True)
     if plotter.notebook and "jupyter_backend" not in options:
         options["jupyter_backend"] = REMOTE if all(map(find_spec, SERVING)) else "static"
     return plotter.show(**options)

@@ -13,6 +13,7 @@ from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from blobtree._typing import Float64Array
+from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering import Renderer, SceneLike
@@ -21,6 +22,7 @@ from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.uploads import DecalData, ImageArray
 from decals.rendering.viewpoint import PictureView, Rectangle
 from decals.shaders import compose
+from decals.validation import describe
 from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper
 
@@ -247,12 +249,27 @@ class InjectedDecals:
 
     def apply(self, actor: Any, *, follow: bool) -> None:
         """Show the decals on an actor."""
-        self.remove(actor)
+        self._release(self._of(actor))
         self._injections.append(Injection(self._subplot, actor, follow=follow))
 
     def remove(self, actor: Any) -> None:
-        """Remove the decals from an actor; an actor without decals stays as it is."""
-        self._release([item for item in self._injections if item.actor is actor])
+        """Remove the decals from an actor.
+
+        Raises
+        ------
+        InvalidScene
+            The actor has no decals of the subplot.
+        """
+        injections = self._of(actor)
+        if not injections:
+            raise InvalidScene(
+                f"expected an actor with decals of this subplot, got {describe(actor)} without; "
+                "give an actor that `apply` has received in the active subplot"
+            )
+        self._release(injections)
+
+    def _of(self, actor: Any) -> list[Injection]:
+        return [item for item in self._injections if item.actor is actor]
 
     def clear(self) -> None:
         """Remove the decals from all actors."""

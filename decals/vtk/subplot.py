@@ -215,7 +215,7 @@ class SubplotRenderer:
         self.applied.apply(actor, follow=follow)
 
     def remove(self, actor: Any) -> None:
-        """Remove the decals from an actor; an actor without decals stays as it is."""
+        """Remove the decals from an actor; see `DecalsComponent.remove`."""
         self.applied.remove(actor)
 
     # -- settings, from the next frame on ---------------------------------------------------------------

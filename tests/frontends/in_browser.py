@@ -112,7 +112,7 @@ async def scattering(browser: Page, window: EditWindow, driver: Driver) -> None:
 async def streamed() -> None:
     """trame-rca's view, which pyvista takes too: decals are seen, and turned."""
     plotter = pv.Plotter(off_screen=True)
-    plotter.decals.add_scene(both())
+    plotter.decals.add_scene(both(), camera=True)
     server = get_server("streamed", client_type="vue3")
     with VAppLayout(server, full_height=True):
         view = PyVistaRCAView(plotter, style="width: 100%; height: 100%")

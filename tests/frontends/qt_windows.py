@@ -44,7 +44,7 @@ def fill(plotter: Any) -> None:
     """Decals on our objects and on an actor of VTK's."""
     actor = plotter.add_mesh(pv.Sphere(center=(0, 0, 1), radius=0.4))
     plotter.add_mesh(pv.Cube(center=(0.5, -0.5, 0.4), x_length=0.6), color="skyblue", opacity=0.4)
-    plotter.decals.add_scene(both())
+    plotter.decals.add_scene(both(), camera=True)
     plotter.decals.apply(actor)
 
 

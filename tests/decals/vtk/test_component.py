@@ -95,10 +95,26 @@ def test_what_changes_in_place_is_not_added_to(plotter: Factory) -> None:
         pl.decals.add_implicit(TREE)
 
 
-def test_the_camera_of_a_scene_is_the_plotters(plotter: Factory) -> None:
+def test_a_scene_leaves_the_camera_of_the_plotter_alone(plotter: Factory) -> None:
+    view = [(5.0, 5.0, 5.0), (0.1, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    pl, fresh, stock = plotter(), plotter(), plotter()
+    pl.camera_position = view
+    pl.decals.add_scene(both())
+    np.testing.assert_allclose(list(pl.camera_position), view)
+    shot(pl)
+    np.testing.assert_allclose(list(pl.camera_position), view)
+    fresh.decals.add_scene(both())
+    stock.add_mesh(pv.Sphere())
+    fresh.show(auto_close=False)
+    stock.show(auto_close=False)
+    assert fresh.camera.up == stock.camera.up == (0.0, 0.0, 1.0)
+    np.testing.assert_allclose(fresh.camera.direction, stock.camera.direction, atol=1e-6)
+
+
+def test_the_camera_of_a_scene_is_the_plotters_on_request(plotter: Factory) -> None:
     pl = plotter()
     pl.enable_parallel_projection()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     camera = both().camera
     np.testing.assert_allclose(pl.camera.position, camera.position)
     np.testing.assert_allclose(pl.camera.focal_point, camera.target)
@@ -138,7 +154,7 @@ WIPES = ["clear", "clear_actors"]
 @pytest.mark.parametrize("wipe", WIPES)
 def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(plotter: Factory, wipe: str) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     getattr(pl, wipe)()
     empty = shot(pl)
@@ -154,15 +170,15 @@ def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(plotter: Fa
 @pytest.mark.parametrize("wipe", WIPES)
 def test_a_cleared_plotter_takes_the_same_scene_again(plotter: Factory, wipe: str) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     getattr(pl, wipe)()
     assert (shot(pl) != first).any()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     np.testing.assert_array_equal(shot(pl), first)
     pl.decals.clear()
     assert (shot(pl) != first).any()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     np.testing.assert_array_equal(shot(pl), first)
 
 
@@ -231,7 +247,7 @@ def test_an_actor_of_the_name_that_we_had_is_the_users(plotter: Factory) -> None
 
 def test_a_closed_plotter_says_so(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     component, subplot = pl.decals, pl.decals.subplot
     pl.close()

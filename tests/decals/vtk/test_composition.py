@@ -185,7 +185,7 @@ def test_subplots_show_their_own_scenes(plotter: Factory) -> None:
     pl = plotter(shape=(1, 2), window_size=(200, 100), border=False)
     pl.disable_anti_aliasing()
     pl.subplot(0, 0)
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     pl.subplot(0, 1)
     pl.add_mesh(pv.Cube(x_length=0.6, y_length=0.6, z_length=3.0), color="blue")
     pl.decals.add_implicit(BALL)
@@ -208,7 +208,7 @@ def test_subplots_show_their_own_scenes(plotter: Factory) -> None:
 
 def test_two_windows_at_once(plotter: Factory) -> None:
     first, second = plotter(), plotter(window_size=(120, 90))
-    first.decals.add_scene(both())
+    first.decals.add_scene(both(), camera=True)
     second.decals.add_implicit(BALL)
     a, b = shot(first), shot(second)
     for _ in range(3):
@@ -220,13 +220,13 @@ def test_two_windows_at_once(plotter: Factory) -> None:
 
 def test_resizing_there_and_back(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     pl.window_size = 220, 90
     wide = shot(pl)
     assert wide.shape == (90, 220, 3)
     fresh = plotter(window_size=(220, 90))
-    fresh.decals.add_scene(both())
+    fresh.decals.add_scene(both(), camera=True)
     np.testing.assert_array_equal(wide, shot(fresh))
     pl.window_size = 160, 120
     np.testing.assert_array_equal(shot(pl), first)
@@ -234,7 +234,7 @@ def test_resizing_there_and_back(plotter: Factory) -> None:
 
 def test_a_larger_screenshot_is_drawn_larger(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     large = np.asarray(pl.screenshot(None, return_img=True, scale=2))[..., :3].astype(int)
     assert large.shape == (240, 320, 3)
@@ -279,7 +279,7 @@ def test_moving_the_whole_scene(plotter: Factory) -> None:
 @pytest.mark.parametrize("scale", [0.5, 0.26])
 def test_a_coarse_frame_is_nearly_the_fine_one(plotter: Factory, scale: float) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     fine = shot(pl)
     pl.decals.subplot.draw_scale = scale
     coarse = shot(pl)

@@ -81,7 +81,7 @@ def test_half_of_a_ball_behind_a_plane_is_picked_where_it_is_seen(plotter: Facto
 def test_nothing_of_ours_hides_us(plotter: Factory, scale: float) -> None:
     """At grazing angles and in coarse frames, where depths in a pixel differ much."""
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     subplot.draw_scale = scale
     shot(pl)
@@ -137,7 +137,7 @@ def test_nothing_is_hidden_where_what_was_drawn_is_forgotten(plotter: Factory) -
 def test_a_frame_that_is_ready_but_was_not_shown_hides_nothing(plotter: Factory) -> None:
     """What is compared is what was put into VTK's frame, not what will be."""
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     subplot.draw_scale = 0.2
     shot(pl)

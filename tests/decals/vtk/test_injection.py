@@ -296,6 +296,24 @@ def test_pyvistas_pickers_return_pyvistas_mesh(plotter: Factory) -> None:
     np.testing.assert_allclose(mesh["height"], mesh.points[:, 2])
 
 
+def test_removing_decals_that_are_not_there_is_an_error(plotter: Factory) -> None:
+    mesh = torus()
+    pl = plotter(shape=(1, 2))
+    actor, bare = pl.add_mesh(mesh), pl.add_mesh(pv.Sphere())
+    pl.decals.add(decals_over(mesh), images=["scale"])
+    pl.decals.apply(actor)
+    for wrong in (bare, mesh, None):
+        with pytest.raises(InvalidScene, match="expected an actor with decals of this subplot, got"):
+            pl.decals.remove(wrong)
+    pl.subplot(0, 1)
+    with pytest.raises(InvalidScene, match="in the active subplot"):
+        pl.decals.remove(actor)
+    pl.subplot(0, 0)
+    pl.decals.remove(actor)
+    with pytest.raises(InvalidScene, match="expected an actor with decals"):
+        pl.decals.remove(actor)
+
+
 def test_solids_take_decals_on_their_surface(plotter: Factory) -> None:
     grid = pv.ImageData(
         dimensions=(5, 5, 5), spacing=(0.25,) * 3, origin=(-0.5,) * 3

@@ -30,7 +30,7 @@ def refused(call: Callable[[Any], object], *fits: object) -> None:
 
 def test_a_plotter(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(scene())
+    pl.decals.add_scene(scene(), camera=True)
     pl.render()
     subplot = pl.decals.subplot
     refused(lambda wrong: pl.decals.add_scene(scene(), camera=wrong))

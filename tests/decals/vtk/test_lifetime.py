@@ -24,7 +24,7 @@ def show_and_close(plotter: Factory, *, ours: bool = True) -> np.ndarray:
     pl = plotter()
     actor = pl.add_mesh(pv.Sphere())
     if ours:
-        pl.decals.add_scene(both())
+        pl.decals.add_scene(both(), camera=True)
         pl.decals.apply(actor)
     seen = shot(pl)
     pl.close()
@@ -39,7 +39,7 @@ def test_closing_lets_go_of_everything(plotter: Factory) -> None:
     show_and_close(plotter)
     pl = make()
     pl.decals.apply(pl.add_mesh(pv.Sphere()))
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     things = [weakref.ref(item) for item in (pl, pl.decals, pl.decals.subplot, pl.decals.subplot.renderer)]
     pl.close()
@@ -104,7 +104,7 @@ def test_a_failing_scene_says_so_once_and_recovers(
     plotter: Factory, capfd: pytest.CaptureFixture[str]
 ) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     bad = Picture(np.zeros((4, 4), np.uint8))
     pl.decals.scene = View(both().objects, both().camera, both().decals, (bad,))
@@ -125,11 +125,11 @@ def test_impossible_scales_are_refused(plotter: Factory, scale: float) -> None:
 
 def test_clearing_a_plotter_and_filling_it_again(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     pl.decals.clear()
     assert (shot(pl) == shot(pl)[0, 0]).all()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     np.testing.assert_array_equal(shot(pl), first)
 
 
@@ -145,7 +145,7 @@ def test_a_plotter_without_decals_has_nothing_of_ours(plotter: Factory) -> None:
 
 def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     pl.decals.apply(pl.add_mesh(pv.Sphere(), show_edges=True))
     for width in (160, 170, 150):
         pl.window_size = width, 120
@@ -158,7 +158,7 @@ def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
 def test_a_window_that_is_given_another_context_shows_the_same(plotter: Factory) -> None:
     """Qt makes one anew when a widget is docked elsewhere; here the window is ended and drawn again."""
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     pl.decals.apply(pl.add_mesh(pv.Sphere(center=(0, 0, 1), radius=0.4)))
     first = shot(pl)
     for _ in range(2):
@@ -177,7 +177,7 @@ def test_what_could_not_be_drawn_is_tried_again_once_it_is_asked_for_otherwise(
     plotter: Factory, capfd: pytest.CaptureFixture[str]
 ) -> None:
     pl = plotter(window_size=(1200, 40))
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     context = pl.decals.subplot.renderer.context
     context.max_texture_size = min(context.max_texture_size, 16384)  # some cards take more

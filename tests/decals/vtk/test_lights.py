@@ -97,7 +97,7 @@ def test_a_ball_looks_as_vtks_own(plotter: Factory, lighting: str) -> None:
 def test_the_batch_renderer_gives_the_same_pixels_under_the_same_lights(plotter: Factory) -> None:
     pl = plotter()
     pl.set_background("black")
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     pl.decals.lights = Lights.VTK
     pl.add_light(pv.Light(position=(2, -3, 1), color="orange", intensity=0.5))
     subplot = pl.decals.subplot
@@ -115,7 +115,7 @@ def test_the_batch_renderer_gives_the_same_pixels_under_the_same_lights(plotter:
 
 def test_lights_that_change_are_seen_and_the_studios_do_not_care(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     assert pl.decals.lights is Lights.SCENE
     studio = shot(pl)
     pl.renderer.lights[1].intensity *= 2
@@ -136,7 +136,7 @@ def test_each_subplot_has_lights_of_its_own(plotter: Factory) -> None:
     pl = plotter(shape=(1, 2), window_size=(240, 120), border=False)
     for column in range(2):
         pl.subplot(0, column)
-        pl.decals.add_scene(both())
+        pl.decals.add_scene(both(), camera=True)
         pl.decals.lights = "vtk"
     pl.renderer.remove_all_lights()
     seen = shot(pl)
@@ -145,7 +145,7 @@ def test_each_subplot_has_lights_of_its_own(plotter: Factory) -> None:
 
 def test_more_lights_than_there_is_room_for_are_said_once(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     pl.decals.lights = "vtk"
     for _ in range(40):
         pl.add_light(pv.Light(position=(1, 1, 1), intensity=0.01))

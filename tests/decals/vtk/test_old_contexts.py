@@ -20,7 +20,7 @@ from decals.errors import NoGraphics
 from tests.decals.vtk.scenes import both, shot
 
 pl = pv.Plotter(off_screen=True, window_size=(160, 120))
-pl.decals.add_scene(both())
+pl.decals.add_scene(both(), camera=True)
 try:
     picture = shot(pl)
     with pl.decals.subplot.current():
@@ -47,7 +47,7 @@ def in_a_process(path: Path, **environment: str) -> subprocess.CompletedProcess[
 @pytest.mark.parametrize("entry", ["fragment", "compute"])
 def test_a_context_of_version_3_2_that_can_do_more(plotter: Factory, tmp_path: Path, entry: str) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     expected = shot(pl)
     done = in_a_process(tmp_path / "old.npy", MESA_GL_VERSION_OVERRIDE="3.2", IMPLICIT_DECALS_ENTRY=entry)
     assert done.returncode == 0, done.stderr

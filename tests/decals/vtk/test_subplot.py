@@ -24,7 +24,7 @@ from tests.oracles.raster import edges
 def test_the_window_shows_the_batch_renderers_pixels(plotter: Factory, samples: int) -> None:
     pl = plotter()
     pl.set_background("black")
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     subplot.samples = samples
     seen = shot(pl)
@@ -42,7 +42,7 @@ def test_the_window_shows_the_batch_renderers_pixels(plotter: Factory, samples: 
 
 def test_one_place_in_the_window(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     shot(pl)
     with subplot.current():
@@ -69,14 +69,14 @@ def test_one_place_in_the_window(plotter: Factory) -> None:
 
 def test_before_the_first_frame_there_is_no_graphics(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     with pytest.raises(NoGraphics, match="render it first"):
         pl.decals.subplot.at(80, 60)
 
 
 def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     first = shot(pl)
     np.testing.assert_array_equal(shot(pl), first)
@@ -104,7 +104,7 @@ def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
 )
 def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[pv.Plotter], None]) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     change(pl)
     seen = shot(pl)
@@ -113,7 +113,7 @@ def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[pv.Plotte
 
 def test_the_stages_renderer_may_draw_other_things_in_between(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     first = shot(pl)
     other = both().replace(objects=both().objects[:1])
@@ -138,7 +138,7 @@ def prepared(subplot: SubplotRenderer, samples: int) -> int:
 def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory, samples: int) -> None:
     other, pl = plotter(), plotter()
     for one in (other, pl):
-        one.decals.add_scene(both())
+        one.decals.add_scene(both(), camera=True)
     other.decals.subplot.samples = samples
     whole = shot(other)
     subplot = pl.decals.subplot
@@ -156,7 +156,7 @@ def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory
 
 def test_what_changes_while_a_frame_is_prepared_is_in_it(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     subplot.draw_scale = 0.5
     shot(pl)
@@ -185,7 +185,7 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
 
     document = Document()
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
     pl.decals.scene = document
     np.testing.assert_array_equal(shot(pl), first)
@@ -219,7 +219,7 @@ def test_frames_drawn_in_part_are_those_drawn_whole(
     rng, documents = np.random.default_rng(1), []
     for column in range(2):
         pl.subplot(0, column)
-        pl.decals.add_scene(both())
+        pl.decals.add_scene(both(), camera=True)
         pl.decals.subplot.scene = document = Edited()
         change(pl)
         documents.append(document)
@@ -282,7 +282,7 @@ def test_what_a_stage_cannot_be_set_to_is_said_at_once(plotter: Factory, name: s
 @pytest.mark.parametrize("place", [(float("nan"), 0), (0, float("inf")), ("x", 0), (0, None), ([1], 2)])
 def test_a_place_that_is_none_is_refused(plotter: Factory, place: tuple[float, float]) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     with pytest.raises(InvalidPoints, match=r"[xy]: expected a finite number"):
         pl.decals.subplot.at(*place)
@@ -290,7 +290,7 @@ def test_a_place_that_is_none_is_refused(plotter: Factory, place: tuple[float, f
 
 def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     subplot = pl.decals.subplot
     whole, part = subplot.at(80, 60), subplot.at(80.9, 60.2)
@@ -303,7 +303,7 @@ def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(plotter: Factory
 
 def test_more_samples_than_targets_can_have_are_refused(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     subplot = pl.decals.subplot
     with subplot.current(), pytest.raises(InvalidScene, match="take fewer a pixel"):

@@ -40,7 +40,7 @@ MODES: dict[str, tuple[Callable[[pv.Plotter], object], str]] = {
 def test_one_warning_says_what_does_not_work(plotter: Factory, mode: str) -> None:
     prepare, words = MODES[mode]
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     prepare(pl)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -78,9 +78,9 @@ def test_vtks_own_peeling_with_multisampling_is_as_we_say(plotter: Factory) -> N
 def test_exports_say_what_they_leave_out(plotter: Factory, tmp_path: Path) -> None:
     pl = plotter(shape=(1, 2))
     pl.add_mesh(pv.Sphere())
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     pl.subplot(0, 1)
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     shot(pl)
     with pytest.warns(UserWarning, match="export_obj writes VTK's own actors; .* by OpenGL") as exporting:
         pl.export_obj(tmp_path / "scene.obj")
@@ -118,7 +118,7 @@ def test_views_that_draw_in_a_browser_say_what_they_leave_out(
     plotter: Factory, name: str, words: str | None
 ) -> None:
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     view = type(name, (View,), {})()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -141,7 +141,7 @@ def test_trames_own_views_say_what_they_leave_out(plotter: Factory) -> None:
 
     server = get_server("modes", client_type="vue3")
     pl = plotter()
-    pl.decals.add_scene(both())
+    pl.decals.add_scene(both(), camera=True)
     said: dict[str, int] = {}
     local = CLIENTS.keys() - {"PyVistaWasmView"}  # that one is fetched from the network
     for name in ("PyVistaRemoteView", "PyVistaRCAView", *local):

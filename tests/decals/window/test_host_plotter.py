@@ -50,7 +50,7 @@ def test_hands_in_a_subplot_that_is_no_longer_the_active_one(plotter: Factory) -
 
 def test_a_subplot_that_showed_a_scene_shows_the_edited_one(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(scene())
+    pl.decals.add_scene(scene(), camera=True)
     pl.decals.subplot.samples = 1
     first = shot(pl)
     with EditWindow(scene(), plotter=pl) as window:
@@ -71,7 +71,7 @@ def test_a_subplot_that_showed_a_scene_shows_the_edited_one(plotter: Factory) ->
     after = shot(pl)
     assert (after != first).any()
     fresh = plotter()
-    fresh.decals.add_scene(edited)
+    fresh.decals.add_scene(edited, camera=True)
     fresh.decals.subplot.samples = 1
     np.testing.assert_array_equal(after, shot(fresh))
     pl.decals.add(edited.decals[:1])
@@ -80,7 +80,7 @@ def test_a_subplot_that_showed_a_scene_shows_the_edited_one(plotter: Factory) ->
 def test_a_tick_after_the_end_leaves_the_plotter_alone(plotter: Factory) -> None:
     """Scripts tick by themselves, and a timer's last event may be on its way."""
     pl = plotter()
-    pl.decals.add_scene(scene())
+    pl.decals.add_scene(scene(), camera=True)
     pl.decals.subplot.samples = 1
     window = EditWindow(scene(), plotter=pl, samples=3)
     window.show()
@@ -100,7 +100,7 @@ def test_a_tick_after_the_end_leaves_the_plotter_alone(plotter: Factory) -> None
 
 def test_what_somebody_shows_meanwhile_stays(plotter: Factory) -> None:
     pl = plotter()
-    pl.decals.add_scene(scene())
+    pl.decals.add_scene(scene(), camera=True)
     with EditWindow(scene(), plotter=pl) as window:
         window.show()
         pl.decals.scene = other = scene(20)

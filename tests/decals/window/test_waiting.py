@@ -253,7 +253,7 @@ def test_a_plotter_that_nobody_edits_in_shows_the_whole_at_once(waiting: Any) ->
     import pyvista as pv
 
     plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    plotter.decals.add_scene(scene())
+    plotter.decals.add_scene(scene(), camera=True)
     try:
         plotter.show(auto_close=False)
         assert not plotter.decals.subplot.warming_up
