@@ -89,6 +89,8 @@ def edit(
             scene = options.scene(loaded, where, pixels, progress)
         path = path or new_file(Path(), Path(model[0]).stem)
     with EditWindow(scene, path=path, size=pixels) as window:
-        window.show()
-        if window.session.modified:
-            Console(stderr=True).print("closed without saving the last changes", highlight=False)
+        try:
+            window.show()
+        finally:
+            if window.session.modified:
+                Console(stderr=True).print("closed without saving the last changes", highlight=False)

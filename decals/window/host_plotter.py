@@ -1,17 +1,23 @@
 """Host plotters: the window of an editor, its own or one that the caller provides."""
 
 import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import wraps
 from typing import Any
 
 import pyvista as pv
 from numpy.typing import ArrayLike
+from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
 from decals.editing.document import Document
 from decals.editing.pointer_tools import Ray
 from decals.errors import InvalidScene, NoGraphics
+from decals.rendering.gl_libraries import require_gl
+from decals.rendering.options import STUDIO
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
@@ -20,8 +26,8 @@ from decals.vtk.subplot import SubplotRenderer
 DEFAULT_SIZE = (1200, 800)
 """Width and height of a window, in pixels."""
 
-BOTTOM_COLOR, TOP_COLOR = (0.80, 0.82, 0.85), (0.96, 0.96, 0.95)
-"""Background of a window."""
+OFF_SCREEN_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+"""VTK's windows that no screen shows; on Linux, VTK takes one of them if there is no X server."""
 
 MAX_WINDOW_SIDE = 16384
 """Pixels along each side of a window, at most: the limit of VTK."""
@@ -138,12 +144,43 @@ def edits_at(subplot: SubplotRenderer, x: int, y: int) -> bool:
 
 def require_screen() -> None:
     """Raise `NoGraphics` if there is no screen for a window; VTK would silently draw off screen."""
-    linux = sys.platform.startswith("linux")
-    if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise NoGraphics(
-            "expected a screen for the window, got none (DISPLAY is not set); log in with a desktop, "
-            "use `ssh -X`, or draw pictures with `implicit-decals render`"
-        )
+    if not sys.platform.startswith("linux"):
+        return
+    reason = "DISPLAY is not set"
+    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        require_gl()
+        if vtkRenderWindow().GetClassName() not in OFF_SCREEN_WINDOWS:
+            return
+        reason = f"no X server answers at DISPLAY={os.environ.get('DISPLAY', '')!r}"
+    raise NoGraphics(
+        f"expected a screen for the window, got none ({reason}); log in with a desktop, "
+        "use `ssh -X`, or draw pictures with `implicit-decals render`"
+    )
+
+
+@contextmanager
+def collected_interrupts() -> Iterator[list[int]]:
+    """Collect the first Ctrl + C in a list within a ``with`` block.
+
+    VTK ends the process, with a text of its own, if a callback raises KeyboardInterrupt. Only a second
+    Ctrl + C raises it, in case the window does not respond.
+    """
+    received: list[int] = []
+
+    def receive(number: int, _frame: object) -> None:
+        if received:
+            raise KeyboardInterrupt
+        received.append(number)
+
+    own = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    if own or threading.current_thread() is not threading.main_thread():
+        yield received
+        return
+    signal.signal(signal.SIGINT, receive)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def checked_size(size: object) -> tuple[int, int]:
@@ -164,7 +201,7 @@ def new_plotter(off_screen: bool, size: tuple[int, int]) -> Any:
         require_screen()
     plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
     plotter.disable_anti_aliasing()
-    plotter.set_background(BOTTOM_COLOR, top=TOP_COLOR)
+    plotter.set_background(STUDIO.bottom[:3], top=STUDIO.top[:3])
     return plotter
 
 

@@ -27,6 +27,7 @@ from decals.window.host_plotter import (
     before_screenshots,
     camera_of,
     checked_size,
+    collected_interrupts,
     edits_at,
     eye_and_target,
     ray_through,
@@ -111,6 +112,7 @@ class EditWindow:
         self._host = HostPlotter(plotter, off_screen=off_screen, size=size)
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
         self._closed = False
+        self._interrupts: list[int] = []
         self.subplot: SubplotRenderer = self.plotter.decals.subplot
         self._backup = SubplotBackup(self.subplot)
         self._host.add_scene(self.document.scene)
@@ -226,6 +228,9 @@ class EditWindow:
 
     def tick(self) -> None:
         """Do the next piece of background work, and refine the frame once nothing moves."""
+        if self._interrupts and not self._closed:
+            self._host.interactor.TerminateApp()
+            return
         dragging = self.tools.dragging or self.handle.dragging
         if self._closed or self.warmup.advance():
             return
@@ -256,14 +261,19 @@ class EditWindow:
         ------
         InvalidEdit
             The window was closed before.
+        KeyboardInterrupt
+            Ctrl + C was pressed in the terminal; the window is closed then.
         """
         self.begin()
         if self._host.provided:
             self.plotter.render()
             return
-        self.plotter.show(auto_close=False, interactive=self._host.has_timers)
+        with collected_interrupts() as self._interrupts:
+            self.plotter.show(auto_close=False, interactive=self._host.has_timers)
         if self._host.has_timers:
             self.close()
+        if self._interrupts:
+            raise KeyboardInterrupt
 
     def begin(self) -> None:
         """Start the timer and the first, coarse frame; `show` calls it."""

@@ -1,6 +1,10 @@
 """The same user in a real window, where there is a virtual X display."""
 
 import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +25,59 @@ def test_real_keys_and_buttons_do_what_the_help_says(display: str) -> None:
     except OSError:
         pytest.skip("libXtst is not installed (on Debian: apt-get install libxtst6)")
     assert "all of it worked" in run_module("tests.decals.window.x_events", DISPLAY=display)
+
+
+INTERRUPTED = """
+import os, signal, sys
+from decals.apps.cli import run
+from decals.window import EditWindow
+
+begin = EditWindow.begin
+
+def begin_and_interrupt(window):
+    begin(window)
+    ticks = []
+    def tick(*_):
+        ticks.append(0)
+        if len(ticks) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        elif len(ticks) > 100:
+            os._exit(9)
+    window.plotter.iren.interactor.AddObserver("TimerEvent", tick)
+
+EditWindow.begin = begin_and_interrupt
+sys.exit(run(["edit", "knot", "--decals", "2", "--size", "120x80"]))
+"""
+
+
+def test_ctrl_c_in_the_terminal_closes_the_window(display: str, tmp_path: Path) -> None:
+    done = run_script(INTERRUPTED, tmp_path, display)
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.strip().endswith("interrupted")
+    assert "Ctrl-C" not in done.stderr + done.stdout
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only X servers are missing silently")
+def test_a_display_that_does_not_answer_is_an_error(tmp_path: Path) -> None:
+    command = "import sys; from decals.apps.cli import run; sys.exit(run(['edit', 'knot', '--decals', '2']))"
+    done = run_script(command, tmp_path, ":30999")
+    assert done.returncode == 2, done.stderr
+    assert "error: expected a screen for the window, got none (no X server answers at" in done.stderr
+    assert "':30999'" in done.stderr
+
+
+def run_script(script: str, folder: Path, display: str) -> "subprocess.CompletedProcess[str]":
+    """Run a script with a display in a folder."""
+    environment = {name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"}
+    return subprocess.run(
+        [sys.executable, "-c", script],
+        env={**environment, "DISPLAY": display},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
 
 
 def test_on_a_virtual_display(display: str) -> None:

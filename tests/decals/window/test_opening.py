@@ -5,8 +5,10 @@ import subprocess
 import sys
 from typing import Any
 
+import numpy as np
 import pytest
 
+from decals import render
 from decals.errors import InvalidScene, NoGraphics
 from decals.window import EditWindow, edit
 from tests.decals.editing.scenes import scene
@@ -37,6 +39,20 @@ def test_without_a_screen_a_window_says_so(monkeypatch: pytest.MonkeyPatch) -> N
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(NoGraphics, match="DISPLAY is not set"):
         edit(scene())
+
+
+def test_the_background_is_that_of_a_rendered_picture() -> None:
+    """Above as well as below the object."""
+    size, shown = (64, 48), scene()
+    with EditWindow(shown, off_screen=True, size=size) as window:
+        window.show()
+        window.overlay.release()
+        window.plotter.camera.zoom(0.3)
+        seen = np.asarray(window.plotter.screenshot(None, return_img=True))[..., :3].astype(int)
+    rendered = np.asarray(render(shown, size=size))[..., :3].astype(int)
+    assert abs(rendered[0, 0] - rendered[-1, 0]).max() > 20
+    for row in (0, -1):
+        np.testing.assert_allclose(seen[row, 0], rendered[row, 0], atol=3)
 
 
 MEMORY = """
