@@ -1,4 +1,7 @@
-"""Meshes from files and from pyvista datasets: PLY by our own reader, every other format by pyvista's."""
+"""Meshes from files and from pyvista datasets: PLY by our own reader, every other format by pyvista's.
+
+VTK's readers of most formats crash or hang on some damaged files, so they run in a process of their own.
+"""
 
 from os import PathLike
 from pathlib import Path
@@ -7,18 +10,20 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
+from pyvista.core.utilities.reader import CLASS_READERS
 
-from blobtree._typing import Float32Array, Int32Array
 from blobtree.vtk_errors import vtk_errors
 from decals.errors import InvalidMesh
 from decals.surfaces.ply import Polygons, read_ply
+from decals.surfaces.vtk_process import MeshArrays, can_isolate, read_isolated
 from decals.validation import describe, is_file
-
-MeshArrays = tuple[Float32Array, Int32Array]
-"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
 
 _VOLUMES = (pv.UnstructuredGrid, pv.StructuredGrid, pv.MultiBlock)
 """Kinds of datasets in files whose boundary is a surface; an image or a point set has none."""
+
+
+_ROBUST = (".obj", ".stl")
+"""Suffixes of formats whose readers in VTK neither crash nor hang on damaged files; see `tests.fuzz`."""
 
 
 def read_mesh(path: str | PathLike[str]) -> MeshArrays:
@@ -59,7 +64,9 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     if path.suffix.lower() == ".ply":
         return polygon_triangles(*read_ply(path), name=str(path))
-    return dataset_triangles(_read_dataset(path), name=str(path))
+    if path.suffix.lower() not in CLASS_READERS or path.suffix.lower() in _ROBUST or not can_isolate():
+        return dataset_triangles(read_dataset(path), name=str(path))
+    return read_isolated(path)
 
 
 def dataset_triangles(dataset: pv.DataSet | pv.MultiBlock, *, name: str) -> MeshArrays:
@@ -100,7 +107,8 @@ def _check_indices(corners: Any, count: int, name: str) -> None:
         raise InvalidMesh(f"{name!r} has {count} points but a face asks for number {bad}; export it again")
 
 
-def _read_dataset(path: Path) -> pv.DataSet | pv.MultiBlock:
+def read_dataset(path: Path) -> pv.DataSet | pv.MultiBlock:
+    """Read a file by pyvista in this process; InvalidMesh for errors that the reader reports."""
     try:
         with vtk_errors() as errors:
             dataset = pv.read(path)

@@ -1,0 +1,100 @@
+"""The process in which `vtk_process` reads mesh files: VTK's readers may crash or hang on damaged ones.
+
+It imports VTK once and forks for every file, so that a crash or corrupt memory does not reach the next file.
+Where the system has no fork it reads by itself, and is started again after a crash.
+"""
+
+import contextlib
+import json
+import os
+import select
+import sys
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from decals.errors import ImplicitDecalsError
+from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, read_dataset
+
+IDLE_SECONDS = 120.0
+"""Seconds without a request after which the process ends."""
+
+
+def main() -> None:
+    """Answer requests until the parent closes the pipe, or sends none for a while."""
+    requests = os.fdopen(os.dup(0), "rb")
+    answers = os.fdopen(os.dup(1), "wb")
+    with Path(os.devnull).open("r+b") as nothing:  # libraries may print
+        for descriptor in (0, 1, 2):
+            os.dup2(nothing.fileno(), descriptor)
+    _send(answers, {"ready": True})
+    while True:
+        if sys.platform != "win32" and not select.select([requests], [], [], IDLE_SECONDS)[0]:
+            return
+        line = requests.readline()
+        if not line:
+            return
+        request = json.loads(line)
+        if hasattr(os, "fork"):
+            _answer_in_fork(request, answers)
+        else:
+            _answer(request, answers)
+
+
+def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
+    child = os.fork()
+    if child == 0:
+        try:
+            _limit(request)
+            _answer(request, answers)
+            os._exit(0)
+        finally:
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    if status != 0:  # it sends its answer last
+        _send(answers, {"error": "VTK's reader crashed"})
+
+
+def _limit(request: dict[str, Any]) -> None:
+    """Limit the memory and the processor time of this process."""
+    import resource
+
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    memory = pages * resource.getpagesize() + int(request["bytes"])
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # Readers may use several threads, so processor time is more than the seconds that pass.
+    processor = int(request["seconds"] * (os.cpu_count() or 1)) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (processor, processor))
+
+
+def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
+    try:
+        vertices, faces = read(Path(os.fsdecode(bytes.fromhex(request["path"]))))
+    except ImplicitDecalsError as error:
+        _send(answers, {"error": str(error), "whole": True})
+    except MemoryError:
+        _send(answers, {"error": "it would take too much memory"})
+    except Exception as error:
+        _send(answers, {"error": f"{type(error).__name__}: {error}"})
+    else:
+        arrays = [np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32)]
+        _send(answers, {"vertices": len(vertices), "faces": len(faces)}, *(array.data for array in arrays))
+
+
+def read(path: Path) -> MeshArrays:
+    """Read a mesh file by pyvista, as vertices and triangles."""
+    return dataset_triangles(read_dataset(path), name=str(path))
+
+
+def _send(answers: BinaryIO, header: dict[str, Any], *contents: memoryview) -> None:
+    answers.write(json.dumps(header).encode() + b"\n")
+    for content in contents:
+        answers.write(content)
+    answers.flush()
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
+        main()

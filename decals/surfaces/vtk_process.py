@@ -1,0 +1,197 @@
+"""Mesh files that VTK reads, read in a process of its own with limits on time and memory.
+
+`vtk_child` is that process. It is started at the first such file and kept for the next ones.
+"""
+
+import atexit
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree._typing import Float32Array, Int32Array
+from decals.errors import InvalidMesh
+
+MeshArrays = tuple[Float32Array, Int32Array]
+"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
+
+START_SECONDS = 120.0
+"""Seconds until the process must be ready; imports from a slow disk take long."""
+
+SECONDS, SECONDS_PER_BYTE = 6.0, 2e-6
+"""Time in which a file must be read: for any file, and per byte of it."""
+
+MEMORY, MEMORY_PER_BYTE = 2 << 30, 64
+"""Bytes of memory for reading: for any file, and per byte of it."""
+
+
+def can_isolate() -> bool:
+    """Return True if a Python of its own can be started; not in programs that embed or freeze Python."""
+    return bool(sys.executable) and not getattr(sys, "frozen", False)
+
+
+def read_isolated(path: Path) -> MeshArrays:
+    """Read a mesh file by pyvista in the process of its own.
+
+    Returns
+    -------
+    vertices : float32[n, 3]
+    faces : int32[m, 3]
+
+    Raises
+    ------
+    InvalidMesh
+        The file is no surface mesh, or the reader crashed, took too long or took too much memory.
+    """
+    return _process.read(path)
+
+
+class _ReaderProcess:
+    """The client of `vtk_child`; threads use it in turn."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._child: subprocess.Popen[bytes] | None = None
+
+    def read(self, path: Path) -> MeshArrays:
+        """Read a file; see `read_isolated`."""
+        size = path.stat().st_size
+        seconds = SECONDS + SECONDS_PER_BYTE * size
+        memory = MEMORY + MEMORY_PER_BYTE * size
+        request = {"path": os.fsencode(path.absolute()).hex(), "seconds": seconds, "bytes": memory}
+        with self._lock:
+            try:
+                answer = self._answer(request, seconds)
+                if answer is None and self._has_left():
+                    answer = self._answer(request, seconds)
+            except BaseException:
+                self.stop()  # half of an answer may be in the pipe
+                raise
+            if answer is None:
+                self.stop()
+                raise InvalidMesh(_failure(path, f"VTK's reader crashed, or took more than {seconds:.0f} s"))
+        header, arrays = answer
+        if "error" in header:
+            raise InvalidMesh(header["error"] if "whole" in header else _failure(path, header["error"]))
+        vertices, faces = arrays
+        return vertices, faces
+
+    def _answer(self, request: dict[str, Any], seconds: float) -> tuple[dict[str, Any], list[Any]] | None:
+        """Return the header and the arrays of an answer; None if the process ended or took too long."""
+        child = self._started()
+        assert child.stdin is not None
+        assert child.stdout is not None
+        with _time_limit(child, seconds):
+            try:
+                child.stdin.write(json.dumps(request).encode() + b"\n")
+                child.stdin.flush()
+                header = json.loads(child.stdout.readline())
+                arrays: list[Any] = []
+                if "error" not in header:
+                    arrays.append(np.empty((header["vertices"], 3), np.float32))
+                    arrays.append(np.empty((header["faces"], 3), np.int32))
+                whole = all(_fill(child.stdout, array) for array in arrays)
+            except (OSError, ValueError):  # the pipe is broken, or ends within a line
+                return None
+            return (header, arrays) if whole else None
+
+    def _started(self) -> "subprocess.Popen[bytes]":
+        """Return the process, started again if it has ended."""
+        if self._child is not None and self._child.poll() is None:
+            return self._child
+        self.stop()
+        folders = os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path)
+        self._child = child = subprocess.Popen(
+            [sys.executable, "-P", "-W", "ignore", "-m", "decals.surfaces.vtk_child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": folders},
+            start_new_session=True,  # Control-C is for the parent, and `_kill` reaches the forks of the child
+        )
+        assert child.stdout is not None
+        with _time_limit(child, START_SECONDS):
+            ready = child.stdout.readline()
+        if not ready:
+            raise InvalidMesh(
+                "could not start the process that reads meshes by VTK; run `implicit-decals doctor`"
+            )
+        return child
+
+    def _has_left(self) -> bool:
+        """Return True if the process ended by itself, as it does after a while without requests."""
+        return self._child is not None and self._child.wait(timeout=START_SECONDS) == 0
+
+    def stop(self) -> None:
+        """End the process, and with it the reading."""
+        child, self._child = self._child, None
+        if child is not None:
+            _kill(child)
+            child.wait()
+            _close_pipes(child)
+
+    def forget(self) -> None:
+        """In a forked child: leave the process to the parent."""
+        self._lock = threading.Lock()
+        child, self._child = self._child, None
+        if child is not None:
+            child.returncode = 0  # it is no child of this process, so there is nothing to wait for
+            _close_pipes(child)
+
+
+@contextmanager
+def _time_limit(child: "subprocess.Popen[bytes]", seconds: float) -> Iterator[None]:
+    """Kill a process unless the ``with`` block ends in time; a read from its pipe then ends too."""
+    timer = threading.Timer(seconds, _kill, [child])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _kill(child: "subprocess.Popen[bytes]") -> None:
+    """Kill a process and the forks that it made."""
+    with suppress(OSError):
+        if sys.platform == "win32":
+            child.kill()
+        else:
+            os.killpg(child.pid, signal.SIGKILL)
+
+
+def _close_pipes(child: "subprocess.Popen[bytes]") -> None:
+    for pipe in (child.stdin, child.stdout):
+        if pipe is not None:
+            with suppress(OSError):  # a request that could not be sent
+                pipe.close()
+
+
+def _fill(pipe: IO[bytes], array: NDArray[Any]) -> bool:
+    """Read an array from a pipe; return False if the pipe ends before."""
+    rest = memoryview(array).cast("B") if array.size else memoryview(b"")
+    while len(rest):
+        count = pipe.readinto(rest)  # type: ignore[attr-defined]  # a buffered reader
+        if not count:
+            return False
+        rest = rest[count:]
+    return True
+
+
+def _failure(path: Path, reason: str) -> str:
+    return f"could not read {str(path)!r} as a mesh ({reason}); it is damaged, so export it again"
+
+
+_process = _ReaderProcess()
+atexit.register(_process.stop)
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_process.forget)

@@ -1,0 +1,86 @@
+"""Files at which VTK's readers crash or hang: one error of ours, and the next file is read as usual."""
+
+import multiprocessing
+import os
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from decals.errors import InvalidMesh
+from decals.surfaces import read_mesh
+from decals.surfaces.vtk_process import SECONDS, _process
+
+DAMAGED = Path(__file__).with_name("damaged")
+"""Files that crash or hang the process which reads them by pyvista 0.49 with VTK 9.6."""
+
+
+@pytest.fixture
+def sphere(tmp_path: Path) -> Path:
+    path = tmp_path / "sphere.vtp"
+    pv.Sphere(theta_resolution=8, phi_resolution=6).save(path)
+    return path
+
+
+def check_sphere(path: Path) -> None:
+    expected = pv.read(path)
+    vertices, faces = read_mesh(path)
+    assert np.array_equal(vertices, expected.points)
+    assert np.array_equal(faces, expected.regular_faces)
+
+
+@pytest.mark.parametrize("name", ["crash.vtu", "crash.vtk", "hang.vtp"])
+def test_a_file_that_breaks_the_reader_is_refused(name: str, sphere: Path) -> None:
+    begun = time.perf_counter()
+    with pytest.raises(InvalidMesh, match=f"{name}.*damaged"):
+        read_mesh(DAMAGED / name)
+    assert time.perf_counter() - begun < SECONDS + 30.0  # with the start of the process
+    check_sphere(sphere)
+
+
+def test_the_process_is_kept_and_started_again(sphere: Path) -> None:
+    check_sphere(sphere)
+    child = _process._child
+    assert child is not None
+    check_sphere(sphere)
+    assert _process._child is child
+    os.kill(child.pid, 9)
+    child.wait()
+    check_sphere(sphere)
+    assert _process._child is not child
+
+
+def test_threads_read_in_turn(sphere: Path) -> None:
+    threads = [threading.Thread(target=check_sphere, args=[sphere]) for _ in range(4)]
+    failures: list[object] = []
+    hook, threading.excepthook = threading.excepthook, failures.append
+    try:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        threading.excepthook = hook
+    assert failures == []
+
+
+def faces_of(path: Path) -> int:
+    return len(read_mesh(path)[1])
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="the system has no fork")
+def test_forked_children_read_by_processes_of_their_own(sphere: Path) -> None:
+    expected = faces_of(sphere)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(faces_of, [sphere] * 4).get(timeout=120) == [expected] * 4
+    assert faces_of(sphere) == expected
+
+
+def test_a_mesh_without_faces_is_refused_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "points.vtp"
+    pv.PolyData(np.zeros((3, 3), np.float32)).save(path)
+    with pytest.raises(InvalidMesh, match=r"points.vtp.*no faces"):
+        read_mesh(path)
