@@ -279,6 +279,8 @@ def load(path: str | os.PathLike[str]) -> Node:
         return from_json(Path(path).read_bytes())
     except InvalidFile as error:
         raise InvalidFile(f"{path}: {error}") from None
+    except ValueError:  # of the path; a text that is no tree is an InvalidFile
+        raise InvalidFile(f"path: expected the path of a file, got {path!r}") from None
 
 
 def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:

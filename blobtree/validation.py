@@ -20,14 +20,22 @@ LARGEST_NUMBER = 1e18
 LIMIT = f"none may be beyond {LARGEST_NUMBER:g}"
 
 
+def shown(value: object) -> str:
+    """Return the `repr` of a value; its type if it has none, such as a whole number of 10,000 digits."""
+    try:
+        return repr(value)
+    except Exception:  # of any kind, by a class of the user
+        return f"a {type(value).__name__}"
+
+
 def finite_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
     try:
         numbers = tuple(float(component) for component in cast(Iterable[Any], value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(abs(number) <= LARGEST_NUMBER for number in numbers):
-        raise InvalidNode(f"{name}: expected three finite numbers (x, y, z), got {value!r}; {LIMIT}")
+        raise InvalidNode(f"{name}: expected three finite numbers (x, y, z), got {shown(value)}; {LIMIT}")
     return numbers
 
 
@@ -43,7 +51,7 @@ def non_negative_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats from 0; raise `InvalidNode` otherwise."""
     vector = finite_vector(name, value)
     if min(vector) < 0.0:
-        raise InvalidNode(f"{name}: expected three numbers from 0, got {value!r}")
+        raise InvalidNode(f"{name}: expected three numbers from 0, got {shown(value)}")
     return vector
 
 
@@ -51,7 +59,7 @@ def positive_number(name: str, value: object) -> float:
     """Return `value` as a finite float above 0; raise `InvalidNode` otherwise."""
     number = finite_number(name, value)
     if number <= 0.0:
-        raise InvalidNode(f"{name}: expected a number above 0, got {value!r}")
+        raise InvalidNode(f"{name}: expected a number above 0, got {shown(value)}")
     return number
 
 
@@ -59,10 +67,10 @@ def finite_number(name: str, value: object) -> float:
     """Return `value` as a finite float; raise `InvalidNode` otherwise."""
     try:
         number = float(cast(Any, value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not abs(number) <= LARGEST_NUMBER:
-        raise InvalidNode(f"{name}: expected a finite number, got {value!r}; {LIMIT}")
+        raise InvalidNode(f"{name}: expected a finite number, got {shown(value)}; {LIMIT}")
     return number
 
 
@@ -70,7 +78,7 @@ def color_triple(value: object) -> Vector:
     """Return `value` as red, green and blue in [0, 1]; raise `InvalidNode` otherwise."""
     color = finite_vector("color", value)
     if min(color) < 0.0 or max(color) > 1.0:
-        raise InvalidNode(f"color: expected red, green, blue in [0, 1], got {value!r}")
+        raise InvalidNode(f"color: expected red, green, blue in [0, 1], got {shown(value)}")
     return color
 
 
@@ -78,15 +86,15 @@ def affine_matrix(value: ArrayLike) -> Matrix:
     """Return `value` (3×4 or 4×4) as an invertible affine map; raise `InvalidNode` otherwise."""
     try:
         matrix = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         matrix = np.empty(0)
     if matrix.shape == (4, 4) and np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0)):
         matrix = matrix[:3]
     if matrix.shape != (3, 4) or not np.all(np.abs(matrix) <= LARGEST_NUMBER):
-        raise InvalidNode(f"matrix: expected a finite 3×4 or affine 4×4 matrix, got {value!r}")
+        raise InvalidNode(f"matrix: expected a finite 3×4 or affine 4×4 matrix, got {shown(value)}")
     singular_values = np.linalg.svd(matrix[:, :3], compute_uv=False)
     if singular_values[-1] <= 1e-6 * singular_values[0]:
-        raise InvalidNode(f"matrix: expected an invertible map, got one that flattens space: {value!r}")
+        raise InvalidNode(f"matrix: expected an invertible map, got one that flattens space: {shown(value)}")
     return tuple(tuple(float(number) for number in row) for row in matrix)
 
 

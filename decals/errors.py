@@ -5,6 +5,7 @@
     ImplicitDecalsError(Exception)            root of every error raised on purpose
     ├── InvalidInput(ValueError)              an argument that cannot be used
     │   ├── InvalidDecals                     arrays that are no decals: shapes, NaN, radius ≤ 0
+    │   │   └── InvalidRow(IndexError)        a selection of decals that do not exist
     │   ├── InvalidMesh                       a mesh without a surface: empty, NaN, zero area
     │   ├── InvalidScattering                 an impossible request for particles: negative count, no surface
     │   ├── InvalidImage                      a file or array that is no image
@@ -33,6 +34,7 @@ __all__ = [
     "InvalidInput",
     "InvalidMesh",
     "InvalidPoints",
+    "InvalidRow",
     "InvalidScattering",
     "InvalidScene",
     "MissingPackage",
@@ -43,6 +45,10 @@ __all__ = [
 
 class InvalidDecals(InvalidInput):
     """Arrays that do not describe decals."""
+
+
+class InvalidRow(InvalidDecals, IndexError):
+    """A selection of decals that is no slice, mask or index of theirs; iteration ends at it."""
 
 
 class InvalidMesh(InvalidInput):

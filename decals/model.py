@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.formulas.falloff import RIM
+from decals.errors import InvalidRow
 from decals.images.load import decode_srgb
 from decals.validation import (
     bool_array,
     check_range,
+    describe,
     finite_array,
     orthogonal_vectors,
     row_selection,
@@ -228,9 +230,14 @@ class Decals:
         return f"Decals({len(self)}, radii from {self.radii.min():.3g} to {self.radii.max():.3g})"
 
     def __getitem__(self, rows: slice | ArrayLike) -> Self:
-        """Return some of the decals, by a slice, a mask or an array of indices."""
-        chosen = rows if isinstance(rows, slice) else np.atleast_1d(row_selection(rows))
-        arrays = {name: getattr(self, name)[chosen] for name in COLUMNS}
+        """Return some of the decals, by a slice, a mask or an array of indices; else raise InvalidRow."""
+        try:
+            chosen = rows if isinstance(rows, slice) else np.atleast_1d(row_selection(rows))
+            arrays = {name: getattr(self, name)[chosen] for name in COLUMNS}
+        except (IndexError, TypeError, ValueError, OverflowError):
+            raise InvalidRow(
+                f"rows: expected a slice, mask or indices of {len(self)} decals, got {describe(rows)}"
+            ) from None
         return type(self).of_rows(arrays) if arrays["radii"].ndim == 1 else type(self)(**arrays)
 
     @property

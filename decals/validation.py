@@ -27,7 +27,10 @@ MIN_TANGENT_SINE = 1e-3
 def describe(value: object) -> str:
     """Return a value in a few words: numbers and text as they are, other objects by their type."""
     if isinstance(value, int | float | str | bytes | list | tuple | np.number | np.ndarray) or value is None:
-        return " ".join(f"{value!r:.60}".split())
+        try:
+            return " ".join(f"{value!r:.60}".split())
+        except ValueError:  # a whole number of thousands of digits
+            return f"a {type(value).__name__} of very many digits"
     return f"a {type(value).__name__}"
 
 
@@ -140,6 +143,15 @@ def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = Inva
     return pixels
 
 
+def is_unicode(text: str) -> bool:
+    """Return True if a text has an encoding; False for the lone surrogates of undecodable file names."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def is_file(path: Path) -> bool:
     """Return True for an existing file; False also for an impossible path (too long, with a NUL)."""
     try:
@@ -227,7 +239,7 @@ def whole_array(name: str, values: Any, count: int, *, low: int, high: int, defa
     """Return whole numbers from low to high as a new array; the default in each row for None."""
     array = np.full(count, default, np.int64) if values is None else np.array(values)
     _check_shape(name, array.shape, (count,))
-    if count and array.dtype.kind not in "iu":
+    if (count and array.dtype.kind not in "iu") or array.dtype.kind not in "iuf":
         raise InvalidDecals(f"{name}: expected whole numbers, got {array.dtype}; round or index first")
     bad = (array < low) | (array > high)
     if bad.any():

@@ -26,6 +26,7 @@ from blobtree.meshing.creases import sharpened
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.progress import Cancel, Progress, watched
 from blobtree.tape.model import ImplicitModel, checked_tree
+from blobtree.validation import shown
 
 DEFAULT_RESOLUTION = 64
 
@@ -316,9 +317,9 @@ def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | N
         cells = DEFAULT_RESOLUTION if resolution is None else resolution
         if not isinstance(cells, int | np.integer) or cells < 1:
             raise InvalidResolution(
-                f"resolution: expected a whole number of cells from 1, got {resolution!r}"
+                f"resolution: expected a whole number of cells from 1, got {shown(resolution)}"
             )
-        cell_size = longest / int(cells)
+        cell_size = longest / int(min(cells, 2 * MAX_RESOLUTION))  # beyond it is refused below
     cell_size = _above_zero("cell_size", "size", cell_size)
     if not MIN_MODEL_SIZE < longest < MAX_MODEL_SIZE:
         raise InvalidResolution(
@@ -348,10 +349,10 @@ def _above_zero(name: str, noun: str, value: object) -> float:
     """Return `value` as a finite number above zero; raise `InvalidResolution` otherwise."""
     try:
         number = float(cast(Any, value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not 0.0 < number < np.inf:
-        raise InvalidResolution(f"{name}: expected a finite {noun} above 0, got {value!r}")
+        raise InvalidResolution(f"{name}: expected a finite {noun} above 0, got {shown(value)}")
     return number
 
 

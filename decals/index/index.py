@@ -27,11 +27,12 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int32Array, Int64Array
 from blobtree.device import known_device
 from blobtree.kernels import loaded
+from decals.errors import InvalidDecals
 from decals.index.build import build_index
 from decals.index.decal_cells import LEVEL_SHIFT, NO_PARITY
 from decals.index.lookup import IndexedDecals, count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, LAYER_LIMIT, MAX_COORDINATE, Decals
-from decals.validation import check_range, finite_array, whole_array
+from decals.validation import check_range, finite_array, instance, whole_array
 
 MAX_INFLUENCE = 4.0 * MAX_COORDINATE
 MAX_RANK = 8 * LAYER_LIMIT - 1
@@ -107,7 +108,8 @@ class DecalIndex:
 
     @classmethod
     def of(cls, decals: Decals) -> Self:
-        """Build the index of decals."""
+        """Build the index of decals; raise InvalidDecals for any other object."""
+        instance("decals", decals, Decals, InvalidDecals, "such as decals.scatter(...)")
         return cls.build(decals.positions, decals.influence, decals.ranks)
 
     @property

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
 from decals.rendering.viewpoint import Bounds, Rays
-from decals.validation import finite_number, finite_vector
+from decals.validation import describe, finite_number, finite_vector, real_array
 
 Vector = tuple[float, float, float]
 
@@ -222,7 +222,7 @@ def _half_diagonal(points: Float64Array) -> float:
 
 
 def _points(points: ArrayLike) -> Float64Array:
-    positions = np.asarray(points, np.float64)
+    positions = real_array("points", points, InvalidScene)
     if (
         positions.ndim != 2
         or positions.shape[1] != 3
@@ -236,9 +236,14 @@ def _points(points: ArrayLike) -> Float64Array:
 
 
 def _corners(bounds: Bounds) -> Float64Array:
-    box = np.asarray([bounds[0], bounds[1]], np.float64)
+    try:
+        box = np.asarray([bounds[0], bounds[1]], np.float64)
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError):
+        box = np.zeros(0)
     if box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any():
-        raise InvalidScene(f"bounds must be two finite corners (lower, upper) of three numbers, got {bounds}")
+        raise InvalidScene(
+            f"bounds must be two finite corners (lower, upper) of three numbers, got {describe(bounds)}"
+        )
     choice = np.indices((2, 2, 2)).reshape(3, 8).T
     return np.take_along_axis(box, choice, axis=0)
 

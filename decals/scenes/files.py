@@ -147,10 +147,9 @@ def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
     path = Path(path)
     try:
         text = path.read_bytes()
-    except OSError as error:
-        raise InvalidScene(
-            f"could not read the scene {str(path)!r} ({error.strerror}); check the path"
-        ) from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "no file can have this name"
+        raise InvalidScene(f"could not read the scene {str(path)!r} ({reason}); check the path") from error
     try:
         return from_json(text, folder=path.parent, samples=samples)
     except InvalidScene as error:
@@ -194,7 +193,7 @@ def is_scene(text: bytes) -> bool:
     """Return True if JSON has the format of a scene; damaged JSON if it begins like one."""
     try:
         return msgspec.json.decode(text, type=_Header).format == FORMAT
-    except msgspec.MsgspecError:
+    except (msgspec.MsgspecError, RecursionError):
         return f'"{FORMAT}"'.encode() in text[:HEADER_BYTES]
 
 
@@ -209,6 +208,8 @@ def _decode(text: bytes) -> _SceneRecord:
                 "it was written by another release of implicit-decals"
             )
         return msgspec.json.decode(text, type=_SceneRecord)
+    except RecursionError:
+        raise InvalidScene("expected a scene, but the file is nested too deeply; correct the file") from None
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise InvalidScene(f"expected a scene, but {_lower_first(str(error))}; correct the file") from error
 

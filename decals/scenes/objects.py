@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from decals.errors import InvalidScene
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
-from decals.validation import finite_vector, instance
+from decals.validation import describe, finite_vector, instance, is_unicode
 
 Color = tuple[float, float, float]
 Box = tuple[Float32Array, Float32Array]
@@ -69,6 +70,7 @@ class MeshObject:
         checked = {
             "name": _name(self.name),
             "color": _color(self.name, self.color),
+            "source": _source(self.name, self.source),
             "surface": surface,
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -173,8 +175,12 @@ def _renamed(item: SceneObject, taken: set[str]) -> SceneObject:
 
 
 def bounds_of(objects: Iterable[SceneObject]) -> Box:
-    """Return the box around several objects; InvalidScene if there are no objects."""
-    boxes = [item.bounds for item in objects]
+    """Return the box around several objects; InvalidScene if there are none, or one is of another kind."""
+    listed = list(objects) if isinstance(objects, Iterable) else [objects]
+    for item in listed:
+        if not isinstance(item, MeshObject | TreeObject):
+            raise InvalidScene(f"objects: expected objects of a scene, got {describe(item)}; use as_objects")
+    boxes = [item.bounds for item in listed]
     if not boxes:
         raise InvalidScene("expected at least one object, got none; add a mesh or a BlobTree")
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
@@ -192,7 +198,23 @@ def _name(name: str) -> str:
     instance("an object's name", name, str, InvalidScene, "give it a name of letters")
     if not name.strip():
         raise InvalidScene("expected a name for the object, got an empty one; give it a name")
+    if not is_unicode(name):
+        raise InvalidScene(f"expected a name of Unicode characters for the object, got {name!r}; rename it")
     return name
+
+
+def _source(name: str, source: object) -> str | None:
+    if source is None:
+        return None
+    try:
+        text = os.fspath(cast("str | os.PathLike[str]", source))
+    except TypeError:
+        text = ""
+    if not isinstance(text, str) or not text or not is_unicode(text):
+        raise InvalidScene(
+            f"object {name!r}, source: expected a path or 'sample:NAME', got {describe(source)}; leave it out"
+        )
+    return text
 
 
 def _color(name: str, color: ArrayLike) -> Color:

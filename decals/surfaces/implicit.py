@@ -110,7 +110,14 @@ class ImplicitSurface:
         return self.project(self._coarse.sample(count, seed)[0])
 
     def on(self, device: str) -> "DeviceImplicitSurface":
-        """Return the surface in the memory of a device; later calls return the same object."""
+        """Return the surface in the memory of a device; later calls return the same object.
+
+        Raises
+        ------
+        InvalidDevice
+            There is no such device.
+        """
+        device = known_device(device)
         if device not in self._on_devices:
             self._on_devices[device] = DeviceImplicitSurface(
                 self.tree, self._coarse.on(device), self._max_step

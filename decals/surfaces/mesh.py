@@ -132,7 +132,14 @@ class MeshSurface:
         return positions.astype(np.float32), self._normals[face]
 
     def on(self, device: str) -> "DeviceMeshSurface":
-        """Return the surface in the memory of a device; later calls return the same object."""
+        """Return the surface in the memory of a device; later calls return the same object.
+
+        Raises
+        ------
+        InvalidDevice
+            There is no such device.
+        """
+        device = known_device(device)
         if device not in self._on_devices:
             self._on_devices[device] = DeviceMeshSurface(
                 self.vertices,

@@ -88,7 +88,8 @@ def dataset_triangles(dataset: pv.DataSet | pv.MultiBlock, *, name: str) -> Mesh
 
 def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> MeshArrays:
     """Divide polygons into triangles, concave ones too, after a check of their indices."""
-    vertices: Any = np.asarray(points, np.float32)
+    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused by surfaces
+        vertices: Any = np.asarray(points, np.float32)
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
     if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:

@@ -64,12 +64,20 @@ def read_ply(path: Path) -> tuple[NDArray[np.float64], Polygons]:
         If the file is not PLY, has no faces, or ends too early.
     """
     try:
-        order, elements, body = _header(path.read_bytes())
-        columns = dict(_elements(order, elements, body))
-    except (ValueError, IndexError, KeyError) as error:
+        with np.errstate(invalid="ignore", over="ignore"):  # the checks of values come later
+            order, elements, body = _header(path.read_bytes())
+            columns = dict(_elements(order, elements, body))
+            vertex = columns.get("vertex", {})
+            polygons = _polygons(columns)
+            scalar = any(np.ndim(vertex[axis]) != 1 for axis in "xyz" if axis in vertex)
+    except OSError as error:
+        raise InvalidMesh(
+            f"could not read {str(path)!r} ({error.strerror}); check its permissions"
+        ) from error
+    except (ValueError, LookupError, OverflowError, TypeError, MemoryError) as error:
         raise InvalidMesh(f"could not read {str(path)!r} as PLY ({error}); export it again") from error
-    vertex = columns.get("vertex", {})
-    polygons = _polygons(columns)
+    if scalar:
+        raise InvalidMesh(f"{str(path)!r} has lists in place of coordinates; export it again")
     if polygons is None or not {"x", "y", "z"} <= vertex.keys():
         raise InvalidMesh(
             f"{str(path)!r} has no vertices with x, y, z or no faces; export it as a triangle mesh"
@@ -92,7 +100,15 @@ def _corner_lists(element: Columns) -> Polygons | None:
     if corners is None:
         return None
     if isinstance(corners, list):
-        return [np.asarray(row, np.int64) for row in corners]
+        return [_row(row) for row in corners]
+    if corners.ndim != 2:
+        raise ValueError("its faces are no lists of corners")
+    return np.asarray(corners, np.int64)
+
+
+def _row(corners: NDArray[np.generic]) -> NDArray[np.int64]:
+    if corners.ndim != 1:
+        raise ValueError("its faces are no lists of corners")
     return np.asarray(corners, np.int64)
 
 
@@ -121,7 +137,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
             case ["format", name, _]:
                 order = _ORDERS[name]
             case ["element", name, count]:
-                elements.append(_Element(name, int(count), ()))
+                elements.append(_Element(name, _row_count(count), ()))
             case ["property", "list", count_kind, kind, name]:
                 elements.append(_extended(elements.pop(), _Property(name, _TYPES[kind], _TYPES[count_kind])))
             case ["property", kind, name]:
@@ -129,6 +145,13 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     if order is None:
         raise ValueError("its header names no format")
     return order, elements, body
+
+
+def _row_count(text: str) -> int:
+    count = int(text)
+    if not 0 <= count <= np.iinfo(np.int64).max:
+        raise ValueError(f"an element claims {text[:40]} rows")
+    return count
 
 
 def _extended(element: _Element, prop: _Property) -> _Element:
@@ -197,7 +220,7 @@ def _row_type(order: str, element: _Element, body: bytes, position: int) -> np.d
 
 def _list_length(value: Any) -> int:
     """Return the length of a list; ValueError if it is absurd."""
-    count = int(value)
+    count = int(value) if np.isfinite(value) else -1
     if not 0 <= count <= MAX_LIST_LENGTH:
-        raise ValueError(f"one of its lists claims {count} entries")
+        raise ValueError(f"one of its lists claims {value} entries")
     return count

@@ -1,0 +1,127 @@
+"""Wrong arguments, file names and PLY headers, each of which raised an exception of another library."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blobtree
+import decals
+from blobtree import Point
+from decals.editing import EditSession, SetValues
+from decals.errors import ImplicitDecalsError
+from decals.index import DecalIndex
+from decals.scenes.objects import bounds_of
+from decals.surfaces import as_surface, read_mesh
+
+HUGE = 10**400
+ENDLESS = 10**6000
+"""A number that Python refuses to print."""
+
+BALL = Point((0, 0, 0), radius=1.0)
+TRIANGLE: Any = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+SPOTS = decals.Decals([[0, 0, 1]] * 3, [[0, 0, 1]] * 3, [[1, 0, 0]] * 3, [0.1] * 3, images=[-1] * 3)
+CAMERA = decals.Camera((0, 0, 4), (0, 0, 0))
+SCENE = decals.Scene(objects=(decals.TreeObject("ball", BALL),), camera=CAMERA, decals=SPOTS)
+WRONG: Any = object()
+"""A value of no kind that is expected anywhere."""
+
+CALLS: dict[str, Callable[[], object]] = {
+    "radius": lambda: Point((0, 0, 0), radius=HUGE),
+    "endless radius": lambda: Point((0, 0, 0), radius=ENDLESS),
+    "centre": lambda: Point((HUGE, 0, 0), radius=1.0),
+    "scale": lambda: BALL.scale(HUGE),
+    "angle": lambda: BALL.rotate((0, 0, 1), HUGE),
+    "matrix": lambda: BALL.transform([[HUGE] * 4] * 3),
+    "resolution": lambda: blobtree.polygonize(BALL, resolution=HUGE),
+    "cell size": lambda: blobtree.polygonize(BALL, cell_size=HUGE),
+    "device of a tree": lambda: as_surface(BALL).on("nope"),
+    "device of a mesh": lambda: as_surface(TRIANGLE).on("nope"),
+    "no device": lambda: as_surface(TRIANGLE).on(WRONG),
+    "row": lambda: SPOTS[3],
+    "rows": lambda: SPOTS[[0, 99]],
+    "text as row": lambda: SPOTS["a"],
+    "fraction as row": lambda: SPOTS[[0.5]],
+    "short mask": lambda: SPOTS[[True]],
+    "None as row": lambda: SPOTS[WRONG],
+    "slice of text": lambda: SPOTS[slice("a", "b")],
+    "index of no decals": lambda: DecalIndex.of(WRONG),
+    "bounds of none": lambda: bounds_of(WRONG),
+    "bounds of text": lambda: bounds_of("ball"),  # type: ignore[arg-type]
+    "framing of none": lambda: decals.Camera.framing(WRONG),
+    "framing of objects": lambda: decals.Camera.framing(SCENE.objects),  # type: ignore[arg-type]
+    "fitting of none": lambda: decals.Camera.fitting(WRONG),
+    "layer of no decal": lambda: EditSession(SCENE).do(SetValues.each([], layers="x")),
+    "number as source": lambda: decals.MeshObject("a", *TRIANGLE, source=3.5),  # type: ignore[arg-type]
+    "surrogate as source": lambda: decals.MeshObject("a", *TRIANGLE, source="\ud800.ply"),
+    "surrogate as name": lambda: decals.TreeObject("\ud800", BALL),
+    "NUL in a scene": lambda: decals.load_scene("a\0.json"),
+    "surrogate in a scene": lambda: decals.load_scene("\ud800.json"),
+    "surrogate in a tree": lambda: blobtree.load("\ud800.json"),
+    "surrogate in a mesh": lambda: read_mesh("\ud800.ply"),
+    "surrogate in a saved scene": lambda: decals.save_scene(SCENE, "\ud800.json"),
+    "NUL in a saved scene": lambda: decals.save_scene(SCENE, "a\0/a.json"),
+}
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=list(CALLS))
+def test_a_wrong_argument_gets_an_error_of_ours(call: Callable[[], object]) -> None:
+    with pytest.raises(ImplicitDecalsError):
+        call()
+
+
+def test_iteration_over_decals_ends_at_the_last() -> None:
+    """Python ends a loop over an object without `__iter__` at the first IndexError."""
+    assert [len(spot) for spot in SPOTS] == [1, 1, 1]
+    with pytest.raises(IndexError):
+        SPOTS[3]
+
+
+HEADER = "ply\nformat ascii 1.0\n"
+POINTS = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+FACES = "element face 1\nproperty list uchar int vertex_indices\n"
+ROWS = "0 0 0\n1 0 0\n0 1 0\n"
+
+PLY = {
+    "property without element": f"{HEADER}property float x\nend_header\n",
+    "negative rows": f"{HEADER}{POINTS.replace('3', '-3')}{FACES}end_header\n{ROWS}3 0 1 2\n",
+    "endless rows": f"{HEADER}{POINTS.replace('3', '9' * 30)}{FACES}end_header\n{ROWS}3 0 1 2\n",
+    "property twice": f"{HEADER}{POINTS}property float x\n{FACES}end_header\n{ROWS}3 0 1 2\n",
+    "lists as coordinates": f"{HEADER}{POINTS.replace('float x', 'list uchar float x')}{FACES}end_header\n"
+    "1 0 0 0\n2 0 0 0 0\n1 0 0 0\n3 0 1 2\n",
+    "numbers as faces": f"{HEADER}{POINTS}{FACES.replace('list uchar int', 'int')}end_header\n{ROWS}3\n",
+    "numbers as strips": f"{HEADER}{POINTS}element tristrips 1\nproperty int vertex_indices\n"
+    f"end_header\n{ROWS}3\n",
+    "endless list": f"{HEADER}{POINTS}{FACES.replace('uchar', 'float')}end_header\n{ROWS}inf 0 1 2\n",
+    "NaN as length": f"{HEADER}{POINTS}{FACES.replace('uchar', 'float')}end_header\n{ROWS}nan 0 1 2\n",
+    "NaN as corner": f"{HEADER}{POINTS}{FACES}end_header\n{ROWS}3 0 nan 1e300\n",
+    "no properties": f"{HEADER}element vertex 3\nelement face 1\nend_header\n{ROWS}",
+    "unknown format": "ply\nformat octal 1.0\nend_header\n",
+    "coordinate beyond float32": f"{HEADER}{POINTS}{FACES}end_header\n1e300 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+}
+
+
+@pytest.mark.parametrize("text", PLY.values(), ids=list(PLY))
+def test_an_odd_ply_header_gets_an_error_of_ours(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "odd.ply"
+    path.write_text(text, encoding="ascii")
+    with pytest.raises(ImplicitDecalsError):
+        decals.load_model(path)
+
+
+@pytest.mark.parametrize("start", ["", '{"format": "implicit-decals-scene", "version": 1, "objects": '])
+@pytest.mark.parametrize(
+    "load", [decals.load_model, decals.load_scene, blobtree.load], ids=lambda f: f.__name__
+)
+def test_deeply_nested_json_gets_an_error_of_ours(load: Any, start: str, tmp_path: Path) -> None:
+    path = tmp_path / "deep.json"
+    path.write_text(start + "[" * 100_000, encoding="ascii")
+    with pytest.raises(ImplicitDecalsError):
+        load(path)
+
+
+def test_a_source_may_be_a_path_object() -> None:
+    assert decals.MeshObject("a", *TRIANGLE, source=Path("a.ply")).source == "a.ply"  # type: ignore[arg-type]
+    assert np.isfinite(decals.MeshObject("a", *TRIANGLE).vertices).all()
