@@ -12,11 +12,15 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 from pyvista.core.utilities.reader import CLASS_READERS
 
+from blobtree._typing import Float32Array, Int32Array
 from blobtree.vtk_errors import vtk_errors
 from decals.errors import InvalidMesh
 from decals.surfaces.ply import Polygons, read_ply
-from decals.surfaces.vtk_process import MeshArrays, can_isolate, read_isolated
+from decals.surfaces.vtk_process import can_isolate, read_isolated
 from decals.validation import describe, is_file
+
+MeshArrays = tuple[Float32Array, Int32Array]
+"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
 
 _VOLUMES = (pv.UnstructuredGrid, pv.StructuredGrid, pv.MultiBlock)
 """Kinds of datasets in files whose boundary is a surface; an image or a point set has none."""

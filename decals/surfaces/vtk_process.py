@@ -21,9 +21,6 @@ from numpy.typing import NDArray
 from blobtree._typing import Float32Array, Int32Array
 from decals.errors import InvalidMesh
 
-MeshArrays = tuple[Float32Array, Int32Array]
-"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
-
 START_SECONDS = 120.0
 """Seconds until the process must be ready; imports from a slow disk take long."""
 
@@ -39,7 +36,7 @@ def can_isolate() -> bool:
     return bool(sys.executable) and not getattr(sys, "frozen", False)
 
 
-def read_isolated(path: Path) -> MeshArrays:
+def read_isolated(path: Path) -> tuple[Float32Array, Int32Array]:
     """Read a mesh file by pyvista in the process of its own.
 
     Returns
@@ -62,7 +59,7 @@ class _ReaderProcess:
         self._lock = threading.Lock()
         self._child: subprocess.Popen[bytes] | None = None
 
-    def read(self, path: Path) -> MeshArrays:
+    def read(self, path: Path) -> tuple[Float32Array, Int32Array]:
         """Read a file; see `read_isolated`."""
         size = path.stat().st_size
         seconds = SECONDS + SECONDS_PER_BYTE * size
@@ -178,7 +175,7 @@ def _close_pipes(child: "subprocess.Popen[bytes]") -> None:
 
 def _fill(pipe: IO[bytes], array: NDArray[Any]) -> bool:
     """Read an array from a pipe; return False if the pipe ends before."""
-    rest = memoryview(array).cast("B") if array.size else memoryview(b"")
+    rest = array.data.cast("B") if array.size else memoryview(b"")
     while len(rest):
         count = pipe.readinto(rest)  # type: ignore[attr-defined]  # a buffered reader
         if not count:
