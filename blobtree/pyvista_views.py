@@ -201,7 +201,7 @@ def _rectangle(
     if len(crossings) == 0:
         raise InvalidPoints(
             f"origin: the plane through {tuple(start.tolist())} misses the model, whose influence ends at "
-            f"{tree.bounds[0].tolist()} and {tree.bounds[1].tolist()}; move it"
+            f"{tree.support[0].tolist()} and {tree.support[1].tolist()}; move it"
         )
     flat = np.column_stack([(crossings - start) @ right, (crossings - start) @ up])
     low, high = flat.min(axis=0), flat.max(axis=0)
@@ -213,7 +213,7 @@ def _rectangle(
 
 def _crossings(tree: ImplicitModel, start: Float64Array, axis: Float64Array) -> Float64Array:
     """Return the points (n, 3) where edges of the tree's box cross the plane."""
-    box = np.array(tree.bounds, np.float64)
+    box = np.array(tree.support, np.float64)
     corners = np.array([[box[c >> i & 1, i] for i in range(3)] for c in range(8)])
     heights = (corners - start) @ axis
     points = []

@@ -122,3 +122,12 @@ def point_array(
             "drop such rows, or rescale the model"
         )
     return array
+
+
+def points_or_point(points: ArrayLike) -> tuple[Float32Array, bool]:
+    """Return points as `point_array` does, and True if they are a single point of shape (3,)."""
+    try:
+        single = np.shape(points) == (3,)
+    except ValueError:  # rows of different lengths, which `point_array` refuses
+        single = False
+    return point_array(cast(ArrayLike, [points]) if single else points), single

@@ -81,7 +81,7 @@ def polygonize(
     tree : Node
         The model.
     resolution : int, optional
-        Cells along the longest side of the tree's box of influence; 64 by default.
+        Cells along the longest side of the tree's support; 64 by default.
     cell_size : float, optional
         Side of a cell, in the model's units. Features thinner than a cell may be lost.
     chord_error : float, optional
@@ -309,7 +309,7 @@ class Polygonizer:
 
 def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:
     """Return the side of a cell from `resolution` or `cell_size`, once it is checked."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
     longest = float((upper - lower).max())
     if resolution is not None and cell_size is not None:
         raise InvalidResolution("expected either resolution or cell_size, got both; drop one")
@@ -337,7 +337,7 @@ def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | N
 def _chord_error(tree: ImplicitModel, value: object) -> float:
     """Return `value` as a chord error that float32 can resolve."""
     chord_error = _above_zero("chord_error", "length", value)
-    smallest = MIN_RELATIVE_ERROR * float(np.abs(tree.bounds).max())
+    smallest = MIN_RELATIVE_ERROR * float(np.abs(tree.support).max())
     if chord_error < smallest:
         raise InvalidResolution(
             f"chord_error: {chord_error:g} is below what float32 can tell there; allow {smallest:.2g} or more"
@@ -357,6 +357,6 @@ def _above_zero(name: str, noun: str, value: object) -> float:
 
 
 def _grid(tree: ImplicitModel, cell_size: float) -> Grid:
-    """Return cells around the box of influence, and one more on every side so that the surface is closed."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    """Return cells around the support, and one more on every side so that the surface is closed."""
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
     return aligned_grid(lower - cell_size, upper + cell_size, cell_size)

@@ -77,7 +77,7 @@ def primitive_near(tree: Node, point: ArrayLike) -> Path:
 def primitives_around(tree: Node, point: Float32Array) -> list[Path]:
     """Return the paths of the primitives whose boxes hold a point float32[1, 3]; of all if no box does."""
     paths = primitive_paths(tree)
-    return [path for path in paths if inside_bounds(point, node_in_world(tree, path))[0]] or paths
+    return [path for path in paths if inside_support(point, node_in_world(tree, path))[0]] or paths
 
 
 def with_node(tree: Node, path: Path, node: Node) -> Node:
@@ -113,11 +113,11 @@ def node_in_world(tree: Node, path: Path) -> Node:
     return result
 
 
-def inside_bounds(points: Float32Array, *nodes: Node) -> BoolArray:
-    """Return True for each of the points (n, 3) that lies in the box of influence of one of the nodes."""
+def inside_support(points: Float32Array, *nodes: Node) -> BoolArray:
+    """Return True for each of the points (n, 3) that lies in the support of one of the nodes."""
     inside = np.zeros(len(points), np.bool_)
     for node in nodes:
-        lower, upper = node.bounds
+        lower, upper = node.support
         inside |= ((points >= lower) & (points <= upper)).all(axis=1)
     return inside
 

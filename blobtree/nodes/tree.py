@@ -21,6 +21,7 @@ from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
 from blobtree.kernels import loaded
+from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
@@ -112,6 +113,9 @@ class Node(ImplicitModel):
 
     def __add__(self, other: "Node") -> "Node":
         return _folded(Sum, self, other)
+
+    def __radd__(self, other: int) -> "Node":
+        return self if isinstance(other, int) and other == 0 else NotImplemented  # the start of `sum`
 
     def __or__(self, other: "Node") -> "Node":
         return _folded(Union, self, other)
@@ -256,8 +260,8 @@ class Node(ImplicitModel):
         Raises
         ------
         InvalidNode
-            The distance is not a finite number. `tape` and `bounds` of the result raise it too, if a negative
-            distance leaves nothing of a primitive.
+            The distance is not a finite number. `tape` and `support` of the result raise it too, if a
+            negative distance leaves nothing of a primitive.
 
         Examples
         --------
@@ -269,18 +273,41 @@ class Node(ImplicitModel):
 
     # -- queries ------------------------------------------------------------------------------------
 
+    @Lazy
+    def bounds(self) -> tuple[Float32Array, Float32Array]:
+        """Lower and upper corner of the surface, float32[3] each; `support` is the larger box of the field.
+
+        The box of the vertices of ``polygonize(self)``, which lie on the surface. It may be too small by a
+        cell at most, a 64th of the longest side of the support. Parts thinner than a cell may be missed. A
+        tree without a surface raises `InvalidNode`.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> lower, upper = Point((0, 0, 0), radius=1.0).bounds
+        >>> upper.round(2).tolist()
+        [1.0, 1.0, 1.0]
+        """
+        vertices = polygonize(self).vertices
+        if not len(vertices):
+            raise InvalidNode(
+                "bounds: expected a tree with a surface, got none in 64 cells; `support` is its field's box"
+            )
+        return vertices.min(axis=0), vertices.max(axis=0)
+
     def __call__(self, points: ArrayLike) -> Float32Array:
         """Return the field values at points.
 
         Parameters
         ----------
-        points : array-like (n, 3)
-            Points in the world, in model units.
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
 
         Returns
         -------
         numpy.ndarray
-            float32[n]: 0 outside every influence, 0.5 on the surface, more inside.
+            float32[n], or one number at one point: 0 outside every influence, 0.5 on the surface, more
+            inside.
 
         Raises
         ------
@@ -292,6 +319,8 @@ class Node(ImplicitModel):
         >>> from blobtree import Point
         >>> Point((0, 0, 0), radius=1.0)([[0, 0, 0], [1, 0, 0]]).round(3).tolist()
         [1.0, 0.5]
+        >>> float(Point((0, 0, 0), radius=1.0)([0, 0, 0]))
+        1.0
         """
         return super().__call__(points)
 
@@ -300,13 +329,13 @@ class Node(ImplicitModel):
 
         Parameters
         ----------
-        points : array-like (n, 3)
-            Points in the world, in model units.
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
 
         Returns
         -------
         numpy.ndarray
-            float32[n, 3], per model unit; they point into the model.
+            float32[n, 3], or float32[3] at one point, per model unit; they point into the model.
 
         Raises
         ------
@@ -326,13 +355,13 @@ class Node(ImplicitModel):
 
         Parameters
         ----------
-        points : array-like (n, 3)
-            Points in the world, in model units.
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
 
         Returns
         -------
         numpy.ndarray
-            float32[n, 3]: red, green and blue, black outside every influence.
+            float32[n, 3], or float32[3] at one point: red, green and blue, black outside every influence.
 
         Raises
         ------
@@ -391,9 +420,9 @@ class Node(ImplicitModel):
 
         Parameters
         ----------
-        origins : array-like (n, 3)
-            Starts of the rays. A ray that starts inside hits at once.
-        directions : array-like (n, 3)
+        origins : array-like (n, 3) or (3,)
+            Starts of the rays, or of one ray. A ray that starts inside hits at once.
+        directions : array-like (n, 3) or (3,)
             Directions of any length above 0.
         device : str, optional
             Warp device that does the work; the current one by default.
@@ -491,7 +520,7 @@ class Node(ImplicitModel):
         normal : array-like (3,)
             Normal of the plane, of any length above 0.
         resolution : int
-            Squares along the longer side of the plane's part in the tree's box.
+            Squares along the longer side of the plane's part in the tree's support.
         values : iterable of float
             Field values that get lines; by default 0.1, 0.2, …, 1.
 

@@ -21,8 +21,8 @@ from blobtree.tape.program import (
 EMPTY: Box = (np.full(3, np.inf), np.full(3, -np.inf))
 
 
-def influence_bounds(program: list[Instruction]) -> tuple[Float32Array, Float32Array]:
-    """Return lower and upper corner (3,) of the box of influence of a tree, rounded outward.
+def support_box(program: list[Instruction]) -> tuple[Float32Array, Float32Array]:
+    """Return lower and upper corner (3,) of the support of a tree, rounded outward.
 
     The program runs over boxes in place of numbers. A tree that is empty everywhere has the box of its first
     primitive, so that views always have a box to frame.

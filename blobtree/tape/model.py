@@ -1,6 +1,7 @@
 """A tree as a field: its program, its tape, and values, gradients, slope bounds, colours and projections."""
 
 import reprlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
 from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
-from blobtree.tape.bounds import influence_bounds
+from blobtree.tape.bounds import support_box
 from blobtree.tape.evaluate_kernels import (
     evaluate_bounds,
     evaluate_colors,
@@ -21,7 +22,7 @@ from blobtree.tape.evaluate_kernels import (
 )
 from blobtree.tape.program import Instruction, ProgramNode, compile_program
 from blobtree.tape.tape import Tape, compile_tape
-from blobtree.validation import point_array
+from blobtree.validation import point_array, points_or_point
 
 
 class ImplicitModel(ProgramNode):
@@ -40,21 +41,31 @@ class ImplicitModel(ProgramNode):
         return compile_tape(self._program)
 
     @Lazy
-    def bounds(self) -> tuple[Float32Array, Float32Array]:
+    def support(self) -> tuple[Float32Array, Float32Array]:
         """Lower and upper corner, float32[3] each, of a box outside which the field is exactly 0."""
-        return influence_bounds(self._program)
+        return support_box(self._program)
 
     def __call__(self, points: ArrayLike) -> Float32Array:
-        """Return the field values (n,) at `points` (n, 3)."""
-        return values_at(self.tape, points)
+        """Return the field values (n,) at `points` (n, 3), or one value at one point (3,)."""
+        return _one_or_rows(points, lambda rows: values_at(self.tape, rows))
 
     def gradient(self, points: ArrayLike) -> Float32Array:
-        """Return the exact field gradients (n, 3) at `points` (n, 3)."""
-        return gradients_at(self.tape, points)[:, 1:]
+        """Return the exact field gradients (n, 3) at `points` (n, 3), or one at one point (3,)."""
+        return _one_or_rows(points, lambda rows: gradients_at(self.tape, rows)[:, 1:])
 
     def colors(self, points: ArrayLike) -> Float32Array:
-        """Return the blended colours (n, 3) at `points` (n, 3), black outside every primitive's influence."""
-        return colors_at(self.tape, points)
+        """Return the blended colours (n, 3) at `points` (n, 3), or one at one point (3,).
+
+        It is black outside every primitive's influence.
+        """
+        return _one_or_rows(points, lambda rows: colors_at(self.tape, rows))
+
+
+def _one_or_rows(points: ArrayLike, evaluate: Callable[[ArrayLike], Float32Array]) -> Float32Array:
+    """Return a function's rows at points (n, 3), or its only row at one point (3,)."""
+    array, single = points_or_point(points)
+    rows = evaluate(array)
+    return rows[0] if single else rows
 
 
 def checked_tree(tree: object) -> ImplicitModel:

@@ -13,7 +13,7 @@ from blobtree.errors import InvalidPoints
 from blobtree.tape.model import ImplicitModel
 from blobtree.tracing.ray_kernels import shade_hits, trace_rays
 from blobtree.tracing.tree_cells import device_cells
-from blobtree.validation import point_array
+from blobtree.validation import points_or_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def trace_arrays(tree: ImplicitModel, origins: Any, directions: Any) -> tuple[An
 
 def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> list[Any]:
     """Return checked rays as arrays on a device."""
-    starts, vectors = point_array(origins), point_array(directions)
+    starts, vectors = points_or_point(origins)[0], points_or_point(directions)[0]
     if starts.shape != vectors.shape:
         raise InvalidPoints(f"directions: expected one per origin, {len(starts)}, got {len(vectors)}")
     largest = np.abs(vectors).max(axis=1, initial=0.0)

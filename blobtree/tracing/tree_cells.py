@@ -86,7 +86,7 @@ def trace_tolerance(bounds: tuple[Float32Array, Float32Array]) -> float:
 
 
 def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
-    lower, upper = tree.bounds
+    lower, upper = tree.support
     return tuple(lower.tolist()), tuple(upper.tolist())
 
 

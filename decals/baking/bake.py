@@ -76,7 +76,7 @@ def bake(
     mapping : ImageMapping
         Image mapping: how images lie on curved surface.
     resolution : int, optional
-        Cells along the longest side of a tree's box, for the triangles of implicit objects; 64 by default.
+        Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64.
     creases : bool
         Keep the edges that unions, intersections and differences leave on implicit objects.
     progress : callable, optional

@@ -7,7 +7,7 @@ import numpy as np
 from blobtree import ISO, Node
 from blobtree._typing import Float32Array, Float64Array, IndexArray, Int64Array
 from blobtree.lazy import Lazy
-from blobtree.nodes.paths import Path, inside_bounds, moved, node_at, node_in_world, with_node, world_matrix
+from blobtree.nodes.paths import Path, inside_support, moved, node_at, node_in_world, with_node, world_matrix
 from decals.editing.document import Document, ForkFamily
 from decals.editing.queries import SurfacePoints, nearest_points
 from decals.scenes.objects import SceneObject, TreeObject
@@ -57,7 +57,7 @@ def followers(
     numbers, decals = document.decals.numbers, document.decals.decals
     anchor = _drag_anchor(document, (document.objects, number, path), tree, decals.positions)
     near = np.flatnonzero(
-        inside_bounds(decals.positions, node_in_world(tree, path), node_in_world(item.tree, path))
+        inside_support(decals.positions, node_in_world(tree, path), node_in_world(item.tree, path))
     )
     rows = anchor.on_object(near)
     positions = decals.positions[rows].astype(np.float64)
@@ -96,7 +96,7 @@ class DragAnchor:
         """Part of the node's displacement that each decal follows; 0 outside the node's support."""
         _, _, path = self._key
         shifted = [node_in_world(tree, path) for pair in _shifted_trees(self._tree, path)[1] for tree in pair]
-        near = inside_bounds(self._positions, *shifted)
+        near = inside_support(self._positions, *shifted)
         weights = np.zeros(len(near))
         weights[near] = following_weights(self._tree, path, self._positions[near].astype(np.float64))
         return weights
@@ -132,7 +132,7 @@ def following_weights(tree: Node, path: Path, points: Float64Array) -> Float64Ar
 
 def _shifted_trees(tree: Node, path: Path) -> tuple[float, list[tuple[Node, Node]]]:
     """Return a small step, and for each world axis the trees with the node moved ahead and back by it."""
-    low, high = node_in_world(tree, path).bounds
+    low, high = node_in_world(tree, path).support
     step = DIFFERENCE_STEP * float((high - low).min())
     inverse = np.linalg.inv(world_matrix(tree, path))
 

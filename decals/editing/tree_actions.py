@@ -100,7 +100,7 @@ class TreeActions:
 
     def _middle(self, number: int, path: Path) -> Float32Array:
         """Return the middle of a primitive's box, which moves with the primitive."""
-        low, high = node_in_world(self._tree(number), path).bounds
+        low, high = node_in_world(self._tree(number), path).support
         return np.asarray((low + high) / 2)
 
     @property
@@ -316,7 +316,7 @@ def _surface_check(number: int) -> Step:
 
 def _thickness(node: Node) -> float:
     """Return the approximate visible radius of a primitive; its box has its influence radius."""
-    low, high = node.bounds
+    low, high = node.support
     return RIM * float((high - low).min()) / 2
 
 

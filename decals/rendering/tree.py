@@ -282,7 +282,7 @@ class TreeDrawable:
     def __init__(self, context: Context, item: TreeHolder) -> None:
         tree = item.tree
         cells = tracing_cells(tree)
-        self._bounds = tree.bounds
+        self._bounds = tree.support
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         self._gl = context.gl
@@ -304,7 +304,7 @@ class TreeDrawable:
 
     @property
     def bounds(self) -> Bounds:
-        """The tree's box of influence."""
+        """The tree's support."""
         return self._bounds
 
     @property

@@ -29,7 +29,7 @@ FIELD_TOLERANCE = 1e-4
 
 
 RESOLUTION = 64
-"""Cells of the coarse mesh along the longest side of the tree's box."""
+"""Cells of the coarse mesh along the longest side of the tree's support."""
 
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
@@ -50,8 +50,8 @@ class ImplicitSurface:
     tree : blobtree.Node
         The model.
     resolution : int, optional
-        Cells of the coarse mesh along the longest side of the tree's box. Parts thinner than a cell may get
-        no samples. Default 64.
+        Cells of the coarse mesh along the longest side of the tree's support. Parts thinner than a cell may
+        get no samples. Default 64.
     device : str, optional
         Warp device for queries of the host, except `raycast`. Default "cpu".
 
@@ -157,7 +157,7 @@ class DeviceImplicitSurface:
         kernel_for = tree.tape.instruction_set.kernel_for
         self._project, self._mark_above = kernel_for(project_with_mesh), kernel_for(mark_above)
         self._coarse, self._max_step = coarse, max_step
-        low, high = tree.bounds
+        low, high = tree.support
         self._low, self._high = wp.vec3(*low), wp.vec3(*high)
 
     def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
@@ -173,7 +173,7 @@ class DeviceImplicitSurface:
 
 
 def _max_step(tree: Node, resolution: int) -> float:
-    low, high = tree.bounds
+    low, high = tree.support
     return MAX_STEP * float((high - low).max()) / resolution
 
 

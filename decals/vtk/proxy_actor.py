@@ -32,7 +32,7 @@ def _tree_box(item: TreeObject) -> Box:
     cells = tracing_cells(item.tree)
     crossed = np.argwhere(cells.blocks.reshape(cells.counts) >= 0)
     if not len(crossed):
-        return item.tree.bounds
+        return item.tree.support
     low = cells.lower + cells.block_size * crossed.min(axis=0)
     high = cells.lower + cells.block_size * (crossed.max(axis=0) + 1)
     return low.astype(np.float32), high.astype(np.float32)

@@ -35,7 +35,7 @@ def errors(device: str) -> dict[str, float]:
         for resolution in RESOLUTIONS:
             mesh = polygonize(tree, resolution=resolution, creases=True, device=device)
             assert mesh.sheet_counts is not None
-            cell = float((tree.bounds[1] - tree.bounds[0]).max()) / resolution
+            cell = float((tree.support[1] - tree.support[0]).max()) / resolution
             worst = max(worst, float(ring.distances(mesh.vertices[mesh.sheet_counts > 1]).max()) / cell)
             met, unmet = met + int((mesh.sheet_counts > 1).sum()), unmet + int((mesh.sheet_counts == 0).sum())
     return {"crease_error_h": worst, "met": met, "unmet": unmet}

@@ -11,7 +11,7 @@ from tests.blobtree.meshing.test_polygonize import BALL, assert_closed, ring, vo
 
 
 def meshed(tree: object, cell: float) -> Mesh:
-    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)  # type: ignore[attr-defined]
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)  # type: ignore[attr-defined]
     cells = build_cells(tree.tape, aligned_grid(lower - cell, upper + cell, cell))  # type: ignore[attr-defined]
     positions, faces = marching_cubes(cells)
     return Mesh(positions.numpy(), faces.numpy(), positions.numpy(), positions.numpy())

@@ -74,7 +74,7 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
         tree = Sum(tuple(blobs(count)))
         cells = tracing_cells(tree)
         kinds = Kinds.of(tree.tape)
-        part = covered_rectangle(tree.bounds, tile)
+        part = covered_rectangle(tree.support, tile)
         arrays[f"tape/{count}"], arrays[f"blocks/{count}"] = cells.tape, cells.blocks
         arrays[f"distances/{count}"] = tree.raycast(*pixel_rays(size, CHECKED)).distances
         scenes[str(count)] = {
@@ -82,8 +82,8 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
             "compute": tracing_shader(kinds, PassBackend.COMPUTE).text,
             "uniforms": {
                 **tracing_uniforms(cells),
-                "box_lower": tree.bounds[0].tolist(),
-                "box_upper": tree.bounds[1].tolist(),
+                "box_lower": tree.support[0].tolist(),
+                "box_upper": tree.support[1].tolist(),
                 "rectangle": [part.x, part.y, part.width, part.height],
                 "object_id": 0,
             },

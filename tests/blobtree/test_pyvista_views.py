@@ -81,7 +81,7 @@ def test_slices_of_random_trees_are_exact(seed: int) -> None:
     origin, normal = rng.uniform(-0.2, 0.2, 3), rng.normal(size=3)
     cut = tree.slice(origin, normal, resolution=80)
     unit = normal / np.linalg.norm(normal)
-    size = float((tree.bounds[1] - tree.bounds[0]).max())
+    size = float((tree.support[1] - tree.support[0]).max())
     np.testing.assert_array_equal(cut["plane"]["field"], tree(cut["plane"].points))
     for name in ("plane", "lines", "surface"):
         if cut[name].n_points:
@@ -96,7 +96,7 @@ def test_slices_of_random_trees_are_exact(seed: int) -> None:
 def test_the_plane_covers_what_the_box_shows_of_it() -> None:
     tree = Point((3, 4, 5), radius=1.0) + Point((5, 4, 5), radius=1.0)
     cut = tree.slice((4, 4, 5), (0, 1, 0), resolution=50)["plane"]
-    lower, upper = tree.bounds
+    lower, upper = tree.support
     np.testing.assert_allclose(cut.points.min(axis=0)[[0, 2]], lower[[0, 2]], atol=1e-5)
     np.testing.assert_allclose(cut.points.max(axis=0)[[0, 2]], upper[[0, 2]], atol=1e-5)
     steps = np.ptp(cut.points, axis=0)[[0, 2]] / [50, 34]
@@ -168,7 +168,7 @@ def test_a_plotted_slice_has_white_lines_and_a_dark_surface() -> None:
     dark = pixels.max(axis=2) < 60
     rows, columns = np.nonzero(grey | white | dark)
     center = np.array([(rows.min() + rows.max()) / 2, (columns.min() + columns.max()) / 2])
-    unit = (np.ptp(rows) + 1) / float(A.bounds[1][0] - A.bounds[0][0])  # pixels
+    unit = (np.ptp(rows) + 1) / float(A.support[1][0] - A.support[0][0])  # pixels
     assert white.sum() > 60
     assert dark.sum() > 40
     for line, level in ((white, 0.2), (dark, 0.5)):

@@ -117,8 +117,8 @@ def random_trees(seed: int, count: int, depth: int = 4, more: MoreKinds | None =
 
 
 def points_around(rng: np.random.Generator, tree: Node, count: int) -> NDArray[np.float32]:
-    """Points in the tree's box of influence widened by a tenth, most of them where there is a field."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    """Points in the tree's support widened by a tenth, most of them where there is a field."""
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
     margin = 0.1 * (upper - lower)
     pool = rng.uniform(lower - margin, upper + margin, (8 * count, 3)).astype(np.float32)
     empty = tree(pool) == 0.0

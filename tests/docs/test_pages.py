@@ -54,7 +54,7 @@ def check_modelling(session: Session) -> None:
 
 def check_custom_nodes(session: Session) -> None:
     assert len(session["mesh"].faces) > 1000
-    assert session["model"].bounds[1][0] > 1.2
+    assert session["model"].support[1][0] > 1.2
     page = (DOCS / "custom-nodes.md").read_text(encoding="utf-8")
     (promise,) = re.findall(r"print\(error\)  # ([\w.]+):(\d+): halfway: ", page)
     assert f"{promise[0]}:{promise[1]}: halfway: " in session["printed"]

@@ -71,8 +71,8 @@ def polygonize(tree: Node, *, cell_size: float) -> Mesh:
 
 
 def _make_grid(tree: Node, cell_size: float) -> _Grid:
-    """The cells of the world over the box of influence, one more on every side."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    """The cells of the world over the support, one more on every side."""
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
     first = np.floor(lower / cell_size) - 1.0
     nx, ny, nz = (int(n) for n in np.ceil(upper / cell_size) + 3.0 - first)
     return _Grid(first, cell_size, (nx, ny, nz))

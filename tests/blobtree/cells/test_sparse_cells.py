@@ -19,7 +19,7 @@ CELLS_ALONG = 28
 
 
 def cells_of(tree: Node, cell: float) -> SparseCells:
-    return build_cells(tree.tape, aligned_grid(*tree.bounds, cell))
+    return build_cells(tree.tape, aligned_grid(*tree.support, cell))
 
 
 def quads(mesh: Mesh, labels: np.ndarray) -> set[tuple[int, ...]]:
@@ -29,7 +29,7 @@ def quads(mesh: Mesh, labels: np.ndarray) -> set[tuple[int, ...]]:
 
 
 def assert_same_surface(tree: Node) -> None:
-    lower, upper = tree.bounds
+    lower, upper = tree.support
     cell = float((upper - lower).max()) / CELLS_ALONG
     sparse, dense = polygonize(tree, cell_size=cell), dense_polygonize(tree, cell_size=cell)
     assert len(sparse.vertices) == len(dense.vertices)
@@ -81,7 +81,7 @@ def test_every_edge_has_two_triangles_in_opposite_directions() -> None:
 def test_pruned_tapes_match_the_whole_tape_in_their_blocks() -> None:
     rng = np.random.default_rng(3)
     for tree in random_trees(3, 25):
-        lower, upper = tree.bounds
+        lower, upper = tree.support
         cell = float((upper - lower).max()) / 24
         cells = cells_of(tree, cell)
         blocks, spans = cells.leaves.blocks.numpy(), cells.leaves.spans.numpy()
@@ -96,7 +96,7 @@ def test_pruned_tapes_match_the_whole_tape_in_their_blocks() -> None:
 
 def test_dropped_blocks_contain_no_surface() -> None:
     for tree in random_trees(11, 20):
-        lower, upper = tree.bounds
+        lower, upper = tree.support
         cell = float((upper - lower).max()) / 20
         cells = cells_of(tree, cell)
         side, origin = cells.grid.blocks_per_side, cells.grid.origin

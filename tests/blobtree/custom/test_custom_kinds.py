@@ -35,7 +35,7 @@ def test_no_ray_passes_through_unseen(seed: int, kinds: MoreKinds) -> None:
     rng = np.random.default_rng(seed)
     hits = on_surface = 0
     for tree in random_trees(60 + seed, 8, depth=3, more=kinds):
-        lower, upper = tree.bounds
+        lower, upper = tree.support
         size = float(np.linalg.norm(upper - lower))
         origins = rng.normal(size=(60, 3))
         origins *= 2.0 * size / np.linalg.norm(origins, axis=1, keepdims=True)
@@ -115,10 +115,10 @@ def test_bounds_are_tight_around_a_custom_skeleton(away: float) -> None:
     place = np.array([away, 0.0, -away])
     ring = Ring(tuple(place), (0, 0, 1), 1.0, radius=0.2)
     half = np.array([1.0 + reach, 1.0 + reach, reach])
-    for seen, exact in zip(ring.bounds, (place - half, place + half), strict=True):
+    for seen, exact in zip(ring.support, (place - half, place + half), strict=True):
         np.testing.assert_allclose(seen, exact, atol=0.012 + 1e-4 * away)
     point = Path((5, 5, 5), (5, 5, 5), (5, 5, 5), radius=0.2)
-    np.testing.assert_allclose(point.bounds, [[5.0 - reach] * 3, [5.0 + reach] * 3], atol=2e-3)
+    np.testing.assert_allclose(point.support, [[5.0 - reach] * 3, [5.0 + reach] * 3], atol=2e-3)
 
 
 def test_a_small_and_a_large_model() -> None:

@@ -109,7 +109,7 @@ def test_a_skeleton_that_the_checks_took_for_bounded_is_refused_with_its_box() -
 
     plane = define_skeleton(high_plane)(60.0, radius=0.1)
     with pytest.raises(InvalidNode, match="a skeleton must be bounded"):
-        plane.bounds  # noqa: B018
+        plane.support  # noqa: B018
 
 
 @pytest.mark.parametrize("tree", CUSTOM_TREES[:30], ids=range(30))

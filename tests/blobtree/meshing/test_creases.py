@@ -27,7 +27,7 @@ PAIRS = pytest.mark.parametrize("pair", [A | B, A & B, A - B], ids=["union", "in
 
 
 def longest(tree: Node) -> float:
-    return float((tree.bounds[1] - tree.bounds[0]).max())
+    return float((tree.support[1] - tree.support[0]).max())
 
 
 def sharp(tree: Node, resolution: int) -> tuple[Mesh, Float64Array, float]:

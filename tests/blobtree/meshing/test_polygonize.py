@@ -118,7 +118,7 @@ def test_random_trees(seed: int) -> None:
             continue
         surfaces += 1
         assert volume(mesh) > 0.0
-        cell = float((tree.bounds[1] - tree.bounds[0]).max()) / 24
+        cell = float((tree.support[1] - tree.support[0]).max()) / 24
         gap = np.abs(tree(mesh.vertices) - ISO) / np.maximum(
             np.linalg.norm(tree.gradient(mesh.vertices), axis=1), 0.1
         )
@@ -149,7 +149,7 @@ def test_a_tree_without_surface_is_an_empty_mesh(nothing: Node) -> None:
 
 
 def test_a_cell_size_in_units_of_the_model() -> None:
-    longest = float((BALL.bounds[1] - BALL.bounds[0]).max())
+    longest = float((BALL.support[1] - BALL.support[0]).max())
     by_count, by_size = polygonize(BALL, resolution=32), polygonize(BALL, cell_size=longest / 32)
     assert len(by_count.vertices) == pytest.approx(len(by_size.vertices), rel=0.05)
     assert len(polygonize(BALL, cell_size=100.0).faces) in (0, 12)

@@ -21,14 +21,14 @@ def test_a_spine_of_ten_thousand_differences() -> None:
         tree = tree - Point((2.0 + 0.001 * i, 0, 0), radius=0.5)
     assert tree.tape.registers == 0
     np.testing.assert_allclose(tree(PLACES), A(PLACES) * [1, 1, 0], atol=1e-6)
-    assert (tree.bounds[0] < tree.bounds[1]).all()
+    assert (tree.support[0] < tree.support[1]).all()
 
 
 def test_a_spine_of_ten_thousand_translations() -> None:
     tree: Node = A
     for _ in range(10_000):
         tree = tree.translate((0.001, 0, 0))
-    np.testing.assert_allclose(tree.bounds[0] + tree.bounds[1], [20.0, 0.0, 0.0], atol=1e-4)
+    np.testing.assert_allclose(tree.support[0] + tree.support[1], [20.0, 0.0, 0.0], atol=1e-4)
     np.testing.assert_allclose(tree([(10.0, 0, 0), (11.0, 0, 0)]), [1.0, 0.5], atol=1e-5)
 
 
@@ -70,7 +70,7 @@ def test_a_hundred_thousand_points_take_seconds() -> None:
     assert len(tree.tape.data) == 1 + 100_000 * (POINT.parameters + 1)
     assert time.process_time() - started < 30.0
     assert values.max() > 0.0
-    assert (tree.bounds[0] >= -0.03).all()
+    assert (tree.support[0] >= -0.03).all()
 
 
 def test_hundreds_of_operands_added_one_by_one_are_one_sum() -> None:

@@ -14,7 +14,7 @@ BALL = Point((0, 0, 0), radius=1.0)
 def test_no_value_in_a_box_lies_outside_its_interval(batch: Batch) -> None:
     rng = np.random.default_rng(0)
     for tree in batch.trees:
-        lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+        lower, upper = (corner.astype(np.float64) for corner in tree.support)
         for _ in range(8):
             a, b = np.sort(rng.uniform(lower, upper, (2, 3)), axis=0)
             b = a + (b - a) * rng.uniform(0.02, 1.0)

@@ -83,7 +83,7 @@ def test_bounds_are_tight() -> None:
         (Disc((1, 0, 0), (0, 0, 1), 1.0, radius=0.2), (1.09, 1.09, 0)),
         (Box((1, 0, 0), (2, 4, 6), radius=0.2), (1, 2, 3)),
     ):
-        np.testing.assert_allclose(node.bounds[1], np.add((1, 0, 0), half) + reach, atol=0.01)
+        np.testing.assert_allclose(node.support[1], np.add((1, 0, 0), half) + reach, atol=0.01)
 
 
 def test_one_kind_is_one_run_and_maps_fold_into_tori_and_discs() -> None:

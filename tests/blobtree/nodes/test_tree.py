@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 import blobtree
-from blobtree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Union
+from blobtree import Difference, Intersection, InvalidNode, Node, Point, Ricci, Segment, Sum, Union
 from tests.blobtree.trees import random_trees, trees
 
 A = Point((0, 0, 0), radius=1.0)
@@ -22,6 +22,36 @@ C = Segment((0, 0, 0), (0, 2, 0), radius=0.25)
 def test_operators_flatten(combined: Node, kind: type[Node]) -> None:
     assert type(combined) is kind
     assert combined.children == (A, B, C)
+
+
+def test_sum_blends_a_list_of_nodes() -> None:
+    assert sum([A, B, C]) == A + B + C
+    assert sum([A]) == A
+    for wrong in (1, "x", None):
+        with pytest.raises(TypeError):
+            wrong + A  # type: ignore[operator]
+
+
+def test_bounds_are_the_box_of_the_surface() -> None:
+    """Analytic boxes, to a 64th of the longest side of the support."""
+    half = 0.25 * 5.0
+    solids: list[tuple[Node, Any]] = [
+        (A, [[-1, -1, -1], [1, 1, 1]]),
+        (C, [[-0.25, -0.25, -0.25], [0.25, 2.25, 0.25]]),
+        (A.scale((3, 1, 0.2)).translate((5, 0, 0)), [[2, -1, -0.2], [8, 1, 0.2]]),
+        (A | B.scale(0.5).translate((2, 0, 0)), [[-1, -1, -1], [2.75, 1, 1]]),
+        (A - A.translate((half, 0, 0)), [[-1, -1, -1], [half / 2, 1, 1]]),
+    ]
+    for tree, box in solids:
+        lower, upper = tree.bounds
+        assert lower.dtype == upper.dtype == np.float32
+        cell = float((tree.support[1] - tree.support[0]).max()) / 64
+        np.testing.assert_allclose([lower, upper], box, atol=cell)
+        assert (tree.support[0] < lower).all()
+        assert (tree.support[1] > upper).all()
+        assert tree.bounds is tree.bounds
+    with pytest.raises(InvalidNode, match="expected a tree with a surface"):
+        _ = (A & A.translate((9, 0, 0))).bounds
 
 
 def test_operators_flatten_from_the_right_too_but_not_one_kind_into_another() -> None:
@@ -92,5 +122,5 @@ def test_a_turn_leaves_its_axis_alone_and_a_full_one_everything() -> None:
 def test_tape_and_bounds_are_made_once() -> None:
     (tree,) = random_trees(seed=3, count=1)
     assert tree.tape is tree.tape
-    assert tree.bounds is tree.bounds
+    assert tree.support is tree.support
     assert tree.tape.on() is tree.tape.on()

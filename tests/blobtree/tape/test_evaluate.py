@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree import InvalidPoints, Point, Segment, Transform
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at, values_at
@@ -76,7 +76,7 @@ def test_colours_of_plain_blends() -> None:
 def test_outside_the_bounds_the_field_is_exactly_zero(batch: Batch) -> None:
     rng = np.random.default_rng(5)
     for tree in batch.trees:
-        lower, upper = tree.bounds
+        lower, upper = tree.support
         assert lower.dtype == upper.dtype == np.float32
         points = rng.uniform(lower - 1.0, upper + 1.0, (800, 3)).astype(np.float32)
         faces = rng.integers(0, 3, 200), rng.integers(0, 2, 200)
@@ -91,13 +91,13 @@ def test_outside_the_bounds_the_field_is_exactly_zero(batch: Batch) -> None:
 def test_the_bounds_are_tight_around_a_stretched_capsule() -> None:
     tree = Segment((0, 0, 0), (1, 0, 0), radius=0.5).scale((1.0, 2.0, 3.0)).translate((1.0, 0.0, 0.0))
     reach = 0.5 / oracle.RIM
-    np.testing.assert_allclose(tree.bounds[0], [1.0 - reach, -2.0 * reach, -3.0 * reach], rtol=1e-6)
-    np.testing.assert_allclose(tree.bounds[1], [2.0 + reach, 2.0 * reach, 3.0 * reach], rtol=1e-6)
+    np.testing.assert_allclose(tree.support[0], [1.0 - reach, -2.0 * reach, -3.0 * reach], rtol=1e-6)
+    np.testing.assert_allclose(tree.support[1], [2.0 + reach, 2.0 * reach, 3.0 * reach], rtol=1e-6)
 
 
 def test_an_empty_tree_has_a_box() -> None:
     nothing = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
-    lower, upper = nothing.bounds
+    lower, upper = nothing.support
     assert (lower < upper).all()
     assert nothing([[0, 0, 0], [9, 9, 9]]).tolist() == [0.0, 0.0]
 
@@ -212,12 +212,23 @@ def test_points_that_are_not_finite_are_refused(bad: float) -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [1.0, [1.0, 2.0, 3.0], [[1.0, 2.0]], np.zeros((2, 4)), np.zeros((2, 3, 1)), np.zeros((0, 2)), "abc", None,
+    [1.0, [1.0, 2.0], [[1.0, 2.0]], np.zeros((2, 4)), np.zeros((2, 3, 1)), np.zeros((0, 2)), "abc", None,
      [[1, 2, 3], [1, 2]], [["a", "b", "c"]], {"x": 1}, np.zeros((3, 0))],
 )  # fmt: skip
 def test_arrays_of_a_wrong_shape_are_refused(wrong: object) -> None:
     with pytest.raises(InvalidPoints, match=r"points: expected an array of shape \(n, 3\), got "):
         BALL(wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("point", [[0.5, 0.2, 0.0], (1, 0, 0), np.array([0.0, 0.0, 0.9])])
+def test_one_point_gives_one_row(point: ArrayLike) -> None:
+    rows = np.array([point])
+    for evaluate in (BALL, BALL.gradient, BALL.colors):
+        one = evaluate(point)
+        assert one.shape == evaluate(rows).shape[1:]
+        np.testing.assert_array_equal(one, evaluate(rows)[0])
+    hits = BALL.raycast([3, 0, 0], [-1, 0, 0])
+    np.testing.assert_allclose(hits.distances, [2.0], atol=1e-3)
 
 
 @pytest.mark.parametrize("none", [np.zeros((0, 3)), np.zeros((0, 3), np.float32), []])

@@ -135,6 +135,6 @@ def test_an_offset_folds_into_the_radii_and_shrinks_tools() -> None:
 @pytest.mark.parametrize("distance", [-1.5, -10.0])
 def test_an_offset_that_removes_a_primitive_is_refused(distance: float) -> None:
     eaten = BALL.offset(distance)
-    for ask in (lambda: eaten.bounds, lambda: polygonize(eaten), lambda: polygonize(eaten, cell_size=0.1)):
+    for ask in (lambda: eaten.support, lambda: polygonize(eaten), lambda: polygonize(eaten, cell_size=0.1)):
         with pytest.raises(InvalidNode, match="leaves nothing of Point"):
             ask()

@@ -24,7 +24,7 @@ def unit(vectors: Float64Array) -> Float64Array:
 
 def rays_through(rng: np.random.Generator, tree: Node, count: int) -> tuple[Float64Array, Float64Array]:
     """Origins around the tree's box, in float32's numbers, and directions toward places in it."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
     centre, size = 0.5 * (lower + upper), np.linalg.norm(upper - lower)
     origins = (centre + size * unit(rng.normal(size=(count, 3)))).astype(np.float32).astype(np.float64)
     return origins, unit(rng.uniform(lower, upper, (count, 3)) - origins)
@@ -56,7 +56,7 @@ def test_a_ball(scale: float) -> None:
     starts = (aim - 5.0 * scale * directions[:2000]).astype(np.float32).astype(np.float64)
     origins, directions = np.concatenate([origins, starts]), np.concatenate([directions, directions[:2000]])
     beside = depth_of(origins, directions)
-    tolerance = trace_tolerance(ball.bounds)
+    tolerance = trace_tolerance(ball.support)
     seen, expected = cast(ball, origins, directions), sphere_distance(origins, directions, scale)
     sure = np.abs(beside - scale) > 2.0 * tolerance
     np.testing.assert_array_equal(np.isfinite(seen[sure]), np.isfinite(expected[sure]))
@@ -85,7 +85,7 @@ def test_a_capsule() -> None:
     np.testing.assert_array_equal(np.isfinite(seen)[sure], (nearest < 0.4)[sure])
     hit = np.isfinite(seen)
     on_surface = distance(origins[hit] + seen[hit, None] * directions[hit])
-    assert np.abs(on_surface - 0.4).max() <= 2.0 * trace_tolerance(capsule.bounds)
+    assert np.abs(on_surface - 0.4).max() <= 2.0 * trace_tolerance(capsule.support)
 
 
 STEPS = 1500
@@ -98,7 +98,7 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     hits = 0
     for tree in random_trees(seed=20 + seed, count=6, depth=3):
         origins, directions = rays_through(rng, tree, 60)
-        reach = 2.0 * float(np.linalg.norm(tree.bounds[1] - tree.bounds[0]))
+        reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
         places = np.linspace(0.0, reach, STEPS)
         samples = origins[:, None] + places[:, None] * directions[:, None]
         field = oracle.value(tree, samples.reshape(-1, 3)).reshape(60, STEPS)
@@ -106,7 +106,7 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
             (field > 0.5 + 1e-5).any(axis=1), places[(field > 0.5 + 1e-5).argmax(axis=1)], np.inf
         )
         seen = cast(tree, origins, directions)
-        tolerance = trace_tolerance(tree.bounds)
+        tolerance = trace_tolerance(tree.support)
         assert (seen <= first + 2.0 * tolerance).all()
         hit = np.isfinite(seen)
         points = origins[hit] + seen[hit, None] * directions[hit]
@@ -132,7 +132,7 @@ def test_raycast_returns_position_normal_and_color() -> None:
             assert array.dtype == np.float32
             assert (array[~where] == 0.0).all()
         places = origins[where] + hits.distances[where, None] * directions[where]
-        size = float(np.linalg.norm(tree.bounds[1] - tree.bounds[0]))
+        size = float(np.linalg.norm(tree.support[1] - tree.support[0]))
         np.testing.assert_allclose(hits.positions[where], places, atol=1e-5 * size)
         field = oracle.evaluate(tree, hits.positions[where].astype(np.float64))
         smooth = field.margin > 2e-3
@@ -174,7 +174,7 @@ def test_a_direction_that_is_almost_along_an_axis(zero: float) -> None:
 
 
 def test_rays_inside_the_faces_of_the_box() -> None:
-    lower, upper = BALL.bounds
+    lower, upper = BALL.support
     for face in (lower[2], upper[2], np.nextafter(upper[2], np.float32(9))):
         assert np.isinf(
             cast(BALL, [[-5, 0, face], [0, 5, face], [0, 0, face]], [[1, 0, 0], [0, -1, 0], [1, 1, 0]])
@@ -183,7 +183,7 @@ def test_rays_inside_the_faces_of_the_box() -> None:
 
 def test_rays_that_touch_a_corner_or_an_edge_of_the_box_miss() -> None:
     """Nothing lies there, however short the way through the box is."""
-    lower, upper = (corner.astype(np.float64) for corner in BALL.bounds)
+    lower, upper = (corner.astype(np.float64) for corner in BALL.support)
     corners = np.array([[(lower, upper)[i][0], (lower, upper)[j][1], (lower, upper)[k][2]]
                         for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
     rng = np.random.default_rng(2)

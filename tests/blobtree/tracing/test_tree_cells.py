@@ -66,7 +66,7 @@ def test_empty_layers_match_the_chessboard_distance(name: str | int) -> None:
 
 def test_blocks_cover_the_box_of_the_tree() -> None:
     cells = tracing_cells(THIN, device="cpu")
-    lower, upper = (corner.astype(np.float64) for corner in THIN.bounds)
+    lower, upper = (corner.astype(np.float64) for corner in THIN.support)
     assert max(cells.counts) == cells.counts[0] == BLOCKS_ALONG
     extent = cells.block_size * np.array(cells.counts)
     assert (cells.lower + extent >= upper - 1e-6).all()

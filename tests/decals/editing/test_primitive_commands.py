@@ -57,7 +57,7 @@ def test_skeletons_of_ones_own_move_again_and_again_by_the_same_path() -> None:
         session.do(ResizePrimitive(0, path, 1 / 1.1))
         session.do(PaintPrimitive(0, path, (1, 0, 0)))
         after = node_in_world(session.document.objects[0].tree, path)
-        points = np.random.default_rng(0).uniform(*before.bounds, (300, 3)).astype(np.float32)
+        points = np.random.default_rng(0).uniform(*before.support, (300, 3)).astype(np.float32)
         there = np.add(points, (0, 0.3, 0.6))
         np.testing.assert_allclose(after(there), before(points), atol=1e-4)
         assert after.colors(there).max() == 1
@@ -87,7 +87,7 @@ def test_a_move_is_one_in_the_world_whatever_lies_above(path: Any) -> None:
     before = node_in_world(tree, path)
     session.do(MovePrimitive(0, path, offset))
     after = node_in_world(session.document.objects[0].tree, path)
-    points = np.random.default_rng(0).uniform(*before.bounds, (300, 3)).astype(np.float32)
+    points = np.random.default_rng(0).uniform(*before.support, (300, 3)).astype(np.float32)
     np.testing.assert_allclose(after(points + offset), before(points), atol=1e-5)
 
 
@@ -128,7 +128,7 @@ def test_decals_stay_on_the_surface_and_come_back(tree: Any, command: Any) -> No
 
 def test_following_is_whole_on_a_primitive_alone_and_shared_in_a_blend() -> None:
     tree = A + Point((1.2, 0, 0), radius=1.0)
-    low, high = tree.bounds
+    low, high = tree.support
     points = scatter([TreeObject("t", tree).surface], count=100).positions
     first, second = following_weights(tree, (0,), points), following_weights(tree, (1,), points)
     np.testing.assert_allclose(first + second, 1.0, atol=0.02)

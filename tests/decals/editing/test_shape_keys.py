@@ -191,13 +191,13 @@ def test_skeletons_of_ones_own_stay_held_while_they_are_dragged() -> None:
     actions = Actions(session)
     for path in ((1, 0), (0,)):
         actions.state.primitive = (0, path)
-        before = node_in_world(session.document.objects[0].tree, path).bounds[0]
+        before = node_in_world(session.document.objects[0].tree, path).support[0]
         actions.trees.begin_drag()
         for step in (0.1, 0.2, 0.3):
             actions.trees.drag((0, 0, step))
         actions.trees.end_drag()
         assert actions.state.primitive == (0, path)
-        after = node_in_world(session.document.objects[0].tree, path).bounds[0]
+        after = node_in_world(session.document.objects[0].tree, path).support[0]
         np.testing.assert_allclose(after - before, (0, 0, 0.3), atol=1e-5)
     while session.undo():
         pass

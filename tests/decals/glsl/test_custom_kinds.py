@@ -73,7 +73,7 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context) -> None:
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
     tree, (width, height) = PICTURES[name], (160, 120)
-    camera = Camera.framing(tree.bounds, direction=(0.3, 0.5, 1.0), aspect=width / height)
+    camera = Camera.framing(tree.support, direction=(0.3, 0.5, 1.0), aspect=width / height)
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=(width, height)))
     x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
     rays = camera.rays(width, height)
@@ -85,5 +85,5 @@ def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> 
     assert (seen != expected).sum() <= 1e-3 * expected.size
     both = seen & expected
     depth = np.linalg.norm(buffers.position.reshape(-1, 3)[both] - rays.origin, axis=1)
-    size = float(np.linalg.norm(tree.bounds[1] - tree.bounds[0]))
+    size = float(np.linalg.norm(tree.support[1] - tree.support[0]))
     assert (np.abs(depth - distance[both]) > 1e-4 * size).mean() <= 2e-3

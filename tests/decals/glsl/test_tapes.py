@@ -76,7 +76,7 @@ MODELS = {
 @pytest.mark.parametrize("name", MODELS)
 def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
     tree, (width, height) = MODELS[name], (160, 120)
-    camera = Camera.framing(tree.bounds, direction=(0.3, 0.5, 1.0), aspect=width / height)
+    camera = Camera.framing(tree.support, direction=(0.3, 0.5, 1.0), aspect=width / height)
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=(width, height)))
     x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
     rays = camera.rays(width, height)
@@ -89,7 +89,7 @@ def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> 
     assert (seen != expected).sum() <= 1e-3 * expected.size
     both = seen & expected
     depth = np.linalg.norm(buffers.position.reshape(-1, 3)[both] - rays.origin, axis=1)
-    size = float(np.linalg.norm(tree.bounds[1] - tree.bounds[0]))
+    size = float(np.linalg.norm(tree.support[1] - tree.support[0]))
     assert (np.abs(depth - distance[both]) > 1e-4 * size).mean() <= 2e-3
     points = buffers.position.reshape(-1, 3)[both]
     smooth = oracle.evaluate(tree, points).margin > 2e-3  # a hit may lie a tolerance beside its block

@@ -53,7 +53,7 @@ def objects() -> list[TreeObject | MeshObject]:
 
 def framed(things: list[TreeObject | MeshObject], direction: tuple[float, float, float]) -> View:
     boxes = [
-        thing.tree.bounds
+        thing.tree.support
         if isinstance(thing, TreeObject)
         else (thing.vertices.min(axis=0), thing.vertices.max(axis=0))
         for thing in things
@@ -226,5 +226,5 @@ def test_a_box_around_the_eye_falls_on_the_whole_tile() -> None:
 def test_a_tree_of_every_kind_compiles_as_compute_shader(compute: Renderer) -> None:
     trees: list[Node] = random_trees(seed=31, count=4)
     for tree in trees:
-        view = View((TreeObject("tree", tree),), Camera.framing(tree.bounds))
+        view = View((TreeObject("tree", tree),), Camera.framing(tree.support))
         assert (compute.buffers(view, RenderOptions(size=(24, 18))).object_id == 0).any()

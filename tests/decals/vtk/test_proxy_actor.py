@@ -23,12 +23,12 @@ def test_a_trees_box(name: str) -> None:
     thing = TreeObject(name, tree)
     low, high = box_around([thing])
     assert "surface" not in vars(thing), "the surface was not made for it"
-    block = float(np.max(tree.bounds[1] - tree.bounds[0])) / BLOCKS_ALONG
+    block = float(np.max(tree.support[1] - tree.support[0])) / BLOCKS_ALONG
     true_low, true_high = thing.bounds
     assert (low <= true_low + 1e-3 * block).all()
     assert (high >= true_high - 1e-3 * block).all()
-    assert (low >= tree.bounds[0] - block).all()
-    assert (high <= tree.bounds[1] + block).all()
+    assert (low >= tree.support[0] - block).all()
+    assert (high <= tree.support[1] + block).all()
     if name != "flat":  # intervals of stretched parts are loose
         assert (true_low - low).max() < 2.5 * block
         assert (high - true_high).max() < 2.5 * block

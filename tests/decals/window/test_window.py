@@ -159,8 +159,8 @@ def test_a_primitive_is_moved_by_its_handle_and_decals_follow(
     moved = np.linalg.norm(driver.document.decals.decals.positions - before, axis=1)
     assert moved.max() > 0.2
     assert (moved == 0).any()
-    low, high = node_in_world(driver.document.objects[number].tree, path).bounds
-    moved_by = low + high - sum(node_in_world(first_tree, path).bounds)
+    low, high = node_in_world(driver.document.objects[number].tree, path).support
+    moved_by = low + high - sum(node_in_world(first_tree, path).support)
     assert moved_by / 2 == pytest.approx([0.4, 0, 0], abs=1e-5)
     assert driver.session.labels == ("move a primitive",)
     assert (driver.shot() != first).any()
