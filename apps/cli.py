@@ -77,6 +77,16 @@ implicit-decals bake scene.json -o model.glb --size 4096
 
 implicit-decals bake scene.json -o small.glb --vertex-colors
 """,
+    "gallery": """List the examples, or draw their pictures.
+
+For example:
+
+implicit-decals gallery
+
+implicit-decals gallery sphere -o sphere.png
+
+implicit-decals gallery --all -o pictures
+""",
     "doctor": "Check the software and hardware of this machine, and print advice.",
 }
 
@@ -101,6 +111,9 @@ for _name, _help in HELP.items():
 _bench = App(name="bench", help="Measure this machine.", help_format="plaintext")
 _bench.command("decals.apps.commands.bench:table", name="table", help=BENCH_TABLE)
 app.command(_bench)
+app.register_install_completion_command(
+    help="Install completion of commands and options for your shell: bash, zsh or fish."
+)
 
 
 def run(tokens: Sequence[str] | None = None) -> int:

@@ -30,3 +30,19 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     except OSError as error:
         reason = f"the output folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
         raise InvalidInput(reason) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder if it does not exist.
+
+    Raises
+    ------
+    InvalidInput
+        If its parent is missing or read-only, or a file has its name.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InvalidInput(
+            f"could not make the output folder {str(folder)!r} ({error.strerror}); choose another"
+        ) from error

@@ -18,8 +18,7 @@ from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, 
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.gallery import spanning
 from decals.apps.models.shapes import creature, egg
-from decals.apps.output import check_output
-from decals.errors import InvalidInput
+from decals.apps.output import check_output, make_folder
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
 
@@ -77,7 +76,7 @@ def demo(
     """
     pixels = parse_size(size)
     check_count("--samples", samples, 1, MAX_SAMPLES)
-    _make_folder(output)
+    make_folder(output)
     for name in PICTURES:
         check_output(output / name, (".png",))
     with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:
@@ -88,15 +87,6 @@ def demo(
             Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
     for name in PICTURES:
         Console().print(str(output / name), soft_wrap=True, highlight=False)
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise InvalidInput(
-            f"could not make the output folder {str(folder)!r} ({error.strerror}); choose another"
-        ) from error
 
 
 def nest_scene(*, progress: Progress) -> Scene:

@@ -1,9 +1,14 @@
-"""Examples: ``python -m decals.apps.gallery.NAME -o picture.png`` draws the picture of one.
+"""Examples: ``implicit-decals gallery NAME -o picture.png`` draws the picture of one.
 
 The function ``panels`` of each module makes the scenes that its picture shows side by side.
+The first line of its docstring is the example's title.
 """
 
-EXAMPLES = (
+import ast
+from importlib.resources import files
+from typing import Literal, get_args
+
+Example = Literal[
     "sphere",
     "edges",
     "spanning",
@@ -20,8 +25,18 @@ EXAMPLES = (
     "mapping_modes",
     "custom_nodes",
     "creases",
-)
+]
+"""The name of an example."""
+
+EXAMPLES: tuple[Example, ...] = get_args(Example)
 """The names of all examples."""
 
 DOWNLOADED = ("models", "dragon")
 """The examples whose meshes pyvista downloads on first use."""
+
+
+def title(name: Example) -> str:
+    """Return the title of an example, without importing it."""
+    source = files(__name__).joinpath(f"{name}.py").read_text(encoding="utf-8")
+    docstring = ast.get_docstring(ast.parse(source)) or ""
+    return docstring.partition("\n")[0]

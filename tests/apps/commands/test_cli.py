@@ -1,5 +1,9 @@
 """The command as a whole: version, help, interrupts."""
 
+import os
+import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -18,10 +22,65 @@ def test_version(capsys: Capture) -> None:
     assert capsys.readouterr().out.strip() == version("implicit-decals")
 
 
+def test_the_package_runs_as_the_command() -> None:
+    ran = [
+        subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
+        for command in (
+            [sys.executable, "-m", "decals"],
+            [sys.executable, "-c", "from decals.apps.cli import main; main()"],
+        )
+    ]
+    assert "Usage: implicit-decals" in ran[0]
+    assert ran[0] == ran[1]
+
+
+def test_help_and_version_import_nothing_heavy() -> None:
+    script = """
+import sys
+from decals.apps.cli import run
+run(sys.argv[1:])
+print({"numpy", "warp", "vtkmodules", "pyvista", "moderngl"} & set(sys.modules), file=sys.stderr)
+"""
+    for option in ("--help", "--version"):
+        command = [sys.executable, "-c", script, option]
+        assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == "set()\n"
+
+
+def test_bash_completes_commands_options_and_values(folder: Path) -> None:
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("bash is not installed")
+    command = [sys.executable, "-m", "decals", "--install-completion", "--shell", "bash"]
+    environment = {**os.environ, "HOME": str(folder)}
+    ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert str(folder / ".bashrc") in ran.stdout
+
+    def complete(*words: str) -> set[str]:
+        typed = " ".join(f"'{word}'" for word in words)
+        script = f"""
+. ~/.bashrc
+COMP_WORDS=({typed}) COMP_CWORD={len(words) - 1}
+$(complete -p implicit-decals | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+        done = subprocess.run(
+            [bash, "-c", script], env=environment, capture_output=True, text=True, check=True
+        )
+        return set(done.stdout.split())
+
+    assert complete("implicit-decals", "re") == {"render"}
+    assert complete("implicit-decals", "render", "--ca") == {"--camera"}
+    assert complete("implicit-decals", "render", "--contact", "") == {"product", "min", "radial"}
+    assert complete("implicit-decals", "gallery", "sp") == {"sphere", "spanning"}
+
+
 def test_help_names_the_commands_and_their_options(capsys: Capture) -> None:
     assert run(["--help"]) == 0
     listing = capsys.readouterr().out
-    assert all(name in listing for name in ("demo", "render", "scatter", "polygonize", "doctor"))
+    assert all(
+        name in listing
+        for name in ("demo", "render", "scatter", "polygonize", "gallery", "doctor", "--install-completion")
+    )
     assert run(["render", "--help"]) == 0
     page = capsys.readouterr().out
     options = (

@@ -1,0 +1,89 @@
+"""``implicit-decals gallery``: list the examples, or draw their pictures."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from decals.apps import gallery as examples
+from decals.apps.commands.options import Whole, check_count
+from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.gallery.helpers import SIDE, draw
+from decals.apps.output import PICTURE_SUFFIXES, check_output, make_folder
+from decals.errors import InvalidInput
+from decals.rendering import Picture, Renderer
+
+FOLDER = Path("gallery")
+"""Default folder of the pictures of all examples."""
+MAX_SIDE = 4096
+"""Longest side of a panel, in pixels: a picture has up to four panels."""
+
+
+def gallery(
+    name: examples.Example | None = None,
+    /,
+    *,
+    all_: Annotated[bool, Parameter(name="--all", negative=())] = False,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"), show_default=False)] = None,
+    side: Whole = SIDE,
+) -> None:
+    """List the examples, or draw their pictures.
+
+    Parameters
+    ----------
+    name
+        The example to draw.
+    all_
+        Draw all examples.
+    output
+        The picture: png, jpg, webp or tif. Default: NAME.png. With --all, the folder of the pictures, which
+        is created if it does not exist. Default: gallery.
+    side
+        Width and height of each panel of a picture in pixels.
+    """
+    check_count("--side", side, 1, MAX_SIDE)
+    if all_ and name is not None:
+        raise InvalidInput(f"expected --all or the name of an example, got both; leave out {name!r} or --all")
+    if all_:
+        folder = output or FOLDER
+        make_folder(folder)
+        _draw({each: folder / f"{each}.png" for each in examples.EXAMPLES}, side)
+    elif name is not None:
+        _draw({name: output or Path(f"{name}.png")}, side)
+    elif output is not None:
+        raise InvalidInput("--output: expected the name of an example, or --all; add one of them")
+    else:
+        _list_examples()
+
+
+def _list_examples() -> None:
+    """Print the name and the title of each example."""
+    table = Table("", "", show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name in examples.EXAMPLES:
+        note = " (downloads its meshes on first use)" if name in examples.DOWNLOADED else ""
+        table.add_row(name, examples.title(name) + note)
+    Console().print(table)
+
+
+def _draw(pictures: dict[str, Path], side: int) -> None:
+    """Draw examples into files, also if the meshes of some cannot be downloaded."""
+    for path in pictures.values():
+        check_output(path, PICTURE_SUFFIXES)
+    failures: dict[str, InvalidInput] = {}
+    with Renderer() as renderer, progress_bars() as progress:
+        for name, path in pictures.items():
+            progress(f"Drawing {name}", 0.0)
+            try:
+                panels = import_module(f"{examples.__name__}.{name}").panels()
+            except InvalidInput as error:
+                failures[name] = error
+                continue
+            Picture(draw(renderer, panels, side=side)).save(path)
+    for name, path in pictures.items():
+        if name not in failures:
+            Console().print(str(path), soft_wrap=True, highlight=False)
+    if failures:
+        raise InvalidInput(f"could not draw {', '.join(failures)}: {next(iter(failures.values()))}")
