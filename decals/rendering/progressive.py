@@ -114,6 +114,15 @@ def joined(rectangles: Sequence[Rectangle]) -> Regions:
     return tuple(result)
 
 
+def _inner_groups(tile: Tile) -> Rectangle:
+    """Return the groups of samples, counted from the tile's own corner, that its inner rectangle touches."""
+    inner = tile.inner
+    left, low = (start // GROUP * GROUP for start in (inner.x - tile.x, inner.y - tile.y))
+    right = min(-(-(inner.x - tile.x + inner.width) // GROUP) * GROUP, tile.width)
+    top = min(-(-(inner.y - tile.y + inner.height) // GROUP) * GROUP, tile.height)
+    return Rectangle(left, low, right - left, top - low)
+
+
 class DirtyRegions(NamedTuple):
     """The rectangles of a tile in which surface, paint and light must be drawn."""
 
@@ -163,7 +172,7 @@ class TargetState:
         return cls(
             tuple(scene.objects),
             bounds,
-            (tile.block(), tile.x, tile.y, tile.width, tile.height, depth),
+            (tile.block(), tile.x, tile.y, tile.width, tile.height, tile.inner, depth),
             (decals, *(image.pixels for image in scene.images)),
             (options.mapping, options.contact, *_editor_formulas(decals)),
             decal_version(scene),
@@ -172,10 +181,11 @@ class TargetState:
 
     def dirty(self, previous: TargetState | None, tile: Tile) -> DirtyRegions:
         """Return the regions to draw in targets of a previous state; None for targets without a picture."""
-        whole: Regions = (Rectangle(0, 0, tile.width, tile.height),)
+        # Light reads the surface around the inner rectangle, but neither paint nor light there.
+        paint: Regions = (_inner_groups(tile),)
+        whole = paint
         if previous is None or self.view != previous.view or not same_objects(self.objects, previous.objects):
-            return DirtyRegions(whole, whole, whole)
-        paint = whole
+            return DirtyRegions((Rectangle(0, 0, tile.width, tile.height),), whole, whole)
         if self.formulas == previous.formulas and same_objects(self.decals, previous.decals):
             paint = self._edited(previous.version, tile)
         same_light = self.options.lights == previous.options.lights

@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree._typing import Float64Array
+from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import GROUP
-from decals.rendering.progressive import MAX_RECTANGLES, ball_extents, joined, regions_of
-from decals.rendering.viewpoint import PictureView, Projection, Rectangle
+from decals.rendering.progressive import MAX_RECTANGLES, TargetState, ball_extents, joined, regions_of
+from decals.rendering.viewpoint import TILE_MARGIN, PictureView, Projection, Rectangle, tiles
 from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
 
 SIZE = (300, 200)
 
@@ -123,3 +125,24 @@ def test_no_balls_are_nowhere_and_those_behind_the_eye_anywhere() -> None:
     assert regions_of(tile, np.array([[0.0, 0.0, 4.5, 0.6]]), 1.0) == (Rectangle(0, 0, *SIZE),)
     assert regions_of(tile, np.array([[0.0, 0.0, 9.0, 0.1]]), 1.0) == (Rectangle(0, 0, *SIZE),)
     assert regions_of(tile, np.array([[50.0, 0.0, 0.0, 0.1]]), 1.0) == ()
+
+
+def test_paint_and_light_leave_out_the_margin_of_a_tile() -> None:
+    scene = Scene(objects=(), camera=Camera((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 30.0))
+    bounds = ([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0])
+    view = PictureView.of(scene.camera, (1000, 700), bounds)
+    options = RenderOptions(size=(1000, 700), samples=1)
+    covered = np.zeros((700, 1000), int)
+    for tile in tiles(view, 1, limit=300):
+        dirty = TargetState.of(scene, bounds, tile, options, depth=False).dirty(None, tile)
+        assert dirty.surface == (Rectangle(0, 0, tile.width, tile.height),)
+        assert dirty.light == dirty.paint
+        (part,) = dirty.paint
+        assert part.x % GROUP == part.y % GROUP == 0
+        assert part.width <= 300 + 2 * GROUP < 300 + TILE_MARGIN
+        inner = tile.inner
+        x, y = tile.x + part.x, tile.y + part.y
+        assert x <= inner.x <= inner.x + inner.width <= x + part.width
+        assert y <= inner.y <= inner.y + inner.height <= y + part.height
+        covered[inner.y : inner.y + inner.height, inner.x : inner.x + inner.width] += 1
+    assert (covered == 1).all()
