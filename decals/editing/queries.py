@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
@@ -261,29 +261,45 @@ def outline(
     (49, 3)
     """
     instance("document", document, Document, InvalidEdit, "session.document is one")
-    decal = document.decals[whole_number("decal", number, 0, document.decals.next_number - 1, InvalidEdit)]
-    center = decal.positions[0].astype(np.float64)
-    spokes = _rim_points(document, decal, ANGLES, mapping)[0] - center
-    fractions = np.arange(RINGS + 1) / RINGS
-    modes = contact, mapping
-    visible = _visible_fractions(document, number, center, spokes, np.tile(fractions, (ANGLES, 1)), modes)
-    if not visible.any():
-        visible = np.ones(ANGLES)
-    else:
-        finer = np.minimum(visible[:, None] + np.arange(RINGS + 1) / RINGS**2, 1.0)
-        visible = _visible_fractions(document, number, center, spokes, finer, modes)
-    line: Float32Array = _lifted(document, (center + visible[:, None] * spokes)[None], decal.radii)[0]
+    whole_number("decal", number, 0, document.decals.next_number - 1, InvalidEdit)
+    line: Float32Array = outlines(document, [number], contact=contact, mapping=mapping)[0]
     return line
 
 
-def undisturbed_rims(
-    document: Document, numbers: ArrayLike, *, mapping: ImageMapping = ImageMapping.CORRECTED
+def outlines(
+    document: Document,
+    numbers: ArrayLike,
+    *,
+    contact: Contact = Contact.PRODUCT,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+    angles: int = ANGLES,
 ) -> Float32Array:
-    """Return the rims that decals would have without neighbours, float32, shape (n, 25, 3), closed."""
+    """Return the lines of `outline` for several decals, float32, shape (n, angles + 1, 3).
+
+    Parameters
+    ----------
+    document
+        The document.
+    numbers
+        Numbers of decals.
+    contact, mapping
+        As for `outline`.
+    angles
+        Directions in which each outline is sampled.
+    """
+    numbers = np.asarray(numbers, np.int64)
     decals = document.decals.take(numbers)
     if not len(decals):
-        return np.zeros((0, ANGLES // 2 + 1, 3), np.float32)
-    return _lifted(document, _rim_points(document, decals, ANGLES // 2, mapping), decals.radii)
+        return np.zeros((0, angles + 1, 3), np.float32)
+    centers = decals.positions[:, None].astype(np.float64)
+    spokes = _rim_points(document, decals, angles, mapping) - centers
+    fractions = np.broadcast_to(np.arange(RINGS + 1) / RINGS, (*spokes.shape[:2], RINGS + 1))
+    modes = contact, mapping
+    visible = _visible_fractions(document, numbers, centers, spokes, fractions, modes)
+    finer = np.minimum(visible[..., None] + np.arange(RINGS + 1) / RINGS**2, 1.0)
+    finer = _visible_fractions(document, numbers, centers, spokes, finer, modes)
+    lengths = np.where(visible.max(axis=1, keepdims=True) > 0.0, finer, 1.0)[..., None]
+    return _lifted(document, centers + lengths * spokes, decals.radii)
 
 
 def _lifted(document: Document, points: Float64Array, radii: Float32Array) -> Float32Array:
@@ -333,19 +349,23 @@ def _image_distances(
 
 def _visible_fractions(
     document: Document,
-    number: int,
-    center: Float64Array,
+    numbers: Int64Array,
+    centers: Float64Array,
     spokes: Float64Array,
     fractions: Float64Array,
     modes: tuple[Contact, ImageMapping],
 ) -> Float64Array:
-    """Return per spoke the largest fraction up to which the decal shows without a gap, else the first one."""
-    points = center + fractions[:, :, None] * spokes[:, None, :]
+    """Return per spoke the largest fraction up to which its decal shows without a gap, else the first one.
+
+    Centres have the shape (n, 1, 3), spokes (n, angles, 3), fractions (n, angles, k).
+    """
+    points = centers[:, :, None] + fractions[..., None] * spokes[:, :, None]
     nearest = nearest_points(document.objects, points.reshape(-1, 3))
     contact, mapping = modes
     samples = evaluate(document.decals, nearest.positions, nearest.normals, contact=contact, mapping=mapping)
     inside = np.linalg.norm(samples.uv - 0.5, axis=1) <= 0.5 * INSIDE_TOLERANCE
-    shows = ((samples.owner == number) & inside).reshape(fractions.shape)
-    last = np.logical_and.accumulate(shows, axis=1).sum(axis=1) - 1
-    result: Float64Array = np.take_along_axis(fractions, np.maximum(last, 0)[:, None], axis=1)[:, 0]
+    owners = np.where(inside, samples.owner, -1).reshape(fractions.shape)
+    shows = owners == numbers[:, None, None]
+    last = np.logical_and.accumulate(shows, axis=2).sum(axis=2) - 1
+    result: Float64Array = np.take_along_axis(fractions, np.maximum(last, 0)[..., None], axis=2)[..., 0]
     return result

@@ -63,16 +63,23 @@ class TreeActions:
     @action(
         "select_primitive",
         "m",
-        summary="select the primitive under the cursor, or deselect",
+        summary="select the primitive under the cursor, or deselect it",
         group=Group.SHAPE,
     )
     def toggle_primitive(self, cursor: Cursor) -> None:
-        """Deselect the primitive, or select the one under the cursor."""
-        if self._state.primitive:
+        """Select the primitive under the cursor; deselect it if it is selected, or if there is none."""
+        selected, pick = self._state.primitive, cursor()
+        if selected is not None and (pick is None or self._selectable(pick) in (None, selected)):
             self._state.primitive, self._state.message = None, "primitive deselected"
             return
-        self._select(cursor)
-        self._state.message = "drag the blue ball to move the primitive, press M to deselect it"
+        self._state.primitive = None
+        self._select(lambda: pick)
+        self._state.message = "drag the blue ball to move the primitive, press M on it to deselect it"
+
+    def _selectable(self, pick: SurfacePick) -> tuple[int, Path] | None:
+        """Return the primitive at a point; None on a mesh."""
+        item = self._state.session.document.objects[pick.object]
+        return self._primitive_under(pick) if isinstance(item, TreeObject) else None
 
     def _select(self, cursor: Cursor) -> tuple[int, Path]:
         """Select the primitive under the cursor unless one is selected, and return the selected one."""

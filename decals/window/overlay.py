@@ -12,7 +12,7 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.nodes.paths import Path
 from decals.editing.actions import KEYS, Actions
 from decals.editing.document import Document
-from decals.editing.queries import outline, undisturbed_rims
+from decals.editing.queries import ANGLES, outlines
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.scenes.objects import bounds_of
@@ -93,14 +93,14 @@ class Overlay:
     def outline(
         self, document: Document, numbers: tuple[int, ...], contact: Contact, mapping: ImageMapping
     ) -> None:
-        """Outline decals, the last one by its visible part."""
+        """Outline the visible parts of decals."""
         key = (document.objects, document.decals.version, numbers, contact, mapping) if numbers else ()
         if key == self._outlined:
             return
         self._outlined = key
         last = numbers[-MAX_OUTLINES:]
-        lines = [outline(document, last[-1], contact=contact, mapping=mapping)] if last else []
-        lines += list(undisturbed_rims(document, np.array(last[:-1], np.int64), mapping=mapping))
+        angles = ANGLES if len(last) == 1 else ANGLES // 2
+        lines = list(outlines(document, last, contact=contact, mapping=mapping, angles=angles))
         self._lines.copy_from(_polylines(lines))
         self._actor.SetVisibility(bool(lines))
 

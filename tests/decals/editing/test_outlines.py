@@ -7,9 +7,9 @@ import pytest
 
 from blobtree import Point, Segment
 from decals.editing.document import Document
-from decals.editing.queries import ANGLES, LIFT, outline, undisturbed_rims
+from decals.editing.queries import ANGLES, LIFT, outline, outlines
 from decals.field.mapping import ImageMapping
-from decals.model import Decals
+from decals.model import Decals, Interaction
 from decals.record import Contact
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
@@ -86,7 +86,7 @@ def test_an_outline_is_the_edge_of_what_the_picture_shows(
 def test_alone_on_a_ball_it_ends_at_its_radius_along_the_surface(radius: Any) -> None:
     document = on_ball(at_angle(30, radius), one((0, 0, -1), 0.01))
     middle = document.decals[0].normals[0]
-    for line in (outline(document, 0), *undisturbed_rims(document, [0])):
+    for line in (outline(document, 0), *outlines(document, [0], angles=24)):
         angles = np.arccos(line @ middle / np.linalg.norm(line, axis=1))
         np.testing.assert_allclose(angles, radius, rtol=5e-3)
         np.testing.assert_allclose(np.linalg.norm(line, axis=1), 1 + LIFT * radius, atol=1e-3)
@@ -94,14 +94,20 @@ def test_alone_on_a_ball_it_ends_at_its_radius_along_the_surface(radius: Any) ->
     np.testing.assert_allclose(np.linalg.norm(chords - middle, axis=1), radius, rtol=2e-2)
 
 
-def test_rims_know_nothing_of_each_other_whatever_their_sizes() -> None:
-    decals = at_angle(0, 0.8), at_angle(10, 0.01), at_angle(-20, 0.3)
-    document = on_ball(*decals)
-    lines = undisturbed_rims(document, [2, 0, 1])
-    assert lines.shape == (3, ANGLES // 2 + 1, 3)
-    for line, number in zip(lines, (2, 0, 1), strict=True):
-        angles = np.arccos(np.clip(line @ decals[number].normals[0] / np.linalg.norm(line, axis=1), -1, 1))
-        np.testing.assert_allclose(angles, decals[number].radii[0], rtol=2e-2)
+@pytest.mark.parametrize("contact", Contact)
+def test_outlines_of_many_are_those_of_each(contact: Contact) -> None:
+    """Of neighbours that push each other, of a tiny one among them, and of one that another hides."""
+    hidden = at_angle(60, 0.1)
+    above = at_angle(60, 0.4).replace(layers=[1], interactions=[Interaction.OVERLAP])
+    document = on_ball(at_angle(0, 0.8), at_angle(10, 0.01), at_angle(-40, 0.3), hidden, above)
+    numbers = [2, 0, 3, 1, 4]
+    lines = outlines(document, numbers, contact=contact)
+    assert lines.shape == (5, ANGLES + 1, 3)
+    for line, number in zip(lines, numbers, strict=True):
+        np.testing.assert_allclose(line, outline(document, number, contact=contact), atol=1e-6)
+    coarse = outlines(document, numbers, contact=contact, angles=ANGLES // 2)
+    np.testing.assert_allclose(coarse, lines[:, ::2], atol=1e-6)
+    assert outlines(document, []).shape == (0, ANGLES + 1, 3)
 
 
 def test_on_a_thin_rod_it_goes_round_as_far_as_the_image() -> None:
@@ -113,6 +119,9 @@ def test_on_a_thin_rod_it_goes_round_as_far_as_the_image() -> None:
         images=(DecalImage.load("scale"),),
         camera=EYE,
     )
-    for line in (outline(Document.from_scene(scene), 0), *undisturbed_rims(Document.from_scene(scene), [0])):
+    for line in (
+        outline(Document.from_scene(scene), 0),
+        *outlines(Document.from_scene(scene), [0], angles=24),
+    ):
         around = 0.5 * np.arctan2(line[:, 1], line[:, 0])
         np.testing.assert_allclose(np.hypot(around, line[:, 2]), 0.7, rtol=1e-2)

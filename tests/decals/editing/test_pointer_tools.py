@@ -292,6 +292,26 @@ def test_scattering_and_relaxing_where_the_cursor_is(user: UserInput) -> None:
     assert user.actions.state.message == "no surface under the cursor; point at one"
 
 
+def test_m_on_another_primitive_selects_that_one(user: UserInput) -> None:
+    surface = user.document.objects[0].surface
+    places = [user.pixel(surface.project([target])[0][0]) for target in ([0, 0, 2], [1.3, 1.2, 2])]
+    first, second = places
+    user.tools.key("m", *first)
+    one = user.actions.state.primitive
+    user.tools.key("m", *second)
+    other = user.actions.state.primitive
+    assert None not in (one, other)
+    assert one != other
+    assert "drag the blue ball" in user.actions.state.message
+    user.tools.key("m", *second)
+    assert user.actions.state.primitive is None
+    user.tools.key("m", *second)
+    assert user.actions.state.primitive == other
+    user.tools.key("m", 0, 0)
+    assert user.actions.state.primitive is None
+    assert user.actions.state.message == "primitive deselected"
+
+
 def test_primitives_under_the_cursor(user: UserInput) -> None:
     at = user.pixel(user.document.objects[0].surface.project([[0, 0, 2]])[0][0])
     tree = user.document.objects[0].tree
