@@ -14,13 +14,16 @@ from rich.console import Console
 from blobtree import Progress
 from blobtree._typing import Float32Array, Int32Array
 from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
+from decals.apps.commands.activation import command_lines
 from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.gallery import spanning
 from decals.apps.models.shapes import creature, egg
 from decals.apps.output import check_output, make_folder
+from decals.errors import NoGraphics
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
+from decals.window.host_plotter import require_screen
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 
@@ -87,6 +90,20 @@ def demo(
             Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
     for name in PICTURES:
         Console().print(str(output / name), soft_wrap=True, highlight=False)
+    lines = "".join(f"  {line}\n" for line in command_lines(next_commands()))
+    Console(stderr=True).print(
+        f"\nNext, type in this shell:\n\n{lines}", soft_wrap=True, highlight=False, markup=False
+    )
+
+
+def next_commands() -> list[str]:
+    """Return the commands to try after the demo; those with a window only if there is a screen."""
+    commands = ["gallery", "render knot --decals 800 -o knot.png"]
+    try:
+        require_screen()
+    except NoGraphics:
+        return commands
+    return [*commands, "edit knot --decals 300 --image scale --image eye"]
 
 
 def nest_scene(*, progress: Progress) -> Scene:

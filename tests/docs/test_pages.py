@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,11 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 import pyvista as pv
+from cyclopts import CycloptsError
 from PIL import Image
 
 from blobtree import Point, polygonize
 from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
+from decals.apps.cli import app
 from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
 from tests.decals.baking.glb import need
 
@@ -200,6 +203,25 @@ def test_commands_on_pages_name_existing_files() -> None:
         files = re.findall(r"python ([\w/]+\.py)", text)
         missing += [f"{page.name}: {file}" for file in files if not (ROOT / file).exists()]
     assert missing == []
+
+
+def test_every_command_on_the_pages_is_valid() -> None:
+    wrong, count = [], 0
+    for page in [*PAGES, ROOT / "CONTRIBUTING.md"]:
+        for line in re.findall(r"^implicit-decals (.+)", page.read_text(encoding="utf-8"), re.MULTILINE):
+            count += 1
+            try:
+                app.parse_args(shlex.split(line, comments=True), print_error=False, exit_on_error=False)
+            except CycloptsError as error:
+                wrong.append(f"{page.name}: {line}: {error}")
+    assert wrong == []
+    assert count > 20
+
+
+def test_the_readme_activates_the_environment_before_its_first_command() -> None:
+    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    lines = [line.partition("#")[0].strip() for line in "".join(blocks).splitlines()]
+    assert lines[:3] == ["make demo", ". .venv/bin/activate", "implicit-decals doctor"]
 
 
 def test_the_key_table_is_that_of_the_editor() -> None:
