@@ -3,7 +3,7 @@
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cached_property
 from types import TracebackType
 from typing import Any, Self
@@ -11,6 +11,7 @@ from typing import Any, Self
 import moderngl
 
 from decals.errors import NoGraphics
+from decals.rendering.current_context import kept_current
 from decals.rendering.gl_libraries import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.rendering.pixel_pass import (
     COMPUTE_VERSION,
@@ -130,11 +131,12 @@ class Context:
             If OpenGL 3.3 is missing (the message says what to install), or the backend is not supported.
         """
         require_gl()
-        hold_display()
-        gl = _newest_context()
-        context = cls(gl, owned=True, backend=backend)
-        with context.current():  # a new context is current: give the thread back to the one before
-            return context
+        with kept_current():
+            hold_display()
+            gl = _newest_context()
+            context = cls(gl, owned=True, backend=backend)
+            with context.current():  # a new context is current: give the thread back to the one before
+                return context
 
     @property
     def name(self) -> str:
@@ -155,7 +157,8 @@ class Context:
     def current(self) -> Iterator[Self]:
         """Make this the thread's current context within a ``with`` block.
 
-        Blocks nest, of one context and of several. A context that is not owned must be current already: its
+        Blocks nest, of one context and of several. After the outermost block the context of the caller is
+        current again. A context that is not owned must be current already: its
         window sees to that. (glcontext's own blocks leave no context current, hence the stack.)
         """
         if not self._owned:
@@ -163,15 +166,16 @@ class Context:
             return
         check_not_forked()
         stack = _entered.contexts
-        stack.append(self.gl)
-        self.gl.__enter__()  # type: ignore[no-untyped-call]
-        try:
-            yield self
-        finally:
-            stack.pop()
-            self.gl.__exit__(None, None, None)  # type: ignore[no-untyped-call]
-            if stack:
-                stack[-1].__enter__()  # type: ignore[no-untyped-call]
+        with nullcontext() if stack else kept_current():
+            stack.append(self.gl)
+            self.gl.__enter__()  # type: ignore[no-untyped-call]
+            try:
+                yield self
+            finally:
+                stack.pop()
+                self.gl.__exit__(None, None, None)  # type: ignore[no-untyped-call]
+                if stack:
+                    stack[-1].__enter__()  # type: ignore[no-untyped-call]
 
     def program(self, vertex: Source, fragment: Source) -> moderngl.Program:
         """Compile two sources, or return the program that was compiled of them before.
@@ -243,7 +247,8 @@ class Context:
         self._programs.clear()
         self._compute_programs.clear()
         if self._owned:
-            self.gl.release()
+            with kept_current():
+                self.gl.release()
             self._owned = False
 
     def __enter__(self) -> Self:

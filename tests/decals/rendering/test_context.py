@@ -1,11 +1,14 @@
 """Contexts: what they cannot do they say; they nest; programs are compiled once."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import moderngl
 import pytest
 
+import decals
+from blobtree import Point
 from decals.errors import NoGraphics
 from decals.rendering.context import Context
 from decals.shaders import CompileError, Source, compose
@@ -86,3 +89,22 @@ def test_an_attached_context_is_left_alone(context: Context) -> None:
         assert usable(attached)
     attached.release()
     assert usable(context)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="contexts are kept on Linux alone")
+def test_the_context_of_the_caller_stays_current() -> None:
+    """Around a picture, and around contexts and renderers that are made, used and released."""
+    own = moderngl.create_context(standalone=True, backend="egl")
+    texture = own.texture((2, 2), 1, bytes(range(4)), alignment=1)
+    try:
+        for _ in range(2):
+            decals.render(Point((0, 0, 0), radius=1.0), size=(16, 12), samples=1)
+            assert texture.read(alignment=1) == bytes(range(4))
+        with Context.standalone() as context:
+            assert texture.read(alignment=1) == bytes(range(4))
+            with context.current():
+                assert usable(context)
+            assert texture.read(alignment=1) == bytes(range(4))
+        assert texture.read(alignment=1) == bytes(range(4))
+    finally:
+        own.release()
