@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from decals import Contact, ImageMapping
 from decals import bake as bake_scene
-from decals.apps.commands.options import MAX_SAMPLES, Definitions, OptionalWhole, Whole, check_count
+from decals.apps.commands.options import MAX_SAMPLES, Definitions, OptionalWhole, Trust, Whole, check_count
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_model
 from decals.apps.output import check_output
@@ -26,6 +26,7 @@ def bake(
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     define: Definitions = None,
+    trust: Trust = False,
 ) -> None:
     """Write a scene as a GLB file, with the decals in a texture or in vertex colours.
 
@@ -50,12 +51,15 @@ def bake(
     creases
         Keep the edges that unions, intersections and differences leave.
     define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
+        repeated.
+    trust
+        Let a scene read files outside its folder, and any number of images.
     """
     check_output(output, (".glb",))
     check_count("--samples", samples, 1, MAX_SAMPLES)
     import_definitions(define)
-    loaded = load_model(scene)
+    loaded = load_model(scene, trust=trust)
     with progress_bars() as progress:
         bake_scene(
             loaded,

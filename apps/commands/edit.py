@@ -14,6 +14,7 @@ from decals.apps.commands.options import (
     Definitions,
     OptionalWhole,
     ScatterOptions,
+    Trust,
     check_count,
     parse_size,
 )
@@ -44,6 +45,7 @@ def edit(
     seed: OptionalWhole = None,
     save: Path | None = None,
     define: Definitions = None,
+    trust: Trust = False,
 ) -> None:
     """Open models or a scene in an editor window.
 
@@ -66,7 +68,10 @@ def edit(
     save
         The JSON file that Ctrl + S writes. Default: the opened scene, or a new file MODEL-decals.json.
     define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
+        repeated.
+    trust
+        Let a scene read files outside its folder, and any number of images.
     """
     pixels = parse_size(size)
     if decals is not None:
@@ -77,7 +82,7 @@ def edit(
         check_output(save, (".json",))
     EditWindow.require_screen()
     import_definitions(define)
-    loaded, path = load_models(model), save
+    loaded, path = load_models(model, trust=trust), save
     if isinstance(loaded, Scene):
         if decals is not None or image or seed is not None:
             raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")

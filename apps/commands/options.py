@@ -42,6 +42,9 @@ OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=F
 Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
 """Modules that define custom nodes."""
 
+Trust = Annotated[bool, Parameter(name="--trust", negative=(), show_default=False)]
+"""Permission for a scene to read files outside its folder."""
+
 
 def parse_size(text: str) -> Size:
     """Parse a picture size such as ``"1200x900"``."""

@@ -47,7 +47,8 @@ def polygonize(
     split_normals
         As --creases, with separate vertices and normals on the sides of a crease, so that it looks sharp.
     define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
+        repeated.
     """
     check_output(output, MESH_SUFFIXES)
     import_definitions(define)

@@ -12,6 +12,7 @@ from decals.apps.commands.options import (
     Definitions,
     OptionalWhole,
     ScatterOptions,
+    Trust,
     Whole,
     check_count,
     parse_size,
@@ -42,6 +43,7 @@ def render(
     seed: OptionalWhole = None,
     save: Path | None = None,
     define: Definitions = None,
+    trust: Trust = False,
 ) -> None:
     """Cover models with decals and draw a picture.
 
@@ -78,7 +80,10 @@ def render(
     save
         Also write the scene to this JSON file, which render and edit can open.
     define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
+        repeated.
+    trust
+        Let a scene read files outside its folder, and any number of images.
     """
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
@@ -87,7 +92,7 @@ def render(
     if save is not None:
         check_output(save, (".json",))
     import_definitions(define)
-    loaded = load_models(model)
+    loaded = load_models(model, trust=trust)
     if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
         raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
     options = ScatterOptions.from_arguments(decals, image, seed)

@@ -82,7 +82,8 @@ def scatter(
     seed
         Seed of the random numbers: equal seeds give equal decals.
     define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Can be repeated.
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
+        repeated.
     """
     if count is not None and spacing is not None:
         raise InvalidInput("expected --count or --spacing, got both; leave one of them out")

@@ -15,8 +15,8 @@ from decals.scenes.objects import SceneObject, as_objects
 from decals.validation import is_file
 
 
-def load_model(model: str) -> SceneObject | Scene:
-    """Load the sample or the file that a MODEL argument names.
+def load_model(model: str, *, trust: bool = False) -> SceneObject | Scene:
+    """Load the sample or the file that a MODEL argument names; ``trust`` is that of `decals.load_scene`.
 
     Raises
     ------
@@ -31,14 +31,14 @@ def load_model(model: str) -> SceneObject | Scene:
             f"found no file {model!r}"
         )
     try:
-        return load_file(model, samples=sample_mesh)
+        return load_file(model, samples=sample_mesh, trust=trust)
     except ImplicitDecalsError as error:
         if model in str(error):
             raise
         raise InvalidInput(f"{model!r}: {error}") from error
 
 
-def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
+def load_models(models: Sequence[str], *, trust: bool = False) -> list[SceneObject] | Scene:
     """Load one whole scene, or several models, each in its own coordinates and under its own name.
 
     Raises
@@ -48,7 +48,7 @@ def load_models(models: Sequence[str]) -> list[SceneObject] | Scene:
     """
     objects: list[SceneObject] = []
     for model in models:
-        loaded = load_model(model)
+        loaded = load_model(model, trust=trust)
         if isinstance(loaded, Scene):
             if len(models) > 1:
                 raise InvalidInput(

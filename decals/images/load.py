@@ -15,6 +15,9 @@ from decals.validation import is_file
 MAX_IMAGE_EDGE = 8192
 """Longest edge of a decal image that is read from a file, in pixels."""
 
+PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM", "TGA", "JPEG2000", "AVIF")
+"""Formats that are read, by their names in Pillow. Others, such as EPS, would start programs or are rare."""
+
 _ADVICE = "give a picture such as PNG or JPEG, or one of: " + ", ".join(BUILTIN_IMAGES)
 
 
@@ -65,7 +68,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     Parameters
     ----------
     path : Path
-        A file of any format that Pillow reads.
+        A PNG, JPEG, WebP, TIFF, BMP, GIF, PPM, TGA, JPEG 2000 or AVIF file.
 
     Returns
     -------
@@ -93,7 +96,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     if not is_file(path):
         raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_ADVICE}")
     try:
-        with warnings.catch_warnings(), Image.open(path) as picture:
+        with warnings.catch_warnings(), Image.open(path, formats=PICTURE_FORMATS) as picture:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_IMAGE_EDGE is the limit
             _check_size(picture, path)
             picture.load()

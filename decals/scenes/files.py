@@ -35,11 +35,13 @@ from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
 from decals.scenes.objects import SceneObject, as_object
 from decals.scenes.records import (
+    TRUST_ADVICE,
     DecalRecord,
     MeshRecord,
     SampleLoader,
     TreeRecord,
     absolute,
+    check_inside,
     decals_of,
     object_of,
     record_of,
@@ -51,6 +53,12 @@ from decals.validation import describe, is_file
 
 PART = 500
 """Decals that are described at a time."""
+
+MAX_IMAGES = 1024
+"""Most images of a scene that is not trusted."""
+
+MAX_IMAGE_PIXELS = 1 << 28
+"""Most pixels of all images of a scene that is not trusted: 1 GB of memory."""
 
 FORMAT = "implicit-decals-scene"
 VERSION = 1
@@ -114,7 +122,9 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
         raise InvalidScene(f"could not write the scene {str(path)!r} ({error.strerror})") from error
 
 
-def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = None) -> Scene:
+def load_scene(
+    path: str | os.PathLike[str], *, samples: SampleLoader | None = None, trust: bool = False
+) -> Scene:
     """Read a scene from a JSON file.
 
     Parameters
@@ -123,6 +133,9 @@ def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
         A scene file, as `save_scene` writes it.
     samples : callable, optional
         Function that returns the vertices and faces of a source ``"sample:NAME"``, by NAME.
+    trust : bool
+        True reads meshes and images at any path, and images of any number. By default a scene may name
+        files in its own folder and below alone, and at most `MAX_IMAGES` images of `MAX_IMAGE_PIXELS` pixels.
 
     Returns
     -------
@@ -132,7 +145,8 @@ def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
     Raises
     ------
     InvalidScene
-        If the file is missing or is no scene; the message names the offending field.
+        If the file is missing or is no scene, or names a file that it may not without ``trust``; the message
+        names the offending field.
     InvalidMesh, InvalidImage, blobtree.ImplicitDecalsError
         If a mesh, an image or a tree that the scene refers to is missing or broken.
 
@@ -151,7 +165,7 @@ def load_scene(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
         reason = getattr(error, "strerror", None) or "no file can have this name"
         raise InvalidScene(f"could not read the scene {str(path)!r} ({reason}); check the path") from error
     try:
-        return from_json(text, folder=path.parent, samples=samples)
+        return from_json(text, folder=path.parent, samples=samples, trust=trust)
     except InvalidScene as error:
         raise InvalidScene(f"{str(path)!r}: {error}") from error
 
@@ -173,16 +187,39 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
     return b"{\n" + b",\n".join(fields) + b"\n}\n"
 
 
-def from_json(text: bytes, *, folder: Path, samples: SampleLoader | None = None) -> Scene:
+def from_json(
+    text: bytes, *, folder: Path, samples: SampleLoader | None = None, trust: bool = False
+) -> Scene:
     """Read a scene from JSON; see `load_scene`."""
     record = _decode(text)
+    if not trust:
+        meshes = [item.source for item in record.objects if isinstance(item, MeshRecord)]
+        check_inside([*(source for source in meshes if source is not None), *record.images], folder)
     objects = [object_of(item, folder, samples) for item in record.objects]
     return Scene(
         objects=tuple(objects),
         camera=_camera(record.camera),
         decals=decals_of(record.decals),
-        images=tuple(DecalImage.load(absolute(source, folder)) for source in record.images),
+        images=_images(record.images, folder, trust),
     )
+
+
+def _images(sources: list[str], folder: Path, trust: bool) -> tuple[DecalImage, ...]:
+    """Load the images of a scene; InvalidScene if an unknown scene has too many, or too large ones."""
+    images: list[DecalImage] = []
+    pixels = 0
+    if not trust and len(sources) > MAX_IMAGES:
+        raise InvalidScene(f"images: expected at most {MAX_IMAGES}, got {len(sources)}; {TRUST_ADVICE}")
+    for source in sources:
+        images.append(DecalImage.load(absolute(source, folder)))
+        height, width = images[-1].pixels.shape[:2]
+        pixels += height * width
+        if not trust and pixels > MAX_IMAGE_PIXELS:
+            raise InvalidScene(
+                f"images: expected at most {MAX_IMAGE_PIXELS:,} pixels together, got more with {source!r}; "
+                f"scale them, or {TRUST_ADVICE}"
+            )
+    return tuple(images)
 
 
 HEADER_BYTES = 200
@@ -238,7 +275,9 @@ def _camera(record: _CameraRecord) -> Camera:
         raise InvalidScene(f"camera: {error}") from error
 
 
-def load_model(path: str | os.PathLike[str], *, samples: SampleLoader | None = None) -> SceneObject | Scene:
+def load_model(
+    path: str | os.PathLike[str], *, samples: SampleLoader | None = None, trust: bool = False
+) -> SceneObject | Scene:
     """Load a mesh, a BlobTree or a scene from a file.
 
     Parameters
@@ -247,6 +286,8 @@ def load_model(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
         A mesh file of any format that pyvista reads, or a BlobTree or a scene in JSON.
     samples : callable, optional
         Function that returns the meshes of a scene whose source is ``"sample:NAME"``.
+    trust : bool
+        True lets a scene name files at any path, see `decals.load_scene`.
 
     Returns
     -------
@@ -273,7 +314,7 @@ def load_model(path: str | os.PathLike[str], *, samples: SampleLoader | None = N
     if not isinstance(path, str | os.PathLike):
         raise InvalidScene(f"path: expected the path of a model, got {describe(path)}")
     if _is_scene_file(Path(path)):
-        return load_scene(path, samples=samples)
+        return load_scene(path, samples=samples, trust=trust)
     return as_object(path, "model")
 
 

@@ -20,6 +20,8 @@ from decals.surfaces.mesh_file import MeshArrays, read_mesh
 SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""
 
+TRUST_ADVICE = "if you trust the author of the scene, pass trust=True (--trust on the command line)"
+
 SampleLoader = Callable[[str], MeshArrays]
 """Gives the vertices and faces of a sample mesh by its name."""
 
@@ -96,6 +98,22 @@ def _unpacked(name: str, data: _InlineMesh) -> MeshArrays:
     except ValueError as error:
         raise InvalidScene(f"mesh {name!r}: expected rows of three 4-byte numbers ({error})") from error
     return vertices.astype(np.float32), faces.astype(np.int32)
+
+
+def check_inside(sources: Iterable[str], folder: Path) -> None:
+    """Raise InvalidScene for a path that leads out of the folder of its scene, also by a symbolic link."""
+    root = Path(os.path.realpath(folder))
+    for source in sources:
+        if _is_name(source):
+            continue
+        try:
+            inside = Path(os.path.realpath(folder / source)).is_relative_to(root)
+        except ValueError:
+            inside = False
+        if not inside:
+            raise InvalidScene(
+                f"expected files in the folder of the scene, {str(root)!r}, got {source!r}; {TRUST_ADVICE}"
+            )
 
 
 def relative(source: str, folder: Path) -> str:
