@@ -200,7 +200,7 @@ def test_commands_on_pages_name_existing_files() -> None:
         text = page.read_text(encoding="utf-8")
         modules = set(re.findall(r"python -m ((?:tests|decals)\.[\w.]*\w)", text)) - {"tests.bench.NAME"}
         missing += [f"{page.name}: {module}" for module in modules if find_spec(module) is None]
-        files = re.findall(r"python ([\w/]+\.py)", text)
+        files = re.findall(r"python (\w+/[\w/]+\.py)", text)  # a reader's own script has no folder
         missing += [f"{page.name}: {file}" for file in files if not (ROOT / file).exists()]
     assert missing == []
 
