@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import weakref
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from typing import Any
 
@@ -23,7 +24,7 @@ from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
 from decals.vtk.exports import restore_exports, warn_of_exports
 from decals.vtk.frame import WindowContext
-from decals.vtk.subplot import SubplotRenderer
+from decals.vtk.subplot import PickResult, SubplotRenderer
 
 Image = str | os.PathLike[str] | DecalImage | NDArray[np.uint8]
 """The name of a generated image, a path, an image, or ``uint8[h, w, 4]``."""
@@ -59,6 +60,7 @@ class DecalsComponent:
         self._plotter = plotter
         self._subplots: dict[int, SubplotRenderer] = {}
         self._context: WindowContext | None = None
+        self._picking: Any = None
 
     # -- what is shown ----------------------------------------------------------------------------------
 
@@ -214,6 +216,76 @@ class DecalsComponent:
             self._plotter.renderer.reset_camera_clipping_range()
         return scene
 
+    def enable_picking(
+        self, callback: Callable[[PickResult], object], *, left_clicking: bool = False
+    ) -> None:
+        """Call a function at each click on an object of any subplot.
+
+        pyvista's pickers find VTK's own actors only. A click on the background, or on an actor in front of
+        the objects, calls nothing. A second call replaces the first function.
+
+        Parameters
+        ----------
+        callback
+            Function of a `PickResult`: ``object_id`` is the index of the object in the scene, ``owner`` the
+            number of the decal that shows there (−1 for none), ``position`` the point on the surface.
+        left_clicking
+            If True, clicks of the left button count, else those of the right button.
+
+        Raises
+        ------
+        InvalidScene
+            The callback is not a function, or the plotter has no interactor.
+
+        Examples
+        --------
+        >>> import pyvista
+        >>> from blobtree import Point
+        >>> plotter = pyvista.Plotter()
+        >>> ball = plotter.decals.add_implicit(Point((0, 0, 0), radius=1.0))
+        >>> plotter.decals.enable_picking(lambda pick: print(pick.owner, pick.position))
+        >>> plotter.show()  # doctest: +SKIP
+        """
+        if not callable(callback):
+            raise InvalidScene(
+                f"callback: expected a function of a PickResult, got {describe(callback)}; "
+                "give a function such as print"
+            )
+        instance("left_clicking", left_clicking, bool, InvalidScene, "True for the left button")
+        self._require_window()
+        iren: Any = getattr(self._plotter, "iren", None)
+        if iren is None:
+            raise InvalidScene(
+                "expected a plotter with an interactor; make pyvistaqt's with off_screen=False"
+            )
+        self.disable_picking()
+        component = weakref.ref(self)
+
+        def pick(interactor: Any, _event: str) -> None:
+            alive = component()
+            if alive is not None:
+                x, y = interactor.GetEventPosition()
+                alive._pick(x, y, callback)
+
+        event = "LeftButtonPressEvent" if left_clicking else "RightButtonPressEvent"
+        self._picking = iren.add_observer(event, pick)
+
+    def disable_picking(self) -> None:
+        """Undo `enable_picking`; without it this does nothing."""
+        iren: Any = getattr(self._plotter, "iren", None)
+        if self._picking is not None and iren is not None:
+            iren.remove_observer(self._picking)
+        self._picking = None
+
+    def _pick(self, x: int, y: int, callback: Callable[[PickResult], object]) -> None:
+        """Call a function with what is visible at a pixel of the window, if that is an object."""
+        for subplot in self.subplots:
+            if subplot.covers(x, y):
+                result = subplot.at(x, y)
+                if result is not None:
+                    callback(result)
+                return
+
     def clear(self) -> None:
         """Remove everything from the active subplot."""
         self.subplot.scene = None
@@ -275,6 +347,7 @@ class DecalsComponent:
 
     def __plotter_close__(self) -> None:
         """Release all resources while the window exists; pyvista calls it."""
+        self.disable_picking()
         for subplot in self._subplots.values():
             subplot.release()
         self._subplots.clear()

@@ -100,6 +100,11 @@ def _writes_depth(prop: Any) -> bool:
     return not (prop.IsA("vtkActor") and prop.HasTranslucentPolygonalGeometry())
 
 
+PICKERS = (
+    "pyvista's pickers find VTK's own actors only, not the objects of plotter.decals; "
+    "call plotter.decals.enable_picking(callback) for these"
+)
+
 MAX_COORDINATE = 2.0**30
 """Largest pixel coordinate that VTK accepts."""
 
@@ -448,8 +453,12 @@ class SubplotRenderer:
         self.applied.end_frame()
 
     def _warn_of_unsupported(self) -> None:
-        """Warn once of each mode of VTK that the subplot does not support."""
-        for message in unsupported_modes(self.vtk_renderer, self.lights):
+        """Warn once of each mode of VTK and pyvista that the subplot does not support."""
+        messages = unsupported_modes(self.vtk_renderer, self.lights)
+        picking = getattr(getattr(self.plotter, "picking", None), "_picker_in_use", False)
+        if picking and self._enclosed:
+            messages = [*messages, PICKERS]
+        for message in messages:
             if message not in self._warned:
                 self._warned.add(message)
                 warnings.warn(message, stacklevel=2)
