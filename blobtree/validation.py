@@ -74,14 +74,6 @@ def finite_number(name: str, value: object) -> float:
     return number
 
 
-def color_triple(value: object) -> Vector:
-    """Return `value` as red, green and blue in [0, 1]; raise `InvalidNode` otherwise."""
-    color = finite_vector("color", value)
-    if min(color) < 0.0 or max(color) > 1.0:
-        raise InvalidNode(f"color: expected red, green, blue in [0, 1], got {shown(value)}")
-    return color
-
-
 def affine_matrix(value: ArrayLike) -> Matrix:
     """Return `value` (3×4 or 4×4) as an invertible affine map; raise `InvalidNode` otherwise."""
     try:

@@ -15,8 +15,10 @@ from decals.images.load import decode_srgb
 from decals.validation import (
     bool_array,
     check_range,
+    color_array,
     describe,
     finite_array,
+    member_array,
     orthogonal_vectors,
     row_selection,
     unit_interval,
@@ -95,12 +97,13 @@ class Decals:
         True if a decal also colours surface that faces away from it, such as the far side of a thin wall.
         Default False.
     interactions : int32[n], optional
-        An `Interaction` each. Default PUSH.
+        An `Interaction` or its name (``"overlap"``) each, or one for all. Default PUSH.
     layers : int32[n], optional
         Layers are drawn from the lowest up. Overlapping or independent decals of one layer are drawn in the
         order of their numbers. Default 0.
     tints : float32[n, 3], optional
-        sRGB colour from 0 to 1 by which the image is multiplied in linear light. Default white.
+        sRGB colour from 0 to 1 by which the image is multiplied in linear light; or the name of a colour
+        each, or one for all. Default white.
     opacities : float32[n], optional
         From 0 (invisible) to 1, the default.
 
@@ -129,6 +132,8 @@ class Decals:
     Decals(2, radii from 0.3 to 0.6)
     >>> disks.replace(layers=[0, 1]).layered
     True
+    >>> disks.replace(interactions="overlap", tints=["tomato", "#336699"]).tints[1].round(1).tolist()
+    [0.20000000298023224, 0.4000000059604645, 0.6000000238418579]
     """
 
     positions: Float32Array
@@ -176,13 +181,13 @@ class Decals:
             "radii": radii.astype(np.float32),
             "images": whole_array("images", self.images, count, low=NO_IMAGE, high=MAX_IMAGES - 1, default=0),
             "spill": bool_array("spill", self.spill, count),
-            "interactions": whole_array(
-                "interactions", self.interactions, count, low=0, high=2, default=Interaction.PUSH
+            "interactions": member_array(
+                "interactions", self.interactions, count, Interaction, Interaction.PUSH
             ),
             "layers": whole_array(
                 "layers", self.layers, count, low=-LAYER_LIMIT, high=LAYER_LIMIT - 1, default=0
             ),
-            "tints": unit_interval("tints", self.tints, (count, 3)).astype(np.float32),
+            "tints": color_array("tints", self.tints, count).astype(np.float32),
             "opacities": unit_interval("opacities", self.opacities, (count,)).astype(np.float32),
         }
         for name, array in arrays.items():

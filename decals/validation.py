@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from enum import Enum
+from enum import Enum, IntEnum
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
+from blobtree.colors import color_rgb, is_named
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, MissingPackage
 
 T = TypeVar("T")
@@ -45,12 +46,17 @@ def instance(name: str, value: object, kind: type[T], error: type[ImplicitDecals
 
 
 def member(name: str, value: Any, kind: type[E], error: type[ImplicitDecalsError]) -> E:
-    """Return a member of an enumeration, which may be given by its value."""
+    """Return a member of an enumeration, which may be given by its value, or by its name in any case."""
+    words = {one: one.value if isinstance(one.value, str) else one.name.lower() for one in kind}
+    if isinstance(value, str):
+        for one, word in words.items():
+            if value.strip().lower() in (word, one.name.lower()):
+                return one
     try:
         return kind(value)
     except ValueError:
-        names = ", ".join(f"{kind.__name__}.{one.name}" for one in kind)
-        raise error(f"{name}: expected one of {names}, got {describe(value)}") from None
+        choices = ", ".join(map(repr, words.values()))
+        raise error(f"{name}: expected one of {choices}, got {describe(value)}") from None
 
 
 def whole_number(name: str, value: Any, low: int, high: int | None, error: type[ImplicitDecalsError]) -> int:
@@ -246,6 +252,40 @@ def whole_array(name: str, values: Any, count: int, *, low: int, high: int, defa
         row = int(np.argmax(bad))
         raise InvalidDecals(f"{name}: expected numbers from {low} to {high}, got {array[row]} in row {row}")
     return array.astype(np.int32)
+
+
+def member_array(name: str, values: Any, count: int, kind: type[IntEnum], default: IntEnum) -> Int32Array:
+    """Return members of an enumeration as a new array of their numbers; the default in each row for None.
+
+    Members may be given by name. A single one stands for all rows.
+    """
+    if isinstance(values, str | kind):
+        values = [values] * count
+    values = _items(values)
+    if isinstance(values, list | tuple):
+        values = [member(name, one, kind, InvalidDecals) if isinstance(one, str) else one for one in values]
+    return whole_array(name, values, count, low=min(kind), high=max(kind), default=default)
+
+
+def color_values(name: str, values: Any, error: type[ImplicitDecalsError]) -> Any:
+    """Return one colour, or colours, with three numbers for each name; other values as they are."""
+    if is_named(values):
+        return color_rgb(name, values, error)
+    values = _items(values)
+    if isinstance(values, list | tuple):
+        return [color_rgb(name, one, error) if is_named(one) else one for one in values]
+    return values
+
+
+def color_array(name: str, values: Any, count: int) -> Float64Array:
+    """Return sRGB colours as a new array ``[count, 3]``; one name stands for all rows, None is white."""
+    numbers = color_values(name, values, InvalidDecals)
+    return unit_interval(name, np.tile(numbers, (count, 1)) if is_named(values) else numbers, (count, 3))
+
+
+def _items(values: Any) -> Any:
+    """Return an array of texts or objects as a list, other values as they are."""
+    return values.tolist() if isinstance(values, np.ndarray) and values.dtype.kind in "UO" else values
 
 
 def unit_interval(name: str, values: Any, shape: tuple[int, ...]) -> Float64Array:

@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from decals import Contact, ImageMapping
 from decals import bake as bake_scene
 from decals.apps.commands.options import MAX_SAMPLES, Definitions, OptionalWhole, Trust, Whole, check_count
 from decals.apps.commands.progress_bars import progress_bars
@@ -67,8 +66,8 @@ def bake(
             size=size,
             samples=samples,
             vertex_colors=vertex_colors,
-            contact=Contact[contact.upper()],
-            mapping=ImageMapping[mapping.upper()],
+            contact=contact,
+            mapping=mapping,
             resolution=resolution,
             creases=creases,
             progress=progress,

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from decals import Contact, ImageMapping, Scene, save_scene
+from decals import Scene, save_scene
 from decals.apps.commands.options import (
     MAX_SAMPLES,
     TILE,
@@ -109,8 +109,8 @@ def render(
             RenderOptions(
                 size=pixels,
                 samples=samples,
-                contact=Contact[contact.upper()],
-                mapping=ImageMapping[mapping.upper()],
+                contact=contact,
+                mapping=mapping,
             ),
         )
         Picture(picture).save(output)

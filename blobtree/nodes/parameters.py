@@ -21,11 +21,11 @@ from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hin
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.colors import color_rgb
 from blobtree.errors import InvalidNode
 from blobtree.validation import (
     Vector,
     affine_matrix,
-    color_triple,
     finite_number,
     finite_vector,
     non_negative_vector,
@@ -166,13 +166,15 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.DISTANCE: finite_number,
     Quantity.ANGLE: finite_number,
     Quantity.FACTOR: finite_number,
-    Quantity.COLOR: lambda _name, value: color_triple(value),
+    Quantity.COLOR: color_rgb,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }
 """Functions (name, value) that return the checked value of each quantity."""
 
 Radius: TypeAlias = Annotated[float, Parameter(Quantity.RADIUS, "visible radius around the skeleton")]
-Color: TypeAlias = Annotated[Vector, Parameter(Quantity.COLOR, "red, green and blue from 0 to 1")]
+Color: TypeAlias = Annotated[
+    Vector, Parameter(Quantity.COLOR, "red, green and blue from 0 to 1, or the name of a colour")
+]
 
 
 _PARAMETERS: dict[type, dict[str, Parameter]] = {}

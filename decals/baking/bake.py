@@ -45,8 +45,8 @@ def bake(
     size: int = 2048,
     samples: int = 2,
     vertex_colors: bool = False,
-    contact: Contact = Contact.PRODUCT,
-    mapping: ImageMapping = ImageMapping.CORRECTED,
+    contact: Contact | str = Contact.PRODUCT,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
     resolution: int | None = None,
     creases: bool = False,
     progress: Progress | None = None,
@@ -71,10 +71,11 @@ def bake(
     vertex_colors : bool
         Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
         not needed.
-    contact : Contact
-        Contact mode: how decals that push each other share the surface.
-    mapping : ImageMapping
-        Image mapping: how images lie on curved surface.
+    contact : Contact or str
+        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"`` or
+        ``"radial"``.
+    mapping : ImageMapping or str
+        Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     resolution : int, optional
         Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64.
     creases : bool

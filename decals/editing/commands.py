@@ -17,7 +17,7 @@ from decals.model import NO_IMAGE, Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, finite_number, finite_vector, instance, whole_number
+from decals.validation import color_values, describe, finite_number, finite_vector, instance, whole_number
 
 DUPLICATE_OFFSET = 1.0
 """Distance between a decal and its duplicate, in radii."""
@@ -454,6 +454,8 @@ def _broadcast(decals: Decals, name: str, value: ArrayLike) -> Any:
     present = getattr(decals, name, None)
     if not isinstance(present, np.ndarray):
         raise InvalidEdit(f"expected the name of an array of decals, such as 'layers', got {name!r}")
+    if name == "tints":
+        value = color_values(name, value, InvalidEdit)
     try:
         array = np.asarray(value)
         return array if array.ndim == present.ndim else np.broadcast_to(array, present.shape)

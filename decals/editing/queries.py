@@ -16,7 +16,7 @@ from decals.model import Decals
 from decals.record import Contact
 from decals.scenes.objects import SceneObject
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, finite_vector, instance, whole_number
+from decals.validation import describe, finite_vector, instance, member, whole_number
 
 OPPOSITE_COSINE = -0.999999
 """Cosine below which two normals count as opposite: the shortest rotation between them is not unique."""
@@ -172,7 +172,7 @@ class SurfacePick:
 
 
 def pick(
-    document: Document, origin: ArrayLike, direction: ArrayLike, *, contact: Contact = Contact.PRODUCT
+    document: Document, origin: ArrayLike, direction: ArrayLike, *, contact: Contact | str = Contact.PRODUCT
 ) -> SurfacePick | None:
     """Return the first surface point along a ray and its owner, or None for a miss.
 
@@ -224,8 +224,8 @@ def outline(
     document: Document,
     number: int,
     *,
-    contact: Contact = Contact.PRODUCT,
-    mapping: ImageMapping = ImageMapping.CORRECTED,
+    contact: Contact | str = Contact.PRODUCT,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
 ) -> Float32Array:
     """Return the line around the visible part of a decal.
 
@@ -270,8 +270,8 @@ def outlines(
     document: Document,
     numbers: ArrayLike,
     *,
-    contact: Contact = Contact.PRODUCT,
-    mapping: ImageMapping = ImageMapping.CORRECTED,
+    contact: Contact | str = Contact.PRODUCT,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
     angles: int = ANGLES,
 ) -> Float32Array:
     """Return the lines of `outline` for several decals, float32, shape (n, angles + 1, 3).
@@ -287,6 +287,8 @@ def outlines(
     angles
         Directions in which each outline is sampled.
     """
+    mapping = member("mapping", mapping, ImageMapping, InvalidEdit)
+    modes = member("contact", contact, Contact, InvalidEdit), mapping
     numbers = np.asarray(numbers, np.int64)
     decals = document.decals.take(numbers)
     if not len(decals):
@@ -294,7 +296,6 @@ def outlines(
     centers = decals.positions[:, None].astype(np.float64)
     spokes = _rim_points(document, decals, angles, mapping) - centers
     fractions = np.broadcast_to(np.arange(RINGS + 1) / RINGS, (*spokes.shape[:2], RINGS + 1))
-    modes = contact, mapping
     visible = _visible_fractions(document, numbers, centers, spokes, fractions, modes)
     finer = np.minimum(visible[..., None] + np.arange(RINGS + 1) / RINGS**2, 1.0)
     finer = _visible_fractions(document, numbers, centers, spokes, finer, modes)

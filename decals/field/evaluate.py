@@ -50,8 +50,8 @@ def evaluate(
     points: ArrayLike,
     normals: ArrayLike,
     *,
-    mapping: ImageMapping = ImageMapping.CORRECTED,
-    contact: Contact = Contact.PRODUCT,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
+    contact: Contact | str = Contact.PRODUCT,
     index: DecalIndex | None = None,
     images: Sequence[UInt8Array] | None = None,
     device: Any = None,
@@ -66,10 +66,10 @@ def evaluate(
         Surface points in model units. A point that is not finite has no owner.
     normals : float32[m, 3]
         Geometric normals of the surface there, of any length. A zero normal faces every decal.
-    mapping : ImageMapping, optional
-        Image mapping. Default CORRECTED.
-    contact : Contact, optional
-        Contact mode. Default PRODUCT.
+    mapping : ImageMapping or str, optional
+        Image mapping: CORRECTED (default) or CHORD.
+    contact : Contact or str, optional
+        Contact mode: PRODUCT (default), MIN or RADIAL.
     index : DecalIndex, optional
         Index of these decals. Built if not given; an editor has its own.
     images : sequence of uint8[h, w, 4], optional

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.colors import color_rgb, is_named
 from decals.errors import InvalidScene
 from decals.validation import describe, finite_number, finite_vector
 
@@ -24,8 +25,8 @@ class Light:
 
     Parameters
     ----------
-    color : (red, green, blue)
-        Display values of a white surface that faces the light, intensity included.
+    color : (red, green, blue) or str
+        Display values of a white surface that faces the light, intensity included; or the name of a colour.
     direction : (x, y, z)
         Unit vector along which the light travels.
     position : (x, y, z), optional
@@ -57,6 +58,8 @@ class Light:
 
     def __post_init__(self) -> None:
         positions = () if self.position is None else ("position",)
+        if is_named(self.color):
+            object.__setattr__(self, "color", color_rgb("a light's color", self.color, InvalidScene))
         for name in ("color", "direction", "attenuation", *positions):
             numbers = finite_vector(f"a light's {name}", getattr(self, name), InvalidScene)
             object.__setattr__(self, name, tuple(numbers.tolist()))

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from blobtree._typing import UInt8Array
+from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
@@ -18,8 +17,6 @@ from decals.validation import describe, instance, member, whole_number
 
 Size: TypeAlias = tuple[int, int]
 """Width and height."""
-
-Rgba: TypeAlias = tuple[float, float, float, float]
 
 MAX_PICTURE_SIDE = 1 << 20
 """Pixels along each side of a picture, at most."""
@@ -34,33 +31,33 @@ class Background:
 
     Parameters
     ----------
-    top, bottom : (red, green, blue, alpha)
-        sRGB and alpha at the upper and the lower edge, each in [0, 1], not premultiplied.
+    top, bottom : (red, green, blue, alpha) or str
+        sRGB and alpha at the upper and the lower edge, each in [0, 1], not premultiplied; or the name of a
+        colour. Alpha is 1 if it is left out.
 
     Raises
     ------
     InvalidScene
-        If a colour is not four such numbers.
+        If a colour is neither three or four such numbers nor a name.
 
     Examples
     --------
     >>> from decals.rendering import Background
-    >>> white = Background((1, 1, 1, 1), (1, 1, 1, 1))
+    >>> Background("white", (0.5, 0.5, 0.5))
+    Background(top=(1.0, 1.0, 1.0, 1.0), bottom=(0.5, 0.5, 0.5, 1.0))
     """
 
     top: Rgba
     bottom: Rgba
 
+    if TYPE_CHECKING:  # names of colours are converted
+
+        def __init__(self, top: ColorLike, bottom: ColorLike) -> None: ...
+
     def __post_init__(self) -> None:
-        for name, color in (("top", self.top), ("bottom", self.bottom)):
-            try:
-                channels = np.array(color, np.float64)
-            except (TypeError, ValueError, OverflowError):
-                channels = np.zeros(0)
-            if channels.shape != (4,) or not ((channels >= 0.0) & (channels <= 1.0)).all():
-                raise InvalidScene(
-                    f"a background's {name}: expected sRGB and alpha in [0, 1], got {describe(color)}"
-                )
+        for name in ("top", "bottom"):
+            color = color_rgba(f"a background's {name}", getattr(self, name), InvalidScene)
+            object.__setattr__(self, name, color)
 
 
 STUDIO = Background((0.80, 0.82, 0.85, 1.0), (0.96, 0.96, 0.95, 1.0))
@@ -80,10 +77,11 @@ class RenderOptions:
         Width and height in pixels.
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
-    contact : Contact
-        Contact mode: how decals that push each other share the surface.
-    mapping : ImageMapping
-        Image mapping: how images lie on curved surface.
+    contact : Contact or str
+        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"`` or
+        ``"radial"``.
+    mapping : ImageMapping or str
+        Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     background : Background
         Colours behind the objects.
     lights : Lighting, optional
@@ -107,6 +105,18 @@ class RenderOptions:
     mapping: ImageMapping = ImageMapping.CORRECTED
     background: Background = STUDIO
     lights: Lighting | None = None
+
+    if TYPE_CHECKING:  # names of modes are converted
+
+        def __init__(
+            self,
+            size: Size = (800, 600),
+            samples: int = 2,
+            contact: Contact | str = Contact.PRODUCT,
+            mapping: ImageMapping | str = ImageMapping.CORRECTED,
+            background: Background = STUDIO,
+            lights: Lighting | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         checked = {

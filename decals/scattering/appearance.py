@@ -1,6 +1,7 @@
 """Decals of oriented points: radii, tangents and images by a set of rules."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,10 +10,10 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.orientation import Direction, check_direction, max_curvatures, tangents
+from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
-from decals.validation import real_number
+from decals.validation import member, real_number
 
 SAMPLES_PER_DECAL = 64
 """Samples for each decal from which its radius is measured."""
@@ -43,16 +44,30 @@ class Appearance:
     jitter: Jitter | None = None
     _shares: Float64Array = field(init=False)
 
+    if TYPE_CHECKING:  # names of rules are converted
+
+        def __init__(
+            self,
+            sizing: Sizing | str = Sizing.COVERING,
+            factor: float = 1.0,
+            direction: Direction = None,
+            images: int = 1,
+            weights: ArrayLike | None = None,
+            choice: ImageChoice | str = ImageChoice.RANDOM,
+            jitter: Jitter | None = None,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
-        for name, kind in (("sizing", Sizing), ("choice", ImageChoice)):
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                known = ", ".join(str(member) for member in kind)
-                raise InvalidScattering(f"{name}: expected one of {known}, got {value!r}")
+        checked = {
+            "sizing": member("sizing", self.sizing, Sizing, InvalidScattering),
+            "choice": member("choice", self.choice, ImageChoice, InvalidScattering),
+            "direction": as_direction(self.direction),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         if not isinstance(self.jitter, Jitter | None):
             raise InvalidScattering(f"jitter: expected a Jitter, got {self.jitter!r}")
         real_number("factor", self.factor, "a number above 0", lambda value: value > 0, InvalidScattering)
-        check_direction(self.direction)
         object.__setattr__(self, "_shares", image_shares(self.images, self.weights))
 
     def decals_of(

@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array
 from decals.errors import InvalidScattering
 from decals.scattering.neighbors import FacingTree
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, function_values, real_array
+from decals.validation import describe, function_values, member, real_array
 
 MIN_TANGENTIAL_SHARE = 1e-3
 """Least tangential share of a direction; below it the direction counts as normal to the surface."""
@@ -46,18 +46,24 @@ class Orientation(Enum):
     """As `CURVATURE`, smoothed: neighbouring tangents agree up to quarter turns."""
 
 
-Direction: TypeAlias = ArrayLike | Callable[[Float32Array], ArrayLike] | Orientation | None
+Direction: TypeAlias = ArrayLike | Callable[[Float32Array], ArrayLike] | Orientation | str | None
 """Directions of tangents.
 
 None (random), one vector for all decals, a function of ``points[n, 3]`` to ``vectors[n, 3]`` (such as
-`gradient_of` returns), or an `Orientation`.
+`gradient_of` returns), or an `Orientation` or its name.
 """
 
 
-def check_direction(direction: Direction) -> None:
-    """Raise `InvalidScattering` for an invalid direction; the values of a function are checked later."""
+def as_direction(direction: Direction) -> Direction:
+    """Return a direction with the `Orientation` of a name; the values of a function are checked later.
+
+    Raise `InvalidScattering` for an invalid direction.
+    """
+    if isinstance(direction, str):
+        return member("direction", direction, Orientation, InvalidScattering)
     if direction is not None and not isinstance(direction, Orientation) and not callable(direction):
         _check_vectors(real_array("direction", direction, InvalidScattering), (3,))
+    return direction
 
 
 def tangents(positions: Float32Array, normals: Float32Array, direction: Direction, seed: int) -> Float32Array:

@@ -429,12 +429,12 @@ class Relaxation:
         self,
         *,
         seed: int = 0,
-        sizing: Sizing = Sizing.COVERING,
+        sizing: Sizing | str = Sizing.COVERING,
         factor: float = 1.0,
         direction: Direction = None,
         images: int = 1,
         weights: ArrayLike | None = None,
-        choice: ImageChoice = ImageChoice.RANDOM,
+        choice: ImageChoice | str = ImageChoice.RANDOM,
         jitter: Jitter | None = None,
     ) -> Decals:
         """Return a decal for each particle.

@@ -31,12 +31,12 @@ def scatter(
     mask: Mask | None = None,
     fixed: ArrayLike | None = None,
     regularity: float = 1.0,
-    sizing: Sizing = Sizing.COVERING,
+    sizing: Sizing | str = Sizing.COVERING,
     factor: float = 1.0,
     direction: Direction = None,
     images: int = 1,
     weights: ArrayLike | None = None,
-    choice: ImageChoice = ImageChoice.RANDOM,
+    choice: ImageChoice | str = ImageChoice.RANDOM,
     jitter: Jitter | None = None,
     device: str = "cpu",
     progress: Progress | None = None,
@@ -66,19 +66,19 @@ def scatter(
     regularity : float, default: 1.0
         From 0 (random positions) to 1 (as even as possible). In between the relaxation stops when the
         least distance reaches that share of the one at 1.
-    sizing : Sizing, default: Sizing.COVERING
-        Rule for the radii.
+    sizing : Sizing or str, default: Sizing.COVERING
+        Rule for the radii: ``"covering"``, ``"touching"`` or ``"delaunay"``.
     factor : float, default: 1.0
         Factor of the radii.
-    direction : array_like, callable or Orientation, optional
+    direction : array_like, callable, Orientation or str, optional
         Direction of the images' u axes: a vector, a function of ``points[n, 3]`` to ``vectors[n, 3]``, or an
-        `Orientation`. Random by default.
+        `Orientation`, ``"curvature"`` or ``"cross"``. Random by default.
     images : int, default: 1
         Number of images to choose from.
     weights : array_like, optional
         Relative frequency of each image, ``float[images]``; equal by default.
-    choice : ImageChoice, default: ImageChoice.RANDOM
-        Rule for the image of each decal.
+    choice : ImageChoice or str, default: ImageChoice.RANDOM
+        Rule for the image of each decal: ``"random"``, ``"size"`` or ``"curvature"``.
     jitter : Jitter, optional
         Random deviations of positions, radii and directions; none by default.
     device : str, default: "cpu"

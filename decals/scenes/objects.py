@@ -4,19 +4,20 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import Node
 from blobtree._typing import Float32Array, Int32Array
+from blobtree.colors import ColorLike, color_rgb
 from blobtree.lazy import Lazy
 from decals.errors import InvalidScene
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
-from decals.validation import describe, finite_vector, instance, is_unicode
+from decals.validation import describe, instance, is_unicode
 
 Color = tuple[float, float, float]
 Box = tuple[Float32Array, Float32Array]
@@ -38,8 +39,8 @@ class MeshObject:
         Positions in the scene's units.
     faces : int32[m, 3]
         Corner indices, counter-clockwise seen from outside.
-    color : (red, green, blue)
-        sRGB colour between the decals, each channel in [0, 1].
+    color : (red, green, blue) or str
+        sRGB colour between the decals, each channel in [0, 1]; or the name of a colour.
     source : str, optional
         Where the mesh came from, so that a scene file need not repeat it: a path, or ``"sample:NAME"``.
 
@@ -65,11 +66,22 @@ class MeshObject:
     source: str | None = None
     surface: MeshSurface = field(init=False, repr=False)
 
+    if TYPE_CHECKING:  # lists of numbers and names of colours are converted
+
+        def __init__(
+            self,
+            name: str,
+            vertices: ArrayLike,
+            faces: ArrayLike,
+            color: ColorLike = CLAY,
+            source: str | None = None,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         surface = MeshSurface(self.vertices, self.faces)
         checked = {
             "name": _name(self.name),
-            "color": _color(self.name, self.color),
+            "color": color_rgb(f"object {self.name!r}, colour", self.color, InvalidScene),
             "source": _source(self.name, self.source),
             "surface": surface,
             "vertices": surface.vertices,
@@ -130,7 +142,7 @@ class TreeObject:
 SceneObject = MeshObject | TreeObject
 
 
-def as_object(model: object, name: str, *, color: Color = CLAY) -> SceneObject:
+def as_object(model: object, name: str, *, color: ColorLike = CLAY) -> SceneObject:
     """Return a model as an object of a scene.
 
     Parameters
@@ -139,7 +151,7 @@ def as_object(model: object, name: str, *, color: Color = CLAY) -> SceneObject:
         An object of a scene is returned as it is; `decals.surfaces.convert.as_shape` lists all other kinds.
     name : str
         Name of the object; the model of a file is named after the file.
-    color : (red, green, blue)
+    color : (red, green, blue) or str
         Colour of a mesh.
 
     Raises
@@ -215,11 +227,3 @@ def _source(name: str, source: object) -> str | None:
             f"object {name!r}, source: expected a path or 'sample:NAME', got {describe(source)}; leave it out"
         )
     return text
-
-
-def _color(name: str, color: ArrayLike) -> Color:
-    values = finite_vector(f"object {name!r}, colour", color, InvalidScene)
-    if not ((values >= 0.0) & (values <= 1.0)).all():
-        raise InvalidScene(f"object {name!r}: expected a colour of three numbers in [0, 1], got {color!r}")
-    red, green, blue = values.tolist()
-    return red, green, blue

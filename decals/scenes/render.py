@@ -22,8 +22,8 @@ def render(
     *,
     size: Size = (800, 600),
     samples: int = 2,
-    contact: Contact = Contact.PRODUCT,
-    mapping: ImageMapping = ImageMapping.CORRECTED,
+    contact: Contact | str = Contact.PRODUCT,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
     background: Background = STUDIO,
     lights: Lighting | None = None,
     viewpoint: Viewpoint | None = None,
@@ -40,10 +40,11 @@ def render(
         Width and height in pixels.
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
-    contact : Contact
-        Contact mode: how decals that push each other share the surface.
-    mapping : ImageMapping
-        Image mapping: how images lie on curved surface.
+    contact : Contact or str
+        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"`` or
+        ``"radial"``.
+    mapping : ImageMapping or str
+        Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     background : Background
         Colours behind the objects, such as `decals.rendering.TRANSPARENT`.
     lights : Lighting, optional

@@ -13,11 +13,12 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import Node
+from blobtree.colors import ColorLike
 from decals.errors import InvalidScene, NoGraphics
 from decals.model import NO_IMAGE, Decals
 from decals.rendering import SceneLike
 from decals.scenes.camera import Camera
-from decals.scenes.objects import CLAY, Color, MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import CLAY, MeshObject, SceneObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.convert import Model, as_shape
 from decals.validation import describe, instance
@@ -102,7 +103,7 @@ class DecalsComponent:
         return item
 
     def add_mesh(
-        self, mesh: Model | MeshObject, *, color: Color | str = CLAY, name: str | None = None
+        self, mesh: Model | MeshObject, *, color: ColorLike = CLAY, name: str | None = None
     ) -> MeshObject:
         """Add a mesh, lit like the other objects.
 
@@ -114,13 +115,11 @@ class DecalsComponent:
             A pyvista dataset with a surface, any mesh with ``vertices`` and ``faces``, a tuple of such
             arrays, the path of a mesh file, or an object of a scene.
         color
-            sRGB, each channel in [0, 1], or a name that pyvista knows.
+            sRGB, each channel in [0, 1]; or the name of a colour.
         name
             Its name, unique in the subplot.
         """
-        item = (
-            mesh if isinstance(mesh, MeshObject) else self._mesh_object(mesh, self._name(name), _color(color))
-        )
+        item = mesh if isinstance(mesh, MeshObject) else self._mesh_object(mesh, self._name(name), color)
         self._add_object(item)
         return item
 
@@ -333,7 +332,7 @@ class DecalsComponent:
     def _add_object(self, item: SceneObject) -> None:
         self.scene = self.scene.replace(objects=(*self.scene.objects, item))
 
-    def _mesh_object(self, model: object, name: str, color: Color) -> MeshObject:
+    def _mesh_object(self, model: object, name: str, color: ColorLike) -> MeshObject:
         shape = as_shape(model, name=name, error=InvalidScene)
         if isinstance(shape, Node):
             raise InvalidScene(f"{name}: expected a mesh, got a BlobTree; `add_implicit` adds it")
@@ -367,19 +366,6 @@ def _image(image: Any, number: int) -> DecalImage:
     except ValueError:
         raise InvalidScene(f"image {number}: expected uint8[h, w, 4], got {describe(image)}") from None
     return DecalImage(f"image {number}", pixels)
-
-
-def _color(color: Color | str) -> Color:
-    """Return the channels of a colour name; other values are checked with the object."""
-    if not isinstance(color, str):
-        return color
-    try:
-        red, green, blue = pv.Color(color).float_rgb
-    except ValueError as error:
-        raise InvalidScene(
-            f"expected a colour that pyvista knows, got {color!r}; give a name such as 'tomato', or #rrggbb"
-        ) from error
-    return red, green, blue
 
 
 REMOTE = "server"

@@ -27,7 +27,7 @@ from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, bounds_of
-from decals.validation import describe, finite_number, member, whole_number
+from decals.validation import finite_number, member, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.injection import InjectedDecals
@@ -255,7 +255,7 @@ class SubplotRenderer:
         return self._mapping
 
     @mapping.setter
-    def mapping(self, mapping: ImageMapping) -> None:
+    def mapping(self, mapping: ImageMapping | str) -> None:
         self._mapping = member("mapping", mapping, ImageMapping, InvalidScene)
 
     @property
@@ -264,7 +264,7 @@ class SubplotRenderer:
         return self._contact
 
     @contact.setter
-    def contact(self, contact: Contact) -> None:
+    def contact(self, contact: Contact | str) -> None:
         self._contact = member("contact", contact, Contact, InvalidScene)
 
     @property
@@ -274,10 +274,7 @@ class SubplotRenderer:
 
     @lights.setter
     def lights(self, lights: Lights | str) -> None:
-        try:
-            self._lights = Lights(lights)
-        except ValueError as error:
-            raise InvalidScene(f"lights must be 'scene' or 'vtk'; got {describe(lights)}") from error
+        self._lights = member("lights", lights, Lights, InvalidScene)
 
     # -- coordinates ------------------------------------------------------------------------------------
 

@@ -198,3 +198,22 @@ def test_thousands_of_decals_are_shown_in_one_line() -> None:
     many = Decals(np.zeros((5000, 3)), up, np.roll(up, 1, axis=1), np.linspace(0.1, 0.25, 5000))
     assert repr(many) == "Decals(5000, radii from 0.1 to 0.25)"
     assert repr(Decals.empty()) == "Decals(0)"
+
+
+def test_interactions_and_tints_by_name() -> None:
+    rows = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    decals = Decals(rows, [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [0.5, 0.5])
+    overlap = decals.replace(interactions="Overlap")
+    assert overlap.interactions.tolist() == [Interaction.OVERLAP] * 2
+    assert overlap.interactions.dtype == np.int32
+    for names in (["push", "INDEPENDENT"], np.array(["push", "independent"]), [1, "independent"]):
+        assert decals.replace(interactions=names).interactions.tolist() == [1, 0]
+    assert decals.replace(interactions=Interaction.INDEPENDENT).interactions.tolist() == [0, 0]
+    with pytest.raises(InvalidDecals, match="interactions: expected one of 'independent', 'push', 'ov"):
+        decals.replace(interactions=["push", "pull"])
+    np.testing.assert_allclose(decals.replace(tints="red").tints, [[1, 0, 0]] * 2)
+    mixed = decals.replace(tints=["#336699", "w"]).tints
+    np.testing.assert_allclose(mixed, [[0.2, 0.4, 0.6], [1, 1, 1]], atol=1e-6)
+    assert Decals.empty().replace(tints="red", interactions="push").tints.shape == (0, 3)
+    with pytest.raises(InvalidDecals, match=r"tints: expected red, .* or a name, got 'reddish'"):
+        decals.replace(tints="reddish")

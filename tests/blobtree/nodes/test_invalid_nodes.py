@@ -34,7 +34,7 @@ BAD_VECTORS = [
     [[1, 2, 3]],
 ]
 BAD_POSITIVES = [0, 0.0, -1.0, np.nan, np.inf, 1e19, None, "wide", [1.0]]
-BAD_COLORS = [None, (0, 0), (0, 0, 1.01), (-0.01, 0, 0), (0, 0, np.nan), "red"]
+BAD_COLORS = [None, (0, 0), (0, 0, 1.01), (-0.01, 0, 0), (0, 0, np.nan), "reddish"]
 
 
 @pytest.mark.parametrize("bad", BAD_VECTORS, ids=repr)

@@ -8,6 +8,7 @@ import pytest
 from blobtree import Point, Segment
 from decals.editing.document import Document
 from decals.editing.queries import ANGLES, LIFT, outline, outlines
+from decals.errors import InvalidEdit
 from decals.field.mapping import ImageMapping
 from decals.model import Decals, Interaction
 from decals.record import Contact
@@ -125,3 +126,13 @@ def test_on_a_thin_rod_it_goes_round_as_far_as_the_image() -> None:
     ):
         around = 0.5 * np.arctan2(line[:, 1], line[:, 0])
         np.testing.assert_allclose(np.hypot(around, line[:, 2]), 0.7, rtol=1e-2)
+
+
+def test_modes_by_name() -> None:
+    document = on_ball(one((0, 0, 1), radius=0.5), one((0.5, 0, 0.8), radius=0.4))
+    line = outline(document, 1, contact="radial", mapping="chord")
+    np.testing.assert_array_equal(
+        line, outline(document, 1, contact=Contact.RADIAL, mapping=ImageMapping.CHORD)
+    )
+    with pytest.raises(InvalidEdit, match="mapping: expected one of 'chord', 'corrected', got 'flat'"):
+        outline(document, 1, mapping="flat")

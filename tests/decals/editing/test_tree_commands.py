@@ -228,7 +228,11 @@ def test_the_decals_of_what_becomes_a_tool_go_and_the_others_stay_on_the_surface
     ("command", "error", "message"),
     [
         (AddPrimitive(0, (), None), InvalidEdit, "node: expected a Node, got None"),
-        (AddPrimitive(0, (), A, "weld"), InvalidEdit, "join: expected one of Join.BLEND, .*, got 'weld'"),
+        (
+            AddPrimitive(0, (), A, "weld"),
+            InvalidEdit,
+            "join: expected one of 'blend', .*, got 'weld'",
+        ),
         (AddPrimitive(0, (7,), A), InvalidNode, "path"),
         (AddPrimitive(0, None, A), InvalidNode, "path"),
         (AddPrimitive(0, (), Point((0, 0, 0), radius=9), Join.DIFFERENCE), InvalidMesh, "got none"),

@@ -216,9 +216,9 @@ def test_refuses(points: NDArray[Any], normals: NDArray[Any], says: str) -> None
         (
             {"mapping": 5},
             InvalidScene,
-            "mapping: expected one of ImageMapping.CHORD, ImageMapping.CORRECTED, got 5",
+            "mapping: expected one of 'chord', 'corrected', got 5",
         ),
-        ({"contact": "radial"}, InvalidScene, "contact: expected one of .*Contact.RADIAL, got 'radial'"),
+        ({"contact": "round"}, InvalidScene, "contact: expected one of .*, 'radial', got 'round'"),
         ({"device": "cuda:99"}, InvalidDevice, "got 'cuda:99'"),
         ({"images": ["scale"]}, InvalidImage, "image 0: expected uint8 pixels .* got 'scale'"),
         ({"decals": "scale"}, InvalidDecals, "expected Decals or a DecalEditor, got 'scale'"),

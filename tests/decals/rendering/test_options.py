@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from decals.errors import ImplicitDecalsError, InvalidPoints, InvalidScene
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.rendering import Background
 from decals.rendering.lights import Light, Lighting
 from decals.rendering.options import RenderOptions
@@ -93,3 +95,14 @@ def test_a_picture_after_a_refused_one_is_as_before(renderer: Renderer) -> None:
     np.testing.assert_array_equal(renderer.render(scene(), RenderOptions(size=SIZE)), before)
     with pytest.raises(InvalidScene, match="viewpoint: expected a Camera"):
         renderer.render(scene(), RenderOptions(size=SIZE), viewpoint=Camera)  # type: ignore[arg-type]
+
+
+def test_modes_and_colours_by_name() -> None:
+    assert RenderOptions(contact="radial", mapping="Chord") == RenderOptions(
+        contact=Contact.RADIAL, mapping=ImageMapping.CHORD
+    )
+    assert Background("white", "#00000000") == Background((1, 1, 1, 1), (0, 0, 0, 0))
+    assert Light("red", (0, 0, -1)) == Light((1, 0, 0), (0, 0, -1))
+    for wrong in ("round", 3, None):
+        with pytest.raises(InvalidScene, match="contact: expected one of 'product', 'min', 'radial', got"):
+            RenderOptions(contact=wrong)

@@ -9,8 +9,10 @@ from scipy.spatial import SphericalVoronoi
 from blobtree import Point, Segment
 from decals.errors import InvalidScattering
 from decals.model import Decals
+from decals.scattering.orientation import Orientation
 from decals.scattering.scatter import scatter
 from decals.scattering.sizing import Sizing
+from decals.scattering.variation import ImageChoice
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Surface
@@ -206,8 +208,8 @@ def test_progress() -> None:
         ({"spacing": 1e-9}, "spacing: 1e-09 makes more than 100,000,000 particles"),
         ({"spacing": 1e-200}, "spacing: 1e-200 makes more than 100,000,000 particles"),
         ({"spacing": "wide"}, "spacing: expected a length above 0, got 'wide'"),
-        ({"count": 5, "sizing": "touching"}, "sizing: expected one of Sizing.COVERING, .*, got 'touching'"),
-        ({"count": 5, "choice": "size"}, "choice: expected one of ImageChoice.RANDOM, .*, got 'size'"),
+        ({"count": 5, "sizing": "touch"}, "sizing: expected one of 'covering', .*, got 'touch'"),
+        ({"count": 5, "choice": 1}, "choice: expected one of 'random', .*, got 1"),
         ({"count": 5, "jitter": 0.1}, "jitter: expected a Jitter, got 0.1"),
         ({"count": 5, "seed": -3}, "seed: expected a whole number from 0 upward"),
         ({"count": 5, "factor": 0.0}, "factor: expected"),
@@ -216,7 +218,7 @@ def test_progress() -> None:
         ({"count": 5, "images": 2, "weights": [1, -1]}, "weights: expected finite"),
         ({"count": 5, "images": 2, "weights": [0, 0]}, "weights: expected finite"),
         ({"count": 5, "direction": (1, 2)}, "direction: expected shape"),
-        ({"count": 5, "direction": "up"}, "direction: expected numbers"),
+        ({"count": 5, "direction": "up"}, "direction: expected one of 'curvature', 'cross', got 'up'"),
         ({"count": 5, "direction": lambda points: points[:2]}, "direction: expected shape"),
         ({"count": 5, "direction": lambda points: points * np.nan}, "direction: expected finite"),
     ],
@@ -254,3 +256,15 @@ def test_regularity() -> None:
     for wrong in (-0.1, 1.1, np.nan):
         with pytest.raises(InvalidScattering, match="regularity: expected"):
             scatter(ball, count=3, regularity=wrong)
+
+
+def test_rules_by_name() -> None:
+    """Names in any case give the decals of the members of the enumerations."""
+    wall = MeshSurface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    options: dict[str, Any] = {"count": 12, "images": 2, "seed": 3}
+    named = scatter(wall, sizing="touching", choice="Size", direction="cross", **options)
+    members = scatter(
+        wall, sizing=Sizing.TOUCHING, choice=ImageChoice.SIZE, direction=Orientation.CROSS, **options
+    )
+    for column in ("radii", "images", "tangents"):
+        np.testing.assert_array_equal(getattr(named, column), getattr(members, column))

@@ -157,6 +157,6 @@ def test_more_lights_than_there_is_room_for_are_said_once(plotter: Factory) -> N
 @pytest.mark.parametrize("wrong", ["studio", None, 1, ["vtk"]])
 def test_lights_are_one_of_two(plotter: Factory, wrong: object) -> None:
     pl = plotter()
-    with pytest.raises(InvalidScene, match="lights must be 'scene' or 'vtk'; got"):
+    with pytest.raises(InvalidScene, match="lights: expected one of 'scene', 'vtk', got"):
         pl.decals.lights = wrong
     assert pl.decals.lights is Lights.SCENE
