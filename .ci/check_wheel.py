@@ -11,6 +11,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("blobtree", "decals", "decals.apps", "decals.shaders")
+COMMANDS = (
+    ["--help"],
+    ["bench", "table", "--models", "knot,spheres", "--counts", "100", "--size", "160x120"],
+)
+"""Commands that an installed wheel must run without the checkout."""
 IMPORT_ALL = """
 import importlib, pathlib, pkgutil, sys
 for package in map(importlib.import_module, sys.argv[2:]):
@@ -57,7 +62,7 @@ def check_content(wheel: Path) -> None:
 
 
 def check_use(wheel: Path, folder: Path) -> None:
-    """Import every module from the installed wheel and ask the command for its help."""
+    """Import every module from the installed wheel, and run commands outside the checkout."""
     home = folder / "venv"
     venv.create(home, symlinks=os.name != "nt")
     paths = sysconfig.get_paths(vars={"base": str(home), "platbase": str(home)})
@@ -79,7 +84,9 @@ def check_use(wheel: Path, folder: Path) -> None:
     ]
     subprocess.run([*install, wheel], check=True)
     subprocess.run([python, "-c", IMPORT_ALL, site.resolve(), *PACKAGES], check=True, cwd=folder)
-    subprocess.run([scripts / "implicit-decals", "--help"], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    for arguments in COMMANDS:
+        command = [scripts / "implicit-decals", *arguments]
+        subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
 
 
 def main() -> None:

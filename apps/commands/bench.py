@@ -119,7 +119,7 @@ class Row:
         return PAPER_ROWS.get((self.model, self.decals))
 
 
-def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str = MODELS) -> None:
+def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str | None = None) -> None:
     """Measure figure 14 of the paper on this machine, and print it beside the paper's numbers.
 
     The paper used a GeForce 8800 Ultra.
@@ -131,18 +131,27 @@ def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str = MODELS
     counts
         Numbers of decals, separated by commas.
     models
-        Sample models, separated by commas: creature, dragon, horse, knot, spheres.
+        Sample models, separated by commas: creature, dragon, horse, knot, spheres. Default: all but
+        creature; those that cannot be downloaded are left out.
     """
-    pixels, numbers, names = parse_size(size), parse_counts(counts), parse_models(models)
+    pixels, numbers, names = parse_size(size), parse_counts(counts), parse_models(models or MODELS)
+    missing = []
     with Renderer() as renderer:
         with progress_bars() as progress:
             rows = []
             for step, name in enumerate(names):
                 progress("Measuring", step / len(names))
-                rows += measure(renderer, name, numbers, pixels)
+                try:
+                    rows += measure(renderer, name, numbers, pixels)
+                except InvalidInput as error:
+                    if models is not None:
+                        raise
+                    missing.append(f"{name} is left out: {error}")
         Console(width=max(Console().width, MIN_COLUMNS)).print(
             as_table(rows, f"{renderer.context.name}, {size}, {renderer.backend} shader")
         )
+    for line in missing:
+        Console(stderr=True, soft_wrap=True).print(line, markup=False, highlight=False)
 
 
 def parse_counts(text: str) -> list[int]:

@@ -3,9 +3,12 @@
 import pytest
 
 from decals.apps.cli import BAD_INPUT, run
+from decals.apps.commands import bench
 from decals.apps.commands.bench import PAPER_ROWS, Row, as_table, measure, parse_counts, parse_models
+from decals.apps.models.samples import sample
 from decals.errors import InvalidInput
 from decals.rendering import Renderer
+from decals.scenes.objects import SceneObject
 
 
 def test_lists_are_read() -> None:
@@ -25,6 +28,28 @@ def test_the_command_prints_a_table(renderer: Renderer, capsys: pytest.CaptureFi
     assert "knot" in shown
     assert "(897)" in shown
     assert run([*arguments[:2], "--size", "0x1"]) == BAD_INPUT
+
+
+def test_samples_that_cannot_be_downloaded_are_left_out(
+    renderer: Renderer, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only the default table goes on without them: a wheel holds no downloaded meshes."""
+
+    def sample_without_network(name: str) -> SceneObject:
+        if name in ("dragon", "horse"):
+            raise InvalidInput(f"the sample {name!r} is downloaded by pyvista on first use, and that failed")
+        return sample(name)
+
+    monkeypatch.setattr(bench, "sample", sample_without_network)
+    arguments = ["bench", "table", "--size", "32x24", "--counts", "100"]
+    assert run(arguments) == 0
+    shown = capsys.readouterr()
+    assert "(897)" in shown.out
+    assert "(921)" in shown.out
+    assert "(697)" not in shown.out
+    assert shown.err.count("is left out: the sample") == 2
+    assert run([*arguments, "--models", "knot,dragon"]) == BAD_INPUT
+    assert "'dragon' is downloaded" in capsys.readouterr().err
 
 
 def test_rows_of_a_measurement(renderer: Renderer) -> None:
