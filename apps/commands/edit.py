@@ -28,9 +28,9 @@ from decals.window import EditWindow
 
 
 def new_file(folder: Path, name: str) -> Path:
-    """Return the first path that does not exist: NAME-decals.json, NAME-decals-2.json, ..."""
+    """Return the first path that does not exist: NAME.json, NAME-2.json, ..."""
     endings = chain([""], (f"-{number}" for number in count(2)))
-    paths = (folder / f"{name}-decals{ending}.json" for ending in endings)
+    paths = (folder / f"{name}{ending}.json" for ending in endings)
     return next(path for path in paths if not path.exists())
 
 
@@ -92,10 +92,31 @@ def edit(
             options = ScatterOptions.from_arguments(decals, image, seed)
             where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
             scene = options.scene(loaded, where, pixels, progress)
-        path = path or new_file(Path(), Path(model[0]).stem)
-    with EditWindow(scene, path=path, size=pixels) as window:
-        try:
+        path = path or new_file(Path(), f"{Path(model[0]).stem}-decals")
+
+    def load_recovered(path: Path) -> Scene:
+        recovered = load_models([str(path)], trust=trust)
+        if not isinstance(recovered, Scene):
+            raise InvalidInput(f"expected a scene in the recovery file {str(path)!r}, got a model")
+        return recovered
+
+    window = EditWindow(scene, path=path, size=pixels, recover=load_recovered)
+    try:
+        with window:
             window.show()
-        finally:
-            if window.session.modified:
-                Console(stderr=True).print("closed without saving the last changes", highlight=False)
+    finally:
+        _report_unsaved(window)
+
+
+def _report_unsaved(window: EditWindow) -> None:
+    """Say where unsaved changes are, if the window was closed with some."""
+    files, console = window.actions.files, Console(stderr=True, soft_wrap=True)
+    if files.recovery.exists:
+        console.print(
+            f"unsaved changes are kept in {files.recovery.path}; "
+            f"`implicit-decals edit {files.path}` opens them",
+            highlight=False,
+            markup=False,
+        )
+    elif window.session.modified:
+        console.print("closed without saving the last changes", highlight=False)

@@ -8,6 +8,7 @@ from .commands import (
     MoveDecals,
     RemoveImage,
     ReplaceImage,
+    ReplaceScene,
     ScaleDecals,
     SetCamera,
     SetValues,
@@ -16,6 +17,7 @@ from .commands import (
 from .document import Document
 from .pointer_tools import PointerTools
 from .queries import first_hit, nearest_points, outline, pick
+from .recovery import recovery_path
 from .scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
 from .session import EditSession, UndoEntry
 from .tree_commands import (
@@ -52,6 +54,7 @@ __all__ = [
     "RemovePrimitive",
     "ReplaceDecals",
     "ReplaceImage",
+    "ReplaceScene",
     "ResizePrimitive",
     "ScaleDecals",
     "ScatterDecals",
@@ -63,4 +66,5 @@ __all__ = [
     "nearest_points",
     "outline",
     "pick",
+    "recovery_path",
 ]

@@ -9,6 +9,7 @@ from blobtree._typing import Float32Array, Int64Array
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
 from decals.editing.document import Edit
+from decals.editing.prompts import PromptLine
 from decals.editing.queries import SurfacePick
 from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure
@@ -47,6 +48,8 @@ class ActionState:
         Offset of the primitive's handle from the middle of its box, shape (3,).
     message
         Result of the last action, in plain words.
+    prompt
+        The open prompt, if any; it receives all keys.
     view
         Returns the eye and its target. Default: the document camera's.
     background
@@ -59,6 +62,7 @@ class ActionState:
         self.primitive: tuple[int, Path] | None = None
         self.handle_offset: Float32Array = np.zeros(3, np.float32)
         self.message = ""
+        self.prompt = PromptLine(self.show)
         self.view: Callable[[], tuple[ArrayLike, ArrayLike]] = self._document_view
         self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
         self._series: tuple[str, object] | None = None

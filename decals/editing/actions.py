@@ -1,6 +1,6 @@
-"""Actions of the editing window by name: selection, history, file, and those on decals and trees.
+"""Actions of the editing window by name: selection, history, and those on files, decals and trees.
 
-To add an action, write a method with the `action` decorator in `DecalActions`, `TreeActions` or `Actions`.
+To add an action, write a method with the `action` decorator in `Actions` or one of the classes that it names.
 The key table and the help follow from it.
 """
 
@@ -11,11 +11,11 @@ from decals.editing.action_state import ActionState, Cursor
 from decals.editing.background import are_many
 from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
+from decals.editing.file_actions import FileActions
 from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, action, registered_actions
 from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.scenes.camera import Camera
 from decals.validation import describe
 
 
@@ -39,12 +39,10 @@ class Actions:
         Actions on decals.
     trees : TreeActions
         Actions on objects and primitives.
-    path
-        File to save to.
+    files : FileActions
+        Actions on the scene's file.
     help_visible
         True while the window shows the help.
-    camera
-        Returns the camera to save with the scene; None for the document's.
 
     Examples
     --------
@@ -69,12 +67,11 @@ class Actions:
         self.state = ActionState(session, threaded=threaded)
         self.decals = DecalActions(self.state)
         self.trees = TreeActions(self.state)
-        self.path = path
+        self.files = FileActions(self.state, path)
         self.help_visible = False
-        self.camera: Callable[[], Camera | None] = lambda: None
         self._actions = {
             name: (binding, method.__get__(owner))
-            for owner in (self, self.decals, self.trees)
+            for owner in (self, self.files, self.decals, self.trees)
             for name, (binding, method) in registered_actions(type(owner)).items()
         }
 
@@ -201,13 +198,6 @@ class Actions:
         else:
             state.message = step(state.session, entry)
 
-    @action("save", "Ctrl+s", summary="save", group=Group.SCENE)
-    def save(self, _cursor: Cursor) -> None:
-        """Save the scene."""
-        if self.path is None:
-            raise InvalidEdit("no file to save to; give path= when you open the window")
-        self.state.background.save(self.path, self.camera())
-
     @action("help", "h", "F1", summary="show or hide this help", group=Group.SCENE)
     def toggle_help(self, _cursor: Cursor) -> None:
         """Show or hide the help."""
@@ -229,6 +219,7 @@ def _redo(session: EditSession, entry: UndoEntry) -> str:
 KEYS = KeyTable(
     [
         *(binding for binding, _ in registered_actions(Actions).values()),
+        *(binding for binding, _ in registered_actions(FileActions).values()),
         *(binding for binding, _ in registered_actions(DecalActions).values()),
         *(binding for binding, _ in registered_actions(TreeActions).values()),
         *UNREGISTERED,

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 
 from blobtree._typing import Int64Array
 from blobtree.device import core_left_free
@@ -70,6 +71,11 @@ class Worker:
     def cancelling(self) -> bool:
         """True from `cancel` until `poll` has noticed the end of the job."""
         return self.busy and self._cancelled.is_set()
+
+    @property
+    def label(self) -> str:
+        """Label of the last job."""
+        return self._label
 
     @property
     def progress(self) -> tuple[str, float]:
@@ -169,6 +175,9 @@ LONG_COMMANDS = (AddObject, PrimitiveCommand, RelaxDecals, RemoveObject, Replace
 CLOSE_TIMEOUT = 5.0
 """Seconds for which `BackgroundJobs.close` waits for a cancelled edit."""
 
+SAVE = "save"
+"""Label of a save."""
+
 BUSY = "another edit is running; wait for it, or press Escape to cancel it"
 
 Step = Callable[[EditSession], str]
@@ -207,7 +216,7 @@ class _Request:
 
 
 class BackgroundJobs:
-    """Runs at most one edit and one save of a session in threads.
+    """Runs at most one edit, and writes at most one file of a session, in threads.
 
     Parameters
     ----------
@@ -368,27 +377,71 @@ class BackgroundJobs:
 
     # -- saves ------------------------------------------------------------------------------------------
 
-    def save(self, path: str | PathLike[str], camera: Camera | None) -> None:
-        """Save the present state; if a save is running, save again after it."""
-        save = self._session.begin_save(path, camera=camera)
-        if not self._threaded:
-            save.write()()
-            self._show(f"saved to {path}")
-        elif not self._saves.start(self._save_job(save, path)):
-            self._next_save = self._save_job(save, path)
-            self._show("still saving; a second save follows")
+    def save(
+        self, path: str | PathLike[str], camera: Camera | None, saved: Callable[[], None] = lambda: None
+    ) -> None:
+        """Save the present state, then call ``saved``; if another file is being written, save after it."""
+        job = self._save_job(self._session.begin_save(path, camera=camera), path, saved)
+        if self._start_writing(job):
+            return
+        self._next_save = job
+        self._show("still saving; a second save follows")
 
-    def _save_job(self, save: SaveJob, path: str | PathLike[str]) -> Job:
+    def _save_job(self, save: SaveJob, path: str | PathLike[str], saved: Callable[[], None]) -> Job:
         def work(progress: Progress, _cancel: Cancel) -> Completion:
             mark_saved = save.write(progress)
 
             def complete() -> None:
                 mark_saved()
                 self._show(f"saved to {path}")
+                saved()
 
             return complete
 
-        return Job("save", work)
+        return Job(SAVE, work)
+
+    def write_copy(self, path: Path, camera: Camera | None, written: Callable[[], None]) -> None:
+        """Write the present state to another file, then call ``written``; it does not count as a save."""
+        copy = self._session.begin_save(path, camera=camera)
+
+        def work(progress: Progress, _cancel: Cancel) -> Completion:
+            copy.write(progress)
+            return written
+
+        self._start_writing(Job("autosave", work))
+
+    def write(self, label: str, write: Callable[[Progress], None], message: str) -> None:
+        """Write a file of another format, then show a message.
+
+        Raises
+        ------
+        InvalidEdit
+            Another file is being written.
+        """
+
+        def work(progress: Progress, _cancel: Cancel) -> Completion:
+            write(progress)
+            return lambda: self._show(message)
+
+        if not self._start_writing(Job(label, work)):
+            raise InvalidEdit("another file is being written; wait for it")
+
+    def _start_writing(self, job: Job) -> bool:
+        """Start to write a file, and return True, or return False while another one is being written."""
+        if self._threaded:
+            return self._saves.start(job)
+        job.work(lambda _stage, _fraction: None, lambda: False)()
+        return True
+
+    @property
+    def saving(self) -> bool:
+        """True while a save runs, or waits for another file."""
+        return self._next_save is not None or (self._saves.busy and self._saves.label == SAVE)
+
+    @property
+    def writing(self) -> bool:
+        """True while a file is being written."""
+        return self._saves.busy
 
     # -- state ------------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers
 from decals.model import NO_IMAGE, Decals
 from decals.scenes.camera import Camera
-from decals.scenes.scene import DecalImage
+from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
 from decals.validation import color_values, describe, finite_number, finite_vector, instance, whole_number
 
@@ -309,6 +309,46 @@ class DuplicateDecals(DecalCommand):
         before = document.decals.take(self.numbers)
         targets = before.positions + DUPLICATE_OFFSET * before.radii[:, None] * before.tangents
         return document.compute_addition(move_decals(before, nearest_points(document.objects, targets)))
+
+
+@dataclass(frozen=True, eq=False)
+class ReplaceScene:
+    """Replace all objects, decals and images, and the camera, by those of another scene.
+
+    Parameters
+    ----------
+    scene
+        The other scene.
+    label
+        Name of the undo entry.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ReplaceScene
+    >>> ball = Point((0, 0, 0), radius=1.0)
+    >>> session = EditSession(decals.cover(ball, count=3, images=["eye"]))
+    >>> edit = session.do(ReplaceScene(decals.cover(ball, count=5, images=["scale"])))
+    >>> len(session.document.decals)
+    5
+    """
+
+    scene: Scene
+    label: str = "replace the scene"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        scene = instance("scene", self.scene, Scene, InvalidEdit, "decals.load_scene reads one")
+        first = document.decals.next_number
+        addition = document.compute_replacement(
+            np.arange(first, first + len(scene.decals)),
+            scene.decals,
+            objects=scene.objects,
+            images=scene.images,
+            camera=scene.camera,
+        )
+        return document.compute_deletion(document.decals.numbers).then(addition)
 
 
 @dataclass(frozen=True, eq=False)

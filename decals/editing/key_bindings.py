@@ -76,7 +76,6 @@ UNREGISTERED = (
     Binding(CAMERA, ("Shift+Drag", "Middle drag"), "shift the camera", Group.CAMERA),
     Binding(CAMERA, ("WheelUp", "WheelDown", "Right drag"), "zoom", Group.CAMERA),
     Binding(CAMERA, ("r",), "show everything", Group.CAMERA),
-    Binding(CAMERA, ("q",), "close the window", Group.CAMERA),
 )
 """Gestures of the help that are not actions: the drag of decals, and those that pyvista handles."""
 

@@ -92,8 +92,17 @@ class PointerTools:
             return None
         return surface_pick
 
-    def key(self, name: str, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:
-        """Handle a key press with the cursor at a pixel."""
+    def key(
+        self, name: str, x: float, y: float, *, ctrl: bool = False, shift: bool = False, text: str = ""
+    ) -> bool:
+        """Handle a key press with the cursor at a pixel; ``text`` is the character that the key types.
+
+        While a prompt is open it receives all keys.
+        """
+        prompt = self.actions.state.prompt
+        if prompt.open and isinstance(name, str):
+            prompt.key(name, "" if ctrl else text)
+            return True
         return self._perform(name, x, y, ctrl=ctrl, shift=shift)
 
     def wheel(self, up: bool, x: float, y: float, *, ctrl: bool = False, shift: bool = False) -> bool:

@@ -121,7 +121,8 @@ def press_key(
     x, y = interactor.GetEventPosition()
     if window.in_other_subplot(x, y):
         return False
-    used = window.tools.key(from_browser(key), x, y, ctrl=ctrl, shift=shift)
+    text = key if len(key) == 1 else ""  # other names are those of keys without a character
+    used = window.tools.key(from_browser(key), x, y, ctrl=ctrl, shift=shift, text=text)
     if used:
         window.redraw(whole=not window.tools.dragging)
     return used

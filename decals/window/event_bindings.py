@@ -137,7 +137,8 @@ class EventBindings:
             self._key_used = False
             return False
         if event == "KeyPressEvent":
-            self._key_used = tools.key(source.GetKeySym() or "", *pixel, ctrl=ctrl, shift=shift)
+            name, text = source.GetKeySym() or "", source.GetKeyCode() or ""
+            self._key_used = tools.key(name, *pixel, ctrl=ctrl, shift=shift, text=text)
             used = self._key_used
         elif event == "LeftButtonPressEvent":
             return tools.press(*pixel, ctrl=ctrl, shift=shift)  # a press alone changes nothing visible

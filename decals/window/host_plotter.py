@@ -29,6 +29,9 @@ DEFAULT_SIZE = (1200, 800)
 OFF_SCREEN_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 """VTK's windows that no screen shows; on Linux, VTK takes one of them if there is no X server."""
 
+TITLE = "Implicit Decals"
+"""Title of a window, after the name of the file."""
+
 MAX_WINDOW_SIDE = 16384
 """Pixels along each side of a window, at most: the limit of VTK."""
 
@@ -87,6 +90,25 @@ class HostPlotter:
     def open(self) -> bool:
         """True until the plotter is closed."""
         return self.plotter.render_window is not None
+
+    def set_title(self, title: str) -> None:
+        """Name the document in the title of a new window; a provided plotter keeps its own."""
+        title = f"{title} - {TITLE}"
+        if not self.provided and self.open and self.plotter.title != title:
+            self.plotter.title = title
+            self.plotter.render_window.SetWindowName(title)
+
+    def leave(self) -> None:
+        """End the event loop of the plotter."""
+        self.interactor.ExitCallback()
+
+    def run(self) -> None:
+        """Show the window, and handle events until the event loop ends."""
+        self.plotter.show(auto_close=False, interactive=self.has_timers)
+
+    def resume(self) -> None:
+        """Go on to handle events."""
+        self.plotter.iren.start()
 
 
 def ray_through(subplot: SubplotRenderer, x: float, y: float) -> Ray | None:
@@ -199,7 +221,7 @@ def new_plotter(off_screen: bool, size: tuple[int, int]) -> Any:
     """
     if not off_screen:
         require_screen()
-    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title="Implicit Decals")
+    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title=TITLE)
     plotter.disable_anti_aliasing()
     plotter.set_background(STUDIO.bottom[:3], top=STUDIO.top[:3])
     return plotter

@@ -1,6 +1,8 @@
 """The editing window."""
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pyvista as pv
@@ -14,6 +16,7 @@ from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
 from decals.rendering.gl_libraries import require_gl
+from decals.scenes.files import load_scene
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
 from decals.vtk.adapters import weak_callback
@@ -34,6 +37,9 @@ from decals.window.host_plotter import (
     require_screen,
 )
 from decals.window.overlay import Overlay, PrimitiveHandle
+
+HELP_HINT = "h: help"
+"""First part of the status line, unless a prompt is open."""
 
 
 class EditWindow:
@@ -58,6 +64,9 @@ class EditWindow:
         Edit in the active subplot of this plotter, such as one of pyvistaqt or trame, in place of a new
         window. The plotter stays open; ``size`` and ``off_screen`` do not apply. A subplot that showed a
         scene of ``plotter.decals`` shows the edited scene afterwards.
+    recover : callable, optional
+        Reads the recovery file that an earlier window left beside ``path``, such as `decals.load_scene`. Its
+        changes become one undo entry. Default: a recovery file is ignored.
 
     Attributes
     ----------
@@ -101,6 +110,7 @@ class EditWindow:
         off_screen: bool = False,
         samples: int = 2,
         plotter: pv.BasePlotter | None = None,
+        recover: Callable[[Path], Scene] | None = None,
     ) -> None:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
@@ -113,6 +123,9 @@ class EditWindow:
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
         self._closed = False
         self._interrupts: list[int] = []
+        self.actions = Actions(self.session, path=path, threaded=True)
+        if recover is not None:
+            self.actions.files.recover(recover)
         self.subplot: SubplotRenderer = self.plotter.decals.subplot
         self._backup = SubplotBackup(self.subplot)
         self._host.add_scene(self.document.scene)
@@ -120,8 +133,8 @@ class EditWindow:
         self.frames = FrameController(self.subplot, samples, self.plotter.render, self._content_version)
         self.warmup = Warmup(self.subplot, weak_callback(self._show_status), self.frames.give_up)
         self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
-        self.actions = Actions(self.session, path=path, threaded=True)
-        self.actions.camera = lambda: camera_of(self.subplot)
+        self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
+        self.actions.files.leave = self._host.leave
         self.actions.state.view = lambda: eye_and_target(self.subplot)
         self.tools = PointerTools(
             self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
@@ -160,7 +173,8 @@ class EditWindow:
     def busy(self) -> bool:
         """True while background work runs, or the frame is to be refined."""
         coarse = self.frames.state is FrameState.COARSE
-        return not self._closed and (self.background.busy or coarse or self.subplot.warming_up)
+        unsaved = self.actions.files.recovery.pending
+        return not self._closed and (self.background.busy or coarse or unsaved or self.subplot.warming_up)
 
     def _content_version(self) -> tuple[int, ...]:
         document = self.document
@@ -215,10 +229,12 @@ class EditWindow:
         self.overlay.outline(self.document, outlined, self.subplot.contact, self.subplot.mapping)
         self.overlay.show_help(self.actions.help_visible)
         self.overlay.show_status(self._status())
+        self._host.set_title(self.actions.files.title)
 
     def _status(self) -> str:
-        parts = (self.warmup.status, self.background.progress, self.actions.state.message)
-        return "   ".join(filter(None, parts)) or "h: help"
+        state = self.actions.state
+        parts = (state.prompt.text or HELP_HINT, self.warmup.status, self.background.progress, state.message)
+        return "   ".join(filter(None, parts))
 
     def _show_status(self) -> None:
         self.overlay.show_status(self._status())
@@ -240,6 +256,7 @@ class EditWindow:
             self._show_status()
         else:
             self.frames.refine_when_due()
+        self.actions.files.update()
 
     def in_other_subplot(self, x: int, y: int) -> bool:
         """Return True if a pixel is in a subplot of the same plotter that another window edits."""
@@ -257,6 +274,9 @@ class EditWindow:
     def show(self) -> None:
         """Open the window and wait until it is closed; off screen and in a given plotter, draw one frame.
 
+        If there are unsaved changes, the window asks before it closes. Ctrl+C in the terminal leaves them in
+        the recovery file.
+
         Raises
         ------
         InvalidEdit
@@ -268,10 +288,16 @@ class EditWindow:
         if self._host.provided:
             self.plotter.render()
             return
+        if not self._host.has_timers:
+            self._host.run()
+            return
+        files = self.actions.files
         with collected_interrupts() as self._interrupts:
-            self.plotter.show(auto_close=False, interactive=self._host.has_timers)
-        if self._host.has_timers:
-            self.close()
+            self._host.run()
+            while self._host.open and not self._interrupts and not files.may_close():
+                self.redraw(whole=False)
+                self._host.resume()
+        self.close()
         if self._interrupts:
             raise KeyboardInterrupt
 
@@ -288,7 +314,8 @@ class EditWindow:
     def close(self) -> None:
         """Close the window, or leave the given plotter, after all saves are complete.
 
-        Background edits are cancelled. Closing twice is harmless.
+        Background edits are cancelled. Unsaved changes stay in the recovery file, unless the user discarded
+        them. Closing twice is harmless.
 
         Raises
         ------
@@ -301,6 +328,7 @@ class EditWindow:
         self._ticker.stop()
         try:
             self.background.close()
+            self.actions.files.finish()
         finally:
             self._release()
 
@@ -343,7 +371,8 @@ def edit(
     scene : Scene or EditSession
         What to edit.
     path : str or path-like, optional
-        File to save to with Ctrl + S.
+        File to save to with Ctrl + S. Unsaved changes that an earlier window left in its recovery file are
+        opened, as one undo entry.
     size : (int, int)
         Width and height of the window in pixels.
 
@@ -366,6 +395,6 @@ def edit(
     >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
     >>> edited = decals.edit(scene)  # doctest: +SKIP
     """
-    with EditWindow(scene, path=path, size=size) as window:
+    with EditWindow(scene, path=path, size=size, recover=load_scene) as window:
         window.show()
         return window.document.scene

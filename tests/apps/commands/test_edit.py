@@ -39,34 +39,60 @@ def test_edit_opens_models_and_scenes(folder: Path, windows: list[EditWindow]) -
     arguments = ["edit", "ball.json", "--decals", "20", "--size", "80x60", "--save", "scene.json"]
     assert run(arguments) == 0
     assert len(windows[0].document.decals) == 20
-    assert windows[0].actions.path == Path("scene.json")
+    assert windows[0].actions.files.path == Path("scene.json")
     save_scene(windows[0].document.scene, folder / "scene.json")
     assert run(["edit", "scene.json", "--size", "80x60"]) == 0
     assert len(windows[1].document.decals) == 20
-    assert windows[1].actions.path == Path("scene.json")
+    assert windows[1].actions.files.path == Path("scene.json")
 
 
 def test_models_are_saved_to_a_new_file(folder: Path, windows: list[EditWindow]) -> None:
     blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
     for path in ("ball-decals.json", "ball-decals-2.json", "ball-decals-3.json"):
         assert run(["edit", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
-        assert windows[-1].actions.path == Path(path)
+        assert windows[-1].actions.files.path == Path(path)
         (folder / path).write_text("another file")
 
 
-def test_edit_reports_unsaved_changes(
+def press_in_windows(
+    monkeypatch: pytest.MonkeyPatch, *keys: str, stop: type[BaseException] | None = None
+) -> None:
+    """Let windows receive some keys, and an exception, in place of a user's."""
+
+    def show(window: EditWindow) -> None:
+        for key in keys:
+            window.tools.key(key[-1], 0, 0, ctrl=key.startswith("Ctrl+"))
+        if stop is not None:
+            raise stop
+
+    monkeypatch.setattr(EditWindow, "show", show)
+
+
+def test_discarded_changes_are_reported(
     folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
-
-    def show(window: EditWindow) -> None:
-        window.tools.key("a", 0, 0, ctrl=True)
-        window.tools.key("d", 0, 0)
-
-    monkeypatch.setattr(EditWindow, "show", show)
+    press_in_windows(monkeypatch, "Ctrl+a", "d", "q", "q")
     assert run(["edit", "ball.json", "--decals", "5", "--size", "80x60"]) == 0
     assert len(windows[0].document.decals) == 10
     assert "without saving" in capsys.readouterr().err
+    assert [path.name for path in folder.iterdir()] == ["ball.json"]
+
+
+def test_unsaved_changes_are_kept_and_opened_by_the_next_edit(
+    folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    arguments = ["edit", "ball.json", "--decals", "5", "--size", "80x60"]
+    press_in_windows(monkeypatch, "Ctrl+a", "d", stop=KeyboardInterrupt)
+    assert run(arguments) == 130
+    assert (folder / "ball-decals.recovery.json").is_file()
+    assert "ball-decals.recovery.json" in capsys.readouterr().err
+    press_in_windows(monkeypatch)
+    assert run(arguments) == 0
+    assert len(windows[1].document.decals) == 10
+    assert windows[1].session.labels == ("recover unsaved changes",)
+    assert "ball-decals.recovery.json" in windows[1].actions.state.message
 
 
 def test_invalid_arguments(folder: Path, windows: list[EditWindow], capsys: Capture) -> None:

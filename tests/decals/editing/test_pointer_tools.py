@@ -59,6 +59,10 @@ class UserInput:
     def key(self, name: str, at: Any = (1, 1), **modifiers: Any) -> Any:
         return self.tools.key(name, *at, **modifiers)
 
+    def type(self, text: str) -> None:
+        for letter in text:
+            self.tools.key("unnamed", 1, 1, text=letter)
+
 
 @pytest.fixture
 def user() -> Any:
@@ -340,17 +344,20 @@ def test_primitives_under_the_cursor(user: UserInput) -> None:
     assert digest(user.document) == user.first
 
 
-def test_saving_says_where(user: UserInput, tmp_path: Path) -> None:
+def test_a_scene_without_a_file_asks_for_its_name(user: UserInput, tmp_path: Path) -> None:
     user.key("s", ctrl=True)
-    assert "no file to save to" in user.actions.state.message
-    user.actions.path = tmp_path / "scene.json"
-    user.key("s", ctrl=True)
-    assert user.actions.path.exists()
+    assert "save as: untitled.json" in user.actions.state.prompt.text
+    user.key("Delete")
+    user.type(str(tmp_path / "scene.json"))
+    user.key("Return")
+    assert user.actions.files.path == tmp_path / "scene.json"
+    assert "saved to" in user.actions.state.message
+    assert (tmp_path / "scene.json").exists()
     assert not user.session.modified
 
 
 def test_what_means_nothing_here_is_left_to_others(user: UserInput) -> None:
-    for name in ("w", "F5", "q", "r"):
+    for name in ("w", "F5", "r"):
         assert not user.key(name)
     assert not user.tools.move(5, 5)
     assert not user.tools.release(5, 5)

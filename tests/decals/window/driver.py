@@ -20,8 +20,10 @@ class Driver:
         self.plotter = window.plotter
         self._interactor = window.plotter.iren.interactor
 
-    def event(self, name: str, at: Any, *, ctrl: Any = False, shift: Any = False, key: Any = None) -> None:
-        self._interactor.SetEventInformation(int(at[0]), int(at[1]), int(ctrl), int(shift), "\0", 0, key)
+    def event(
+        self, name: str, at: Any, *, ctrl: Any = False, shift: Any = False, key: Any = None, text: str = "\0"
+    ) -> None:
+        self._interactor.SetEventInformation(int(at[0]), int(at[1]), int(ctrl), int(shift), text, 0, key)
         getattr(self._interactor, name)()
 
     def click(self, at: Any, **modifiers: Any) -> None:
@@ -37,6 +39,11 @@ class Driver:
     def key(self, name: str, at: Any = (1, 1), **modifiers: Any) -> None:
         self.event("KeyPressEvent", at, key=name, **modifiers)
         self.event("CharEvent", at, key=name, **modifiers)
+
+    def type(self, text: str) -> None:
+        """Press the keys of some characters."""
+        for letter in text:
+            self.key("unnamed", text=letter)
 
     def press(self, name: str, at: Any = (1, 1), **modifiers: Any) -> None:
         """Press a key, and let what it begins come to its end."""

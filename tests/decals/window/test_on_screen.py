@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from decals.apps.models.samples import sample_mesh
+from decals.scenes.files import load_scene
 from tests.display import display, run_module
 
 __all__ = ["display"]
@@ -40,6 +42,8 @@ def begin_and_interrupt(window):
     def tick(*_):
         ticks.append(0)
         if len(ticks) == 3:
+            window.tools.key("a", 0, 0, ctrl=True)
+            window.tools.key("d", 0, 0)
             os.kill(os.getpid(), signal.SIGINT)
         elif len(ticks) > 100:
             os._exit(9)
@@ -55,6 +59,35 @@ def test_ctrl_c_in_the_terminal_closes_the_window(display: str, tmp_path: Path) 
     assert done.returncode == 130, done.stderr
     assert done.stderr.strip().endswith("interrupted")
     assert "Ctrl-C" not in done.stderr + done.stdout
+    assert "unsaved changes are kept in knot-decals.recovery.json" in done.stderr
+    assert len(load_scene(tmp_path / "knot-decals.recovery.json", samples=sample_mesh).decals) == 4
+
+
+CLOSED = """
+from decals.window import EditWindow
+from tests.decals.editing.scenes import scene
+
+window = EditWindow(scene(), size=(120, 80))
+interactor, ticks = window.plotter.iren.interactor, []
+
+def tick(*_):
+    ticks.append(window.actions.state.prompt.asking)
+    if len(ticks) == 3:
+        window.tools.key("a", 0, 0, ctrl=True)
+        window.tools.key("d", 0, 0)
+    if len(ticks) in (3, 6):
+        interactor.ExitCallback()  # as VTK does when the window manager asks
+
+interactor.AddObserver("TimerEvent", tick)
+window.show()
+print("ticks", ticks[:6], "open" if window._host.open else "closed")
+"""
+
+
+def test_the_first_request_of_the_window_manager_asks_and_the_second_closes(display: str) -> None:
+    done = run_script(CLOSED, Path.cwd(), display)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "ticks [False, False, False, True, True, True] closed"
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only X servers are missing silently")

@@ -124,6 +124,7 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
         left = len(window.session.labels) - 1
         yield "undo all", lambda: user.key("z", "Control_L"), entries(left)
     yield "as at first", lambda: None, lambda: driver.state == first
+    yield "ask", lambda: user.key("q"), lambda: actions.state.prompt.asking
     yield "close", lambda: user.key("q"), lambda: False
 
 

@@ -1,0 +1,205 @@
+"""Actions on files: save, save as, export, add images, and close without losing work."""
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+
+from blobtree.progress import Progress
+from decals.editing.action_state import ActionState, Cursor
+from decals.editing.commands import AddImage
+from decals.editing.key_bindings import Group, action
+from decals.editing.prompts import Question, TextPrompt
+from decals.editing.recovery import RecoveryFile
+from decals.errors import InvalidEdit
+from decals.scenes.camera import Camera
+from decals.scenes.meshes import MESH_SUFFIXES, write_mesh
+from decals.scenes.scene import DecalImage, Scene
+
+UNTITLED = "untitled"
+"""Title of a scene without a file."""
+
+
+class FileActions:
+    """Actions on the scene's file.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    path
+        File to save to, if any.
+
+    Attributes
+    ----------
+    path
+        File to save to, if any.
+    camera
+        Returns the camera to save with the scene; None for the document's.
+    leave
+        Closes the window.
+    recovery : RecoveryFile
+        Unsaved changes for the next window after a crash.
+    """
+
+    def __init__(self, state: ActionState, path: str | PathLike[str] | None) -> None:
+        self._state = state
+        self.path = path
+        self.camera: Callable[[], Camera | None] = lambda: None
+        self.leave: Callable[[], None] = lambda: None
+        self.recovery = RecoveryFile(state.session, state.background, lambda: self.camera())
+        self.recovery.belong_to(path)
+        self._discarded = self._closing = False
+
+    @property
+    def title(self) -> str:
+        """Name of the file, with a star in front if there are unsaved changes."""
+        name = UNTITLED if self.path is None else Path(self.path).name
+        return f"*{name}" if self._state.session.modified else name
+
+    # -- saving -----------------------------------------------------------------------------------------
+
+    @action("save", "Ctrl+s", summary="save", group=Group.SCENE)
+    def save(self, cursor: Cursor) -> None:
+        """Save the scene; a scene without a file asks for its name."""
+        if self.path is None:
+            self.save_as(cursor)
+        else:
+            self._save_to(self.path)
+
+    @action("save_as", "Ctrl+Shift+s", summary="save to another file", group=Group.SCENE)
+    def save_as(self, _cursor: Cursor) -> None:
+        """Ask for another file, and save the scene to it."""
+        self._ask_for_name(self._save_to)
+
+    def _ask_for_name(self, save: Callable[[Path], None]) -> None:
+        def accept(text: str, repeated: bool) -> None:
+            path = _checked_path(text, (".json",))
+            if self.path is None or path.absolute() != Path(self.path).absolute():
+                _refuse_to_replace(path, repeated)
+            save(path)
+
+        self._state.prompt.begin(TextPrompt("save as", str(self.path or f"{UNTITLED}.json"), accept))
+
+    def _save_to(self, path: str | PathLike[str]) -> None:
+        def saved() -> None:
+            self.recovery.belong_to(path)
+            self.path = path
+
+        self._state.background.save(path, self.camera(), saved)
+
+    # -- other files ------------------------------------------------------------------------------------
+
+    @action("export", "Ctrl+e", summary="export the surface as a mesh file", group=Group.SCENE)
+    def export(self, _cursor: Cursor) -> None:
+        """Ask for a file, and write all objects to it as one mesh; its suffix is the format."""
+        if not self._state.session.document.objects:
+            raise InvalidEdit("the scene has no object to export; press N to add one")
+
+        def accept(text: str, repeated: bool) -> None:
+            path = _checked_path(text, MESH_SUFFIXES)
+            _refuse_to_replace(path, repeated)
+            objects = self._state.session.document.objects
+
+            def write(progress: Progress) -> None:
+                write_mesh(objects, path, progress=progress)
+
+            self._state.background.write("export", write, f"exported to {path}")
+
+        first = Path(self.path or UNTITLED).with_suffix(MESH_SUFFIXES[0])
+        self._state.prompt.begin(TextPrompt(f"export to ({', '.join(MESH_SUFFIXES)})", str(first), accept))
+
+    @action("add_image", "Ctrl+i", summary="add an image for decals", group=Group.SCENE)
+    def add_image(self, _cursor: Cursor) -> None:
+        """Ask for the name of an image, and add it to the scene."""
+
+        def accept(text: str, _repeated: bool) -> None:
+            state = self._state
+            state.end_stroke()
+            state.run(AddImage(DecalImage.load(text)))
+            count = len(state.session.document.images)
+            state.show(f"added {text} as image {count - 1}; press I to show it on the selected decals")
+
+        self._state.prompt.begin(TextPrompt("image file, or scale, tile, eye, rivet, rock", "", accept))
+
+    # -- closing ----------------------------------------------------------------------------------------
+
+    def recover(self, load: Callable[[Path], Scene]) -> None:
+        """Take over unsaved changes of an earlier window; see `RecoveryFile.recover`."""
+        message = self.recovery.recover(load)
+        if message:
+            self._state.show(message)
+
+    @action("close", "q", summary="close the window; it asks if there are unsaved changes", group=Group.SCENE)
+    def close(self, _cursor: Cursor) -> None:
+        """Close the window, or ask if that would lose changes."""
+        if self.may_close():
+            self.leave()
+
+    def may_close(self) -> bool:
+        """Return True if the window may close; otherwise ask. While the question is open, return True."""
+        state = self._state
+        if self._discarded:
+            return True
+        if state.background.saving:
+            self._closing = True
+            state.show("saving; the window closes afterwards")
+            return False
+        if not state.session.modified and not state.background.busy_editing:
+            return True
+        if state.prompt.asking:
+            self._discarded = True
+            return True
+        state.prompt.begin(
+            Question(
+                "unsaved changes.   Q: close without saving   S: save and close   Escape: go on",
+                {"q": self._discard, "s": self._save_and_close},
+            )
+        )
+        return False
+
+    def update(self) -> None:
+        """Close the window once a save has ended, and keep the recovery file; call this regularly."""
+        if self._closing and not self._state.background.saving:
+            self._closing = False
+            if not self._state.session.modified:
+                self.leave()
+        self.recovery.update()
+
+    def finish(self) -> None:
+        """Keep unsaved changes in the recovery file, unless they were discarded; call this at the end."""
+        if self._discarded or not self._state.session.modified:
+            self.recovery.remove()
+        else:
+            self.recovery.keep()
+
+    def _discard(self) -> None:
+        self._discarded = True
+        self.leave()
+
+    def _save_and_close(self) -> None:
+        self._state.prompt.close()
+        if self.path is None:
+            self._ask_for_name(self._save_before_closing)
+        else:
+            self._save_before_closing(self.path)
+
+    def _save_before_closing(self, path: str | PathLike[str]) -> None:
+        self._save_to(path)
+        self._closing = True
+        self.update()
+
+
+def _checked_path(text: str, suffixes: tuple[str, ...]) -> Path:
+    """Return the path of a file to write, or raise `InvalidEdit`."""
+    path = Path(text).expanduser()
+    if path.suffix.lower() not in suffixes:
+        raise InvalidEdit(f"expected a name that ends in {', '.join(suffixes)}, got {text!r}")
+    if path.is_dir() or not path.parent.is_dir():
+        raise InvalidEdit(f"expected a file in an existing folder, got {text!r}")
+    return path
+
+
+def _refuse_to_replace(path: Path, repeated: bool) -> None:
+    """Raise `InvalidEdit` if a file exists, unless the name was accepted a second time."""
+    if path.exists() and not repeated:
+        raise InvalidEdit(f"{path} exists; press Return again to replace it")

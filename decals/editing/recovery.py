@@ -1,0 +1,157 @@
+"""The recovery file: unsaved changes beside the scene's file, for the next window after a crash."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import datetime
+from os import PathLike
+from pathlib import Path
+
+from decals.editing.background import BackgroundJobs
+from decals.editing.commands import ReplaceScene
+from decals.editing.session import EditSession
+from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.scenes.camera import Camera
+from decals.scenes.scene import Scene
+
+AUTOSAVE_SECONDS = 10.0
+"""Unsaved changes are written to the recovery file after this time."""
+
+MAX_WRITING_SHARE = 0.1
+"""Part of the time that may pass with writing, at most."""
+
+SUFFIX = ".recovery.json"
+"""End of the name of a recovery file."""
+
+
+def recovery_path(path: str | PathLike[str]) -> Path:
+    """Return the path of the recovery file of a scene file, in the same folder.
+
+    Examples
+    --------
+    >>> from decals.editing import recovery_path
+    >>> recovery_path("scenes/knot.json").name
+    'knot.recovery.json'
+    """
+    return Path(path).with_name(Path(path).stem + SUFFIX)
+
+
+class RecoveryFile:
+    """Keeps a recovery file while a session has unsaved changes.
+
+    Parameters
+    ----------
+    session
+        The edited session.
+    background
+        Writes the file.
+    camera
+        Returns the camera to store; None for the document's.
+    """
+
+    def __init__(
+        self, session: EditSession, background: BackgroundJobs, camera: Callable[[], Camera | None]
+    ) -> None:
+        self._session, self._background, self._camera = session, background, camera
+        self._scene_path: Path | None = None
+        self._exists = False
+        self._written: object = None
+        self._changed_at: float | None = None
+        self._wait = AUTOSAVE_SECONDS
+
+    @property
+    def path(self) -> Path | None:
+        """Path of the recovery file; None if the scene has no file."""
+        return None if self._scene_path is None else recovery_path(self._scene_path)
+
+    @property
+    def exists(self) -> bool:
+        """True while there is a recovery file of this session."""
+        return self._exists
+
+    def belong_to(self, scene_path: str | PathLike[str] | None) -> None:
+        """Remove the recovery file, and keep the next one beside this scene file."""
+        self.remove()
+        self._scene_path = None if scene_path is None else Path(scene_path)
+
+    def recover(self, load: Callable[[Path], Scene]) -> str:
+        """Take over the recovery file of an earlier window, as one entry that undo takes back.
+
+        Parameters
+        ----------
+        load
+            Reads the file.
+
+        Returns
+        -------
+        str
+            What was recovered; empty without a recovery file.
+
+        Raises
+        ------
+        InvalidScene
+            The file cannot be read.
+        """
+        path = self.path
+        if path is None or not path.is_file():
+            return ""
+        when = datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+        try:
+            scene = load(path)
+        except ImplicitDecalsError as error:
+            raise InvalidScene(
+                f"could not read the unsaved changes in {str(path)!r} ({error}); move or delete this file"
+            ) from error
+        self._session.do(ReplaceScene(scene, "recover unsaved changes"))
+        self._exists, self._written = True, self._session.next_undo
+        return (
+            f"recovered unsaved changes of {when:%Y-%m-%d %H:%M} from {path.name}; "
+            "Ctrl + S keeps them, Ctrl + Z goes back to the saved scene"
+        )
+
+    @property
+    def pending(self) -> bool:
+        """True if there are changes that are not in the recovery file, or the file is to be removed."""
+        if self._scene_path is None:
+            return False
+        modified = self._session.modified
+        return self._exists if not modified else self._session.next_undo is not self._written
+
+    def update(self) -> None:
+        """Write or remove the file if it is time to; the owner calls this regularly."""
+        path = self.path
+        if path is None or not self.pending:
+            self._changed_at = None
+            return
+        if self._session.stroke_open or self._background.writing:
+            return
+        if not self._session.modified:
+            self.remove()
+            return
+        now = time.monotonic()
+        self._changed_at = now if self._changed_at is None else self._changed_at
+        if now - self._changed_at < self._wait:
+            return
+
+        def written() -> None:
+            self._wait = max(AUTOSAVE_SECONDS, (time.monotonic() - now) / MAX_WRITING_SHARE)
+
+        self._written, self._exists, self._changed_at = self._session.next_undo, True, None
+        self._background.write_copy(path, self._camera(), written)
+
+    def keep(self) -> Path | None:
+        """Write all unsaved changes now, and return the file; None if there are none, or no path."""
+        path = self.path
+        if path is None or not self._session.modified:
+            return None
+        self._session.begin_save(path, camera=self._camera()).write()
+        self._exists = True
+        return path
+
+    def remove(self) -> None:
+        """Remove the file, if this session wrote or recovered it."""
+        path = self.path
+        if self._exists and path is not None:
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+        self._exists, self._written, self._changed_at = False, None, None

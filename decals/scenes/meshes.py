@@ -1,0 +1,98 @@
+"""Objects of a scene as one mesh, for files of other programs."""
+
+import os
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from blobtree.meshing.mesh import Mesh
+from blobtree.progress import Progress
+from blobtree.pyvista_views import to_polydata, write_polydata
+from decals.errors import InvalidMesh, InvalidScene
+from decals.rendering.mesh import vertex_normals
+from decals.scenes.objects import MeshObject, SceneObject
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
+"""Formats of mesh files that are written."""
+
+
+def as_polydata(
+    objects: Iterable[SceneObject],
+    *,
+    resolution: int | None = None,
+    cell_size: float | None = None,
+    chord_error: float | None = None,
+    creases: bool = False,
+    split_normals: bool = False,
+    progress: Progress | None = None,
+) -> "pv.PolyData":
+    """Return all objects as one mesh with normals and "RGB" colours; trees are polygonized.
+
+    Parameters
+    ----------
+    objects
+        Objects of a scene.
+    resolution, cell_size, chord_error, creases, split_normals
+        See `blobtree.polygonize`.
+    progress
+        Called with a stage and the fraction done.
+
+    Raises
+    ------
+    InvalidScene
+        There is no object.
+    InvalidMesh
+        A tree has no surface in cells of this size.
+    """
+    parts = []
+    for item in objects:
+        if isinstance(item, MeshObject):
+            parts.append(_mesh_polydata(item))
+            continue
+        part = item.tree.to_pyvista(
+            resolution=resolution,
+            cell_size=cell_size,
+            chord_error=chord_error,
+            creases=creases,
+            split_normals=split_normals,
+            progress=progress,
+        )
+        if part.n_points == 0:
+            raise InvalidMesh(
+                f"{item.name!r} has no surface in cells of this size: its parts may be smaller than a cell, "
+                "or the tree may be empty; increase the resolution"
+            )
+        parts.append(part)
+    if not parts:
+        raise InvalidScene("expected at least one object to write as a mesh, got none; add one")
+    first, *others = parts
+    merged: pv.PolyData = first.append_polydata(*others) if others else first
+    return merged
+
+
+def _mesh_polydata(item: MeshObject) -> "pv.PolyData":
+    colors = np.tile(np.asarray(item.color, np.float32), (len(item.vertices), 1))
+    return to_polydata(Mesh(item.vertices, item.faces, vertex_normals(item.vertices, item.faces), colors))
+
+
+def write_mesh(
+    objects: Iterable[SceneObject], path: str | os.PathLike[str], *, progress: Progress | None = None
+) -> None:
+    """Write all objects to a file as one mesh, whole or not at all; the suffix is the format.
+
+    Raises
+    ------
+    InvalidScene
+        There is no object, or the file cannot be written.
+    InvalidMesh
+        A tree has no surface.
+    """
+    mesh = as_polydata(objects, progress=progress)
+    try:
+        write_polydata(path, mesh)
+    except OSError as error:
+        raise InvalidScene(f"could not write the mesh {os.fspath(path)!r} ({error.strerror})") from error
