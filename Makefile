@@ -54,7 +54,7 @@ types: $(INSTALLED) $(LINKS)  ## Check types
 types-tests: $(INSTALLED) $(LINKS)  ## List the type errors of the tests
 	-$(MYPY) -p blobtree -p decals -p tests
 
-wheel: $(INSTALLED)  ## Build the wheel and try it outside the checkout
+wheel: $(INSTALLED)  ## Compile the kernels, build the wheel and try it outside the checkout
 	$(BIN)/python .ci/check_wheel.py
 
 check-lower: $(INSTALLED) gl  ## Run the tests with the oldest dependencies that pyproject.toml allows

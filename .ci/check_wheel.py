@@ -26,8 +26,17 @@ for package in map(importlib.import_module, sys.argv[2:]):
 """
 
 
+FIRST_MESH = """
+import blobtree, blobtree.kernels
+blobtree.polygonize(blobtree.Point((0, 0, 0), radius=1.0), resolution=8)
+assert not blobtree.kernels._state.compiled, "kernels were compiled that the wheel should hold"
+"""
+MAX_BYTES = 30_000_000
+
+
 def build(folder: Path) -> Path:
-    """Build the sdist, and the wheel from it: nothing left over in the checkout can slip in."""
+    """Compile the kernels, then build the sdist, and the wheel from it: nothing left over can slip in."""
+    subprocess.run([sys.executable, ROOT / ".ci" / "compile_kernels.py"], check=True)
     command = [sys.executable, "-m", "build", "--outdir", folder, ROOT]
     built = subprocess.run(command, check=False, capture_output=True, text=True)
     if built.returncode:
@@ -56,13 +65,15 @@ def check_content(wheel: Path) -> None:
     missing = sorted(expected_files() - names)
     if missing:
         sys.exit(f"the wheel lacks {', '.join(missing)}: see packages and package-data in pyproject.toml")
+    if (size := wheel.stat().st_size) > MAX_BYTES:
+        sys.exit(f"the wheel has {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:.0f} MB")
     tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
     if tops != {"blobtree", "decals"}:
         sys.exit(f"the wheel has {sorted(tops)} at its top level")
 
 
 def check_use(wheel: Path, folder: Path) -> None:
-    """Import every module from the installed wheel, and run commands outside the checkout."""
+    """Import every module from the installed wheel, make a mesh, and run commands outside the checkout."""
     home = folder / "venv"
     venv.create(home, symlinks=os.name != "nt")
     paths = sysconfig.get_paths(vars={"base": str(home), "platbase": str(home)})
@@ -84,6 +95,8 @@ def check_use(wheel: Path, folder: Path) -> None:
     ]
     subprocess.run([*install, wheel], check=True)
     subprocess.run([python, "-c", IMPORT_ALL, site.resolve(), *PACKAGES], check=True, cwd=folder)
+    fresh = os.environ | {"WARP_CACHE_PATH": str(folder / "kernels")}
+    subprocess.run([python, "-c", FIRST_MESH], check=True, cwd=folder, env=fresh)
     for arguments in COMMANDS:
         command = [scripts / "implicit-decals", *arguments]
         subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)

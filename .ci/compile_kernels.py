@@ -1,0 +1,64 @@
+"""Compile all kernels for processors ahead of time into `blobtree/compiled`, from where the wheel takes them.
+
+    python .ci/compile_kernels.py
+
+They fit the architecture and the system of this machine. Run it right before the wheel is built: kernels
+whose sources have changed since are carried along, but never loaded.
+"""
+
+import importlib
+import os
+import shutil
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+KEPT = (".o", ".meta")
+
+
+def kernel_files() -> list[str]:
+    """Name the Python modules that define kernels."""
+    files = [file for package in ("blobtree", "decals") for file in sorted((ROOT / package).rglob("*.py"))]
+    return [
+        ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        for file in files
+        if "\n@wp.kernel" in file.read_text(encoding="utf-8")
+    ]
+
+
+def compile_all(cache: Path) -> None:
+    """Compile every kernel into an empty kernel cache."""
+    os.environ["WARP_CACHE_PATH"] = str(cache)
+    import warp as wp
+
+    from blobtree.device import start_warp
+
+    start_warp()
+    for name in kernel_files():
+        importlib.import_module(name)
+    modules = [wp.get_module(name) for name in kernel_files()]
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        list(threads.map(lambda module: wp.load_module(module, device="cpu"), modules))
+
+
+def main() -> None:
+    """Replace `blobtree/compiled` by the kernels of the present sources."""
+    target = ROOT / "blobtree" / "compiled"
+    with tempfile.TemporaryDirectory() as folder:
+        compile_all(Path(folder))
+        shutil.rmtree(target, ignore_errors=True)
+        shutil.copytree(folder, target, ignore=_left_out)
+    files = [file for file in target.rglob("*") if file.is_file()]
+    size = sum(file.stat().st_size for file in files)
+    print(f"{len(files)} files, {size / 1e6:.1f} MB in {target.relative_to(ROOT)}")
+
+
+def _left_out(folder: str, names: list[str]) -> list[str]:
+    return [name for name in names if (Path(folder) / name).is_file() and not name.endswith(KEPT)]
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    main()
