@@ -90,7 +90,7 @@ def demo(
             Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
     for name in PICTURES:
         Console().print(str(output / name), soft_wrap=True, highlight=False)
-    lines = "".join(f"  {line}\n" for line in command_lines(next_commands()))
+    lines = "\n".join(f"  {line}" for line in command_lines(next_commands()))
     Console(stderr=True).print(
         f"\nNext, type in this shell:\n\n{lines}", soft_wrap=True, highlight=False, markup=False
     )
