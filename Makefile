@@ -3,8 +3,6 @@
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
-# Compiled Warp kernels belong to the environment that compiled them.
-export WARP_CACHE_PATH ?= $(CURDIR)/$(VENV)/warp-cache
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Tests that no ordinary machine can run: those that need a CUDA device or a browser.

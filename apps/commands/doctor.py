@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from blobtree.errors import UnusableCache
 from decals.rendering.gl_libraries import GL_LIBRARIES, install_advice, missing_gl_libraries
 
 PACKAGES = ("numpy", "scipy", "warp-lang", "moderngl", "pyvista", "vtk")
@@ -118,9 +119,27 @@ def warp_finding(devices: Callable[[], list[str]] = warp_devices) -> Finding:
     """
     try:
         return Finding("Warp devices", ", ".join(devices()))
+    except UnusableCache as error:
+        return Finding("Warp devices", "none without a kernel cache", Status.MISSING, f"{error}.")
     except Exception as error:  # a broken installation can raise any exception
         advice = f"Run: {sys.executable} -m pip install --force-reinstall warp-lang"
         return Finding("Warp devices", f"none: {last_line(str(error))}", Status.MISSING, advice)
+
+
+def cache_finding() -> Finding:
+    """Check that compiled kernels can be kept, and name their folder."""
+    try:
+        from blobtree.device import start_warp
+        from blobtree.kernels import kernel_cache
+
+        start_warp()
+    except Exception:  # `warp_finding` reports it
+        return Finding("Kernel cache", "unknown, as Warp does not start", Status.NOTE)
+    folder = kernel_cache()
+    if os.access(folder, os.W_OK | os.X_OK):
+        return Finding("Kernel cache", str(folder))
+    advice = "Set the environment variable WARP_CACHE_PATH to a folder that can be written."
+    return Finding("Kernel cache", f"{folder} cannot be written", Status.MISSING, advice)
 
 
 def library_finding(missing: list[str]) -> Finding:
@@ -230,6 +249,7 @@ def examine() -> list[Finding]:
         platform_finding(),
         *package_findings(),
         warp_finding(),
+        cache_finding(),
         library_finding(missing),
         *([] if missing else context_findings()),
         sample_finding(),

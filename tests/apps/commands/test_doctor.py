@@ -6,8 +6,11 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+import warp as wp
 from rich.console import Console
 
+from blobtree.device import start_warp
+from blobtree.errors import UnusableCache
 from decals.apps.commands import doctor
 from decals.apps.commands.doctor import Finding, Status
 from decals.rendering.gl_libraries import missing_gl_libraries
@@ -74,6 +77,27 @@ def test_a_broken_warp_is_a_finding() -> None:
     assert finding.status is Status.MISSING
     assert finding.value == "none: no such library"
     assert doctor.warp_finding(lambda: ["cpu (CPU)"]) == Finding("Warp devices", "cpu (CPU)")
+
+
+def test_an_unusable_kernel_cache_is_no_broken_warp() -> None:
+    def refuse() -> list[str]:
+        raise UnusableCache("kernels cannot be kept; set the environment variable WARP_CACHE_PATH")
+
+    finding = doctor.warp_finding(refuse)
+    assert finding.status is Status.MISSING
+    assert "WARP_CACHE_PATH" in finding.advice
+    assert "install" not in finding.advice
+
+
+def test_the_kernel_cache_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    start_warp()
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    assert doctor.cache_finding() == Finding("Kernel cache", str(tmp_path))
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "absent"))
+    finding = doctor.cache_finding()
+    assert finding.status is Status.MISSING
+    assert finding.value == f"{tmp_path / 'absent'} cannot be written"
+    assert "WARP_CACHE_PATH" in finding.advice
 
 
 CONTEXT: dict[str, str | int] = {
