@@ -208,7 +208,7 @@ def from_json(text: bytes | str) -> Node:
         file = msgspec.json.decode(text, type=TreeFile)
     except TypeError:
         raise InvalidFile(f"expected JSON as text or bytes, got {type(text).__name__}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeError) as error:
         raise InvalidFile(f"not a BlobTree of version {VERSION}: {error}") from None
     except RecursionError:
         raise InvalidFile("not a BlobTree: nested too deeply") from None

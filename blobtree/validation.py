@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
 from blobtree.errors import ImplicitDecalsError, InvalidNode, InvalidPoints
@@ -28,10 +28,22 @@ def shown(value: object) -> str:
         return f"a {type(value).__name__}"
 
 
+def real(values: Any) -> NDArray[Any]:
+    """Return values as an array of any type but complex numbers, for which it raises `TypeError`.
+
+    NumPy only warns when it drops their imaginary parts.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        raise TypeError("complex numbers")
+    return array
+
+
 def finite_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
     try:
-        numbers = tuple(float(component) for component in cast(Iterable[Any], value))
+        values = real(value) if isinstance(value, np.ndarray) else cast(Iterable[Any], value)
+        numbers = tuple(float(component) for component in values)
     except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(abs(number) <= LARGEST_NUMBER for number in numbers):
@@ -66,7 +78,7 @@ def positive_number(name: str, value: object) -> float:
 def finite_number(name: str, value: object) -> float:
     """Return `value` as a finite float; raise `InvalidNode` otherwise."""
     try:
-        number = float(cast(Any, value))
+        number = float(cast(Any, value if isinstance(value, float | int | str) else real(value)))
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not abs(number) <= LARGEST_NUMBER:
@@ -77,7 +89,7 @@ def finite_number(name: str, value: object) -> float:
 def affine_matrix(value: ArrayLike) -> Matrix:
     """Return `value` (3×4 or 4×4) as an invertible affine map; raise `InvalidNode` otherwise."""
     try:
-        matrix = np.asarray(value, dtype=np.float64)
+        matrix = np.asarray(real(value), dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         matrix = np.empty(0)
     if matrix.shape == (4, 4) and np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0)):
@@ -99,7 +111,7 @@ def point_array(
     """Return points as contiguous float32[n, 3], finite up to a limit; raise an error otherwise."""
     try:
         with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused below
-            array = np.ascontiguousarray(points, dtype=np.float32)
+            array = np.ascontiguousarray(real(points), dtype=np.float32)
     except (TypeError, ValueError, OverflowError):
         raise error(f"{name}: expected an array of shape (n, 3), got {reprlib.repr(points)}") from None
     if array.shape == (0,):

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
 from blobtree.colors import color_rgb, is_named
+from blobtree.validation import real
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, MissingPackage
 
 T = TypeVar("T")
@@ -102,7 +103,7 @@ def real_number(
 def finite_vector(name: str, value: Any, error: type[ImplicitDecalsError]) -> Float64Array:
     """Return three finite numbers as ``float64[3]``."""
     try:
-        numbers = np.array(value, np.float64)
+        numbers = np.array(real(value), np.float64)
     except (TypeError, ValueError, OverflowError):
         numbers = np.zeros(0)
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
@@ -113,7 +114,7 @@ def finite_vector(name: str, value: Any, error: type[ImplicitDecalsError]) -> Fl
 def real_array(name: str, values: ArrayLike, error: type[ImplicitDecalsError]) -> Float64Array:
     """Return numbers as an array of any shape."""
     try:
-        return np.asarray(values, dtype=np.float64)
+        return np.asarray(real(values), dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as reason:
         raise error(f"{name}: expected numbers, got {describe(values)}") from reason
 
@@ -182,7 +183,7 @@ def optional_package(name: str, extra: str) -> ModuleType:
 def finite_array(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Float64Array:
     """Return finite numbers of a shape (-1: any length) as a new float64 array."""
     try:
-        array = np.array(values, np.float64)
+        array = np.array(real(values), np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidDecals(f"{name}: expected numbers, got {values!r:.80}") from error
     _check_shape(name, array.shape, shape)

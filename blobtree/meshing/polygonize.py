@@ -26,7 +26,7 @@ from blobtree.meshing.creases import sharpened
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.progress import Cancel, Progress, watched
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.validation import shown
+from blobtree.validation import LARGEST_NUMBER, shown
 
 DEFAULT_RESOLUTION = 64
 
@@ -351,7 +351,7 @@ def _above_zero(name: str, noun: str, value: object) -> float:
         number = float(cast(Any, value))
     except (TypeError, ValueError, OverflowError):
         number = np.nan
-    if not 0.0 < number < np.inf:
+    if not 0.0 < number <= LARGEST_NUMBER:
         raise InvalidResolution(f"{name}: expected a finite {noun} above 0, got {shown(value)}")
     return number
 

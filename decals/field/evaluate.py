@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.device import known_device
 from blobtree.kernels import loaded
+from blobtree.validation import real
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
@@ -201,8 +202,9 @@ def _colors(
 
 def _as_rows(name: str, values: ArrayLike) -> Float32Array:
     try:
-        array = np.asarray(values, np.float32)
-    except (TypeError, ValueError):
+        with np.errstate(over="ignore"):
+            array = np.asarray(real(values), np.float32)
+    except (TypeError, ValueError, OverflowError):
         raise InvalidPoints(f"{name}: expected numbers of shape [m, 3], got {describe(values)}") from None
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidPoints(f"{name}: expected shape [m, 3], got {list(array.shape)}; give one row per point")

@@ -10,7 +10,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 from blobtree._typing import FloatArray
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
-from decals.validation import is_file
+from decals.validation import describe, is_file
 
 MAX_IMAGE_EDGE = 8192
 """Longest edge of a decal image that is read from a file, in pixels."""
@@ -51,6 +51,8 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
     >>> decals.load_image("scale").shape
     (256, 256, 4)
     """
+    if not isinstance(reference, str):
+        raise InvalidImage(f"reference: expected the name or the path of an image, got {describe(reference)}")
     if is_builtin(reference) or _has_invalid_color(reference, folder):
         return generate_image(reference)
     return read_image((folder or Path()) / reference)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
 from decals.rendering.viewpoint import Bounds, Rays
-from decals.validation import describe, finite_number, finite_vector, real_array
+from decals.validation import describe, finite_number, finite_vector, real_array, real_number
 
 Vector = tuple[float, float, float]
 
@@ -184,6 +184,8 @@ class Camera:
         least distance. Other arguments and errors are those of `framing`.
         """
         positions = _points(points)
+        aspect = real_number("aspect", aspect, "a number above 0", lambda value: value > 0.0, InvalidScene)
+        margin = real_number("margin", margin, "a number above 0", lambda value: value > 0.0, InvalidScene)
         toward, upward = _orientation(direction, up)
         axes_camera = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
         half = math.tan(math.radians(axes_camera.fov) / 2) / margin

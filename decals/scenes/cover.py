@@ -13,6 +13,7 @@ from decals.scenes.camera import THREE_QUARTER, Camera, Vector
 from decals.scenes.objects import SceneObject, as_objects
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.convert import Model
+from decals.validation import describe
 
 FRAMING_SAMPLES = 2000
 """Points per object that the camera is fitted to."""
@@ -71,7 +72,11 @@ def cover(
     12
     """
     objects = as_objects(models)
-    pictures = [image if isinstance(image, DecalImage) else DecalImage.load(image) for image in images]
+    try:
+        sources = list(images)
+    except TypeError:
+        raise InvalidScene(f"images: expected a list of images, got {describe(images)}") from None
+    pictures = [image if isinstance(image, DecalImage) else DecalImage.load(image) for image in sources]
     if not objects:
         raise InvalidScene("expected at least one model, got none")
     decals = scatter(

@@ -23,7 +23,7 @@ Numbers are the shortest decimals that give the same float32 again. Paths are re
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import msgspec
 from msgspec import Raw, Struct
@@ -110,7 +110,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
     >>> decals.save_scene(scene, "ball.json")
     """
-    path = Path(path)
+    path = as_path(path)
     folder = path.parent
     if not folder.is_dir():
         raise InvalidScene(
@@ -158,7 +158,7 @@ def load_scene(
     >>> len(decals.load_scene("ball.json").decals)
     20
     """
-    path = Path(path)
+    path = as_path(path)
     try:
         text = path.read_bytes()
     except (OSError, ValueError) as error:
@@ -168,6 +168,14 @@ def load_scene(
         return from_json(text, folder=path.parent, samples=samples, trust=trust)
     except InvalidScene as error:
         raise InvalidScene(f"{str(path)!r}: {error}") from error
+
+
+def as_path(path: object) -> Path:
+    """Return the path of a file; InvalidScene for values of other types."""
+    try:
+        return Path(cast("str | os.PathLike[str]", path))
+    except TypeError:
+        raise InvalidScene(f"path: expected the path of a file, got {describe(path)}; give a text") from None
 
 
 def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> bytes:
@@ -311,9 +319,7 @@ def load_model(
     >>> decals.load_model(path).name
     'ball'
     """
-    if not isinstance(path, str | os.PathLike):
-        raise InvalidScene(f"path: expected the path of a model, got {describe(path)}")
-    if _is_scene_file(Path(path)):
+    if _is_scene_file(as_path(path)):
         return load_scene(path, samples=samples, trust=trust)
     return as_object(path, "model")
 

@@ -188,7 +188,10 @@ def _renamed(item: SceneObject, taken: set[str]) -> SceneObject:
 
 def bounds_of(objects: Iterable[SceneObject]) -> Box:
     """Return the box around several objects; InvalidScene if there are none, or one is of another kind."""
-    listed = list(objects) if isinstance(objects, Iterable) else [objects]
+    try:
+        listed = list(objects)
+    except TypeError:
+        listed = [cast("SceneObject", objects)]
     for item in listed:
         if not isinstance(item, MeshObject | TreeObject):
             raise InvalidScene(f"objects: expected objects of a scene, got {describe(item)}; use as_objects")
