@@ -52,6 +52,15 @@ CALLS: dict[str, Callable[[], object]] = {
     "bounds of text": lambda: bounds_of("ball"),  # type: ignore[arg-type]
     "framing of none": lambda: decals.Camera.framing(WRONG),
     "framing of objects": lambda: decals.Camera.framing(SCENE.objects),  # type: ignore[arg-type]
+    "framing of complex numbers": lambda: decals.Camera.framing(np.zeros(3, complex)),  # type: ignore[arg-type]
+    "endless sample": lambda: as_surface(TRIANGLE).sample(HUGE, 0),
+    "endless factor": lambda: decals.scatter(as_surface(TRIANGLE), count=3, factor=1e308),
+    "complex radius": lambda: Point((0, 0, 0), radius=1j),  # type: ignore[arg-type]
+    "path of a number": lambda: decals.load_scene(1.5),  # type: ignore[arg-type]
+    "image of a number": lambda: decals.load_image(1.5),  # type: ignore[arg-type]
+    "margin of nothing": lambda: decals.Camera.framing(([0, 0, 0], [1, 1, 1]), margin=0),
+    "surrogate as JSON": lambda: blobtree.from_json("\ud800"),
+    "endless cell": lambda: blobtree.polygonize(BALL, cell_size=1e308),
     "fitting of none": lambda: decals.Camera.fitting(WRONG),
     "layer of no decal": lambda: EditSession(SCENE).do(SetValues.each([], layers="x")),
     "number as source": lambda: decals.MeshObject("a", *TRIANGLE, source=3.5),  # type: ignore[arg-type]
@@ -97,6 +106,7 @@ PLY = {
     "endless list": f"{HEADER}{POINTS}{FACES.replace('uchar', 'float')}end_header\n{ROWS}inf 0 1 2\n",
     "NaN as length": f"{HEADER}{POINTS}{FACES.replace('uchar', 'float')}end_header\n{ROWS}nan 0 1 2\n",
     "NaN as corner": f"{HEADER}{POINTS}{FACES}end_header\n{ROWS}3 0 nan 1e300\n",
+    "edges as faces": f"{HEADER}{POINTS}{FACES}end_header\n{ROWS}2 0 1\n",
     "no properties": f"{HEADER}element vertex 3\nelement face 1\nend_header\n{ROWS}",
     "unknown format": "ply\nformat octal 1.0\nend_header\n",
     "coordinate beyond float32": f"{HEADER}{POINTS}{FACES}end_header\n1e300 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",

@@ -99,7 +99,9 @@ def read_image(path: Path) -> NDArray[np.uint8]:
         raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_ADVICE}")
     try:
         with warnings.catch_warnings(), Image.open(path, formats=PICTURE_FORMATS) as picture:
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_IMAGE_EDGE is the limit
+            warnings.simplefilter(
+                "ignore"
+            )  # of odd tags, and of sizes, for which MAX_IMAGE_EDGE is the limit
             _check_size(picture, path)
             picture.load()
             return _to_rgba(ImageOps.exif_transpose(picture))

@@ -67,7 +67,13 @@ class Appearance:
             object.__setattr__(self, name, value)
         if not isinstance(self.jitter, Jitter | None):
             raise InvalidScattering(f"jitter: expected a Jitter, got {self.jitter!r}")
-        real_number("factor", self.factor, "a number above 0", lambda value: value > 0, InvalidScattering)
+        real_number(
+            "factor",
+            self.factor,
+            "a number above 0, at most 1e6",
+            lambda value: 0 < value <= 1e6,
+            InvalidScattering,
+        )
         object.__setattr__(self, "_shares", image_shares(self.images, self.weights))
 
     def decals_of(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
+from blobtree.validation import real
 from decals.errors import InvalidScene
 from decals.rendering.viewpoint import Bounds, Rays
 from decals.validation import describe, finite_number, finite_vector, real_array, real_number
@@ -239,7 +240,7 @@ def _points(points: ArrayLike) -> Float64Array:
 
 def _corners(bounds: Bounds) -> Float64Array:
     try:
-        box = np.asarray([bounds[0], bounds[1]], np.float64)
+        box = np.asarray([real(bounds[0]), real(bounds[1])], np.float64)
     except (TypeError, ValueError, IndexError, KeyError, OverflowError):
         box = np.zeros(0)
     if box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any():

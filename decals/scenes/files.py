@@ -238,7 +238,7 @@ def is_scene(text: bytes) -> bool:
     """Return True if JSON has the format of a scene; damaged JSON if it begins like one."""
     try:
         return msgspec.json.decode(text, type=_Header).format == FORMAT
-    except (msgspec.MsgspecError, RecursionError):
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
         return f'"{FORMAT}"'.encode() in text[:HEADER_BYTES]
 
 

@@ -32,6 +32,9 @@ MIN_FACE_QUALITY = 1e-6
 Warp's mesh queries skip the same faces.
 """
 
+MAX_SAMPLES = 1 << 30
+"""Most points that `sample` returns."""
+
 R2_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the R2 sequence (Roberts 2018): powers of the inverse of the plastic number."""
 
@@ -118,7 +121,7 @@ class MeshSurface:
         One point falls into each ``1/count`` of the area, in the order of the faces. Within a face, points
         are jittered around a sequence of low discrepancy, so that all parts of large faces get their share.
         """
-        whole_number("count", count, 0, None, InvalidScattering)
+        whole_number("count", count, 0, MAX_SAMPLES, InvalidScattering)
         rng = np.random.default_rng(whole_number("seed", seed, 0, None, InvalidScattering))
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)

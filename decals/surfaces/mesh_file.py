@@ -101,7 +101,10 @@ def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> Me
         return vertices, polygons.astype(np.int32)
     corners = np.concatenate(list(polygons))
     _check_indices(corners, len(vertices), name)
-    surface = pv.PolyData.from_irregular_faces(vertices, [p for p in polygons if len(p) > 2])
+    areal = [polygon for polygon in polygons if len(polygon) > 2]
+    if not areal:
+        raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
+    surface = pv.PolyData.from_irregular_faces(vertices, areal)
     return vertices, surface.triangulate().regular_faces.astype(np.int32)
 
 
