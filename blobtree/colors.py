@@ -3,8 +3,10 @@
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias, cast
 
+import numpy as np
+
 from blobtree.errors import ImplicitDecalsError, InvalidNode, MissingPackage
-from blobtree.validation import shown
+from blobtree.validation import real, shown
 
 Rgb = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
@@ -64,7 +66,8 @@ def _channels(value: object) -> tuple[float, ...]:
     try:
         if is_named(value):
             return _named_channels(value)
-        channels = tuple(float(channel) for channel in cast(Iterable[Any], value))
+        values = real(value) if isinstance(value, np.ndarray) else cast(Iterable[Any], value)
+        channels = tuple(float(channel) for channel in values)
     except (TypeError, ValueError, OverflowError):
         return ()
     return channels if len(channels) in (3, 4) and all(0.0 <= c <= 1.0 for c in channels) else ()

@@ -55,6 +55,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "framing of complex numbers": lambda: decals.Camera.framing(np.zeros(3, complex)),  # type: ignore[arg-type]
     "endless sample": lambda: as_surface(TRIANGLE).sample(HUGE, 0),
     "endless factor": lambda: decals.scatter(as_surface(TRIANGLE), count=3, factor=1e308),
+    "complex colour": lambda: Point((0, 0, 0), radius=1.0, color=np.zeros(3, complex)),  # type: ignore[arg-type]
     "complex radius": lambda: Point((0, 0, 0), radius=1j),  # type: ignore[arg-type]
     "path of a number": lambda: decals.load_scene(1.5),  # type: ignore[arg-type]
     "image of a number": lambda: decals.load_image(1.5),  # type: ignore[arg-type]

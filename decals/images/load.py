@@ -98,10 +98,11 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     if not is_file(path):
         raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_ADVICE}")
     try:
-        with warnings.catch_warnings(), Image.open(path, formats=PICTURE_FORMATS) as picture:
-            warnings.simplefilter(
-                "ignore"
-            )  # of odd tags, and of sizes, for which MAX_IMAGE_EDGE is the limit
+        # Pillow warns of odd tags, and of sizes, for which MAX_IMAGE_EDGE is the limit.
+        with (
+            warnings.catch_warnings(action="ignore"),
+            Image.open(path, formats=PICTURE_FORMATS) as picture,
+        ):
             _check_size(picture, path)
             picture.load()
             return _to_rgba(ImageOps.exif_transpose(picture))
