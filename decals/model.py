@@ -215,8 +215,8 @@ class Decals:
             object.__setattr__(decals, name, arrays[name])
         return decals
 
-    def replace(self, **arrays: ArrayLike) -> Self:
-        """Return decals with other arrays of these names; the result is checked.
+    def replace(self, **arrays: ArrayLike | None) -> Self:
+        """Return decals with other arrays of these names, or with defaults for None; the result is checked.
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,6 +89,10 @@ class DeleteDecals(DecalCommand):
 
     label: ClassVar[str] = "delete"
 
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(self, numbers: ArrayLike) -> None: ...
+
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         return document.compute_deletion(self.numbers)
@@ -121,10 +125,16 @@ class SetValues(DecalCommand):
     values: Mapping[str, ArrayLike]
     label: str = "set values"
 
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(
+            self, numbers: ArrayLike, values: Mapping[str, ArrayLike], label: str = "set values"
+        ) -> None: ...
+
     @classmethod
     def each(cls, numbers: ArrayLike, label: str = "set values", **values: ArrayLike) -> Self:
         """Return the command with the values as keyword arguments."""
-        return cls(as_numbers(numbers), values, label)
+        return cls(numbers, values, label)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -165,6 +175,16 @@ class MapValues(DecalCommand):
     function: Callable[[Decals], ArrayLike]
     label: str = "set values"
 
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(
+            self,
+            numbers: ArrayLike,
+            name: str,
+            function: Callable[[Decals], ArrayLike],
+            label: str = "set values",
+        ) -> None: ...
+
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         values = {self.name: self.function(document.decals.take(self.numbers))}
@@ -196,6 +216,10 @@ class ScaleDecals(DecalCommand):
 
     factor: float
     label: ClassVar[str] = "scale"
+
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(self, numbers: ArrayLike, factor: float) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -231,6 +255,10 @@ class TurnDecals(DecalCommand):
     degrees: float
     label: ClassVar[str] = "turn"
 
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(self, numbers: ArrayLike, degrees: float) -> None: ...
+
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         angle = np.radians(finite_number("degrees", self.degrees, InvalidEdit))
@@ -264,9 +292,13 @@ class MoveDecals(DecalCommand):
     array([[0., 0., 1.]], dtype=float32)
     """
 
-    position: Float32Array
-    normal: Float32Array
+    position: ArrayLike
+    normal: ArrayLike
     label: ClassVar[str] = "move"
+
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(self, numbers: ArrayLike, position: ArrayLike, normal: ArrayLike) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -303,6 +335,10 @@ class DuplicateDecals(DecalCommand):
     """
 
     label: ClassVar[str] = "duplicate"
+
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(self, numbers: ArrayLike) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

@@ -1,6 +1,7 @@
 """`scatter`: cover surfaces with decals in one call."""
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -17,12 +18,15 @@ from decals.scattering.variation import ImageChoice, Jitter
 from decals.surfaces.surface import Surface
 from decals.validation import function_or_none, real_number
 
+if TYPE_CHECKING:  # pyvista takes long to import
+    from decals.surfaces.convert import HasSurface, Model
+
 RELAXATION_SHARE = 0.8
 """Share of the relaxation in the whole work, for progress bars."""
 
 
 def scatter(
-    surfaces: Surface | Sequence[Surface],
+    surfaces: "Surface | HasSurface | Model | Sequence[Surface | HasSurface | Model]",
     *,
     count: int | None = None,
     spacing: float | None = None,
@@ -49,8 +53,9 @@ def scatter(
 
     Parameters
     ----------
-    surfaces : Surface or sequence of Surface
-        One surface, or several that are covered together.
+    surfaces : Surface, Model or object of a scene, or a sequence of these
+        One surface, or several that are covered together. `decals.surfaces.convert.as_shape` lists all
+        models.
     count : int, optional
         Exact number of decals, the fixed ones included. Give either `count` or `spacing`.
     spacing : float, optional

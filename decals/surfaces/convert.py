@@ -41,6 +41,15 @@ class MeshLike(Protocol):
         ...
 
 
+class HasSurface(Protocol):
+    """Anything with a surface of its own, such as an object of a scene."""
+
+    @property
+    def surface(self) -> Surface:
+        """Surface for decals."""
+        ...
+
+
 Model: TypeAlias = (
     Node | MeshLike | pv.DataSet | pv.MultiBlock | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str]
 )
