@@ -12,5 +12,5 @@ def vtk_display() -> None:
         return
     import pyvista as pv
 
-    plotter = pv.Plotter(off_screen=True, window_size=(16, 16))
+    plotter = pv.Plotter(off_screen=True, window_size=[16, 16])
     plotter.show(auto_close=True)

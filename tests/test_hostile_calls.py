@@ -14,7 +14,7 @@ from decals.editing import EditSession, SetValues
 from decals.errors import ImplicitDecalsError
 from decals.index import DecalIndex
 from decals.scenes.objects import bounds_of
-from decals.surfaces import as_surface, read_mesh
+from decals.surfaces import ImplicitSurface, MeshSurface, read_mesh
 
 HUGE = 10**400
 ENDLESS = 10**6000
@@ -37,9 +37,9 @@ CALLS: dict[str, Callable[[], object]] = {
     "matrix": lambda: BALL.transform([[HUGE] * 4] * 3),
     "resolution": lambda: blobtree.polygonize(BALL, resolution=HUGE),
     "cell size": lambda: blobtree.polygonize(BALL, cell_size=HUGE),
-    "device of a tree": lambda: as_surface(BALL).on("nope"),
-    "device of a mesh": lambda: as_surface(TRIANGLE).on("nope"),
-    "no device": lambda: as_surface(TRIANGLE).on(WRONG),
+    "device of a tree": lambda: ImplicitSurface(BALL).on("nope"),
+    "device of a mesh": lambda: MeshSurface(*TRIANGLE).on("nope"),
+    "no device": lambda: MeshSurface(*TRIANGLE).on(WRONG),
     "row": lambda: SPOTS[3],
     "rows": lambda: SPOTS[[0, 99]],
     "text as row": lambda: SPOTS["a"],
@@ -64,8 +64,8 @@ CALLS: dict[str, Callable[[], object]] = {
     "endless cell": lambda: blobtree.polygonize(BALL, cell_size=1e308),
     "fitting of none": lambda: decals.Camera.fitting(WRONG),
     "layer of no decal": lambda: EditSession(SCENE).do(SetValues.each([], layers="x")),
-    "number as source": lambda: decals.MeshObject("a", *TRIANGLE, source=3.5),  # type: ignore[arg-type]
-    "surrogate as source": lambda: decals.MeshObject("a", *TRIANGLE, source="\ud800.ply"),
+    "number as source": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], source=3.5),  # type: ignore[arg-type]
+    "surrogate as source": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], source="\ud800.ply"),
     "surrogate as name": lambda: decals.TreeObject("\ud800", BALL),
     "NUL in a scene": lambda: decals.load_scene("a\0.json"),
     "surrogate in a scene": lambda: decals.load_scene("\ud800.json"),
@@ -84,7 +84,7 @@ def test_a_wrong_argument_gets_an_error_of_ours(call: Callable[[], object]) -> N
 
 def test_iteration_over_decals_ends_at_the_last() -> None:
     """Python ends a loop over an object without `__iter__` at the first IndexError."""
-    assert [len(spot) for spot in SPOTS] == [1, 1, 1]
+    assert [len(spot) for spot in SPOTS] == [1, 1, 1]  # type: ignore[attr-defined]
     with pytest.raises(IndexError):
         SPOTS[3]
 
@@ -134,5 +134,5 @@ def test_deeply_nested_json_gets_an_error_of_ours(load: Any, start: str, tmp_pat
 
 
 def test_a_source_may_be_a_path_object() -> None:
-    assert decals.MeshObject("a", *TRIANGLE, source=Path("a.ply")).source == "a.ply"  # type: ignore[arg-type]
-    assert np.isfinite(decals.MeshObject("a", *TRIANGLE).vertices).all()
+    assert decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], source=Path("a.ply")).source == "a.ply"  # type: ignore[arg-type]
+    assert np.isfinite(decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1]).vertices).all()

@@ -3,6 +3,7 @@
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -18,6 +19,7 @@ from decals.rendering.uploads import DecalData
 from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
 from tests.decals.field import log_maps, test_contact, test_radial
+from tests.decals.field.kernels import slopes_of_rays
 
 RUNS = 3
 FOLD_SLACK = 0.0
@@ -87,10 +89,11 @@ def contact(points: int) -> Figures:
     rng, worst = np.random.default_rng(0), 0.0
     for make in test_contact.SETS:
         for count in (2, 3, 6):
-            arrays = [a.astype(np.float32) for a in make(rng, (points // len(test_contact.SETS) // 3, count))]
+            shape = (points // len(test_contact.SETS) // 3, count)
+            at, centres, influence = (a.astype(np.float32) for a in make(rng, shape))
             for mode in (Contact.PRODUCT, Contact.MIN):
-                owner, rims = test_contact.rims_through_warp(*arrays, mode)
-                expected_owner, expected = test_contact.rims_in_float64(*arrays, mode)
+                owner, rims = test_contact.rims_through_warp(at, centres, influence, mode)
+                expected_owner, expected = test_contact.rims_in_float64(at, centres, influence, mode)
                 both = (owner >= 0) & (expected_owner >= 0)
                 worst = max(worst, float(np.abs(rims - expected)[both].max()))
     return {"contact_error_rh": worst}
@@ -107,12 +110,12 @@ def folds(rays: int) -> Figures:
             decals.radii[owners] > 0.05, owners, owners // test_radial.MEMBERS * test_radial.MEMBERS
         )
         directions = test_radial.unit(rng.normal(size=(rays // 2, 3)) * [1, 1, 0 if flat else 1])
-        inputs = [
+        inputs: list[Any] = [
             wp.array(owners, dtype=wp.int32, device="cpu"),
             wp.array(directions, dtype=wp.vec3, device="cpu"),
         ]
         outputs = [wp.zeros(rays // 2, dtype=wp.float32, device="cpu") for _ in range(2)]
-        least, most = test_radial.launch(test_radial.slopes_of_rays, rays // 2, decals, inputs, outputs)
+        least, most = test_radial.launch(slopes_of_rays, rays // 2, decals, inputs, outputs)
         total += int((least < FOLD_SLACK).sum())
         slopes += [least.min(), most.max()]
     return {"folds_radial": total, "slope_least": float(min(slopes)), "slope_most": float(max(slopes))}

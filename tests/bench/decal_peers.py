@@ -70,7 +70,8 @@ class SmoothMesh:
 
     def normals(self, points: Float64Array) -> Float64Array:
         """Return unit normals of the smooth surface."""
-        return analytic.unit(self.gradient(points))
+        normals: Float64Array = analytic.unit(self.gradient(points))
+        return normals
 
     def discs(
         self, rng: np.random.Generator, centres: IndexArray, radius: float, count: int
@@ -145,7 +146,8 @@ def planar(mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -
 
     They are linear in each triangle, so those of the clipped mesh are equal.
     """
-    return (points - mesh.vertices[vertex]) @ frame_at(mesh, vertex)[:2].T
+    coordinates: Float64Array = (points - mesh.vertices[vertex]) @ frame_at(mesh, vertex)[:2].T
+    return coordinates
 
 
 def implicit(

@@ -1,6 +1,6 @@
 """Kernels of the parity check: where to look, what is found there, how far from the oracle."""
 
-# mypy: ignore-errors
+# mypy: disable-error-code="call-overload"
 
 import warp as wp
 
@@ -104,7 +104,7 @@ def choose_points(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     sets: wp.array(dtype=wp.int32),
-):
+) -> None:
     """Adversarial points: near rims, centres, ties and radical planes of decals, and anywhere about them."""
     tid = wp.tid()
     state = wp.rand_init(seed, tid)
@@ -158,7 +158,7 @@ def look_at_points(
     owners: wp.array(dtype=wp.int32),
     rims: wp.array(dtype=wp.float32),
     uv: wp.array(dtype=wp.vec2),
-):
+) -> None:
     """Owner, r/r_h and uv as the decal pass finds them; `once`: in one walk of the index, as shaders do."""
     i = wp.tid()
     q = points[i]
@@ -213,7 +213,7 @@ def compare_points(
     uncut: wp.array(dtype=wp.float64),
     counts: wp.array(dtype=wp.int32),
     worst: wp.array(dtype=wp.float64),
-):
+) -> None:
     """Count, and keep the worst errors: against neighbours within reach, and against all (`uncut`)."""
     i = wp.tid()
     wp.atomic_add(counts, POINTS, 1)

@@ -24,7 +24,7 @@ from decals.rendering import context as context_module
 from decals.rendering.context import Context
 from decals.rendering.mesh import mesh_rows
 from decals.rendering.options import RenderOptions
-from decals.rendering.pixel_pass import CameraBuffer, PassBackend, PixelPass
+from decals.rendering.pixel_pass import CameraBuffer, PassBackend, PixelPass, pass_source
 from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Tile
 from decals.scenes.objects import MeshObject
@@ -63,10 +63,10 @@ def _recording_calls(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
     units: dict[int, Any] = {}
     bodies: dict[str, str] = {}
     sources: Sources = {}
-    use_camera, source_of = CameraBuffer.use, context_module.pass_source
+    use_camera, source_of = CameraBuffer.use, pass_source
     fragment_program, whole_program = Context.program, Context.compute_program
 
-    def pass_source(backend: PassBackend, body: str, *arguments: Any) -> Source:
+    def recorded_source(backend: PassBackend, body: str, *arguments: Any) -> Source:
         source = source_of(backend, body, *arguments)
         bodies[source.text] = body
         return source
@@ -90,7 +90,7 @@ def _recording_calls(arrays: Arrays, passes: dict[str, Any]) -> Iterator[None]:
             stack.enter_context(patch.object(texture, "use", _recording_use(texture.use, units)))
         recording = _recording_run(PixelPass.run, units, sources, arrays, passes)
         stack.enter_context(patch.object(PixelPass, "run", recording))
-        stack.enter_context(patch.object(context_module, "pass_source", pass_source))
+        stack.enter_context(patch.object(context_module, "pass_source", recorded_source))
         stack.enter_context(patch.object(Context, "program", program))
         stack.enter_context(patch.object(Context, "compute_program", compute_program))
         stack.enter_context(patch.object(CameraBuffer, "use", camera))

@@ -73,7 +73,7 @@ def measure(surface: MeshSurface, points: Any) -> Spacing:
     return spacing_of_distances(distances, ideal_spacing(surface.area, len(positions)))
 
 
-def timed(work: Callable, repeats: int) -> Any:
+def timed(work: Callable[[], Any], repeats: int) -> Any:
     """Return the last result and the median time of a piece of work."""
     seconds = []
     for _ in range(repeats):
@@ -97,7 +97,7 @@ def ours(
     return Figures(relaxation.count, relaxation.statistics(), seconds)
 
 
-def theirs(sampler: Callable, meshes: Any, count: int, repeats: int) -> Figures:
+def theirs(sampler: Callable[..., Any], meshes: Any, count: int, repeats: int) -> Figures:
     """Run a package."""
     vertices, faces = joined(meshes)
     points, seconds = timed(lambda: sampler(vertices, faces, count), repeats)

@@ -55,7 +55,8 @@ def rings(relaxation: Relaxation) -> np.ndarray:
     positions, normals = relaxation.positions, relaxation.normals
     distances, _ = FacingTree(positions, normals).nearest(positions, normals, count=6, skip_self=True)
     distances /= relaxation.spacing
-    return np.where(distances <= NEIGHBOR_REACH, distances, np.inf).mean(axis=1)
+    means: np.ndarray = np.where(distances <= NEIGHBOR_REACH, distances, np.inf).mean(axis=1)
+    return means
 
 
 def turned_away(relaxation: Relaxation) -> np.ndarray:

@@ -45,7 +45,7 @@ def mesh_arrays(name: str, file: Path | None = None) -> Any:
 
 def write_meshes(file: Path) -> None:
     """Write the meshes to a file that `mesh_arrays` reads."""
-    arrays = {}
+    arrays: dict[str, Any] = {}
     for name in MESHES:
         vertices, faces = mesh_arrays(name)
         arrays |= {f"{name}_vertices": vertices, f"{name}_faces": faces}

@@ -22,7 +22,7 @@ from blobtree import (
 )
 
 BALL = Point((0, 0, 0), radius=1.0)
-NO_TREES = [None, 5, "x", [BALL], {}, Point]
+NO_TREES: list[Any] = [None, 5, "x", [BALL], {}, Point]
 
 
 @pytest.mark.parametrize("wrong", NO_TREES)
@@ -46,7 +46,7 @@ def test_a_polygonizer_keeps_its_mesh_when_it_is_given_no_tree() -> None:
     polygonizer = Polygonizer(BALL, resolution=4)
     before = polygonizer.mesh
     with pytest.raises(InvalidNode):
-        polygonizer.update(None)
+        polygonizer.update(None)  # type: ignore[arg-type]
     assert polygonizer.mesh is before
     assert polygonizer.tree is BALL
 

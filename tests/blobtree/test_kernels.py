@@ -39,7 +39,7 @@ def _forget() -> None:
 
 
 def _doubled() -> list[float]:
-    values: wp.array[wp.float32] = wp.array(np.float32([1.0, 2.5]), device="cpu")
+    values: wp.array[wp.float32] = wp.array(np.array([1.0, 2.5], np.float32), device="cpu")
     wp.launch(loaded(_double, "cpu"), dim=2, inputs=[values], device="cpu")
     return [float(value) for value in values.numpy()]
 

@@ -22,10 +22,15 @@ class Thing:
 
 
 def test_it_is_made_once() -> None:
-    made = []
-    thing = Thing(lambda: made.append(1) or object())
+    made: list[object] = []
+
+    def make() -> object:
+        made.append(object())
+        return made[-1]
+
+    thing = Thing(make)
     assert thing.value is thing.value
-    assert made == [1]
+    assert made == [thing.value]
     assert Thing.value.__doc__ == "What was made."
 
 

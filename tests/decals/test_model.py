@@ -194,7 +194,7 @@ def test_any_directions_make_an_orthonormal_frame_or_a_clear_error(
 
 
 def test_thousands_of_decals_are_shown_in_one_line() -> None:
-    up = np.tile(np.float32([0, 0, 1]), (5000, 1))
+    up = np.tile(np.array([0, 0, 1], np.float32), (5000, 1))
     many = Decals(np.zeros((5000, 3)), up, np.roll(up, 1, axis=1), np.linspace(0.1, 0.25, 5000))
     assert repr(many) == "Decals(5000, radii from 0.1 to 0.25)"
     assert repr(Decals.empty()) == "Decals(0)"

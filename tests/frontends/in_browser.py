@@ -56,8 +56,9 @@ async def page(picture: str | None = None) -> None:
 
 
 def covered(picture: np.ndarray) -> np.ndarray:
-    """Where something other than the background is."""
-    return np.abs(picture - picture[0, 0]).max(axis=-1) > 8
+    """Return True for pixels that differ from the background."""
+    differs: np.ndarray = np.abs(picture - picture[0, 0]).max(axis=-1) > 8
+    return differs
 
 
 async def user() -> None:

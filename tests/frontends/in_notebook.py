@@ -51,7 +51,7 @@ async def live(url: str, scene: Scene) -> None:
     """The frame shows what a plotter draws here, and turns."""
     async with opened(url, size=(600, 400)) as page:
         height, width = (await seen(page)).shape[:2]
-        plotter = pv.Plotter(off_screen=True, window_size=(width, height))
+        plotter = pv.Plotter(off_screen=True, window_size=[width, height])
         plotter.decals.add_scene(scene, camera=True)
         here = drawn(plotter)[MENU:]
         async with asyncio.timeout(PATIENCE):

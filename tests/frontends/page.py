@@ -8,5 +8,6 @@ PAGE = Path(__file__).parents[2] / "docs" / "pyvista.md"
 
 def code(word: str) -> str:
     """The one block of a kind."""
+    block: str
     (block,) = re.findall(rf"```python {word}\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
     return block

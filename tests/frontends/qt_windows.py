@@ -63,7 +63,7 @@ def drawn(plotter: Any) -> np.ndarray:
 def expected(plotter: Any) -> np.ndarray:
     """The same of a plain plotter without a screen, from where the other's camera stands now."""
     height, width = drawn(plotter).shape[:2]
-    plain = pv.Plotter(off_screen=True, window_size=(width, height))
+    plain = pv.Plotter(off_screen=True, window_size=[width, height])
     fill(plain)
     plain.set_background(plotter.background_color)
     plain.camera_position = plotter.camera_position

@@ -117,7 +117,7 @@ def grown(node: Node, distance: float) -> Node:
         case CustomCombination():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
         case Point() | Segment() | Torus() | Disc() | Box() | CustomPrimitive():
-            return replace(node, radius=node.radius + distance)
+            return replace(node, radius=node.radius + distance)  # type: ignore[type-var]  # all are dataclasses
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Offset(child=child, distance=more):

@@ -151,7 +151,7 @@ class _Scene:
             together = np.zeros(count)
             np.minimum.at(together, pair, log_h)
         else:
-            together = np.bincount(pair, log_h, minlength=count)
+            together = np.bincount(pair, log_h, minlength=count).astype(np.float64)
         complement = least + (0.5 - least) * -np.expm1(together)
         who = np.append(members, -1)
         return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
@@ -215,7 +215,7 @@ def _image_place(
     p, n, u = (a[owner].astype(np.float64) for a in (decals.positions, decals.normals, decals.tangents))
     w = (points - p) / decals.radii[owner].astype(np.float64)[:, None]
     chord = np.linalg.norm(w, axis=1)
-    m, length = _unrolled(w, n, normals) if corrected else (w, None)
+    m, length = _unrolled(w, n, normals) if corrected else (w, chord)
     xy = np.column_stack([(m * u).sum(axis=1), (m * np.cross(n, u)).sum(axis=1)])
     shadow = np.maximum(np.linalg.norm(xy, axis=1), 1e-300)
     drawn = np.minimum(rim_distance(complement), 1)

@@ -7,9 +7,8 @@ brute force. `tests/decals/field/test_parity.py` holds it against the NumPy orac
 Variables that a loop changes begin as literals: one that begins as a Warp constant would change the constant.
 """
 
+# mypy: disable-error-code="call-arg, call-overload"
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
-# mypy: ignore-errors
-
 import math
 
 import warp as wp
@@ -319,7 +318,7 @@ def answer_points(
     places: wp.array(dtype=wp.vec3d),
     doubts: wp.array(dtype=wp.float64),
     edges: wp.array(dtype=wp.float64),
-):
+) -> None:
     """Owner, E, (uv, stretch), doubt and edge (a neighbour's distance from reach) of points in sets."""
     i = wp.tid()
     q = wide(points[i])

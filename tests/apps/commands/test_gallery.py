@@ -11,8 +11,8 @@ import pytest
 
 from decals.apps import gallery
 from decals.apps.cli import run
-from decals.apps.commands import gallery as command
 from decals.apps.gallery import sphere
+from decals.apps.gallery.helpers import draw
 from decals.errors import InvalidInput
 from decals.rendering import Renderer
 from tests.apps.commands.pictures import picture
@@ -44,7 +44,7 @@ def test_an_example_is_drawn(renderer: Renderer, folder: Path, capsys: Capture) 
     assert run(["gallery", "sphere", "-o", "ball.png", "--side", "40"]) == 0
     assert capsys.readouterr().out.split() == ["ball.png"]
     drawn = picture(folder / "ball.png")
-    assert np.array_equal(drawn, command.draw(renderer, sphere.panels(), side=40))
+    assert np.array_equal(drawn, draw(renderer, sphere.panels(), side=40))
     assert run(["gallery", "sphere", "--side", "16"]) == 0
     assert picture(folder / "sphere.png").shape == (16, 36, 4)
 

@@ -145,7 +145,7 @@ def test_maps_of_every_sort_move_a_custom_primitive() -> None:
 def test_one_kind_many_primitives_is_one_run() -> None:
     rng = np.random.default_rng(8)
     rings = [Ring(tuple(p), (0, 0, 1), 0.1, radius=0.05) for p in rng.uniform(-1, 1, (500, 3)).tolist()]
-    tree = rings[0]
+    tree: Node = rings[0]
     for ring in rings[1:]:
         tree = tree + ring
     assert len(tree.tape.data) == 1 + 500 * 3  # two texels of parameters, one of colour

@@ -26,6 +26,7 @@ from tests.blobtree import custom_kinds
 from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell
 
 BALL = Point((0, 0, 0), radius=1.0)
+RING_DOC = "A circle of radius `size` around `axis`."
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +40,7 @@ def names_are_ours() -> None:
 def test_a_definition_gives_a_node_class() -> None:
     assert issubclass(Ring, CustomPrimitive)
     assert issubclass(Soft, CustomCombination)
-    assert (Ring.__name__, Ring.kind, Ring.__doc__) == ("Ring", "ring", custom_kinds.ring.func.__doc__)
+    assert (Ring.__name__, Ring.kind, Ring.__doc__) == ("Ring", "ring", RING_DOC)
     ring = Ring((0, 0, 0), axis=(0, 0, 2), size=1, radius=0.5)
     assert repr(ring) == (
         "Ring(center=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0), size=1.0, radius=0.5, color=(0.8, 0.8, 0.8))"
@@ -81,11 +82,11 @@ def test_the_same_definition_twice_is_one_kind_and_another_one_takes_its_name() 
         lambda: Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.0),
         lambda: Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.2, color=(2, 0, 0)),
         lambda: Soft((BALL, BALL), SOFTEST + 1.0),
-        lambda: Soft((BALL, BALL), "hard"),
+        lambda: Soft((BALL, BALL), "hard"),  # type: ignore[arg-type]
         lambda: Soft((BALL,), 1.0),
         lambda: Soft((BALL, BALL, BALL), 1.0),
-        lambda: Soft(BALL, 1.0),
-        lambda: Mean((BALL, 3)),
+        lambda: Soft(BALL, 1.0),  # type: ignore[arg-type]
+        lambda: Mean((BALL, 3)),  # type: ignore[arg-type]
         lambda: Swell(()),
     ],
 )

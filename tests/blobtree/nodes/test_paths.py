@@ -41,7 +41,9 @@ def test_a_primitive_alone_lies_where_it_lies_in_the_tree() -> None:
 
 def test_moving_keeps_what_a_primitive_is() -> None:
     assert moved(B, (0, 1, 0)) == Segment((1, 1, 0), (2, 1, 0), radius=0.5)
-    assert moved(C, (1, 0, 0)).end_radius == 0.2
+    cone = moved(C, (1, 0, 0))
+    assert isinstance(cone, Cone)
+    assert cone.end_radius == 0.2
     black = Point((0, 0, 0), radius=1, color=(0, 0, 0))
     assert moved(black, (1, 2, 3)) == Point((1, 2, 3), radius=1, color=(0, 0, 0))
     turned = B.rotate((0, 0, 1), 30)

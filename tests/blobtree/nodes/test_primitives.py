@@ -39,7 +39,7 @@ PLACEMENTS = {
 
 @EACH
 @pytest.mark.parametrize("place", PLACEMENTS.values(), ids=PLACEMENTS)
-def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:  # type: ignore[no-untyped-def]
+def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:
     placed = place(node)
     points = points_around(np.random.default_rng(2), placed, 300)
     field = oracle.evaluate(placed, points)
@@ -112,12 +112,12 @@ def test_a_move_and_a_resize_keep_the_kind(node: Primitive) -> None:
         (lambda: Torus((0, 0, 0), (0, 0, 0), 1.0, radius=0.2), "axis: expected a direction"),
         (lambda: Torus((0, 0, 0), (0, 0, 1), 0.0, radius=0.2), "ring_radius: expected a number above 0"),
         (lambda: Disc((0, 0, 0), (0, 0, 1), -1.0, radius=0.2), "disc_radius: expected a number above 0"),
-        (lambda: Disc((0, 0, 0), "z", 1.0, radius=0.2), "axis: expected three finite numbers"),
+        (lambda: Disc((0, 0, 0), "z", 1.0, radius=0.2), "axis: expected three finite numbers"),  # type: ignore[arg-type]
         (lambda: Box((0, 0, 0), (1, -1, 1), radius=0.2), "size: expected three numbers from 0"),
         (lambda: Box((0, 0, 0), (1, 1, 1), radius=0.0), "radius: expected a number above 0"),
     ],
 )
-def test_wrong_parameters_are_refused(make: Any, message: str) -> None:  # type: ignore[no-untyped-def]
+def test_wrong_parameters_are_refused(make: Any, message: str) -> None:
     with pytest.raises(InvalidNode, match=message):
         make()
 

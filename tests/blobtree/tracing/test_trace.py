@@ -229,8 +229,9 @@ def test_no_rays_give_no_hits() -> None:
 @pytest.mark.parametrize("length", [1e-44, 1e-30, 1e-22, 1e-18, 1e17])
 def test_tiny_and_huge_directions_are_directions(length: float) -> None:
     directions = np.float32(length) * np.array([[0, 0, -1], [0, 1, -1]], np.float32)
-    expected = cast(BALL, [[0, 0, 5], [0, -4.5, 5]], np.sign(directions))
-    np.testing.assert_array_equal(cast(BALL, [[0, 0, 5], [0, -4.5, 5]], directions), expected)
+    starts = [[0, 0, 5.0], [0, -4.5, 5]]
+    expected = cast(BALL, starts, np.sign(directions))
+    np.testing.assert_array_equal(cast(BALL, starts, directions), expected)
 
 
 def test_invalid_rays_are_refused() -> None:

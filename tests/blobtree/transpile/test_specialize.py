@@ -3,6 +3,7 @@
 import inspect
 import subprocess
 import sys
+from types import FunctionType
 
 import numpy as np
 import pytest
@@ -11,26 +12,7 @@ import warp as wp
 from blobtree.formulas import operators
 from blobtree.tape import dispatch
 from blobtree.transpile.specialize import original_function, rebind, referenced_values, unrolled
-
-TABLE = ((2.0, operators.sum_partials), (5.0, operators.union_partials))
-
-
-@unrolled
-def chosen(code: wp.int32, a: wp.float32, b: wp.float32) -> wp.float32:
-    """A row's factor times what its operator makes of two numbers."""
-    result = float(0.0)
-    for row in range(wp.static(len(TABLE))):
-        if code == row:
-            result = wp.static(TABLE[row][0]) * wp.static(TABLE[row][1])(a, b, 0.0)[0]
-    for _other in range(2):
-        result += 1.0
-    return result
-
-
-@wp.kernel
-def choose(out: wp.array(dtype=wp.float32)) -> None:
-    i = wp.tid()
-    out[i] = chosen(i, 3.0, 4.0)
+from tests.blobtree.transpile.kernels import TABLE, choose, chosen
 
 
 def test_a_loop_over_a_table_is_a_copy_of_its_body_per_row() -> None:
@@ -38,7 +20,9 @@ def test_a_loop_over_a_table_is_a_copy_of_its_body_per_row() -> None:
     assert text.count("if code == ") == len(TABLE)
     assert "wp.static" not in text
     assert "for _other in range(2)" in text
-    assert original_function(chosen).__code__.co_firstlineno > 10
+    original = original_function(chosen)
+    assert original is not None
+    assert original.__code__.co_firstlineno > 10
     out = wp.zeros(3, dtype=wp.float32, device="cpu")
     wp.launch(choose, dim=3, outputs=[out], device="cpu")
     np.testing.assert_array_equal(out.numpy(), [2.0 * 7.0 + 2.0, 5.0 * 4.0 + 2.0, 2.0])
@@ -46,7 +30,9 @@ def test_a_loop_over_a_table_is_a_copy_of_its_body_per_row() -> None:
 
 def test_another_table_makes_another_function() -> None:
     table = (*TABLE, (1.0, operators.intersection_partials))
-    longer = unrolled(rebind(original_function(chosen), {"TABLE": table}, module=__name__))
+    original = original_function(chosen)
+    assert original is not None
+    longer = unrolled(rebind(original, {"TABLE": table}, module=__name__))
     assert inspect.getsource(longer.func).count("if code == ") == 3
     assert inspect.getsource(chosen.func).count("if code == ") == 2
 
@@ -55,8 +41,9 @@ def test_references_are_globals_and_closures_and_no_attributes() -> None:
     factor = 3.0
 
     def scaled(code: int, slope: float) -> float:
-        return factor * slope * len(str(operators.SUM.partials)) * inspect.currentframe().f_lineno
+        return factor * slope * len(str(operators.SUM.partials)) * sys._getframe().f_lineno
 
+    assert isinstance(scaled, FunctionType)
     found = referenced_values(scaled)
     assert found["factor"] == 3.0
     assert found["operators"] is operators
@@ -72,6 +59,7 @@ def test_the_dispatchers_name_every_function_of_their_tables() -> None:
 
 KEY = """\
 import sys
+from types import FunctionType
 from importlib import import_module
 import warp as wp
 import blobtree

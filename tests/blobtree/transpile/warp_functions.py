@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,12 @@ def typed_functions(module: ModuleType) -> list[TypedFunction]:
             if not value.func.__code__.co_freevars:
                 found.append(TypedFunction(value, hints, returned))
     return found
+
+
+def python_function(function: Any) -> FunctionType:
+    """Return the Python function from which Warp made one."""
+    assert isinstance(function.func, FunctionType)
+    return function.func
 
 
 def is_whole(hint: Any) -> bool:

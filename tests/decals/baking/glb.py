@@ -33,7 +33,8 @@ def gradient(seed: int) -> Array:
     y, x = np.mgrid[0:12, 0:12] / 11
     colors = [a * x + b * y + (1 - a - b) * x * y for a, b in rng.uniform(0, 0.5, (3, 2))]
     alpha = np.clip(1.6 - 1.2 * np.hypot(x - 0.5, y - 0.5), 0, 1)
-    return np.rint(255 * np.stack([*colors, alpha], axis=-1)).astype(np.uint8)
+    pixels: Array = np.rint(255 * np.stack([*colors, alpha], axis=-1)).astype(np.uint8)
+    return pixels
 
 
 def ball_and_cube(*, count: int = 60, scale: float = 1.0) -> Scene:

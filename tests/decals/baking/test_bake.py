@@ -18,6 +18,7 @@ from decals.baking.meshes import bake_mesh
 from decals.baking.texture import bake_texture
 from decals.errors import NoGraphics
 from decals.rendering import Lighting
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.baking.glb import (
     BALL,
     CUBE,
@@ -119,7 +120,8 @@ def neighborhoods(points: Array, normals: Array, reach: float) -> Array:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     frame = np.stack([across, np.cross(normals, across)], axis=1)
     steps = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 2), axis=-1).reshape(-1, 2)
-    return points[:, None] + np.concatenate([np.zeros((1, 2)), steps]) @ frame
+    around: Array = points[:, None] + np.concatenate([np.zeros((1, 2)), steps]) @ frame
+    return around
 
 
 def test_the_textured_meshes_look_like_the_picture_of_the_scene(baked: Path) -> None:
@@ -133,11 +135,12 @@ def test_the_textured_meshes_look_like_the_picture_of_the_scene(baked: Path) -> 
     for node in read_glb(baked).values():
         mesh = pv.PolyData.from_regular_faces(node.vertices, node.faces)
         mesh.active_texture_coordinates = node.uv
-        plotter.add_mesh(mesh, texture=pv.Texture(node.texture), lighting=False)
+        texture = pv.Texture(node.texture)  # type: ignore[no-untyped-call]
+        plotter.add_mesh(mesh, texture=texture, lighting=False)
     camera = scene.camera
     plotter.camera_position = [camera.position, camera.target, camera.up]
     plotter.camera.view_angle = camera.fov
-    plotter.set_background("white")
+    plotter.renderer.set_background("white")
     shown = np.asarray(plotter.screenshot(return_img=True), float)
     plotter.close()
     drawn = np.asarray(picture)[..., :3].astype(float)
@@ -173,6 +176,7 @@ def test_seams_show_no_colour_from_outside_their_chart(tmp_path: Path, samples: 
             colors = bilinear(level, points)
             assert np.abs(colors - 255 * np.asarray(color)).max() <= 1.0
     if samples == 1:
+        assert texture is not None
         colors = np.unique(texture.reshape(-1, 3), axis=0)
         assert len(colors) == 3  # both colours, and their mean far from all charts
 
@@ -222,19 +226,19 @@ def test_nodes_materials_and_normals(baked: Path) -> None:
     assert material["pbrMetallicRoughness"]["metallicFactor"] == 0.0
     ball = read_glb(baked)["ball"]
     assert np.abs(ball.normals - ball.vertices).max() < 0.02
-    assert {tuple(row) for row in np.round(ball.vertices, 5)} == {
-        tuple(row) for row in np.round(ball_and_cube().objects[0].surface.vertices.astype(float), 5)
-    }
+    surface = ball_and_cube().objects[0].surface
+    assert isinstance(surface, MeshSurface)
+    expected = np.round(surface.vertices.astype(float), 5)
+    assert {tuple(row) for row in np.round(ball.vertices, 5)} == {tuple(row) for row in expected}
 
 
 @pytest.mark.parametrize("names", [("world", "scene"), ("scene", "scene-"), ("Kürbis 🎃", "a/b")])
 def test_any_name_of_an_object_is_kept(tmp_path: Path, names: tuple[str, str]) -> None:
     need("trimesh")
-    first, second = ball_and_cube().objects
-    objects = [
-        MeshObject(name, item.surface.vertices, item.surface.faces)
-        for name, item in zip(names, (first, second), strict=True)
-    ]
+    objects = []
+    for name, item in zip(names, ball_and_cube().objects, strict=True):
+        assert isinstance(item.surface, MeshSurface)
+        objects.append(MeshObject(name, item.surface.vertices, item.surface.faces))
     scene = ball_and_cube().replace(objects=objects)
     decals.bake(scene, tmp_path / "names.glb", vertex_colors=True)
     assert {node["name"] for node in read_json(tmp_path / "names.glb")["nodes"] if "mesh" in node} == set(
@@ -272,8 +276,9 @@ def test_the_size_of_a_model_does_not_matter(baked: Path, tmp_path: Path, scale:
 
 def test_degenerate_faces_and_unused_vertices_are_left_out(tmp_path: Path) -> None:
     need("trimesh", "xatlas")
-    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [9e9, 0, 0], [0.5, 0, 0]]
-    scrap = MeshObject("scrap", vertices, [[0, 1, 2], [0, 0, 1], [0, 4, 1], [2, 2, 2]])
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [9e9, 0, 0], [0.5, 0, 0]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 0, 1], [0, 4, 1], [2, 2, 2]], np.int32)
+    scrap = MeshObject("scrap", vertices, faces)
     for vertex_colors in (False, True):
         decals.bake(scrap, tmp_path / "scrap.glb", size=32, vertex_colors=vertex_colors)
         (node,) = read_glb(tmp_path / "scrap.glb").values()

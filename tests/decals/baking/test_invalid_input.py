@@ -52,7 +52,7 @@ def test_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: dict[
     need("trimesh", "xatlas")
     monkeypatch.chdir(tmp_path)
     Path("folder.glb").mkdir()
-    arguments = {"scene": BALL, "path": "a.glb", "size": 32} | options
+    arguments: dict[str, Any] = {"scene": BALL, "path": "a.glb", "size": 32} | options
     with pytest.raises(ImplicitDecalsError, match=says) as error:
         decals.bake(arguments.pop("scene"), arguments.pop("path"), **arguments)
     assert isinstance(error.value, InvalidInput) or "progress" in options

@@ -51,7 +51,7 @@ def hold_writing(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Let saves wait until they are let go; the events that say that one has begun, and let it go."""
     from decals.scenes import files
 
-    begun, go, write = threading.Event(), threading.Event(), files.write_atomically
+    begun, go, write = threading.Event(), threading.Event(), vars(files)["write_atomically"]
 
     def slowly(path: Any, content: Any) -> None:
         begun.set()

@@ -126,9 +126,10 @@ class RandomCommands:
     def path(self) -> Any:
         """Of a primitive, and how many its tree has."""
         number = int(self.rng.integers(len(self.document.objects) + 1))
-        paths = [(0, 9)]
-        if number < len(self.document.objects) and isinstance(self.document.objects[number], TreeObject):
-            paths = primitive_paths(self.document.objects[number].tree)
+        paths: list[tuple[int, ...]] = [(0, 9)]
+        item = self.document.objects[number] if number < len(self.document.objects) else None
+        if isinstance(item, TreeObject):
+            paths = primitive_paths(item.tree)
         return number, paths[self.rng.integers(len(paths))], len(paths)
 
     def shape(self) -> Any:
@@ -157,7 +158,8 @@ class RandomCommands:
         return MovePrimitive(number, path, self.rng.normal(0, 0.05, 3) * (np.nan if self.nonsense() else 1))
 
     def add_object(self) -> Any:
-        return AddObject("none" if self.nonsense() else OBJECTS[self.rng.integers(len(OBJECTS))])
+        item: Any = "none" if self.nonsense() else OBJECTS[self.rng.integers(len(OBJECTS))]
+        return AddObject(item)
 
     def remove_object(self) -> Any:
         return RemoveObject(int(self.rng.integers(-1, 4)))

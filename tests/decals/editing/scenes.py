@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from blobtree import Point, Segment
+from blobtree import Node, Point, Segment
 from decals.editing import Document, EditSession
 from decals.model import Decals
 from decals.scattering.scatter import scatter
@@ -62,3 +62,10 @@ def goes_back_and_forth(session: EditSession) -> None:
     for _ in range(entries):
         session.redo()
     assert digest(session.document) == last
+
+
+def tree_of(document: Document | Scene, number: int = 0) -> Node:
+    """Return the tree of an object."""
+    item = document.objects[number]
+    assert isinstance(item, TreeObject)
+    return item.tree

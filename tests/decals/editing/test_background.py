@@ -194,8 +194,7 @@ def test_edits_continue_while_decals_are_scattered(monkeypatch: pytest.MonkeyPat
     begun, go = threading.Event(), threading.Event()
     actions = threaded()
     from decals.editing import scatter_commands as population
-
-    scatter = population.scatter
+    from decals.scattering.scatter import scatter
 
     def slowly(*arguments: Any, **options: Any) -> Any:
         begun.set()

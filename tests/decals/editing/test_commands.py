@@ -26,6 +26,7 @@ from decals.editing import (
     nearest_points,
 )
 from decals.editing import scatter_commands as population
+from decals.editing.queries import SurfacePoints
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidDecals, InvalidEdit, InvalidMesh, InvalidScene
 from decals.scattering.neighbors import FacingTree
@@ -157,12 +158,13 @@ def test_relaxing_asks_for_the_neighbourhood_alone(
 ) -> None:
     """However many decals there are, what a window waits for does not grow."""
     session.do(ReplaceDecals((0, 1), scene(400).decals))
-    asked, asking = [], population.nearest_points
-    monkeypatch.setattr(
-        population,
-        "nearest_points",
-        lambda objects, points: asked.append(len(points)) or asking(objects, points),
-    )
+    asked: list[int] = []
+
+    def counted(objects: Any, points: Any) -> SurfacePoints:
+        asked.append(len(points))
+        return nearest_points(objects, points)
+
+    monkeypatch.setattr(population, "nearest_points", counted)
     change = session.do(RelaxDecals(session.document.decals.decals.positions[0]))
     assert len(change.after.numbers) <= sum(asked) < len(session.document.decals)
 
@@ -284,7 +286,7 @@ def test_all_objects_may_go(session: EditSession) -> None:
 @pytest.mark.parametrize(
     ("command", "error", "message"),
     [
-        (AddObject(None), InvalidEdit, "a MeshObject or a TreeObject to add, got None"),
+        (AddObject(None), InvalidEdit, "a MeshObject or a TreeObject to add, got None"),  # type: ignore[arg-type]
         (AddObject(TreeObject("box", TREE)), InvalidScene, "'box' twice"),
         (AddObject(TreeObject("hollow", TREE - TREE.scale(3))), InvalidMesh, "surface"),
         (RemoveObject(2), InvalidEdit, "from 0 to 1, got 2"),

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from decals.editing import DeleteDecals, EditSession, ScaleDecals, TurnDecals
+from decals.editing.document import Edit
 from tests.decals.editing.scenes import digest, scene
 
 pytestmark = pytest.mark.usefixtures("few_are_many")
@@ -26,7 +27,8 @@ def test_what_few_decals_come_to_is_a_change_of_these_alone(monkeypatch: pytest.
 def test_a_fork_goes_its_own_way_and_is_adopted_once() -> None:
     session = EditSession(scene())
     session.do(ScaleDecals([1], 2.0))
-    first, heard = digest(session.document), []
+    first = digest(session.document)
+    heard: list[Edit] = []
     session.subscribe(heard.append)
     fork = session.fork()
     fork.undo()

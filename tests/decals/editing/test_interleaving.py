@@ -1,5 +1,6 @@
 """Whatever comes between long edits and user, nothing is lost."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,8 @@ class ThreadedAndDirect:
 
     def __init__(self, path: Any) -> None:
         self.live, self.shadow = threaded(path=path), Actions(EditSession(scene()))
-        self.path, self.pending, self.saved = Path(path), None, None
+        self.path, self.saved = Path(path), None
+        self.pending: Callable[[], None] | None = None
 
     def press(self, key: Any, chosen: Any) -> None:
         numbers = self.live.state.session.document.decals.numbers

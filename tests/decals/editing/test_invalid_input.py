@@ -1,6 +1,8 @@
 """Whatever a session, a command or a window is given: an error of ours, and nothing has changed."""
 
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +50,7 @@ from tests.decals.editing.scenes import TREE, digest, one, scene
 
 RIVET = DecalImage.load("rivet")
 NUMBERS = (0, 1, -3, 10**400, 1e300, float("nan"), float("inf"), True, 0.5, np.float32(2), np.array(np.nan))
-OTHERS = (
+OTHERS: tuple[Any, ...] = (
     None,
     "x",
     "",
@@ -67,11 +69,16 @@ OTHERS = (
 ROWS = ((1, 2), (0, 0, 0), (1e300, 0, 0), (float("nan"), 0, 0), np.ones(3), [1, 2, 3])
 anything = st.sampled_from((*NUMBERS, *OTHERS, *ROWS))
 
-COMMANDS = {
+
+def with_values(name: str, values: Any) -> SetValues:
+    return SetValues.each([1, 2], **{name: values})
+
+
+COMMANDS: dict[str, Callable[[Any], Any]] = {
     "add": AddDecals,
     "alter": lambda x: SetValues([1], x),
     **{
-        f"alter {name}": lambda x, name=name: SetValues.each([1, 2], **{name: x})
+        f"alter {name}": partial(with_values, name)
         for name in ("positions", "normals", "tangents", "radii", "images", "spill", "layers", "tints")
     },
     "scale": lambda x: ScaleDecals([1], x),
@@ -142,13 +149,13 @@ def test_commands_do_something_or_say_why_not(session: Any, name: str, x: Any) -
         (lambda x: EditSession(x), InvalidScene),
         (lambda x: Document.from_scene(x), InvalidScene),
         (lambda x: EditSession(scene()).do(x), InvalidEdit),
-        (lambda x: Scene(objects=[x], camera=Camera((0, 0, 1))), InvalidScene),
+        (lambda x: Scene(objects=(x,), camera=Camera((0, 0, 1))), InvalidScene),
         (lambda x: Scene(objects=(), camera=x), InvalidScene),
-        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), images=[x]), InvalidScene),
+        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), images=(x,)), InvalidScene),
         (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), decals=x), InvalidScene),
         (lambda x: TreeObject("tree", x), InvalidScene),
         (lambda x: TreeObject(x, TREE), InvalidScene),
-        (lambda x: MeshObject("mesh", x, [[0, 1, 2]]), ImplicitDecalsError),
+        (lambda x: MeshObject("mesh", x, np.array([[0, 1, 2]], np.int32)), ImplicitDecalsError),
         (lambda x: DecalImage(x, RIVET.pixels), InvalidScene),
         (lambda x: DecalImage("rivet", x), InvalidScene),
         (lambda x: DecalImage.load(x), InvalidScene),
@@ -177,7 +184,7 @@ def test_a_session_is_saved_to_paths_alone(path: Any) -> None:
 def test_a_camera_to_save_is_one(tmp_path: Path) -> None:
     session = EditSession(scene())
     with pytest.raises(InvalidScene, match="camera: expected a Camera"):
-        session.save(tmp_path / "scene.json", camera=(0, 0, 1))
+        session.save(tmp_path / "scene.json", camera=(0, 0, 1))  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
 
 
@@ -186,7 +193,9 @@ def test_checks_give_what_fits_or_say_what_came(value: Any) -> None:
     fits = isinstance(value, int | float) and abs(value) <= sys.float_info.max
     checked(finite_number, value, fits)
     checked(
-        lambda *args: whole_number(*args[:2], -3, 3, args[2]), value, type(value) is int and -3 <= value <= 3
+        lambda name, number, error: whole_number(name, number, -3, 3, error),
+        value,
+        type(value) is int and -3 <= value <= 3,
     )
     checked(finite_vector, value, isinstance(value, list) and len(value) == 3 and np.isfinite(value).all())
 

@@ -27,7 +27,7 @@ def test_the_nearest_place_is_on_the_nearest_object() -> None:
     points = np.array([[0, 0, 3], [2.9, 0, 5], [1.2, 0, 0], [1.8, 0, 0]])
     found = nearest_points([BALL, BOX], points)
     assert found.objects.tolist() == [0, 1, 0, 1]
-    expected = [[0, 0, 1], [2.9, 0, 1], [1, 0, 0], [2, 0, 0]]
+    expected = [[0.0, 0, 1], [2.9, 0, 1], [1.0, 0, 0], [2.0, 0, 0]]
     np.testing.assert_allclose(found.positions, expected, atol=1e-5)
     np.testing.assert_allclose(found.normals, [[0, 0, 1], [0, 0, 1], [1, 0, 0], [-1, 0, 0]], atol=1e-5)
 

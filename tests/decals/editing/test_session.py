@@ -80,7 +80,7 @@ def test_an_error_within_a_stroke_takes_all_of_it_back(session: EditSession) -> 
 
 
 def test_a_stroke_says_in_words_what_it_is(session: EditSession) -> None:
-    with pytest.raises(InvalidEdit, match="label: expected a str, got None"), session.stroke(None):
+    with pytest.raises(InvalidEdit, match="label: expected a str, got None"), session.stroke(None):  # type: ignore[arg-type]
         session.do(ScaleDecals([1], 1.5))
     assert session.labels == ()
 

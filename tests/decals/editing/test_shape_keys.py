@@ -12,7 +12,7 @@ from blobtree.nodes.surgery import Join, join_of
 from decals.editing import RemoveObject
 from decals.editing.actions import Actions
 from decals.editing.scatter_commands import decals_on
-from tests.decals.editing.scenes import CARVED, digest
+from tests.decals.editing.scenes import CARVED, digest, tree_of
 from tests.decals.editing.test_pointer_tools import UserInput
 from tests.decals.editing.test_primitive_commands import session_of
 
@@ -30,10 +30,6 @@ def top(user: Any) -> Any:
     return user.pixel(user.document.objects[0].surface.project([[0, 0, 2]])[0][0])
 
 
-def tree_of(user: Any, number: Any = 0) -> Any:
-    return user.document.objects[number].tree
-
-
 def undo_all(user: Any) -> None:
     while user.session.labels:
         user.key("z", ctrl=True)
@@ -49,15 +45,15 @@ def test_what_grows_under_the_cursor_is_blended_and_held(user: Any, key: Any, ki
     number, path = user.actions.state.primitive
     assert number == 0
     assert user.actions.state.selection == ()
-    made = primitive_at(tree_of(user), path)
+    made = primitive_at(user.tree, path)
     assert isinstance(made, kind)
-    assert join_of(tree_of(user), path) is Join.BLEND
-    assert len(primitive_paths(tree_of(user))) == len(primitive_paths(CARVED)) + 1
+    assert join_of(user.tree, path) is Join.BLEND
+    assert len(primitive_paths(user.tree)) == len(primitive_paths(CARVED)) + 1
     start = made.center if kind is Point else made.start
     np.testing.assert_allclose(start, place, atol=1e-6)
     assert user.actions.trees.handle_position[2] > place[2] + 0.3  # on top of what is new
     decals = user.document.decals.decals[np.isin(user.document.decals.numbers, decals_on(user.document, [0]))]
-    assert np.abs(tree_of(user)(decals.positions) - ISO).max() < 1e-4
+    assert np.abs(user.tree(decals.positions) - ISO).max() < 1e-4
     user.key("z", ctrl=True)
     assert user.actions.state.primitive is None
     assert digest(user.document) == user.first
@@ -65,17 +61,17 @@ def test_what_grows_under_the_cursor_is_blended_and_held(user: Any, key: Any, ki
 
 def test_the_ways_to_join_go_round_and_the_primitive_stays_held(user: UserInput) -> None:
     user.tools.key("n", *top(user))
-    before = tree_of(user)
+    before = user.tree
     points = np.random.default_rng(0).uniform(-2, 2, (500, 3)).astype(np.float32)
     seen = []
     for _ in range(5):
-        ball = primitive_at(tree_of(user), user.actions.state.primitive[1])
+        ball = primitive_at(user.tree, user.held[1])
         user.key("j")
-        assert primitive_at(tree_of(user), user.actions.state.primitive[1]) == ball
+        assert primitive_at(user.tree, user.held[1]) == ball
         seen.append(user.actions.state.message)
     words = ("soft union", "union", "intersection", "difference", "blend")
     assert seen == [f"joined by {word}" for word in words]
-    np.testing.assert_allclose(tree_of(user)(points), before(points), atol=5e-6)
+    np.testing.assert_allclose(user.tree(points), before(points), atol=5e-6)
     assert len(user.session.labels) == 6
     undo_all(user)
 
@@ -93,24 +89,26 @@ def test_a_hole_is_held_by_its_tool(user: UserInput) -> None:
     assert primitive_at(CARVED, tool) == Point((0, -0.9, 0.6), radius=0.5)
     user.actions.perform("next_join", lambda: user.tools.at(*user.pixel((0, -0.55, 0.85))))
     assert user.actions.state.message == "joined by blend"
-    assert primitive_at(tree_of(user), user.actions.state.primitive[1]) == primitive_at(CARVED, tool)
+    assert primitive_at(user.tree, user.held[1]) == primitive_at(CARVED, tool)
 
 
 def test_held_primitives_are_duplicated_and_deleted_decals_first(user: UserInput) -> None:
     user.tools.key("n", *top(user))
-    count = len(primitive_paths(tree_of(user)))
-    first = node_in_world(tree_of(user), user.actions.state.primitive[1])
+    count = len(primitive_paths(user.tree))
+    first = node_in_world(user.tree, user.held[1])
     user.key("d")
-    copy = primitive_at(tree_of(user), user.actions.state.primitive[1])
+    copy = primitive_at(user.tree, user.held[1])
+    assert isinstance(copy, Point)
+    assert isinstance(first, Point)
     assert copy.radius == first.radius
     assert np.linalg.norm(np.subtract(copy.center, first.center)) == pytest.approx(first.radius, rel=1e-5)
     assert abs(copy.center[2] - first.center[2]) < 0.5 * first.radius  # to the side, as seen
     user.actions.state.selection = (3,)
     user.key("Delete")
     assert 3 not in user.document.decals.numbers
-    assert len(primitive_paths(tree_of(user))) == count + 1
+    assert len(primitive_paths(user.tree)) == count + 1
     user.key("Delete")
-    assert len(primitive_paths(tree_of(user))) == count
+    assert len(primitive_paths(user.tree)) == count
     assert user.actions.state.message == "remove a primitive"
     assert user.actions.state.primitive is None
     user.key("Delete")
@@ -133,12 +131,15 @@ def test_objects_come_and_go_under_the_cursor(user: UserInput) -> None:
     at = top(user)
     place = user.tools.at(*at)
     user.tools.key("N", *at, shift=True)
-    ball = user.document.objects[2]
+    ball, seen = user.document.objects[2], user.tools.at(*at)
     assert ball.name == "ball 1"
-    assert user.tools.at(*at).object == 2
-    np.testing.assert_allclose(
-        ball.tree.center, place.position + ball.tree.radius * place.normal, atol=1e-6
-    )  # it lies on what was under the cursor
+    assert place is not None
+    assert seen is not None
+    assert seen.object == 2
+    point = tree_of(user.document, 2)
+    assert isinstance(point, Point)
+    expected = place.position + point.radius * place.normal
+    np.testing.assert_allclose(point.center, expected.tolist(), atol=1e-6)  # on what was under the cursor
     user.tools.key("N", *at, shift=True)
     assert [item.name for item in user.document.objects[2:]] == ["ball 1", "ball 2"]
     user.tools.key("Delete", *at, shift=True)
@@ -152,11 +153,13 @@ def test_all_objects_may_go_and_the_next_lies_where_the_camera_looks(user: UserI
     for _ in range(2):
         (_, at), *_ = user.visible()
         user.tools.key("Delete", *at, shift=True)
-    assert user.document.objects == ()
+    assert list(user.document.objects) == []
     assert len(user.document.decals) == 0
     user.tools.key("N", *OFF, shift=True)
-    (ball,) = user.document.objects
-    assert ball.tree.center == pytest.approx(user.document.camera.target)
+    assert len(user.document.objects) == 1
+    ball = user.tree
+    assert isinstance(ball, Point)
+    assert ball.center == pytest.approx(user.document.camera.target)
     undo_all(user)
 
 

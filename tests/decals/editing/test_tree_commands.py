@@ -156,6 +156,7 @@ def test_another_way_and_back_is_the_same_field(tree: Any, choice: Any, other: A
     path = paths[choice % len(paths)]
     join = join_of(tree, path)
     assume(join is not None)
+    assert join is not None
     between, there = JoinPrimitive(0, path, other).restructure(tree)
     assert node_at(between, there) == node_at(tree, path)
     after, back = JoinPrimitive(0, there, join).restructure(between)
@@ -165,12 +166,13 @@ def test_another_way_and_back_is_the_same_field(tree: Any, choice: Any, other: A
 
 @quiet
 @given(tree=trees, choice=st.integers(0, 99))
-def test_a_copy_is_where_it_is_wished_and_a_new_one_too(tree: Any, choice: Any) -> None:
+def test_a_copy_and_a_new_primitive_lie_at_the_given_place(tree: Any, choice: Any) -> None:
     paths = primitive_paths(tree)
     path = paths[choice % len(paths)]
     after, there = DuplicatePrimitive(0, path, (0.5, 0.25, 0)).restructure(tree)
     one, other = node_in_world(tree, path), node_in_world(after, there)
-    np.testing.assert_allclose(other(POINTS + np.float32((0.5, 0.25, 0))), one(POINTS), atol=5e-5)
+    offset = np.array([0.5, 0.25, 0], np.float32)
+    np.testing.assert_allclose(other(POINTS + offset), one(POINTS), atol=5e-5)
     after, there = AddPrimitive(0, world_space_path(tree, path), D).restructure(tree)
     np.testing.assert_array_equal(node_in_world(after, there)(POINTS), D(POINTS))
 
@@ -227,25 +229,25 @@ def test_the_decals_of_what_becomes_a_tool_go_and_the_others_stay_on_the_surface
 @pytest.mark.parametrize(
     ("command", "error", "message"),
     [
-        (AddPrimitive(0, (), None), InvalidEdit, "node: expected a Node, got None"),
+        (AddPrimitive(0, (), None), InvalidEdit, "node: expected a Node, got None"),  # type: ignore[arg-type]
         (
             AddPrimitive(0, (), A, "weld"),
             InvalidEdit,
             "join: expected one of 'blend', .*, got 'weld'",
         ),
         (AddPrimitive(0, (7,), A), InvalidNode, "path"),
-        (AddPrimitive(0, None, A), InvalidNode, "path"),
+        (AddPrimitive(0, None, A), InvalidNode, "path"),  # type: ignore[arg-type]
         (AddPrimitive(0, (), Point((0, 0, 0), radius=9), Join.DIFFERENCE), InvalidMesh, "got none"),
         (AddPrimitive(4, (), A), InvalidEdit, "0 to 0, got 4"),
         (RemovePrimitive(0, (3,)), InvalidNode, "path"),
-        (RemovePrimitive(0, 5), InvalidNode, "path"),
+        (RemovePrimitive(0, 5), InvalidNode, "path"),  # type: ignore[arg-type]
         (DuplicatePrimitive(0, (0,), (0, np.nan, 0)), InvalidEdit, "offset"),
-        (DuplicatePrimitive(0, "x", (0, 0, 0)), InvalidNode, "path"),
-        (JoinPrimitive(0, (0,), 3), InvalidEdit, "join"),
+        (DuplicatePrimitive(0, "x", (0, 0, 0)), InvalidNode, "path"),  # type: ignore[arg-type]
+        (JoinPrimitive(0, (0,), 3), InvalidEdit, "join"),  # type: ignore[arg-type]
         (JoinPrimitive(0, (0, 0), Join.UNION), InvalidNode, "path"),
     ],
 )
-def test_what_makes_no_sense_is_said_and_changes_nothing(command: Any, error: Any, message: Any) -> None:
+def test_an_invalid_command_is_refused_and_changes_nothing(command: Any, error: Any, message: Any) -> None:
     session = session_of(A + B, 10)
     before = digest(session.document)
     with pytest.raises(error, match=message):

@@ -1,7 +1,7 @@
 """One job at a time, told of and stopped."""
 
 import threading
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -56,7 +56,7 @@ def test_a_cancelled_job_comes_to_nothing() -> None:
 def test_what_a_job_raises_is_raised_where_it_is_asked_for() -> None:
     worker = Worker()
 
-    def work(tell: Any, stop: Any) -> None:
+    def work(tell: Any, stop: Any) -> NoReturn:
         raise ValueError("no")
 
     worker.start(Job("fails", work))

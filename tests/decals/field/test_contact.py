@@ -7,13 +7,11 @@ import pytest
 import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from decals.field.contact import add_push, contact_complement, contact_push, contact_uv, rim_distance
-from decals.record import NEIGHBOR_REACH, NO_FIELD, Contact, field_complement
+from decals.record import NEIGHBOR_REACH, Contact
+from tests.decals.field.kernels import contact_of_rows, rims_of_sets, uv_of_offsets
 from tests.oracles import contact as oracle
-
-wp.set_module_options({"enable_backward": False})
 
 ERROR_LIMIT = 2e-5
 """Largest accepted error of r, in rim radii."""
@@ -21,63 +19,11 @@ ERROR_LIMIT = 2e-5
 HALF = np.float32(0.5)
 
 
-@wp.kernel
-def contact_of_rows(
-    e: wp.array2d(dtype=wp.float32),
-    owner: wp.array(dtype=wp.int32),
-    contact: wp.int32,
-    result: wp.array(dtype=wp.float32),
-) -> None:
-    row = wp.tid()
-    k = owner[row]
-    push = wp.float32(0.0)
-    for i in range(e.shape[1]):
-        if i != k:
-            push = add_push(push, contact_push(e[row, i], e[row, k]), contact)
-    result[row] = contact_complement(e[row, k], push)
-
-
-@wp.kernel
-def rims_of_points(
-    points: wp.array(dtype=wp.vec3),
-    centres: wp.array2d(dtype=wp.vec3),
-    influence: wp.array2d(dtype=wp.float32),
-    contact: wp.int32,
-    owners: wp.array(dtype=wp.int32),
-    rims: wp.array(dtype=wp.float32),
-) -> None:
-    row = wp.tid()
-    least = wp.float32(NO_FIELD)
-    owner = wp.int32(-1)
-    for i in range(centres.shape[1]):
-        w = points[row] - centres[row, i]
-        e = field_complement(wp.dot(w, w) / (influence[row, i] * influence[row, i]))
-        if e < least:
-            least = e
-            owner = i
-    push = wp.float32(0.0)
-    for i in range(centres.shape[1]):
-        w = points[row] - centres[row, i]
-        e = field_complement(wp.dot(w, w) / (influence[row, i] * influence[row, i]))
-        if i != owner:
-            push = add_push(push, contact_push(e, least), contact)
-    owners[row] = owner if least <= 0.5 else -1
-    rims[row] = rim_distance(contact_complement(least, push))
-
-
-@wp.kernel
-def uv_of_offsets(
-    offsets: wp.array(dtype=wp.vec2), rims: wp.array(dtype=wp.float32), uv: wp.array(dtype=wp.vec2)
-) -> None:
-    row = wp.tid()
-    uv[row] = contact_uv(offsets[row], rims[row])
-
-
 def complement_of(e: Any, contact: Contact = Contact.PRODUCT) -> Any:
     """E of rows of complements, through Warp."""
     e = np.atleast_2d(np.asarray(e, np.float32))
     result = wp.zeros(len(e), dtype=wp.float32, device="cpu")
-    owner = wp.array(e.argmin(axis=1), dtype=wp.int32, device="cpu")
+    owner: Any = wp.array(e.argmin(axis=1), dtype=wp.int32, device="cpu")
     wp.launch(contact_of_rows, len(e), [wp.array(e, device="cpu"), owner, int(contact), result], device="cpu")
     return result.numpy()
 
@@ -126,9 +72,8 @@ def test_small_changes_of_the_fields_change_little(
 ) -> None:
     """Continuity, with the Lipschitz bound that follows from |∂φ/∂e| ≤ 4/e_k."""
     before = np.array([max(x, owner) for x, _ in others], np.float32)
-    after = np.clip(before + np.float32(size) * np.float32([x for _, x in others]), owner, 1).astype(
-        np.float32
-    )
+    steps = np.float32(size) * np.array([x for _, x in others], np.float32)
+    after = np.clip(before + steps, owner, 1).astype(np.float32)
     step = np.abs(after - before).sum()
     change = abs(complement_of([owner, *after], contact)[0] - complement_of([owner, *before], contact)[0])
     assert change <= 4 / owner * step + 1e-6
@@ -137,7 +82,7 @@ def test_small_changes_of_the_fields_change_little(
 @settings(max_examples=200, deadline=None)
 @given(owner=inside, others=st.lists(anywhere, max_size=6))
 def test_agrees_with_the_equation_as_written(owner: float, others: Any) -> None:
-    e = np.float32([owner, *(max(x, owner) for x in others)]).astype(np.float64)
+    e = np.array([owner, *(max(x, owner) for x in others)], np.float32).astype(np.float64)
     if 1e-3 < owner < 0.5 - 1e-3:
         assert 1 - complement_of(e)[0] == pytest.approx(oracle.contact_field(1 - e[None])[0], abs=1e-5)
 
@@ -223,12 +168,12 @@ def rims_through_warp(
     count = len(points)
     owners = wp.zeros(count, dtype=wp.int32, device="cpu")
     rims = wp.zeros(count, dtype=wp.float32, device="cpu")
-    inputs = [
+    inputs: list[Any] = [
         wp.array(points, dtype=wp.vec3, device="cpu"),
         wp.array(centres, dtype=wp.vec3, ndim=2, device="cpu"),
         wp.array(influence, dtype=wp.float32, ndim=2, device="cpu"),
     ]
-    wp.launch(rims_of_points, count, [*inputs, int(contact), owners, rims], device="cpu")
+    wp.launch(rims_of_sets, count, [*inputs, int(contact), owners, rims], device="cpu")
     return owners.numpy(), rims.numpy()
 
 
@@ -251,9 +196,9 @@ def test_error_on_adversarial_points(make: Any, contact: Contact, record_propert
     rng = np.random.default_rng(SETS.index(make))
     worst, owned = 0.0, 0
     for count in (2, 3, 6):
-        arrays = [a.astype(np.float32) for a in make(rng, (50_000, count))]
-        owner, rims = rims_through_warp(*arrays, contact)
-        expected_owner, expected = rims_in_float64(*arrays, contact)
+        points, centres, influence = (a.astype(np.float32) for a in make(rng, (50_000, count)))
+        owner, rims = rims_through_warp(points, centres, influence, contact)
+        expected_owner, expected = rims_in_float64(points, centres, influence, contact)
         assert np.isfinite(rims).all()
         both = (owner >= 0) & (expected_owner >= 0)
         one = (owner >= 0) != (expected_owner >= 0)
@@ -271,7 +216,7 @@ def test_error_on_adversarial_points(make: Any, contact: Contact, record_propert
 def test_concentric_decals_push_alike_at_every_distance(contact: Contact) -> None:
     """Twice the complement is a push of nearly 1/e, down to the smallest squares that float32 holds."""
     e = 10.0 ** np.linspace(-36.5, -1, 200)
-    rows = np.float32(np.column_stack([e, 2 * e]))
+    rows = np.column_stack([e, 2 * e]).astype(np.float32)
     found = complement_of(rows, contact)
     want = oracle.contact_complement(rows.astype(np.float64))[1]
     assert np.abs(found - want).max() < 1e-6
@@ -289,10 +234,13 @@ def test_what_lies_beyond_reach_hardly_matters() -> None:
 # -- image coordinates ------------------------------------------------------------------------------
 
 
-def uv_of(offsets: NDArray[Any], rims: Any) -> Any:
-    offsets, rims = np.float32(offsets), np.float32(rims)
+def uv_of(offsets: ArrayLike, rims: ArrayLike) -> Any:
+    offsets, rims = np.array(offsets, np.float32), np.array(rims, np.float32)
     uv = wp.zeros(len(offsets), dtype=wp.vec2, device="cpu")
-    inputs = [wp.array(offsets, dtype=wp.vec2, device="cpu"), wp.array(rims, dtype=wp.float32, device="cpu")]
+    inputs: list[Any] = [
+        wp.array(offsets, dtype=wp.vec2, device="cpu"),
+        wp.array(rims, dtype=wp.float32, device="cpu"),
+    ]
     wp.launch(uv_of_offsets, len(offsets), [*inputs, uv], device="cpu")
     return uv.numpy()
 

@@ -109,7 +109,7 @@ def worst(got: Any, want: Any, rows: Any) -> Any:
 @pytest.mark.parametrize("make", SETS)
 def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:
     decals, points, normals = make(np.random.default_rng(SETS.index(make)))
-    points, normals = np.float32(points), np.float32(normals)
+    points, normals = np.array(points, np.float32), np.array(normals, np.float32)
     got = evaluate(decals, points, normals, mapping=mapping)
     facing, corrected = unit(normals.astype(float)), mapping == ImageMapping.CORRECTED
     want = decals_at(decals, points, facing, corrected=corrected)
@@ -130,7 +130,7 @@ def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:
 
 def test_a_lone_decal_shows_its_image_undistorted() -> None:
     decals = Decals([[1, 2, 3]], [[0, 0, 1]], [[0, 1, 0]], [2.0])
-    points = [[1, 2, 3], [1, 4, 3], [-1, 2, 3], [1, 1, 3], [1, 4.01, 3]]
+    points = np.array([[1, 2, 3], [1, 4, 3], [-1, 2, 3], [1, 1, 3], [1, 4.01, 3]])
     samples = evaluate(decals, points, np.tile([0, 0, 1], (5, 1)))
     assert samples.owner.tolist() == [0, 0, 0, 0, -1]
     assert samples.uv[:4] == pytest.approx(np.array([[0.5, 0.5], [1, 0.5], [0.5, 1], [0.25, 0.5]]), abs=1e-6)
@@ -165,14 +165,14 @@ def test_index_and_brute_force_agree_to_the_bit() -> None:
 
 
 def test_the_far_side_is_coloured_only_by_decals_that_spill() -> None:
-    frame = {"normals": [[0, 0, 1]], "tangents": [[1, 0, 0]], "radii": [1.0]}
+    decal = Decals([[0, 0, 0]], normals=[[0, 0, 1]], tangents=[[1, 0, 0]], radii=[1.0])
     behind = [[0.1, 0, -0.01]], [[0, 0, -1]]
-    assert evaluate(Decals([[0, 0, 0]], **frame), *behind).owner.tolist() == [-1]
-    assert evaluate(Decals([[0, 0, 0]], **frame, spill=[True]), *behind).owner.tolist() == [0]
+    assert evaluate(decal, *behind).owner.tolist() == [-1]
+    assert evaluate(decal.replace(spill=[True]), *behind).owner.tolist() == [0]
     below, above = np.deg2rad([100, 109])
     for angle, owner in ((below, 0), (above, -1)):
         tilted = [[np.sin(angle), 0, np.cos(angle)]]
-        assert evaluate(Decals([[0, 0, 0]], **frame), [[0.1, 0, 0]], tilted).owner.tolist() == [owner]
+        assert evaluate(decal, [[0.1, 0, 0]], tilted).owner.tolist() == [owner]
 
 
 def test_normals_of_any_length() -> None:
@@ -257,9 +257,9 @@ def test_any_small_set(
     tangent = np.cross(normal, [0.6, 0.8, 0] if abs(normal[2]) > 1e-3 else [0, 0, 1])
     count = len(centres)
     decals = Decals(centres, [normal] * count, [tangent] * count, [radius] * count)
-    normals = np.float32([look] * len(points))
+    normals = np.array([look] * len(points), np.float32)
     got = evaluate(decals, points, normals)
-    want = decals_at(decals, np.float32(points), unit(normals.astype(float)))
+    want = decals_at(decals, np.array(points, np.float32), unit(normals.astype(float)))
     assert np.isfinite(got.uv).all()
     clear = (want.doubt > TIE) & (want.stretch < 10)
     assert np.array_equal(got.owner[clear], want.owner[clear])

@@ -24,7 +24,12 @@ def unit(v: NDArray[Any]) -> Any:
 
 
 def mixed(
-    rng: np.random.Generator, count: int, *, radii: Any = (0.05, 0.4), layers: int = 3, images: int = 3
+    rng: np.random.Generator,
+    count: int,
+    *,
+    radii: tuple[float, float] = (0.05, 0.4),
+    layers: int = 3,
+    images: int = 3,
 ) -> Any:
     """Decals of all kinds on the unit sphere, and points there."""
     positions = unit(rng.normal(size=(count, 3)))
@@ -32,7 +37,7 @@ def mixed(
         positions,
         positions,
         rng.normal(size=(count, 3)),
-        np.exp(rng.uniform(*np.log(radii), count)),
+        np.exp(rng.uniform(np.log(radii[0]), np.log(radii[1]), count)),
         images=rng.integers(-1, images, count),
         spill=rng.random(count) < 0.1,
         interactions=rng.integers(0, 3, count),
@@ -132,7 +137,7 @@ def test_images_are_stretched_where_three_meet_in_the_papers_mode_alone(overlap:
 
 def test_overlapping_decals_show_whole() -> None:
     """An eye on a scale: undeformed to its rim, though the scale's field is higher at places."""
-    decals = Decals([[0, 0, 0], [0.8, 0, 0]], **frame(2), interactions=[1, 2]).replace(radii=[1, 0.5])
+    decals = Decals([[0.0, 0, 0], [0.8, 0, 0]], **frame(2), interactions=[1, 2]).replace(radii=[1, 0.5])
     samples = evaluate(decals, [[0.31, 0, 0], [0.29, 0, 0]], UP * 2)
     assert samples.owner.tolist() == [1, 0]
     assert samples.uv[0, 0] == pytest.approx(0.5 - 0.49, abs=1e-5)
@@ -174,6 +179,7 @@ def test_an_image_is_read_upright_and_smoothly() -> None:
     decals = Decals([[0, 0, 0]], **frame(1))
     at = [[0.5, 0.5, 0], [-0.5, 0.5, 0], [0.5, -0.5, 0], [0, 0.5, 0]]
     color = evaluate(decals, at, UP * 4, images=[image]).color
+    assert color is not None
     assert color[:, 0] == pytest.approx([1, 0, 0, 0.5], abs=1e-5)
     assert color[:, 3] == pytest.approx(1)
 
@@ -199,4 +205,4 @@ def test_without_images_no_colour_and_too_few_are_refused() -> None:
     with pytest.raises(InvalidImage, match="expected 3 or more, got 1"):
         evaluate(decals, [[0, 0, 0]], UP, images=IMAGES[:1])
     with pytest.raises(InvalidImage, match="uint8"):
-        evaluate(decals, [[0, 0, 0]], UP, images=[np.zeros((2, 2, 4))] * 3)
+        evaluate(decals, [[0, 0, 0]], UP, images=[np.zeros((2, 2, 4))] * 3)  # type: ignore[list-item]

@@ -7,75 +7,29 @@ import pytest
 import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from decals.field.evaluate import evaluate
-from decals.field.mapping import (
-    ImageMapping,
-    image_distance,
-    in_image,
-    tangent_coordinates,
-    unroll,
-    unroll_step,
-)
+from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
 from tests.decals.field import log_maps
+from tests.decals.field.kernels import arcs_of, coordinates_of, distances_of, turns_of
 from tests.decals.field.log_maps import DECAL, DISCS, dots, drawn_error, tangents, unit
 
-wp.set_module_options({"enable_backward": False})
 
-
-@wp.kernel
-def arcs_of(
-    w: wp.array(dtype=wp.vec3),
-    n_p: wp.array(dtype=wp.vec3),
-    n_q: wp.array(dtype=wp.vec3),
-    arcs: wp.array(dtype=wp.vec4),
-) -> None:
-    i = wp.tid()
-    arcs[i] = unroll(w[i], n_p[i], n_q[i])
-
-
-@wp.kernel
-def turns_of(
-    steps: wp.array(dtype=wp.vec3),
-    n_p: wp.array(dtype=wp.vec3),
-    n_q: wp.array(dtype=wp.vec3),
-    turned: wp.array(dtype=wp.vec3),
-) -> None:
-    i = wp.tid()
-    turned[i] = unroll_step(steps[i], n_p[i], n_q[i])
-
-
-@wp.kernel
-def distances_of(
-    rims: wp.array(dtype=wp.float32),
-    chords: wp.array(dtype=wp.float32),
-    lengths: wp.array(dtype=wp.float32),
-    drawn: wp.array(dtype=wp.float32),
-) -> None:
-    i = wp.tid()
-    drawn[i] = image_distance(rims[i], chords[i], lengths[i])
-
-
-@wp.kernel
-def coordinates_of(
-    m: wp.array(dtype=wp.vec3),
-    n: wp.array(dtype=wp.vec3),
-    u: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2),
-    seen: wp.array(dtype=wp.bool),
-) -> None:
-    i = wp.tid()
-    xy[i] = tangent_coordinates(m[i], n[i], u[i])
-    seen[i] = in_image(xy[i])
+def on_cpu(dtype: Any, *arrays: ArrayLike) -> list[Any]:
+    """Return arrays of rows as Warp arrays; one vector is one row."""
+    rows = (np.atleast_2d(np.array(a, np.float32)) if dtype is wp.vec3 else a for a in arrays)
+    return [wp.array(np.array(a, np.float32), dtype=dtype, device="cpu") for a in rows]
 
 
 def rolled_out(w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
     """Offset in the tangent plane, and length."""
     n_p = np.reshape(n_p, (-1, 3))
-    inputs = [wp.array(np.float32(a).reshape(-1, 3), dtype=wp.vec3, device="cpu") for a in (w, n_p, n_q)]
+    inputs: list[Any] = [
+        wp.array(np.array(a, np.float32).reshape(-1, 3), dtype=wp.vec3, device="cpu") for a in (w, n_p, n_q)
+    ]
     result = wp.zeros(len(n_p), dtype=wp.vec4, device="cpu")
     wp.launch(arcs_of, len(n_p), [*inputs, result], device="cpu")
     arc = result.numpy().astype(np.float64)
@@ -89,7 +43,7 @@ def mapped(w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
 
 
 def distances(*columns: Any) -> Any:
-    inputs = [wp.array(np.float32(a), dtype=wp.float32, device="cpu") for a in columns]
+    inputs = on_cpu(wp.float32, *columns)
     result = wp.zeros(len(inputs[0]), dtype=wp.float32, device="cpu")
     wp.launch(distances_of, len(result), [*inputs, result], device="cpu")
     return result.numpy()
@@ -147,6 +101,7 @@ def test_an_image_ends_at_its_radius_along_the_surface(name: str, radius: float)
     seen = evaluate(one, disc.points, disc.normals, images=[white], device="cpu")
     length = np.linalg.norm(disc.log, axis=1) / radius
     clear = np.abs(length - 1) > 0.01
+    assert seen.color is not None
     assert ((seen.color[:, 3] > 0) == (length < 1))[clear & (seen.owner >= 0)].all()
     assert (seen.owner[length < 1] == 0).all()
     beyond = clear & (length > 1) & (seen.owner >= 0)
@@ -205,7 +160,9 @@ def test_flat_faces_do_not_mind_normals_that_are_smoothed() -> None:
 
 
 def turned(step: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:
-    inputs = [wp.array(np.float32(a), dtype=wp.vec3, device="cpu") for a in (step, n_p, n_q)]
+    inputs: list[Any] = [
+        wp.array(np.array(a, np.float32), dtype=wp.vec3, device="cpu") for a in (step, n_p, n_q)
+    ]
     result = wp.zeros(len(step), dtype=wp.vec3, device="cpu")
     wp.launch(turns_of, len(step), [*inputs, result], device="cpu")
     return result.numpy().astype(np.float64)
@@ -284,7 +241,9 @@ def test_lines_of_contact_stay_in_place(contact: Contact) -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(steps=st.lists(st.tuples(share, share, share), min_size=2, max_size=20))
-def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(steps: int) -> None:
+def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(
+    steps: list[tuple[float, float, float]],
+) -> None:
     """On any way along a surface chords grow by less than lengths; contact may push as it likes, outwards."""
     chord, bent, pushed = np.cumsum(steps, axis=0).T / len(steps)
     length = chord + bent
@@ -299,7 +258,7 @@ def test_radial_contact_does_not_fold_on_curved_surfaces(name: str) -> None:
     rng, steps, pushed = np.random.default_rng(8), 60, 0
     for _ in range(12):
         disc = DISCS[name](rng, 1, 1e-3)
-        rows, mode = np.linspace(0.02, 1, steps), {"contact": Contact.RADIAL, "device": "cpu"}
+        rows = np.linspace(0.02, 1, steps)
         around = rng.uniform(0, 2 * np.pi, 30)
         rays = np.column_stack([np.cos(around), np.sin(around)])
         log = DECAL * (rows[:, None, None] * rays).reshape(-1, 2)
@@ -308,7 +267,7 @@ def test_radial_contact_does_not_fold_on_curved_surfaces(name: str) -> None:
         centres, up = np.vstack([disc.centre, places[0]]), np.vstack([disc.normal, places[1]])
         away = np.vstack([disc.tangent, tangents(rng, places[1])])
         decals = Decals(centres, up, away, [DECAL, *rng.uniform(0.2, 0.8, 6)])
-        seen = evaluate(decals, q, normals, **mode)
+        seen = evaluate(decals, q, normals, contact=Contact.RADIAL, device="cpu")
         distance = np.linalg.norm(seen.uv - 0.5, axis=1).reshape(steps, -1)
         first = (seen.owner == 0).reshape(steps, -1)
         both = first[1:] & first[:-1]
@@ -351,12 +310,12 @@ def test_opposed_and_equal_normals_give_the_projection() -> None:
     n = np.array([[0, 0, 1.0]])
     w = np.array([[0.3, -0.2, 0.5]])
     for other in (n, -n):
-        assert rolled_out(w, n, other)[0].tolist() == np.float32([[0.3, -0.2, 0]]).tolist()
+        assert rolled_out(w, n, other)[0].tolist() == np.array([[0.3, -0.2, 0]], np.float32).tolist()
 
 
 def test_tangent_coordinates_are_right_handed() -> None:
-    m, n, u = ([[3, 4, 5], [0.5, 0.99, 0]], [[0, 0, 1]] * 2, [[0, 1, 0], [1, 0, 0]])
-    inputs = [wp.array(np.float32(a), dtype=wp.vec3, device="cpu") for a in (m, n, u)]
+    m, n, u = ([[3.0, 4, 5], [0.5, 0.99, 0]], [[0.0, 0, 1]] * 2, [[0.0, 1, 0], [1.0, 0, 0]])
+    inputs = on_cpu(wp.vec3, m, n, u)
     xy, seen = (wp.zeros(2, dtype=dtype, device="cpu") for dtype in (wp.vec2, wp.bool))
     wp.launch(coordinates_of, 2, [*inputs, xy, seen], device="cpu")
     assert xy.numpy()[0].tolist() == [4, -3]

@@ -5,42 +5,23 @@ from typing import Any
 import numpy as np
 import pytest
 import warp as wp
-from numpy.typing import NDArray
 
-from decals.field.ownership import complement_at, owner_at, single_layer_at
 from decals.index.index import index_on
-from decals.index.lookup import IndexedDecals
 from decals.model import Decals
 from decals.record import Contact
-
-wp.set_module_options({"enable_backward": False})
-
-
-@wp.kernel
-def both_ways(
-    points: wp.array(dtype=wp.vec3),
-    contact: wp.int32,
-    index: IndexedDecals,
-    once: wp.array(dtype=wp.vec2),
-    twice: wp.array(dtype=wp.vec2),
-) -> None:
-    i = wp.tid()
-    q = points[i]
-    up = wp.vec3(0.0, 0.0, 1.0)
-    once[i] = single_layer_at(q, up, contact, index)
-    owner = owner_at(q, up, contact, index)
-    e = wp.float32(0.0)
-    if owner >= 0:
-        e = complement_at(q, up, owner, contact, index)
-    twice[i] = wp.vec2(float(owner), e)
+from tests.decals.field.kernels import both_ways
 
 
-def flat(rng: np.random.Generator, count: int, side: Any, radii: NDArray[Any], *, copies: int = 1) -> Any:
+def flat(
+    rng: np.random.Generator, count: int, side: Any, radii: tuple[float, float], *, copies: int = 1
+) -> Any:
     """Decals in the xy plane, each of them several times on its place."""
     positions = np.repeat(np.column_stack([rng.uniform(-side, side, (count, 2)), np.zeros(count)]), copies, 0)
     many = len(positions)
     frame = np.tile([[0, 0, 1.0]], (many, 1)), np.tile([[1.0, 0, 0]], (many, 1))
-    return Decals(positions, *frame, np.repeat(np.exp(rng.uniform(*np.log(radii), count)), copies))
+    return Decals(
+        positions, *frame, np.repeat(np.exp(rng.uniform(np.log(radii[0]), np.log(radii[1]), count)), copies)
+    )
 
 
 @pytest.mark.parametrize("contact", [Contact.PRODUCT, Contact.MIN])
@@ -54,7 +35,9 @@ def flat(rng: np.random.Generator, count: int, side: Any, radii: NDArray[Any], *
         (90, 0.2, (0.3, 0.6), 1),
     ],
 )
-def test_once_is_twice(contact: Contact, count: int, side: Any, radii: NDArray[Any], copies: int) -> None:
+def test_once_is_twice(
+    contact: Contact, count: int, side: Any, radii: tuple[float, float], copies: int
+) -> None:
     rng = np.random.default_rng(count)
     decals = flat(rng, count, side, radii, copies=copies)
     points = np.column_stack([rng.uniform(-side, side, (20_000, 2)), np.zeros(20_000)]).astype(np.float32)

@@ -3,10 +3,12 @@
 The float64 kernel that can answer so many is itself held against the NumPy oracle.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from decals.field.mapping import ImageMapping
 from decals.record import NEIGHBOR_REACH, Contact
@@ -51,7 +53,7 @@ def test_the_two_oracles_agree(contact: Contact, layered: bool) -> None:
     assert owned > 10_000
 
 
-def by_set(sets: int) -> Any:
+def by_set(sets: NDArray[np.integer]) -> Iterable[tuple[int, NDArray[np.intp]]]:
     """Rows of each set."""
     order = np.argsort(sets, kind="stable")
     starts = np.flatnonzero(np.diff(sets[order], prepend=-1))

@@ -11,7 +11,7 @@ from decals.field.evaluate import evaluate
 from decals.index.index import index_on
 from decals.model import Decals
 from decals.record import Contact
-from tests.decals.field.radial_rays import rims_of_points, slopes_of_rays
+from tests.decals.field.kernels import rims_of_points, slopes_of_rays
 from tests.oracles.contact import RIM
 
 LEAST = 0.21
@@ -60,7 +60,10 @@ def test_nothing_folds_on_a_million_rays(flat: bool) -> None:
     owners = rng.integers(0, len(decals), count)
     owners = np.where(decals.radii[owners] > 0.05, owners, owners // MEMBERS * MEMBERS)
     rays = unit(rng.normal(size=(count, 3)) * [1, 1, 0 if flat else 1])
-    before = [wp.array(owners, dtype=wp.int32, device="cpu"), wp.array(rays, dtype=wp.vec3, device="cpu")]
+    before: list[Any] = [
+        wp.array(owners, dtype=wp.int32, device="cpu"),
+        wp.array(rays, dtype=wp.vec3, device="cpu"),
+    ]
     after = [wp.zeros(count, dtype=wp.float32, device="cpu") for _ in range(2)]
     least, most = launch(slopes_of_rays, count, decals, before, after)
     print(f"slopes from {least.min():.3f} to {most.max():.3f}; {(most > 1.001).mean():.0%} of rays pushed")
@@ -130,7 +133,7 @@ def test_a_million_points_against_float64() -> None:
 
 
 def pair(distance: float, radius: float, other: Any) -> Any:
-    return Decals([[0, 0, 0], [distance, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [radius, other])
+    return Decals([[0.0, 0, 0], [distance, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [radius, other])
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -124,10 +124,11 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "log_one_minus": {"w": uniform(0.0, 0.999)},
     "cell_coordinate": {"x": uniform(-1000.0, 1000.0)},
     "cell_hash": dict.fromkeys("xyz", whole(-(2**31), 2**31)),
-} | {
-    f"{name}_{kind}": {"a": interval(2.0), "b": interval(2.0)}
-    for name in ("sum", "ricci", "union", "intersection", "difference", "blend")
-    for kind in ("range", "choice")
+    **{
+        f"{name}_{kind}": {"a": interval(2.0), "b": interval(2.0)}
+        for name in ("sum", "ricci", "union", "intersection", "difference", "blend")
+        for kind in ("range", "choice")
+    },
 }  # fmt: skip
 
 

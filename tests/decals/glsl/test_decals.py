@@ -11,10 +11,9 @@ from blobtree.transpile.glsl import translate_library
 from decals.field.contact import contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import tangent_coordinates, unroll
 from decals.index.index import DecalIndex
-from decals.index.lookup import IndexedDecals, cell_hash, cell_range
+from decals.index.lookup import cell_hash, cell_range
 from decals.record import field_complement
-
-wp.set_module_options({"enable_backward": False})
+from tests.decals.glsl.kernels import contacts, lookups, offsets
 
 AGREEMENT = 1e-5
 WIDTH = 4096
@@ -92,36 +91,12 @@ def rows(*columns: Any) -> Any:
     return np.pad(table, ((0, 0), (0, 4 - table.shape[1])))
 
 
-@wp.kernel
-def contacts(x: wp.array(dtype=wp.vec4), result: wp.array(dtype=wp.vec4)) -> None:
-    i = wp.tid()
-    e_k = field_complement(x[i][0])
-    complement = contact_complement(e_k, contact_push(field_complement(x[i][1]), e_k))
-    uv = contact_uv(wp.vec2(x[i][2], x[i][3]), rim_distance(complement))
-    result[i] = wp.vec4(complement, rim_distance(complement), uv[0], uv[1])
-
-
 CONTACTS = """
     float e_k = field_complement(x[0]);
     float complement = contact_complement(e_k, contact_push(field_complement(x[1]), e_k));
     vec2 uv = contact_uv(x.zw, rim_distance(complement));
     result = vec4(complement, rim_distance(complement), uv);
 """
-
-
-@wp.kernel
-def offsets(
-    x: wp.array(dtype=wp.vec4),
-    y: wp.array(dtype=wp.vec4),
-    z: wp.array(dtype=wp.vec4),
-    result: wp.array(dtype=wp.vec4),
-) -> None:
-    i = wp.tid()
-    n = wp.vec3(y[i][0], y[i][1], y[i][2])
-    w = wp.vec3(x[i][0], x[i][1], x[i][2])
-    m = unroll(w, n, wp.vec3(z[i][0], z[i][1], z[i][2]))
-    xy = tangent_coordinates(wp.vec3(m[0], m[1], m[2]), n, w)
-    result[i] = wp.vec4(xy[0], xy[1], m[2], m[3])
 
 
 OFFSETS = """
@@ -150,7 +125,7 @@ def adversarial_contacts(rng: np.random.Generator, n: int) -> Any:
     ratio = np.where(rng.random(3 * n) < 0.5, 1 + 10.0 ** rng.uniform(-8, 1, 3 * n), rng.uniform(1, 9, 3 * n))
     direction = rng.normal(size=(3 * n, 2)) * 10.0 ** rng.uniform(-9, 9, (3 * n, 1))
     exact = [[0, 0, 1, 0], [0, 0.1, 0, 1], [rim, rim, 1, 1], [1e-20, 1e-20, 0, 0], [0, 1, -1, 0]]
-    return np.concatenate([rows(least, least * ratio, direction), np.float32(exact)])
+    return np.concatenate([rows(least, least * ratio, direction), np.array(exact, np.float32)])
 
 
 def test_contact(through_glsl: Any) -> None:
@@ -187,8 +162,8 @@ LOOKUP = """
 def test_index(through_glsl: Any) -> None:
     """The same lists and the same hash, bit for bit, far from the origin and over six decades of size."""
     rng = np.random.default_rng(2)
-    positions = np.float32(rng.normal(size=(400, 3)) * 10.0 ** rng.uniform(-3, 6, (400, 1)))
-    influence = np.float32(10.0 ** rng.uniform(-3, 3, 400))
+    positions = (rng.normal(size=(400, 3)) * 10.0 ** rng.uniform(-3, 6, (400, 1))).astype(np.float32)
+    influence = (10.0 ** rng.uniform(-3, 3, 400)).astype(np.float32)
     index = DecalIndex.build(positions, influence)
     where = positions + rng.normal(size=(400, 3)) * influence[:, None] * 0.2
     cells = rng.integers(0, 2**24, (400, 3))
@@ -199,22 +174,12 @@ def test_index(through_glsl: Any) -> None:
         assert np.array_equal(seen[:, :3], expected)
 
 
-@wp.kernel
-def lookups(
-    x: wp.array(dtype=wp.vec4),
-    cells: wp.array(dtype=wp.vec3i),
-    index: IndexedDecals,
-    result: wp.array(dtype=wp.vec3),
-) -> None:
-    i = wp.tid()
-    span = cell_range(wp.vec3(x[i][0], x[i][1], x[i][2]), int(x[i][3]), index)
-    h = cell_hash(cells[i][0], cells[i][1], cells[i][2]) & wp.uint32(65535)
-    result[i] = wp.vec3(float(span[0]), float(span[1]), float(h))
-
-
 def through_warp_lookup(index: DecalIndex, x: Any, cells: Any) -> Any:
     result = wp.zeros(len(x), dtype=wp.vec3, device="cpu")
-    inputs = [wp.array(x, dtype=wp.vec4, device="cpu"), wp.array(cells, dtype=wp.vec3i, device="cpu")]
+    inputs: list[Any] = [
+        wp.array(x, dtype=wp.vec4, device="cpu"),
+        wp.array(cells, dtype=wp.vec3i, device="cpu"),
+    ]
     indexed = index.on("cpu", records=np.zeros((0, 4), np.float32), layered=True)
     wp.launch(lookups, len(x), [*inputs, indexed, result], device="cpu")
     return result.numpy()

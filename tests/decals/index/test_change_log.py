@@ -88,12 +88,17 @@ def test_old_entries_are_forgotten_and_said_to_be_anywhere() -> None:
 
 def test_radial_contact_reaches_as_far_as_neighbours_do_and_anywhere_among_very_uneven_ones() -> None:
     ball = np.array([[1.0, 2.0, 3.0, 0.5]], np.float32)
-    assert affected_balls(ball, Contact.PRODUCT, 9.0)[0, 3] == pytest.approx(0.575 * 0.5, rel=1e-4)
-    assert affected_balls(ball, Contact.RADIAL, 2.0)[0, 3] == pytest.approx(
-        0.575 * 0.5 + 0.4542 * 2.0, rel=1e-4
-    )
+    for contact, largest, reach in (
+        (Contact.PRODUCT, 9.0, 0.575 * 0.5),
+        (Contact.RADIAL, 2.0, 0.575 * 0.5 + 0.4542 * 2.0),
+    ):
+        affected = affected_balls(ball, contact, largest)
+        assert affected is not None
+        assert affected[0, 3] == pytest.approx(reach, rel=1e-4)
     assert affected_balls(ball, Contact.RADIAL, 0.51 * MAX_SIZE_RATIO) is None
-    assert affected_balls(ball[:0], Contact.RADIAL, 1e9).shape == (0, 4)
+    nothing = affected_balls(ball[:0], Contact.RADIAL, 1e9)
+    assert nothing is not None
+    assert nothing.shape == (0, 4)
 
 
 @pytest.mark.parametrize("shift", [0.0, 1000.0])

@@ -1,6 +1,7 @@
 """Editing: after any edits, look-ups find who acts, as in an index built anew; only their bytes changed."""
 
 import time
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -114,21 +115,27 @@ def test_many_edits_of_many_decals() -> None:
 
 def test_many_changes_one_after_the_other_lay_the_index_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(4)
-    built, build = [], DecalIndex.build
-    monkeypatch.setattr(DecalIndex, "build", lambda *arrays: built.append(1) or build(*arrays))
+    built, build = 0, DecalIndex.build
+
+    def counted(*arrays: Any) -> DecalIndex:
+        nonlocal built
+        built += 1
+        return build(*arrays)
+
+    monkeypatch.setattr(DecalIndex, "build", counted)
     editor = DecalEditor(some(rng, 400))
     version = editor.version
-    assert len(built) == 1
+    assert built == 1
     first = editor.decals
     editor.assign(np.arange(300), some(rng, 300))
     editor.delete(np.arange(350, 400))
     editor.assign(np.arange(400), first)
     editor.change(7, radii=[0.3])
-    assert len(built) == 1
+    assert built == 1
     assert editor.version > version
-    assert len(built) == 2
+    assert built == 2
     assert {TABLE, IDS} <= set(editor.changed_rows(version))
-    assert len(built) == 2
+    assert built == 2
     check(editor, rng.normal(size=(500, 3)).astype(np.float32))
 
 
@@ -190,7 +197,12 @@ def test_refuses_what_is_no_decal_and_stays_as_it_was() -> None:
         editor.change(0, radii=[1, 2])
     with pytest.raises(InvalidDecals, match="expected one decal, got 2"):
         editor.add(some(np.random.default_rng(4), 2))
-    for wrong in (editor.add, lambda none: editor.assign([1], none), DecalEditor):
+    calls: tuple[Callable[[Any], object], ...] = (
+        editor.add,
+        lambda none: editor.assign([1], none),
+        DecalEditor,
+    )
+    for wrong in calls:
         with pytest.raises(InvalidDecals, match="decals: expected a Decals, got None"):
             wrong(None)
     assert editor.numbers.tolist() == [0, 2]

@@ -9,8 +9,9 @@ from decals.images.load import decode_srgb
 from decals.model import Decals
 from decals.record import Contact
 from decals.rendering.options import SceneLike
-from decals.rendering.renderer import Buffers
+from decals.rendering.picture import Buffers
 from decals.scenes.camera import Camera
+from decals.scenes.objects import MeshObject
 from tests.decals.shapes import Picture, Shape, View
 from tests.oracles.decals import decals_at
 
@@ -25,7 +26,7 @@ TIE = 1e-4
 WHITE = Picture(np.full((4, 4, 4), 255, np.uint8))
 
 
-def scattered(shape: Shape, count: int, seed: int, *, radii: tuple[float, float]) -> Decals:
+def scattered(shape: Shape | MeshObject, count: int, seed: int, *, radii: tuple[float, float]) -> Decals:
     """Decals at random vertices of a shape, random in size and turn."""
     rng = np.random.default_rng(seed)
     corners = shape.vertices[shape.faces[rng.integers(0, len(shape.faces), count)]].astype(np.float64)

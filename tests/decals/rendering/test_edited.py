@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,10 +87,15 @@ def test_a_picture_after_an_edit_sends_about_a_kilobyte(
     renderer: Renderer, edited: EditedScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[int] = []
-    made: list[object] = []
+    made: list[DecalData] = []
     update, make = DecalData.update, DecalData.__init__
+
+    def counted_make(self: DecalData, *args: Any) -> None:
+        made.append(self)
+        make(self, *args)
+
     monkeypatch.setattr(DecalData, "update", lambda self, editor: sent.append(update(self, editor)))
-    monkeypatch.setattr(DecalData, "__init__", lambda self, *args: made.append(self) or make(self, *args))
+    monkeypatch.setattr(DecalData, "__init__", counted_make)
     for step in range(21):
         number = int(edited.decals.numbers[step])
         edited.decals.change(number, positions=edited.decals[number].positions * np.float32(1.001))

@@ -15,7 +15,7 @@ def some(rng: np.random.Generator, count: int) -> Decals:
     normals = rng.normal(size=(count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     radii = np.full(count, 2.0 / np.sqrt(max(count, 100)))
-    return Decals(normals, normals, rng.normal(size=(count, 3)), radii)  # type: ignore[arg-type]
+    return Decals(normals, normals, rng.normal(size=(count, 3)), radii)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from decals.errors import TooMuchData
 from decals.model import Decals
 from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Buffers, Renderer
+from decals.rendering.picture import Buffers
+from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.decals import decals_at

@@ -17,7 +17,19 @@ from tests.decals.editing.scenes import one, scene
 
 SIZE = (16, 12)
 NUMBERS = (-1, 0, True, 10**400, 0.5, float("nan"), float("inf"), np.array(np.nan))
-OTHERS = (None, "x", b"x", {}, ..., [None], ["x"], np.zeros((2, 2)), np.full((4, 4), np.nan), int, one())
+OTHERS: tuple[Any, ...] = (
+    None,
+    "x",
+    b"x",
+    {},
+    ...,
+    [None],
+    ["x"],
+    np.zeros((2, 2)),
+    np.full((4, 4), np.nan),
+    int,
+    one(),
+)
 WRONG = (*NUMBERS, *OTHERS)
 
 
@@ -45,13 +57,13 @@ def test_every_argument_is_checked_by_every_picture(renderer: Renderer, wrong: A
             continue  # the numbers of two modes
         if name == "samples" and wrong is True:
             pass  # no number of samples
-        refused(lambda name=name: drawn(renderer, shown, **{"size": SIZE, name: wrong}))  # type: ignore[misc]
+        refused(lambda name=name: drawn(renderer, shown, **{"size": SIZE, name: wrong}))
     for name in ("x", "y"):
         if not (type(wrong) is int and 0 <= wrong < 12):
             refused(
                 lambda name=name: renderer.buffers_at(
                     shown, **{"x": 1, "y": 1, name: wrong}, options=RenderOptions(size=SIZE)
-                ),  # type: ignore[misc]
+                ),
                 InvalidPoints,
             )
     refused(lambda: Renderer(renderer.context, max_tile=wrong))
@@ -63,7 +75,7 @@ def test_every_argument_is_checked_by_every_picture(renderer: Renderer, wrong: A
 def test_lights_and_backgrounds_are_made_of_numbers(wrong: Any) -> None:
     for name in ("color", "direction", "position", "attenuation"):
         if not (wrong is None and name == "position"):
-            refused(lambda name=name: Light(**{"color": (1, 1, 1), "direction": (0, 0, -1), name: wrong}))  # type: ignore[misc]
+            refused(lambda name=name: Light(**{"color": (1, 1, 1), "direction": (0, 0, -1), name: wrong}))
     refused(lambda: Lighting(wrong))
     refused(lambda: Lighting((wrong,)))
     refused(lambda: Background(wrong, (0, 0, 0, 0)))

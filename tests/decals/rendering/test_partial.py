@@ -180,11 +180,10 @@ def test_editors_say_where_they_changed_something(edited: Edited) -> None:
     np.testing.assert_array_equal(touched[:, 3], np.tile(old.influence, 2))
     middle = editor.version
     editor.delete(3)
-    assert len(editor.changed_balls(middle) if editor.changed_balls(middle) is not None else []) == 1
-    assert (
-        len(editor.changed_balls(editor.version) if editor.changed_balls(editor.version) is not None else [0])
-        == 0
-    )
+    for version, expected in ((middle, 1), (editor.version, 0)):
+        touched = editor.changed_balls(version)
+        assert touched is not None
+        assert len(touched) == expected
     for _ in range(5000):
         editor.change(4, opacities=[0.5])
     assert editor.changed_balls(before) is None

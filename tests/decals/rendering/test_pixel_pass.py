@@ -13,8 +13,9 @@ from decals.field.mapping import ImageMapping
 from decals.rendering import pixel_pass
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
+from decals.rendering.picture import Buffers
 from decals.rendering.pixel_pass import BACKEND_VARIABLE, COMPUTE_VERSION, PassBackend, measure
-from decals.rendering.renderer import Buffers, Renderer
+from decals.rendering.renderer import Renderer
 from tests.decals.rendering.pictures import SIZE, compare, scattered, view_of
 from tests.decals.shapes import torus
 
@@ -96,7 +97,12 @@ def test_equally_fast_means_fragment(card: Context, monkeypatch: pytest.MonkeyPa
 
 def test_it_measures_each_once_for_each_driver(card: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[PassBackend] = []
-    monkeypatch.setattr(pixel_pass, "measure", lambda _, backend: seen.append(backend) or 1.0)
+
+    def one_second(_: Context, backend: PassBackend) -> float:
+        seen.append(backend)
+        return 1.0
+
+    monkeypatch.setattr(pixel_pass, "measure", one_second)
     card.probe(PassBackend.COMPUTE)
     assert seen == [PassBackend.COMPUTE]
     assert card.backend is PassBackend.FRAGMENT

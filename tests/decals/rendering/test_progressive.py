@@ -58,9 +58,12 @@ def test_a_picture_in_parts_has_the_bits_of_one_at_once(
 def test_targets_are_made_one_texture_at_a_time(drawer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
     new = drawer.context._new_texture
-    monkeypatch.setattr(
-        drawer.context, "_new_texture", lambda size, kind: made.append(kind) or new(size, kind)
-    )
+
+    def counted(size: tuple[int, int], kind: str) -> Any:
+        made.append(kind)
+        return new(size, kind)
+
+    monkeypatch.setattr(drawer.context, "_new_texture", counted)
     with drawer.context.current():
         drawer.draw(both(), RenderOptions(size=(8, 8), samples=1))  # so that all else is there
         made.clear()
@@ -106,11 +109,9 @@ class Machine:
 
     def drawing(self) -> ProgressiveFrame:
         steps = [lambda part, number=number: self.step(number, part) for number in range(len(self.costs))]
-        plan, targets = (
-            SimpleNamespace(steps=steps, state=None, work=1.0),
-            SimpleNamespace(frame=None, state=None),
-        )
-        return ProgressiveFrame(iter([targets]), lambda *_: plan, lambda: None, clock=lambda: self.now)  # type: ignore[arg-type,return-value]
+        plan: Any = SimpleNamespace(steps=steps, state=None, work=1.0)
+        targets: Any = SimpleNamespace(frame=None, state=None)
+        return ProgressiveFrame(iter([targets]), lambda *_: plan, lambda: None, clock=lambda: self.now)
 
 
 @pytest.mark.parametrize("total", [0.02, 0.5, 4.0])

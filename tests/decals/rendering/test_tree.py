@@ -8,8 +8,9 @@ import pytest
 from blobtree import Node, Point, Segment
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
+from decals.rendering.picture import Buffers
 from decals.rendering.pixel_pass import COMPUTE_VERSION
-from decals.rendering.renderer import Buffers, Renderer
+from decals.rendering.renderer import Renderer
 from decals.rendering.tree import covered_rectangle
 from decals.rendering.viewpoint import PictureView, Projection, Viewpoint, tiles
 from decals.scenes.camera import Camera

@@ -1,6 +1,7 @@
 """What a picture takes for the first time, piece by piece."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,9 +57,12 @@ def test_after_the_warm_up_a_picture_compiles_nothing(
     compiled: list[str] = []
     for name in ("program", "compute_shader"):
         compiler = getattr(context.gl, name)
-        monkeypatch.setattr(
-            context.gl, name, lambda *a, c=compiler, n=name, **k: compiled.append(n) or c(*a, **k)
-        )
+
+        def counted(*args: Any, name: str = name, compiler: Any = compiler, **options: Any) -> Any:
+            compiled.append(name)
+            return compiler(*args, **options)
+
+        monkeypatch.setattr(context.gl, name, counted)
     with context.current():
         tasks = renderer.warmup(scene, RenderOptions(contact=contact)).tasks
         each = []

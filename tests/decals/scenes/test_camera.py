@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from decals.errors import InvalidScene
-from decals.scenes.camera import MIN_NEAR_OVER_FAR, Bounds, Camera, Vector
+from decals.rendering.viewpoint import Bounds
+from decals.scenes.camera import MIN_NEAR_OVER_FAR, Camera, Vector
 
 coordinate = st.floats(-100, 100)
 vector = st.tuples(coordinate, coordinate, coordinate)

@@ -53,11 +53,12 @@ def test_a_point_without_gradient_gets_a_place_and_a_normal() -> None:
 
 def test_straight_onto_the_surface_is_the_same_without_a_mesh() -> None:
     tree, near = blob(), ImplicitSurface(blob()).sample(200, seed=3)[0] * 1.01
-    positions, normals = project_without_mesh(tree, near)
-    expected = ImplicitSurface(tree).project(near)
-    np.testing.assert_array_equal(positions, expected[0])
-    np.testing.assert_array_equal(normals, expected[1])
+    found, expected = project_without_mesh(tree, near), ImplicitSurface(tree).project(near)
+    assert found is not None
+    np.testing.assert_array_equal(found[0], expected[0])
+    np.testing.assert_array_equal(found[1], expected[1])
     far = project_without_mesh(tree, near * 1.15)
+    assert far is not None
     assert np.abs(tree(far[0]) - 0.5).max() < 1e-4
     assert np.allclose(np.linalg.norm(far[1], axis=1), 1, atol=1e-5)
 

@@ -8,7 +8,7 @@ import pyvista as pv
 from blobtree import Point, Segment
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
+from decals.scenes.objects import MeshObject, TreeObject, as_object
 from decals.scenes.scene import DecalImage, Scene
 from tests.decals.shapes import torus
 
@@ -25,6 +25,13 @@ def both() -> Scene:
     scene = Scene(objects=objects, camera=Camera((0, 0, 1)), images=(DecalImage.load("scale"),))
     camera = Camera.framing(scene.bounds, direction=(0.4, -0.9, 0.7), up=(0, 0, 1))
     return scene.replace(camera=camera, decals=scatter([item.surface for item in objects], count=120, seed=3))
+
+
+def mesh_object(name: str, mesh: pv.DataSet) -> MeshObject:
+    """Return a dataset as an object of a scene."""
+    item = as_object(mesh, name)
+    assert isinstance(item, MeshObject)
+    return item
 
 
 def shot(plotter: pv.Plotter) -> np.ndarray:

@@ -100,9 +100,9 @@ def test_a_scene_leaves_the_camera_of_the_plotter_alone(plotter: Factory) -> Non
     pl, fresh, stock = plotter(), plotter(), plotter()
     pl.camera_position = view
     pl.decals.add_scene(both())
-    np.testing.assert_allclose(list(pl.camera_position), view)
+    np.testing.assert_allclose(tuple(pl.camera_position), np.array(view))
     shot(pl)
-    np.testing.assert_allclose(list(pl.camera_position), view)
+    np.testing.assert_allclose(tuple(pl.camera_position), np.array(view))
     fresh.decals.add_scene(both())
     stock.add_mesh(pv.Sphere())
     fresh.show(auto_close=False)

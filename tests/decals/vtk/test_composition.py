@@ -13,7 +13,7 @@ from decals.rendering.options import RenderOptions
 from decals.scenes.objects import TreeObject
 from decals.vtk import SubplotRenderer
 from decals.vtk import proxy_actor as anchor
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
 from tests.oracles.raster import edges
 
@@ -23,6 +23,7 @@ BALL = TreeObject("ball", Point((0, 0, 0), radius=1.0, color=(0.9, 0.1, 0.1)))
 def lying_behind(subplot: SubplotRenderer) -> Buffers:
     """What our renderer finds, by itself, in the stage's part of the window."""
     width, height = subplot.vtk_renderer.GetSize()
+    assert subplot.scene is not None
     with subplot.current():
         return subplot.renderer.buffers(
             subplot.scene, RenderOptions(size=(width, height)), viewpoint=subplot.viewpoint()
@@ -37,7 +38,7 @@ def red(seen: np.ndarray) -> np.ndarray:
     return (seen[..., 0] > seen[..., 1] + 25) & (seen[..., 0] > seen[..., 2] + 25)
 
 
-def with_plane(pl: pv.Plotter, **options: object) -> None:
+def with_plane(pl: Plotter, **options: Any) -> None:
     """The ball, and a blue plane through its middle that cuts it along x = 0.25."""
     pl.disable_anti_aliasing()
     plane = pv.Plane(center=(0.25, 0, 0), direction=(1, 0, 0), i_size=4, j_size=4)
@@ -45,7 +46,7 @@ def with_plane(pl: pv.Plotter, **options: object) -> None:
     pl.decals.add_implicit(BALL)
 
 
-CAMERAS = {
+CAMERAS: dict[str, dict[str, Any]] = {
     "perspective": {},
     "parallel": {"parallel": True},
     "roll": {"roll": 37.0},
@@ -56,7 +57,7 @@ CAMERAS = {
 
 
 def place(
-    pl: pv.Plotter,
+    pl: Plotter,
     *,
     parallel: Any = False,
     roll: Any = None,
@@ -117,7 +118,7 @@ def test_vtks_depth_is_our_depth(plotter: Factory, name: str) -> None:
     np.testing.assert_allclose(z, expected, atol=1e-5)
 
 
-def vtk_depth(pl: pv.Plotter) -> np.ndarray:
+def vtk_depth(pl: Plotter) -> np.ndarray:
     from vtkmodules.vtkCommonCore import vtkFloatArray
 
     values = vtkFloatArray()
@@ -156,9 +157,9 @@ def test_a_volume_shines_through_before_us_alone(plotter: Factory) -> None:
     pl.disable_anti_aliasing()
     pl.decals.add_implicit(BALL)
     grid = pv.ImageData(dimensions=(12, 12, 12), spacing=(0.09,) * 3, origin=(-0.5, -0.5, -0.5))
-    volume = pl.add_volume(
-        grid, scalars=np.ones(12**3), opacity=[0.2, 0.2], cmap="Blues", show_scalar_bar=False
-    )
+    opacity = np.array([0.2, 0.2])
+    volume = pl.add_volume(grid, scalars=np.ones(12**3), opacity=opacity, cmap="Blues", show_scalar_bar=False)
+    assert isinstance(volume, pv.Volume)
     place(pl)
     pl.camera.clipping_range = (1.0, 20.0)
     within = shot(pl)  # the ball holds the whole volume

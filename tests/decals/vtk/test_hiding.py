@@ -1,6 +1,7 @@
 """What VTK's actors hide is not picked; what shows is, at every size and in every mode."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +12,13 @@ from hypothesis import strategies as st
 from decals.rendering.options import RenderOptions
 from decals.rendering.viewpoint import Rectangle
 from decals.vtk.frame import texels_of
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
 from tests.decals.vtk.test_composition import BALL, blue, lying_behind, place, with_plane
 from tests.oracles.raster import edges
 
 
-def plane(pl: pv.Plotter, *, at: float, **options: object) -> None:
+def plane(pl: Plotter, *, at: float, **options: Any) -> None:
     sheet = pv.Plane(center=(at, 0, 0), direction=(1, 0, 0), i_size=9, j_size=9)
     pl.add_mesh(sheet, reset_camera=False, **options)
     pl.reset_camera_clipping_range()
@@ -37,7 +38,7 @@ def plane(pl: pv.Plotter, *, at: float, **options: object) -> None:
     ],
 )
 def test_a_plane_before_us_hides_us_and_one_behind_us_does_not(
-    plotter: Factory, prepare: Callable[[pv.Plotter], object]
+    plotter: Factory, prepare: Callable[[Plotter], object]
 ) -> None:
     pl = plotter()
     pl.decals.add_implicit(BALL)
@@ -129,7 +130,7 @@ def test_nothing_is_hidden_where_what_was_drawn_is_forgotten(plotter: Factory) -
             subplot.scene, RenderOptions(size=(50, 40), samples=1), viewpoint=view, slot="several"
         ).complete()
     assert subplot.at(80, 60) is not None
-    pl.camera.zoom(1.1)
+    pl.camera.zoom(1.1)  # type: ignore[no-untyped-call]
     shot(pl)
     assert subplot.at(80, 60) is None
 

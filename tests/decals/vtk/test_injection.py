@@ -1,6 +1,7 @@
 """Decals in VTK's own shaders: the same owners and places in images as our renderer finds, VTK's light."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,13 +13,11 @@ from decals.record import Contact
 from decals.rendering import Buffers
 from decals.rendering.options import RenderOptions
 from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject
 from decals.scenes.scene import Scene
-from decals.surfaces.convert import as_shape
 from decals.vtk import injection
 from tests.decals.rendering.pictures import in_layers, scattered
-from tests.decals.vtk.conftest import Factory
-from tests.decals.vtk.scenes import shot
+from tests.decals.vtk.conftest import Factory, Plotter
+from tests.decals.vtk.scenes import mesh_object, shot
 from tests.oracles.raster import edges
 
 SIZE = (160, 120)
@@ -41,17 +40,18 @@ UV = f"""
 
 
 def torus() -> pv.PolyData:
-    return pv.ParametricTorus(ringradius=1.0, crosssectionradius=0.4, u_res=40, v_res=20, w_res=5).clean()
+    ring = pv.ParametricTorus(ringradius=1.0, crosssectionradius=0.4, u_res=40, v_res=20, w_res=5).clean()
+    assert isinstance(ring, pv.PolyData)
+    return ring
 
 
 def decals_over(mesh: pv.PolyData, count: int = 90, *, seed: int = 4) -> Decals:
-    thing = MeshObject("mesh", *as_shape(mesh))
-    return scattered(thing, count, seed, radii=(0.08, 0.4))
+    return scattered(mesh_object("mesh", mesh), count, seed, radii=(0.08, 0.4))
 
 
 def subplot_with(
-    plotter: Factory, mesh: pv.DataSet, decals: Decals, *, paint: str = injection.PAINT, **look: object
-) -> tuple[pv.Plotter, pv.Actor]:
+    plotter: Factory, mesh: pv.DataSet, decals: Decals, *, paint: str = injection.PAINT, **look: Any
+) -> tuple[Plotter, pv.Actor]:
     pl = plotter(window_size=SIZE)
     pl.disable_anti_aliasing()
     actor = pl.add_mesh(mesh, **look)
@@ -63,19 +63,20 @@ def subplot_with(
     return pl, actor
 
 
-def found_by_us(pl: pv.Plotter, mesh: pv.DataSet) -> Buffers:
+def found_by_us(pl: Plotter, mesh: pv.DataSet) -> Buffers:
     """The batch renderer's, of the same mesh from the same camera."""
     subplot = pl.decals.subplot
     scene = Scene(
-        objects=(MeshObject("mesh", *as_shape(mesh)),),
+        objects=(mesh_object("mesh", mesh),),
         camera=Camera((0, 0, 1)),
         decals=pl.decals.scene.decals,
         images=pl.decals.scene.images,
     )
     with subplot.current():
-        return subplot.renderer.buffers(
+        buffers: Buffers = subplot.renderer.buffers(
             scene, RenderOptions(size=SIZE, contact=subplot.contact), viewpoint=subplot.viewpoint()
         )
+    return buffers
 
 
 LOOKS: dict[str, dict[str, object]] = {
@@ -140,7 +141,12 @@ def test_light_is_vtks(plotter: Factory) -> None:
 def test_scalars_edges_and_opacity_stay(plotter: Factory) -> None:
     mesh = pv.Sphere(theta_resolution=16, phi_resolution=16)
     mesh["height"] = mesh.points[:, 2]
-    looks = [{"show_edges": True}, {"opacity": 0.5}, {"pbr": True}, {"scalars": "height", "show_edges": True}]
+    looks: list[dict[str, Any]] = [
+        {"show_edges": True},
+        {"opacity": 0.5},
+        {"pbr": True},
+        {"scalars": "height", "show_edges": True},
+    ]
     decals = decals_over(mesh, 30).replace(radii=np.full(30, 0.1))
     for look in looks:
         pl, actor = subplot_with(plotter, mesh, decals, show_scalar_bar=False, **look)
@@ -161,7 +167,7 @@ def test_scalars_edges_and_opacity_stay(plotter: Factory) -> None:
 def test_decals_over_stock_actors_and_our_objects(plotter: Factory) -> None:
     """Every actor shows its part of a decal that lies on both, owner for owner."""
     ball, box = pv.Sphere(radius=0.6), pv.Cube(center=(0.6, 0, 0)).triangulate().subdivide(3)
-    decals = scattered(MeshObject("ball", *as_shape(ball)), 60, 2, radii=(0.1, 0.3))
+    decals = scattered(mesh_object("ball", ball), 60, 2, radii=(0.1, 0.3))
     pl, _ = subplot_with(plotter, box, decals, paint=OWNER, lighting=False)
     pl.decals.add_mesh(ball)
     seen = shot(pl)
@@ -178,7 +184,7 @@ def test_decals_that_follow_and_decals_that_stay(plotter: Factory) -> None:
     mesh = torus()
     decals = decals_over(mesh)
 
-    def picture(*, follow: bool, moved: bool, **options: object) -> np.ndarray:
+    def picture(*, follow: bool, moved: bool, **options: Any) -> np.ndarray:
         pl = plotter(window_size=SIZE)
         pl.disable_anti_aliasing()
         actor = pl.add_mesh(mesh, lighting=False, color="white")
@@ -237,7 +243,8 @@ def test_a_mesh_that_changes_keeps_true_normals(plotter: Factory) -> None:
     mesh = torus()
     pl, actor = subplot_with(plotter, mesh, decals_over(mesh), color="white")
     shot(pl)
-    mesh.points[:] = np.asarray(mesh.points) * (1.0, 1.0, 0.6)
+    points: Any = mesh.points
+    points[:] = np.asarray(points) * (1.0, 1.0, 0.6)
     changed = shot(pl)
     fresh, _ = subplot_with(plotter, mesh.copy(), pl.decals.scene.decals, color="white")
     np.testing.assert_array_equal(shot(fresh), changed)
@@ -254,7 +261,9 @@ def test_decals_stay_if_another_actor_shows_the_same_mesh(
     """VTK shares the points of a mesh between actors, and shifts and scales those of a large or far one."""
     mesh = pv.Sphere(radius=16, center=center)
     decals = decals_over(pv.Sphere(radius=1.0), 60)
-    decals = decals.replace(positions=16 * decals.positions + np.float32(center), radii=16 * decals.radii)
+    decals = decals.replace(
+        positions=16 * decals.positions + np.array(center, np.float32), radii=16 * decals.radii
+    )
 
     def owners(*, others: int) -> np.ndarray:
         pl = plotter(window_size=SIZE)
@@ -267,7 +276,8 @@ def test_decals_stay_if_another_actor_shows_the_same_mesh(
         pl.decals.add(decals, images=["scale"])
         subplot = pl.decals.subplot
         subplot.applied._injections.append(injection.Injection(subplot, actor, paint=OWNER))
-        pl.camera_position = [np.add(center, (40.0, -50.0, 30.0)), center, (0, 0, 1)]
+        x, y, z = center
+        pl.camera_position = [(x + 40.0, y - 50.0, z + 30.0), center, (0, 0, 1)]
         pl.reset_camera_clipping_range()
         return shot(pl)
 
@@ -286,6 +296,7 @@ def test_pyvistas_pickers_return_pyvistas_mesh(plotter: Factory) -> None:
     picked: list[pv.DataSet] = []
     pl.enable_mesh_picking(picked.append, show=False, show_message=False)
     row, column = np.argwhere((shot(pl) != 255).any(axis=-1))[500]
+    assert pl.iren is not None
     pl.iren.picker.Pick(int(column), SIZE[1] - 1 - int(row), 0, pl.renderer)
     assert pl.picked_actor is actor
     assert [type(one) for one in picked] == [pv.PolyData]

@@ -14,7 +14,8 @@ from tests.decals.editing.scenes import one, scene
 from tests.decals.vtk.conftest import Factory, plotter
 
 __all__ = ["plotter"]
-WRONG = (None, -1, float("nan"), 10**400, "x", b"x", {}, object(), [None], np.zeros((2, 2)), int, one())
+OTHERS: tuple[Any, ...] = (None, "x", b"x", {}, object(), [None], np.zeros((2, 2)), int, one())
+WRONG = (-1, float("nan"), 10**400, *OTHERS)
 
 
 def refused(call: Callable[[Any], object], *fits: object) -> None:
@@ -47,8 +48,9 @@ def test_a_plotter(plotter: Factory) -> None:
 def test_a_window(plotter: Factory) -> None:
     window = EditWindow(scene(), plotter=plotter())
     window.show()
-    for tool in (window.tools.at, window.tools.press, window.tools.move):
-        refused(lambda wrong, tool=tool: tool(wrong, 3), -1)
+    refused(lambda wrong: window.tools.at(wrong, 3), -1)
+    refused(lambda wrong: window.tools.press(wrong, 3), -1)
+    refused(lambda wrong: window.tools.move(wrong, 3), -1)
     refused(lambda wrong: window.tools.key(wrong, 3, 3), "x")
     refused(lambda wrong: window.tools.key("z", wrong, 3), -1)
     refused(lambda wrong: press_key(window, wrong), "x")

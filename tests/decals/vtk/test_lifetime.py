@@ -4,6 +4,7 @@ import gc
 import warnings
 import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from decals.errors import InvalidScene
 from decals.rendering import Renderer
 from decals.rendering.options import RenderOptions
 from tests.decals.shapes import Picture, View
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
 
 STATUS = Path("/proc/self/statm")
@@ -31,8 +32,8 @@ def show_and_close(plotter: Factory, *, ours: bool = True) -> np.ndarray:
     return seen
 
 
-def make(**options: object) -> pv.Plotter:
-    return pv.Plotter(off_screen=True, window_size=(160, 120), **options)
+def make(**options: Any) -> Plotter:
+    return Plotter(off_screen=True, window_size=[160, 120], **options)
 
 
 def test_closing_lets_go_of_everything(plotter: Factory) -> None:

@@ -11,7 +11,7 @@ from decals.errors import InvalidScene
 from decals.rendering import TRANSPARENT
 from decals.rendering.options import RenderOptions
 from decals.vtk import Lights
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
 from tests.decals.vtk.test_composition import lying_behind
 
@@ -21,36 +21,36 @@ BEFORE_ROUNDING = 2
 """Of 255: half floats in our targets, and normals at vertices."""
 
 
-def headlight(pl: pv.Plotter) -> None:
+def headlight(pl: Plotter) -> None:
     pl.remove_all_lights()
     pl.add_light(pv.Light(light_type="headlight", intensity=0.7))
 
 
-def sun(pl: pv.Plotter) -> None:
+def sun(pl: Plotter) -> None:
     pl.remove_all_lights()
     pl.add_light(pv.Light(position=(1, 2, 3), focal_point=(0, 0, 0), color="orange", intensity=0.9))
 
 
-def lamp(pl: pv.Plotter) -> None:
+def lamp(pl: Plotter) -> None:
     pl.remove_all_lights()
     light = pv.Light(position=(0.3, -1.2, 0.8), focal_point=(0, 0, 0), color=(0.6, 0.8, 1.0), intensity=1.4)
     light.positional, light.cone_angle, light.attenuation_values = True, 120.0, (0.6, 0.3, 0.2)
     pl.add_light(light)
 
 
-def spot(pl: pv.Plotter) -> None:
+def spot(pl: Plotter) -> None:
     light = pv.Light(position=(0.2, -2.0, 0.4), focal_point=(0, 0, 0.1), color="cyan", intensity=0.8)
     light.positional, light.cone_angle, light.exponent = True, 12.0, 8.0
     pl.add_light(light)
 
 
-def one_off(pl: pv.Plotter) -> None:
+def one_off(pl: Plotter) -> None:
     sun(pl)
     pl.add_light(pv.Light(position=(-3, 0, 0), color="red", intensity=1.0))
     pl.renderer.lights[-1].switch_off()
 
 
-LIGHTINGS: dict[str, Callable[[pv.Plotter], object]] = {
+LIGHTINGS: dict[str, Callable[[Plotter], object]] = {
     "light kit": lambda pl: None,
     "three lights": lambda pl: pl.enable_3_lights(),
     "none": lambda pl: pl.remove_all_lights(),
@@ -64,7 +64,7 @@ LIGHTINGS: dict[str, Callable[[pv.Plotter], object]] = {
 }
 
 
-def ball(plotter: Factory, lighting: str, *, ours: bool) -> tuple[pv.Plotter, np.ndarray]:
+def ball(plotter: Factory, lighting: str, *, ours: bool) -> tuple[Plotter, np.ndarray]:
     pl = plotter(window_size=(120, 120))
     pl.disable_anti_aliasing()
     if ours:

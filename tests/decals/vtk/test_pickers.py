@@ -14,12 +14,12 @@ from blobtree import Point
 from decals.errors import InvalidScene
 from decals.scattering.scatter import scatter
 from decals.vtk.subplot import PickResult
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import shot
 from tests.decals.vtk.test_composition import BALL, lying_behind, place
 
 
-def filled(plotter: Factory, *, ours: bool) -> tuple[pv.Plotter, pv.Actor]:
+def filled(plotter: Factory, *, ours: bool) -> tuple[Plotter, pv.Actor]:
     pl = plotter()
     pl.disable_anti_aliasing()
     actor = pl.add_mesh(pv.Sphere(radius=0.5, center=(0, -1.4, -0.7)), color="tan")

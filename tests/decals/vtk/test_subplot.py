@@ -12,11 +12,9 @@ from decals.index.editor import DecalEditor
 from decals.record import Contact
 from decals.rendering import TRANSPARENT
 from decals.rendering.options import RenderOptions
-from decals.scenes.objects import MeshObject
-from decals.surfaces.convert import as_shape
 from decals.vtk.subplot import SubplotRenderer
-from tests.decals.vtk.conftest import Factory
-from tests.decals.vtk.scenes import both, shot
+from tests.decals.vtk.conftest import Factory, Plotter
+from tests.decals.vtk.scenes import both, mesh_object, shot
 from tests.oracles.raster import edges
 
 
@@ -102,7 +100,7 @@ def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
         lambda pl: setattr(pl, "window_size", (150, 120)),
     ],
 )
-def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[pv.Plotter], None]) -> None:
+def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[Plotter], None]) -> None:
     pl = plotter()
     pl.decals.add_scene(both(), camera=True)
     first = shot(pl)
@@ -195,7 +193,7 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
     assert 0.0 < pl.decals.subplot.drawn_fraction == share < 0.5
     assert (without != first).any()
     np.testing.assert_array_equal(shot(pl), without)
-    document.objects = (*both().objects, MeshObject("ball", *as_shape(pv.Sphere(center=(0, 0, 4)))))
+    document.objects = (*both().objects, mesh_object("ball", pv.Sphere(center=(0, 0, 4))))
     shot(pl)
     assert pl.bounds.z_max > 4.2
 
@@ -212,7 +210,7 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
     ],
 )
 def test_frames_drawn_in_part_are_those_drawn_whole(
-    plotter: Factory, change: Callable[[pv.Plotter], None]
+    plotter: Factory, change: Callable[[Plotter], None]
 ) -> None:
     """In two subplots of one window, each with a document of its own, seen and lit in VTK's ways."""
     pl = plotter(shape=(1, 2), window_size=(240, 120))

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -12,34 +13,35 @@ from blobtree import Point
 from decals.rendering.options import RenderOptions
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import TreeObject
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import shot
 
-Prepare = Callable[[pv.Plotter], object]
+Prepare = Callable[[Plotter], object]
 
 BLOB = TreeObject("blob", Point((0.7, -0.9, 0.2), radius=0.35))
 DECALS = scatter([BLOB.surface], count=20, seed=1)
 
 
-def textured(pl: pv.Plotter) -> None:
+def textured(pl: Plotter) -> None:
     plane = pv.Plane(i_size=3, j_size=3, center=(0, 0, -0.9))
     checks = (np.indices((16, 16)).sum(axis=0) % 2 * 200).astype(np.uint8)
-    pl.add_mesh(plane, texture=pv.Texture(np.repeat(checks[..., None], 3, axis=2)))
+    texture = pv.Texture(np.repeat(checks[..., None], 3, axis=2))  # type: ignore[no-untyped-call]
+    pl.add_mesh(plane, texture=texture)
 
 
-def opaque(pl: pv.Plotter) -> None:
+def opaque(pl: Plotter) -> None:
     pl.add_mesh(pv.Sphere(radius=0.6), color="tan", smooth_shading=True)
     wave = pv.Plane(i_size=3, j_size=3, center=(0, 0, -1), i_resolution=9, j_resolution=9)
     pl.add_mesh(wave, scalars=np.sin(7 * wave.points[:, 0]), show_edges=True, scalar_bar_args={"title": "x"})
 
 
-def translucent(pl: pv.Plotter) -> None:
+def translucent(pl: Plotter) -> None:
     opaque(pl)
     for shift in (-0.3, 0.0, 0.3):
         pl.add_mesh(pv.Sphere(radius=0.9, center=(shift, 0.2, 0)), color="red", opacity=0.3)
 
 
-def everything(pl: pv.Plotter) -> None:
+def everything(pl: Plotter) -> None:
     translucent(pl)
     textured(pl)
     pl.add_text("some text", font_size=8)
@@ -50,46 +52,46 @@ def everything(pl: pv.Plotter) -> None:
     pl.add_arrows(np.array([[-1.0, 0, 0]]), np.array([[0.0, 0, 1]]))
 
 
-def volume(pl: pv.Plotter) -> None:
+def volume(pl: Plotter) -> None:
     opaque(pl)
     grid = pv.ImageData(dimensions=(20, 20, 20), spacing=(0.1,) * 3, origin=(-1, -1, -0.9))
     values = np.exp(-3 * np.sum(np.asarray(grid.points) ** 2, axis=1))
     pl.add_volume(grid, scalars=values, opacity="linear", cmap="viridis", show_scalar_bar=False)
 
 
-def depth_peeling(pl: pv.Plotter) -> None:
+def depth_peeling(pl: Plotter) -> None:
     translucent(pl)
     pl.enable_depth_peeling(10)
 
 
-def widgets(pl: pv.Plotter) -> None:
+def widgets(pl: Plotter) -> None:
     opaque(pl)
     pl.add_slider_widget(lambda _: None, (0, 1), title="slide")
     pl.add_plane_widget(lambda *_: None, bounds=(-1, 1, -1, 1, -1, 1))
 
 
-def fxaa(pl: pv.Plotter) -> None:
+def fxaa(pl: Plotter) -> None:
     """VTK's own FXAA draws black where VTK goes through EGL; pyvista says so and takes SSAA."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*does not properly support FXAA")
         pl.enable_anti_aliasing("fxaa")
 
 
-def anti_aliasing(kind: str) -> Prepare:
+def anti_aliasing(kind: Literal["", "msaa", "ssaa"]) -> Prepare:
     return lambda pl: pl.enable_anti_aliasing(kind) if kind else pl.disable_anti_aliasing()
 
 
-def eye_dome(pl: pv.Plotter) -> None:
+def eye_dome(pl: Plotter) -> None:
     pl.disable_anti_aliasing()
     pl.enable_eye_dome_lighting()
 
 
-def eye_dome_and_ssaa(pl: pv.Plotter) -> None:
+def eye_dome_and_ssaa(pl: Plotter) -> None:
     pl.enable_eye_dome_lighting()
     pl.enable_anti_aliasing("ssaa")
 
 
-def gradient_and_stereo(pl: pv.Plotter) -> None:
+def gradient_and_stereo(pl: Plotter) -> None:
     pl.set_background("white", top="blue")
     pl.enable_stereo_render()
 
@@ -114,7 +116,7 @@ MODES: dict[str, tuple[Prepare, Prepare, int]] = {
 }
 
 
-def picture(plotter: Factory, mode: str, *, ours: bool) -> tuple[pv.Plotter, np.ndarray]:
+def picture(plotter: Factory, mode: str, *, ours: bool) -> tuple[Plotter, np.ndarray]:
     fill, prepare, _ = MODES[mode]
     pl = plotter()
     fill(pl)

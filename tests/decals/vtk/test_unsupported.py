@@ -10,17 +10,17 @@ import pyvista as pv
 
 from decals.vtk.adapters import Lights, unsupported_modes
 from decals.vtk.exports import CLIENTS
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
 from tests.decals.vtk.test_undisturbed import translucent
 
 
-def peeling(pl: pv.Plotter) -> None:
+def peeling(pl: Plotter) -> None:
     pl.enable_depth_peeling(4)
     pl.enable_anti_aliasing("msaa")
 
 
-def shadows(pl: pv.Plotter) -> None:
+def shadows(pl: Plotter) -> None:
     """One light, so one shadow map."""
     pl.remove_all_lights()
     light = pv.Light(position=(3, -3, 5), focal_point=(0, 0, 0), cone_angle=40, light_type="scene light")
@@ -29,7 +29,7 @@ def shadows(pl: pv.Plotter) -> None:
     pl.enable_shadows()
 
 
-MODES: dict[str, tuple[Callable[[pv.Plotter], object], str]] = {
+MODES: dict[str, tuple[Callable[[Plotter], object], str]] = {
     "shadows": (shadows, "receive none"),
     "occlusion": (lambda pl: pl.enable_ssao(), "VTK's own actors only"),
     "peeling": (peeling, "draws no translucent actors"),
@@ -100,7 +100,7 @@ class View:
     def update(self) -> None:
         raise AssertionError("nothing is drawn here")
 
-    def hear_of(self, plotter: pv.Plotter) -> None:
+    def hear_of(self, plotter: Plotter) -> None:
         plotter.add_on_render_callback(lambda *_: self.update(), render_event=False)
 
 

@@ -2,6 +2,7 @@
 
 from itertools import islice
 
+import numpy as np
 import pyvista as pv
 
 from decals.window.host_plotter import ray_through
@@ -11,15 +12,18 @@ from tests.decals.window.driver import Driver
 def test_what_an_actor_hides_is_neither_picked_nor_gone_to(driver: Driver) -> None:
     (number, at), (other, there) = islice(driver.visible(), 2)
     ray = ray_through(driver.window.subplot, *there)
-    ball = pv.Sphere(radius=0.12, center=ray[0] + 0.5 * (driver.document.decals[other].positions[0] - ray[0]))
+    assert ray is not None
+    origin = np.asarray(ray[0])
+    center = origin + 0.5 * (driver.document.decals[other].positions[0] - origin)
+    ball = pv.Sphere(radius=0.12, center=center)
     driver.plotter.add_mesh(ball, reset_camera=False, name="ball")
     driver.shot()
     driver.click(there)
-    assert driver.window.actions.state.selection == ()
+    assert list(driver.window.actions.state.selection) == []
     driver.key("a", there)
     assert driver.window.actions.state.message == "no surface under the cursor; point at one"
     driver.click(at)
-    assert driver.window.actions.state.selection == (number,)
+    assert list(driver.window.actions.state.selection) == [number]
     before = driver.state
     driver.event("LeftButtonPressEvent", at)
     driver.event("MouseMoveEvent", there)
@@ -28,7 +32,7 @@ def test_what_an_actor_hides_is_neither_picked_nor_gone_to(driver: Driver) -> No
     driver.plotter.remove_actor("ball")
     driver.shot()
     driver.click(there)
-    assert driver.window.actions.state.selection == (other,)
+    assert list(driver.window.actions.state.selection) == [other]
 
 
 def test_what_surrounds_a_selected_decal_hides_nothing(driver: Driver) -> None:

@@ -30,7 +30,7 @@ def test_samples_and_paths_that_are_none_are_refused(options: Any) -> None:
 
 def test_what_is_no_scene_is_refused() -> None:
     with pytest.raises(InvalidScene, match="EditSession to edit, got NoneType"):
-        EditWindow(None, off_screen=True)
+        EditWindow(None, off_screen=True)  # type: ignore[arg-type]
 
 
 def test_without_a_screen_a_window_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from blobtree import Point
 from decals.editing.scatter_commands import decals_on
+from tests.decals.editing.scenes import tree_of
 from tests.decals.window.driver import Driver
 
 
@@ -67,8 +69,9 @@ def test_a_window_without_objects_gets_one_where_it_looks(driver: Driver) -> Non
     driver.plotter.camera.focal_point = (0.25, 0, 0)
     driver.plotter.enable_parallel_projection()
     driver.press("N", shift=True)
-    (ball,) = driver.document.objects
-    np.testing.assert_allclose(ball.tree.center, (0.25, 0, 0), atol=1e-6)
+    ball = tree_of(driver.document)
+    assert isinstance(ball, Point)
+    np.testing.assert_allclose(ball.center, (0.25, 0.0, 0.0), atol=1e-6)
     assert driver.window.handle.widget is not None
     driver.plotter.disable_parallel_projection()
     driver.plotter.camera.focal_point = driver.document.camera.target

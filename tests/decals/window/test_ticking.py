@@ -3,10 +3,10 @@
 import asyncio
 import gc
 import weakref
+from typing import Any
 
 import numpy as np
 import pytest
-import pyvista as pv
 
 from decals.editing.scatter_commands import decals_on
 from decals.window import EditWindow
@@ -17,7 +17,7 @@ from tests.decals.window.driver import Driver
 __all__ = ["plotter"]
 
 
-def tasks() -> list[asyncio.Task]:
+def tasks() -> list[asyncio.Task[Any]]:
     return [task for task in asyncio.all_tasks() if "EditWindow" in task.get_name()]
 
 
@@ -30,7 +30,7 @@ async def rested(window: EditWindow) -> None:
 
 def test_scattered_decals_are_applied_and_the_drawing_is_reported(plotter: Factory) -> None:
     pl = plotter()
-    drawn: list[pv.Plotter] = []
+    drawn: list[object] = []
     pl.add_on_render_callback(drawn.append)
 
     async def play() -> None:

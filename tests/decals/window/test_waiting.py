@@ -40,7 +40,8 @@ def waiting(opened: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
         window.begin()
         window._end_screenshots()  # pyvista takes one while it shows the window
         window.plotter.show(auto_close=False, interactive=False)
-        window.overlay.show_status = lambda text: None  # the line of text is no part of the scene
+        # The line of text is no part of the scene.
+        window.overlay.show_status = lambda text: None  # type: ignore[method-assign]
         window.overlay._status.SetInput("")
         window.plotter.render()
         return window
@@ -249,10 +250,10 @@ def test_a_shader_that_is_refused_is_said_once_and_clearly(
     assert not window.subplot.warming_up
 
 
-def test_a_plotter_that_nobody_edits_in_shows_the_whole_at_once(waiting: Any) -> None:
+def test_a_plotter_without_an_editor_shows_the_whole_at_once(waiting: Any) -> None:
     import pyvista as pv
 
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    plotter = pv.Plotter(off_screen=True, window_size=list(SIZE))
     plotter.decals.add_scene(scene(), camera=True)
     try:
         plotter.show(auto_close=False)
@@ -260,6 +261,6 @@ def test_a_plotter_that_nobody_edits_in_shows_the_whole_at_once(waiting: Any) ->
         first = plotter.screenshot(None, return_img=True)
         plotter.render()
         np.testing.assert_array_equal(plotter.screenshot(None, return_img=True), first)
-        assert len(np.unique(first.reshape(-1, 3), axis=0)) > 50
+        assert len(np.unique(np.asarray(first).reshape(-1, 3), axis=0)) > 50
     finally:
         plotter.close()

@@ -78,7 +78,9 @@ def test_a_click_places_on_either_object(driver: Driver) -> None:
         driver.click(at, ctrl=True)
         (placed,) = driver.window.actions.state.selection
         assert placed in decals_on(driver.document, [number])
-        assert driver.window.tools.at(*at).owner == placed
+        seen = driver.window.tools.at(*at)
+        assert seen is not None
+        assert seen.owner == placed
     assert len(driver.document.decals) == 62
 
 

@@ -55,13 +55,23 @@ class UserInput:
     def click(self, at: tuple[int, int], *modifiers: str, button: int = 1) -> None:
         """Click, with keys held down."""
         self.move(at)
-        self._holding(modifiers, lambda: [self.button(button, down=down) for down in (True, False)])
+
+        def act() -> None:
+            self.button(button, down=True)
+            self.button(button, down=False)
+
+        self._holding(modifiers, act)
 
     def key(self, name: str, *modifiers: str) -> None:
         """Press and release a key, with others held down."""
-        self._holding(modifiers, lambda: [self.press(name, down=down) for down in (True, False)])
 
-    def _holding(self, modifiers: tuple[str, ...], act: Callable[[], object]) -> None:
+        def act() -> None:
+            self.press(name, down=True)
+            self.press(name, down=False)
+
+        self._holding(modifiers, act)
+
+    def _holding(self, modifiers: tuple[str, ...], act: Callable[[], None]) -> None:
         for modifier in modifiers:
             self.press(modifier, down=True)
         act()
@@ -79,6 +89,14 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
     def entries(count: int) -> Callable[[], bool]:
         return lambda: len(window.session.labels) == count and not window.session.stroke_open
 
+    def press() -> None:
+        user.move(at)
+        user.button(1, down=True)
+
+    def hold() -> None:
+        user.move(at)
+        user.key("m")
+
     place = window.plotter.iren.interactor.GetEventPosition
     yield "point", lambda: user.move(at), lambda: tuple(place()) == at
     yield "help", lambda: user.key("h"), lambda: window.overlay.help_visible
@@ -86,11 +104,7 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
     yield "click", lambda: user.click(at), lambda: actions.state.selection == (number,)
     yield "one more", lambda: user.click(there, "Shift_L"), lambda: actions.state.selection == (number, other)
     yield "one less", lambda: user.click(there, "Shift_L"), lambda: actions.state.selection == (number,)
-    yield (
-        "press",
-        lambda: (user.move(at), user.button(1, down=True)),
-        lambda: window.tools.drags_decals,
-    )
+    yield "press", press, lambda: window.tools.drags_decals
     yield "drag", lambda: user.move((at[0] + 9, at[1] + 4)), lambda: window.tools.dragging
     yield "drop", lambda: user.button(1, down=False), entries(1)
     yield "it moved", lambda: None, lambda: (document.decals[number].positions[0] != position).any()
@@ -115,7 +129,7 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
     yield "layer", lambda: user.key("Prior"), lambda: document.decals[placed].layers[0] == 1
     yield "undo", lambda: user.key("z", "Control_L"), lambda: document.decals[placed].layers[0] == 0
     yield "redo", lambda: user.key("y", "Control_L"), lambda: document.decals[placed].layers[0] == 1
-    yield "hold a primitive", lambda: (user.move(at), user.key("m")), lambda: window.handle.widget is not None
+    yield "hold a primitive", hold, lambda: window.handle.widget is not None
     yield "let it go", lambda: user.key("m"), lambda: window.handle.widget is None
     yield "save", lambda: user.key("s", "Control_L"), path.is_file
     camera = driver.plotter.camera.position

@@ -1,0 +1,111 @@
+"""Warp functions of the custom kinds in `custom_kinds.py`: skeletons and operators."""
+
+import warp as wp
+
+
+@wp.func
+def across(n: wp.vec3) -> wp.vec3:
+    """Some unit vector across a unit vector."""
+    if wp.abs(n[0]) < 0.6:
+        return wp.normalize(wp.cross(n, wp.vec3(1.0, 0.0, 0.0)))
+    return wp.normalize(wp.cross(n, wp.vec3(0.0, 1.0, 0.0)))
+
+
+@wp.func
+def ring(q: wp.vec3, center: wp.vec3, axis: wp.vec3, size: wp.float32) -> wp.vec3:
+    """A circle of radius `size` around `axis`."""
+    n = wp.normalize(axis)
+    w = q - center
+    flat = w - n * wp.dot(w, n)
+    if wp.length(flat) <= 1e-6 * wp.length(w):
+        flat = across(n)
+    return center + wp.normalize(flat) * size
+
+
+@wp.func
+def brick(q: wp.vec3, middle: wp.vec3, sides: wp.vec3) -> wp.vec3:
+    """A solid box."""
+    c = wp.vec3(q[0], q[1], q[2])
+    for i in range(3):
+        half = 0.5 * wp.abs(sides[i])
+        c[i] = wp.clamp(q[i], middle[i] - half, middle[i] + half)
+    return c
+
+
+@wp.func
+def closest_between(q: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec3:
+    """The closest point on a straight line from a to b, of any length."""
+    way = b - a
+    length = wp.length(way)
+    if length <= 0.0:
+        return a
+    unit = way / length
+    return a + unit * wp.clamp(wp.dot(q - a, unit), 0.0, length)
+
+
+@wp.func
+def path(q: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+    """Two straight lines, from a to b and from b to c."""
+    first = closest_between(q, a, b)
+    second = closest_between(q, b, c)
+    return wp.where(wp.length(q - first) <= wp.length(q - second), first, second)
+
+
+@wp.func
+def soft(a: wp.float32, b: wp.float32, hardness: wp.float32) -> wp.vec3:
+    """A hyperbolic blend: 0 is the union, 4 the sum."""
+    larger = wp.max(a, b)
+    if larger <= 0.0:
+        return wp.vec3(0.0, 1.0, 0.0)
+    x = a / larger
+    y = b / larger
+    root = wp.sqrt((x - y) * (x - y) + hardness * x * y)
+    if root <= 0.0:
+        return wp.vec3(a, 1.0, 0.0)
+    return wp.vec3(
+        0.5 * (a + b + larger * root),
+        0.5 + 0.5 * (x - y + 0.5 * hardness * y) / root,
+        0.5 + 0.5 * (y - x + 0.5 * hardness * x) / root,
+    )
+
+
+@wp.func
+def carve(a: wp.float32, b: wp.float32) -> wp.vec3:
+    """A difference with soft walls."""
+    rest = wp.max(1.0 - b, 0.0)
+    return wp.vec3(a * rest * rest, rest * rest, -2.0 * a * rest)
+
+
+@wp.func
+def carve_steepest(max_a: wp.float32, max_b: wp.float32) -> wp.vec2:
+    """The tool's partial derivative grows with the solid."""
+    return wp.vec2(1.0, 2.0 * max_a)
+
+
+@wp.func
+def shared(a: wp.float32, b: wp.float32) -> wp.vec3:
+    """The harmonic mean."""
+    total = a + b
+    if total <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    x = a / total
+    y = b / total
+    return wp.vec3(2.0 * a * y, 2.0 * y * y, 2.0 * x * x)
+
+
+@wp.func
+def mean(a: wp.float32, b: wp.float32) -> wp.vec3:
+    """Half of each; where one operand is absent it is neither the other nor 0."""
+    return wp.vec3(0.5 * (a + b), 0.5, 0.5)
+
+
+@wp.func
+def swell(a: wp.float32, b: wp.float32) -> wp.vec3:
+    """A Ricci blend of exponent 2."""
+    larger = wp.max(a, b)
+    if larger <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    x = a / larger
+    y = b / larger
+    root = wp.sqrt(x * x + y * y)
+    return wp.vec3(larger * root, x / root, y / root)
