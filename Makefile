@@ -11,7 +11,7 @@ PYTEST := $(BIN)/python -m pytest --durations=10
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-slow test-all check format lint prose types types-tests wheel check-lower docs gl clean
+.PHONY: help demo test test-slow test-all check format lint prose types wheel check-lower docs gl clean
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s%s\n", $$1, $$2 }' Makefile
@@ -46,11 +46,8 @@ $(LINKS): FORCE
 	@ln -s $(CURDIR)/decals/* $(CURDIR)/apps $(CURDIR)/shaders $@/decals/
 FORCE:
 
-types: $(INSTALLED) $(LINKS)  ## Check types
-	$(MYPY) -p blobtree -p decals
-
-types-tests: $(INSTALLED) $(LINKS)  ## List the type errors of the tests
-	-$(MYPY) -p blobtree -p decals -p tests
+types: $(INSTALLED) $(LINKS)  ## Check types, those of the tests too
+	$(MYPY) -p blobtree -p decals -p tests
 
 wheel: $(INSTALLED)  ## Compile the kernels, build the wheel and try it outside the checkout
 	$(BIN)/python .ci/check_wheel.py
