@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.colors import color_rgb, is_named
+from blobtree.colors import ColorLike, color_rgb, is_named
 from decals.errors import InvalidScene
 from decals.validation import describe, finite_number, finite_vector
 
@@ -55,6 +56,18 @@ class Light:
     attenuation: Vector = (1.0, 0.0, 0.0)
     cone: float = 180.0
     exponent: float = 1.0
+
+    if TYPE_CHECKING:  # names of colours are converted
+
+        def __init__(
+            self,
+            color: ColorLike,
+            direction: Vector,
+            position: Vector | None = None,
+            attenuation: Vector = (1.0, 0.0, 0.0),
+            cone: float = 180.0,
+            exponent: float = 1.0,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         positions = () if self.position is None else ("position",)

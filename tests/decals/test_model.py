@@ -206,12 +206,13 @@ def test_interactions_and_tints_by_name() -> None:
     overlap = decals.replace(interactions="Overlap")
     assert overlap.interactions.tolist() == [Interaction.OVERLAP] * 2
     assert overlap.interactions.dtype == np.int32
-    for names in (["push", "INDEPENDENT"], np.array(["push", "independent"]), [1, "independent"]):
+    mixes: list[Any] = [["push", "INDEPENDENT"], np.array(["push", "independent"]), [1, "independent"]]
+    for names in mixes:
         assert decals.replace(interactions=names).interactions.tolist() == [1, 0]
     assert decals.replace(interactions=Interaction.INDEPENDENT).interactions.tolist() == [0, 0]
     with pytest.raises(InvalidDecals, match="interactions: expected one of 'independent', 'push', 'ov"):
         decals.replace(interactions=["push", "pull"])
-    np.testing.assert_allclose(decals.replace(tints="red").tints, [[1, 0, 0]] * 2)
+    np.testing.assert_allclose(decals.replace(tints="red").tints, np.array([[1.0, 0, 0]] * 2))
     mixed = decals.replace(tints=["#336699", "w"]).tints
     np.testing.assert_allclose(mixed, [[0.2, 0.4, 0.6], [1, 1, 1]], atol=1e-6)
     assert Decals.empty().replace(tints="red", interactions="push").tints.shape == (0, 3)

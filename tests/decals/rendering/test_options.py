@@ -117,4 +117,4 @@ def test_modes_and_colours_by_name() -> None:
     assert Light("red", (0, 0, -1)) == Light((1, 0, 0), (0, 0, -1))
     for wrong in ("round", 3, None):
         with pytest.raises(InvalidScene, match="contact: expected one of 'product', 'min', 'radial', got"):
-            RenderOptions(contact=wrong)
+            RenderOptions(contact=wrong)  # type: ignore[arg-type]

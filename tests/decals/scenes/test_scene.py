@@ -282,7 +282,7 @@ def test_objects_are_checked() -> None:
     with pytest.raises(InvalidMesh, match="rescale"):
         MeshObject("m", CORNERS * np.float32(1e20), FACES)
     with pytest.raises(InvalidMesh, match="finite"):
-        MeshObject("m", CORNERS.astype(np.float64) * 1e300, FACES)  # type: ignore[arg-type]
+        MeshObject("m", CORNERS.astype(np.float64) * 1e300, FACES)
     with pytest.raises(InvalidMesh, match="area"):
         MeshObject("m", CORNERS * 0, FACES)
     with pytest.raises(InvalidScene, match="BlobTree"):

@@ -23,10 +23,12 @@ if TYPE_CHECKING:
         enable_eye_dome_lighting: Any
         enable_mesh_picking: Any
         enable_parallel_projection: Any
+        enable_point_picking: Any
         enable_shadows: Any
         enable_ssao: Any
         enable_terrain_style: Any
         remove_actor: Any
+        iren: Any
         render_window: Any
         set_background: Any
         set_scale: Any

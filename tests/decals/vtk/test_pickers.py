@@ -85,7 +85,7 @@ def test_a_world_point_lies_on_our_surface(plotter: Factory) -> None:
     assert abs(z - hit.depth) < 1e-4
 
 
-def click(pl: pv.Plotter, x: int, y: int, *, left: bool = False) -> None:
+def click(pl: Plotter, x: int, y: int, *, left: bool = False) -> None:
     """Press and release a button at a pixel."""
     interactor = pl.iren.interactor
     interactor.SetEventInformation(x, y, 0, 0, "\0", 0, None)
