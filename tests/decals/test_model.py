@@ -214,7 +214,7 @@ def test_interactions_and_tints_by_name() -> None:
         decals.replace(interactions=["push", "pull"])
     np.testing.assert_allclose(decals.replace(tints="red").tints, np.array([[1.0, 0, 0]] * 2))
     mixed = decals.replace(tints=["#336699", "w"]).tints
-    np.testing.assert_allclose(mixed, [[0.2, 0.4, 0.6], [1, 1, 1]], atol=1e-6)
+    np.testing.assert_allclose(mixed, np.array([[0.2, 0.4, 0.6], [1, 1, 1]]), atol=1e-6)
     assert Decals.empty().replace(tints="red", interactions="push").tints.shape == (0, 3)
     with pytest.raises(InvalidDecals, match=r"tints: expected red, .* or a name, got 'reddish'"):
         decals.replace(tints="reddish")
