@@ -14,7 +14,7 @@ from decals.editing import EditSession, SetValues
 from decals.errors import ImplicitDecalsError
 from decals.index import DecalIndex
 from decals.scenes.objects import bounds_of
-from decals.surfaces import ImplicitSurface, MeshSurface, read_mesh
+from decals.surfaces import ImplicitSurface, MeshSurface, as_surface, read_mesh
 
 HUGE = 10**400
 ENDLESS = 10**6000
