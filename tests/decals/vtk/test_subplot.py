@@ -264,7 +264,7 @@ def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pyte
         *[("samples", wrong) for wrong in (0, 1.5, "2", True, 10**9, None)],
         *[("draw_scale", wrong) for wrong in (0.0, 1.5, "x", None, float("nan"))],
         ("contact", 7),
-        ("mapping", "chord"),
+        ("mapping", "chords"),
         ("scene", 5),
         ("scene", "knot"),
     ],
