@@ -45,7 +45,9 @@ For example:
 
 implicit-decals edit knot --decals 300 --image scale --image eye --save knot.json
 
-implicit-decals edit knot.json
+implicit-decals edit knot.json --images moss.png
+
+implicit-decals edit
 """,
     "scatter": """Scatter decals over models and write a scene, or a table of decals.
 

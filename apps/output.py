@@ -6,7 +6,6 @@ from pathlib import Path
 from decals.errors import InvalidInput
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
-MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
 
 
 def check_output(path: Path, suffixes: tuple[str, ...]) -> None:

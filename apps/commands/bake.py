@@ -1,12 +1,21 @@
 """``implicit-decals bake``: a scene as a GLB file for other programs."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from decals import bake as bake_scene
-from decals.apps.commands.options import MAX_SAMPLES, Definitions, OptionalWhole, Trust, Whole, check_count
+from decals.apps.commands.options import (
+    MAX_SAMPLES,
+    ContactName,
+    Definitions,
+    MappingName,
+    OptionalWhole,
+    Trust,
+    Whole,
+    check_count,
+)
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_model
 from decals.apps.output import check_output
@@ -20,8 +29,8 @@ def bake(
     size: Whole = 2048,
     samples: Whole = 2,
     vertex_colors: Annotated[bool, Parameter(negative=())] = False,
-    contact: Literal["product", "min", "radial"] = "product",
-    mapping: Literal["corrected", "chord"] = "corrected",
+    contact: ContactName = "product",
+    mapping: MappingName = "corrected",
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     define: Definitions = None,

@@ -1,17 +1,22 @@
 """``implicit-decals edit``: the editor window."""
 
+from collections.abc import Sequence
 from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 
-from decals import Scene
+from decals import Camera, Contact, DecalImage, ImageMapping, Scene
 from decals.apps.commands.options import (
+    DEFAULT_IMAGES,
     MAX_DECALS,
     MAX_SEED,
+    ContactName,
     Definitions,
+    MappingName,
     OptionalWhole,
     ScatterOptions,
     Trust,
@@ -22,7 +27,8 @@ from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_output
-from decals.apps.views import UPRIGHT, parse_view
+from decals.apps.views import UPRIGHT, Axes, parse_view
+from decals.editing import AddImage, recovery_path
 from decals.errors import InvalidInput
 from decals.window import EditWindow
 
@@ -35,13 +41,17 @@ def new_file(folder: Path, name: str) -> Path:
 
 
 def edit(
-    model: Annotated[list[str], Parameter(negative=())],
+    model: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     /,
     *,
     decals: OptionalWhole = None,
-    image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
+    image: Annotated[
+        list[str] | None, Parameter(name=("--image", "--images"), negative=(), show_default=False)
+    ] = None,
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x800",
+    contact: ContactName = "product",
+    mapping: MappingName = "corrected",
     seed: OptionalWhole = None,
     save: Path | None = None,
     define: Definitions = None,
@@ -54,19 +64,26 @@ def edit(
     Parameters
     ----------
     model
-        Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render.
+        Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: an empty scene, in
+        which N adds a ball.
     decals
         Number of decals scattered at the start. Default: 500.
     image
-        Image of the decals, as for render. Can be repeated. Default: scale.
+        Image of the decals, as for render. Can be repeated. A saved scene keeps its images, and these are
+        added. Default: scale.
     up
         The axis that points upward. Default: y, or the axis of the sample.
     size
         Width and height of the window in pixels.
+    contact
+        Contact mode at the beginning, as for render; a scene does not store it. P changes it in the window.
+    mapping
+        Image mapping at the beginning, likewise. U changes it in the window.
     seed
         Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
-        The JSON file that Ctrl + S writes. Default: the opened scene, or a new file MODEL-decals.json.
+        The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
+        or scene.json.
     define
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
         repeated.
@@ -82,11 +99,18 @@ def edit(
         check_output(save, (".json",))
     EditWindow.require_screen()
     import_definitions(define)
-    loaded, path = load_models(model, trust=trust), save
-    if isinstance(loaded, Scene):
-        if decals is not None or image or seed is not None:
-            raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
+    added: tuple[DecalImage, ...] = ()
+    path = save
+    if not model or _is_unsaved(model):
+        if decals is not None or seed is not None:
+            raise InvalidInput("an empty scene has no decals; name a model, or leave out --decals and --seed")
+        scene = _empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
+        path = path or (Path(model[0]) if model else new_file(Path(), "scene"))
+    elif isinstance(loaded := load_models(model, trust=trust), Scene):
+        if decals is not None or seed is not None:
+            raise InvalidInput("a saved scene has its own decals; leave out --decals and --seed")
         scene, path = loaded, path or Path(model[0])
+        added = tuple(DecalImage.load(source) for source in image or ())
     else:
         with progress_bars() as progress:
             options = ScatterOptions.from_arguments(decals, image, seed)
@@ -100,12 +124,37 @@ def edit(
             raise InvalidInput(f"expected a scene in the recovery file {str(path)!r}, got a model")
         return recovered
 
-    window = EditWindow(scene, path=path, size=pixels, recover=load_recovered)
+    window = EditWindow(
+        scene,
+        path=path,
+        size=pixels,
+        recover=load_recovered,
+        contact=Contact[contact.upper()],
+        mapping=ImageMapping[mapping.upper()],
+    )
+    for picture in added:
+        window.session.do(AddImage(picture))
     try:
         with window:
             window.show()
     finally:
         _report_unsaved(window)
+
+
+def _is_unsaved(models: list[str]) -> bool:
+    """Return True for one scene file that was never saved, with a recovery file beside it."""
+    first = Path(models[0])
+    return (
+        len(models) == 1 and first.suffix == ".json" and not first.exists() and recovery_path(first).is_file()
+    )
+
+
+def _empty_scene(images: Sequence[str], axes: Axes) -> Scene:
+    """Return a scene without objects, whose camera looks at the origin."""
+    where = parse_view(None, axes)
+    corner = np.ones(3, np.float32)
+    camera = Camera.framing((-corner, corner), direction=where.direction, up=where.up)
+    return Scene(objects=(), camera=camera, images=tuple(DecalImage.load(source) for source in images))
 
 
 def _report_unsaved(window: EditWindow) -> None:

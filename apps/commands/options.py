@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter, Token
 
@@ -41,6 +41,12 @@ OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=F
 
 Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
 """Modules that define custom nodes."""
+
+ContactName = Literal["product", "min", "radial"]
+"""Contact modes on the command line."""
+
+MappingName = Literal["corrected", "chord"]
+"""Image mappings on the command line."""
 
 Trust = Annotated[bool, Parameter(name="--trust", negative=(), show_default=False)]
 """Permission for a scene to read files outside its folder."""

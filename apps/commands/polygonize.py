@@ -6,12 +6,13 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from blobtree.pyvista_views import write_polydata
-from decals import TreeObject
-from decals.apps.commands.options import Definitions, OptionalWhole
+from decals import MeshObject, Scene
+from decals.apps.commands.options import Definitions, OptionalWhole, Trust
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_model
-from decals.apps.output import MESH_SUFFIXES, check_output
-from decals.errors import InvalidInput
+from decals.apps.output import check_output
+from decals.errors import InvalidInput, InvalidMesh, InvalidScene
+from decals.scenes.meshes import MESH_SUFFIXES, as_polydata
 
 OptionalLength = Annotated[float | None, Parameter(show_default=False)]
 
@@ -27,13 +28,14 @@ def polygonize(
     creases: bool = False,
     split_normals: bool = False,
     define: Definitions = None,
+    trust: Trust = False,
 ) -> None:
     """Write the surface of an implicit model as a triangle mesh.
 
     Parameters
     ----------
     model
-        A BlobTree in JSON, or a sample (creature, spheres).
+        A BlobTree in JSON, a sample (creature, spheres), or a saved scene, of which all objects are written.
     output
         The mesh file: ply (with colours), vtp (with colours and normals), obj or stl.
     resolution
@@ -49,24 +51,28 @@ def polygonize(
     define
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
         repeated.
+    trust
+        Let a scene read files outside its folder, and any number of images.
     """
     check_output(output, MESH_SUFFIXES)
     import_definitions(define)
-    loaded = load_model(model)
-    if not isinstance(loaded, TreeObject):
-        raise InvalidInput(f"expected a BlobTree in JSON or a sample (creature, spheres), got {model!r}")
-    with progress_bars() as progress:
-        surface = loaded.tree.to_pyvista(
-            resolution=resolution,
-            cell_size=cell_size,
-            chord_error=chord_error,
-            creases=creases,
-            split_normals=split_normals,
-            progress=progress,
+    loaded = load_model(model, trust=trust)
+    if isinstance(loaded, MeshObject):
+        raise InvalidInput(
+            f"expected a BlobTree or a scene in JSON, or a sample (creature, spheres), got {model!r}"
         )
-        if surface.n_points == 0:
-            raise InvalidInput(
-                f"{model!r} has no surface in cells of this size: its parts may be smaller than a cell, or "
-                "the tree may be empty; increase --resolution"
+    objects = loaded.objects if isinstance(loaded, Scene) else [loaded]
+    with progress_bars() as progress:
+        try:
+            surface = as_polydata(
+                objects,
+                resolution=resolution,
+                cell_size=cell_size,
+                chord_error=chord_error,
+                creases=creases,
+                split_normals=split_normals,
+                progress=progress,
             )
+        except (InvalidMesh, InvalidScene) as error:
+            raise InvalidInput(f"{model!r}: {error}") from error
         write_polydata(output, surface)

@@ -10,7 +10,15 @@ from cyclopts import Parameter
 from blobtree.files import write_atomically
 from decals import DecalImage, Decals, Scene, Sizing, save_scene
 from decals import scatter as scatter_decals
-from decals.apps.commands.options import MAX_DECALS, MAX_SEED, Definitions, OptionalWhole, Whole, check_count
+from decals.apps.commands.options import (
+    MAX_DECALS,
+    MAX_SEED,
+    Definitions,
+    OptionalWhole,
+    Trust,
+    Whole,
+    check_count,
+)
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
@@ -37,7 +45,7 @@ def scatter(
     sizing: Sizing = Sizing.COVERING,
     factor: float = 1.0,
     along: Annotated[Orientation | None, Parameter(show_default=False)] = None,
-    images: Whole = 1,
+    images: OptionalWhole = None,
     choice: ImageChoice = ImageChoice.RANDOM,
     painted: Annotated[Path | None, Parameter(show_default=False)] = None,
     painted_along: Literal["x", "y", "z"] = "z",
@@ -45,6 +53,7 @@ def scatter(
     regularity: float = 1.0,
     seed: Whole = 0,
     define: Definitions = None,
+    trust: Trust = False,
 ) -> None:
     """Scatter decals over models and write them to a file.
 
@@ -54,7 +63,7 @@ def scatter(
     ----------
     model
         Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, or samples (creature, dragon, horse, knot,
-        spheres).
+        spheres), or one saved scene, which keeps its images and camera.
     output
         The output file: json, a scene that render and edit can open, or csv, a row for each decal.
     count
@@ -68,7 +77,7 @@ def scatter(
     along
         Orientation of images: curvature, or cross (a smooth field with fourfold symmetry). Default: random.
     images
-        Number of images, from 1 to 256.
+        Number of images, from 1 to 256. Default: the images of a saved scene, else 1.
     choice
         Rule that assigns images: random, or by the decals' size or the surface's curvature.
     painted
@@ -84,6 +93,8 @@ def scatter(
     define
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
         repeated.
+    trust
+        Let a scene read files outside its folder, and any number of images.
     """
     if count is not None and spacing is not None:
         raise InvalidInput("expected --count or --spacing, got both; leave one of them out")
@@ -91,13 +102,17 @@ def scatter(
         count = 500
     if count is not None:
         check_count("--count", count, 0, MAX_DECALS)
-    check_count("--images", images, 1, MAX_IMAGES)
+    if images is not None:
+        check_count("--images", images, 1, MAX_IMAGES)
     check_count("--seed", seed, 0, MAX_SEED)
     check_output(output, SUFFIXES)
     import_definitions(define)
-    objects = load_models(model)
-    if isinstance(objects, Scene):
-        raise InvalidInput("a saved scene has its own decals; give its models instead")
+    loaded = load_models(model, trust=trust)
+    objects = loaded.objects if isinstance(loaded, Scene) else tuple(loaded)
+    if not objects:
+        raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
+    own = loaded.images if images is None and isinstance(loaded, Scene) else ()
+    pictures = own or scale_images(images or 1)
     with progress_bars() as progress:
         progress(PREPARING, 0.0)
         surfaces = [item.surface for item in objects]
@@ -113,7 +128,7 @@ def scatter(
             sizing=sizing,
             factor=factor,
             direction=along,
-            images=images,
+            images=len(pictures),
             choice=choice,
             seed=seed,
             progress=progress,
@@ -121,9 +136,11 @@ def scatter(
     if output.suffix.lower() == ".csv":
         write_table(decals, output)
         return
-    camera = frame(objects, parse_view(None, axes_of(model[0])), ASPECT)
-    scene = Scene(objects=tuple(objects), camera=camera, images=scale_images(images), decals=decals)
-    save_scene(scene, output)
+    if isinstance(loaded, Scene):
+        camera = loaded.camera
+    else:
+        camera = frame(objects, parse_view(None, axes_of(model[0])), ASPECT)
+    save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals), output)
 
 
 def write_table(decals: Decals, path: Path) -> None:

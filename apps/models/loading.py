@@ -52,7 +52,7 @@ def load_models(models: Sequence[str], *, trust: bool = False) -> list[SceneObje
         if isinstance(loaded, Scene):
             if len(models) > 1:
                 raise InvalidInput(
-                    f"expected meshes and BlobTrees, {model!r} is a whole scene; render it alone"
+                    f"expected meshes and BlobTrees, {model!r} is a whole scene; give it alone"
                 )
             return loaded
         objects.append(loaded)

@@ -1,6 +1,8 @@
 """State that the actions of one window share: selection, messages, strokes and background jobs."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +16,27 @@ from decals.editing.queries import SurfacePick
 from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure
 from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.validation import instance
 
 Cursor = Callable[[], SurfacePick | None]
 """Returns the surface point under the cursor, or None."""
+
+
+class DrawModes(Protocol):
+    """Modes in which a window draws decals; a scene does not store them."""
+
+    contact: Contact
+    mapping: ImageMapping
+
+
+@dataclass
+class DefaultModes:
+    """Modes without a window."""
+
+    contact: Contact = Contact.PRODUCT
+    mapping: ImageMapping = ImageMapping.CORRECTED
 
 
 def require_pick(cursor: Cursor) -> SurfacePick:
@@ -50,6 +69,8 @@ class ActionState:
         Result of the last action, in plain words.
     prompt
         The open prompt, if any; it receives all keys.
+    modes
+        Contact mode and image mapping of the window.
     view
         Returns the eye and its target. Default: the document camera's.
     background
@@ -63,6 +84,7 @@ class ActionState:
         self.handle_offset: Float32Array = np.zeros(3, np.float32)
         self.message = ""
         self.prompt = PromptLine(self.show)
+        self.modes: DrawModes = DefaultModes()
         self.view: Callable[[], tuple[ArrayLike, ArrayLike]] = self._document_view
         self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
         self._series: tuple[str, object] | None = None

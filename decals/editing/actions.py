@@ -16,6 +16,8 @@ from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, action, r
 from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
 from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.validation import describe
 
 
@@ -197,6 +199,30 @@ class Actions:
             state.background.edit(name, lambda session: step(session, entry))
         else:
             state.message = step(state.session, entry)
+
+    @action(
+        "next_contact",
+        "p",
+        summary="contact mode of the window: product, min, radial (not saved)",
+        group=Group.SCENE,
+    )
+    def next_contact(self, _cursor: Cursor) -> None:
+        """Draw with the next contact mode."""
+        modes = self.state.modes
+        modes.contact = Contact((modes.contact + 1) % len(Contact))
+        self.state.message = f"contact mode: {modes.contact.name.lower()}"
+
+    @action(
+        "next_mapping",
+        "u",
+        summary="image mapping of the window: corrected, chord (not saved)",
+        group=Group.SCENE,
+    )
+    def next_mapping(self, _cursor: Cursor) -> None:
+        """Draw with the next image mapping."""
+        modes = self.state.modes
+        modes.mapping = ImageMapping((modes.mapping + 1) % len(ImageMapping))
+        self.state.message = f"image mapping: {modes.mapping.name.lower()}"
 
     @action("help", "h", "F1", summary="show or hide this help", group=Group.SCENE)
     def toggle_help(self, _cursor: Cursor) -> None:

@@ -41,6 +41,9 @@ OBJECT_RADIUS = 0.08
 FIRST_OBJECT_RADIUS = 0.2
 """Radius of the first object of a scene, in distances between the eye and its target."""
 
+FIRST_LIMB_RADIUS = 0.06
+"""Radius of a limb that is the first object, likewise."""
+
 MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
 
@@ -198,7 +201,10 @@ class TreeActions:
         "add_ball", "n", summary="blend a ball into the tree under the cursor, selected", group=Group.SHAPE
     )
     def add_ball(self, cursor: Cursor) -> None:
-        """Blend a ball into the tree under the cursor, and select it."""
+        """Blend a ball into the tree under the cursor, and select it; in an empty scene it is an object."""
+        if not self._state.session.document.objects:
+            self.add_object(cursor)
+            return
         pick = require_pick(cursor)
         path, thickness, color = self._base(pick)
         ball = Point(_coordinates(pick.position), radius=BALL_RADIUS * thickness, color=color)
@@ -206,7 +212,13 @@ class TreeActions:
 
     @action("add_limb", "l", summary="blend a limb into it that stands out", group=Group.SHAPE)
     def add_limb(self, cursor: Cursor) -> None:
-        """Blend a segment along the normal into the tree under the cursor, and select it."""
+        """Blend a segment along the normal into the tree under the cursor, and select it.
+
+        In an empty scene it is an object, across the view.
+        """
+        if not self._state.session.document.objects:
+            self._add_first_limb()
+            return
         pick = require_pick(cursor)
         path, thickness, color = self._base(pick)
         start = _coordinates(pick.position)
@@ -285,15 +297,26 @@ class TreeActions:
             radius = FIRST_OBJECT_RADIUS * float(np.linalg.norm(eye - target))
         up = unit_rows((eye - target)[None])[0] if pick is None else pick.normal
         center = target if pick is None else pick.position + radius * up
-        names = {item.name for item in objects}
-        name = next(name for n in range(1, len(names) + 2) if (name := f"ball {n}") not in names)
-        ball = TreeObject(name, Point(_coordinates(center), radius=radius))
+        self._add_tree("ball", Point(_coordinates(center), radius=radius), radius * up)
+
+    def _add_first_limb(self) -> None:
+        """Add a segment as the first object, at the target of the camera."""
+        eye, target = (np.asarray(point, np.float64) for point in self._state.view())
+        radius = FIRST_LIMB_RADIUS * float(np.linalg.norm(eye - target))
+        half = 0.5 * LIMB_LENGTH / LIMB_RADIUS * radius * np.eye(3)[np.abs(eye - target).argmin()]
+        limb = Segment(_coordinates(target - half), _coordinates(target + half), radius=radius)
+        self._add_tree("limb", limb, radius * unit_rows((eye - target)[None])[0])
+
+    def _add_tree(self, kind: str, tree: Node, handle_offset: Float32Array) -> None:
+        """Add a tree as an object with a new name, and select it."""
+        names = {item.name for item in self._state.session.document.objects}
+        name = next(name for n in range(1, len(names) + 2) if (name := f"{kind} {n}") not in names)
 
         def select() -> None:
             last = len(self._state.session.document.objects) - 1
-            self._state.select_primitive(last, (), radius * up)
+            self._state.select_primitive(last, (), handle_offset)
 
-        self._state.run(AddObject(ball), select)
+        self._state.run(AddObject(TreeObject(name, tree)), select)
 
     @action(
         "remove_object",

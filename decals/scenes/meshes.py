@@ -63,8 +63,8 @@ def as_polydata(
         )
         if part.n_points == 0:
             raise InvalidMesh(
-                f"{item.name!r} has no surface in cells of this size: its parts may be smaller than a cell, "
-                "or the tree may be empty; increase the resolution"
+                f"object {item.name!r} has no surface in cells of this size: its parts may be smaller than a "
+                "cell, or the tree may be empty; increase the resolution"
             )
         parts.append(part)
     if not parts:

@@ -15,6 +15,8 @@ from decals.editing.document import Document
 from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.rendering.gl_libraries import require_gl
 from decals.scenes.files import load_scene
 from decals.scenes.scene import Scene
@@ -40,6 +42,9 @@ from decals.window.overlay import Overlay, PrimitiveHandle
 
 HELP_HINT = "h: help"
 """First part of the status line, unless a prompt is open."""
+
+EMPTY_HINT = f"{HELP_HINT}   n: add a ball   l: add a limb"
+"""The same for a scene without objects."""
 
 
 class EditWindow:
@@ -67,6 +72,10 @@ class EditWindow:
     recover : callable, optional
         Reads the recovery file that an earlier window left beside ``path``, such as `decals.load_scene`. Its
         changes become one undo entry. Default: a recovery file is ignored.
+    contact : Contact or str, optional
+        Contact mode at the beginning; a scene does not store it. Default: that of the plotter's subplot.
+    mapping : ImageMapping or str, optional
+        Image mapping at the beginning, likewise.
 
     Attributes
     ----------
@@ -111,6 +120,8 @@ class EditWindow:
         samples: int = 2,
         plotter: pv.BasePlotter | None = None,
         recover: Callable[[Path], Scene] | None = None,
+        contact: Contact | str | None = None,
+        mapping: ImageMapping | str | None = None,
     ) -> None:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
@@ -135,6 +146,11 @@ class EditWindow:
         self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
         self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
         self.actions.files.leave = self._host.leave
+        self.actions.state.modes = self.subplot
+        if contact is not None:
+            self.subplot.contact = contact
+        if mapping is not None:
+            self.subplot.mapping = mapping
         self.actions.state.view = lambda: eye_and_target(self.subplot)
         self.tools = PointerTools(
             self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
@@ -177,8 +193,8 @@ class EditWindow:
         return not self._closed and (self.background.busy or coarse or unsaved or self.subplot.warming_up)
 
     def _content_version(self) -> tuple[int, ...]:
-        document = self.document
-        return id(document.objects), id(document.images), document.decals.version
+        document, modes = self.document, (self.subplot.contact, self.subplot.mapping)
+        return id(document.objects), id(document.images), document.decals.version, *modes
 
     # -- frames -----------------------------------------------------------------------------------------
 
@@ -233,7 +249,8 @@ class EditWindow:
 
     def _status(self) -> str:
         state = self.actions.state
-        parts = (state.prompt.text or HELP_HINT, self.warmup.status, self.background.progress, state.message)
+        hint = HELP_HINT if self.document.objects else EMPTY_HINT
+        parts = (state.prompt.text or hint, self.warmup.status, self.background.progress, state.message)
         return "   ".join(filter(None, parts))
 
     def _show_status(self) -> None:

@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 import blobtree
 from blobtree import Point
-from decals import Camera, Scene, save_scene
+from decals import Camera, Contact, Scene, load_scene, save_scene
 from decals.apps.cli import run
 from decals.apps.commands import edit as edit_module
+from decals.editing import recovery_path
 from decals.window import EditWindow
 
 Capture = pytest.CaptureFixture[str]
@@ -68,6 +70,41 @@ def press_in_windows(
     monkeypatch.setattr(EditWindow, "show", show)
 
 
+def test_without_a_model_an_empty_scene_opens(
+    folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    press_in_windows(monkeypatch, "n", "Ctrl+s")
+    assert run(["edit", "--image", "eye", "--size", "80x60", "--contact", "radial"]) == 0
+    document = windows[0].document
+    assert (len(document.objects), len(document.decals)) == (0, 0)  # the ball was still being made
+    assert [image.source for image in document.images] == ["eye"]
+    assert windows[0].subplot.contact is Contact.RADIAL
+    assert load_scene(folder / "scene.json").objects == ()
+    assert run(["edit", "--size", "80x60"]) == 0
+    assert windows[1].actions.files.path == Path("scene-2.json")
+
+
+def test_images_are_added_to_a_saved_scene(folder: Path, windows: list[EditWindow]) -> None:
+    save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "scene.json")
+    Image.new("RGB", (4, 4)).save(folder / "a.png")
+    assert run(["edit", "scene.json", "--images", "a.png", "--image", "eye", "--size", "80x60"]) == 0
+    assert [image.source for image in windows[0].document.images] == ["a.png", "eye"]
+    assert windows[0].session.labels == ("add an image", "add an image")
+    assert recovery_path(folder / "scene.json").exists()
+
+
+def test_a_scene_that_was_never_saved_is_opened_from_its_recovery_file(
+    folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    arguments = ["edit", "ball.json", "--decals", "5", "--size", "80x60", "--save", "new.json"]
+    press_in_windows(monkeypatch, "Ctrl+a", "d", stop=KeyboardInterrupt)
+    assert run(arguments) == 130
+    press_in_windows(monkeypatch)
+    assert run(["edit", "new.json", "--size", "80x60"]) == 0
+    assert len(windows[1].document.decals) == 10
+
+
 def test_discarded_changes_are_reported(
     folder: Path, windows: list[EditWindow], monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
@@ -99,6 +136,8 @@ def test_invalid_arguments(folder: Path, windows: list[EditWindow], capsys: Capt
     save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "scene.json")
     for wrong, message in (
         (["edit", "scene.json", "--decals", "3"], "has its own decals"),
+        (["edit", "--decals", "3"], "name a model"),
+        (["edit", "scene.json", "--image", "no.png"], "no.png"),
         (["edit", "nothing.ply"], "nothing.ply"),
         (["edit", "scene.json", "--size", "0x3"], "--size"),
         (["edit", "scene.json", "--save", "scene.png"], "scene.png"),

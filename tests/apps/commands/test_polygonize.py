@@ -8,6 +8,7 @@ import pyvista as pv
 
 import blobtree
 from blobtree import Point
+from decals import Camera, MeshObject, Scene, TreeObject, save_scene
 from decals.apps.cli import run
 
 Capture = pytest.CaptureFixture[str]
@@ -73,5 +74,26 @@ def test_a_tree_without_a_surface_is_refused(folder: Path, capfd: Capture) -> No
     empty = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
     blobtree.save(empty, folder / "nothing.json")
     assert run(["polygonize", "nothing.json", "-o", "a.ply"]) == 2
-    assert capfd.readouterr().err.startswith("error: 'nothing.json' has no surface")
+    assert capfd.readouterr().err.startswith("error: 'nothing.json': object 'nothing' has no surface")
     assert not (folder / "a.ply").exists()
+
+
+def test_all_objects_of_a_scene_are_written(folder: Path) -> None:
+    ball = TreeObject("ball", Point((0, 0, 0), radius=0.5, color=(1.0, 0.5, 0.0)))
+    corner = MeshObject("corner", [[2, 0, 0], [3, 0, 0], [2, 1, 0]], [[0, 1, 2]], color=(0.0, 0.0, 1.0))
+    save_scene(Scene(objects=(ball, corner), camera=Camera((0, 0, 5))), folder / "scene.json")
+    assert run(["polygonize", "scene.json", "--cells", "16", "-o", "mesh.vtp"]) == 0
+    mesh = pv.read(folder / "mesh.vtp")
+    right = mesh.points[:, 0] > 1
+    assert sorted(map(tuple, mesh.points[right])) == [(2, 0, 0), (2, 1, 0), (3, 0, 0)]
+    colors, normals = np.asarray(mesh["RGB"]), np.asarray(mesh.point_data.active_normals)
+    assert (colors[right] == [0, 0, 255]).all()
+    assert (colors[~right] == [255, 128, 0]).all()
+    assert np.allclose(np.linalg.norm(mesh.points[~right], axis=1), 0.5, atol=1e-2)
+    assert np.allclose(normals[right], [0, 0, 1])
+
+
+def test_a_scene_without_objects_is_refused(folder: Path, capfd: Capture) -> None:
+    save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "empty.json")
+    assert run(["polygonize", "empty.json", "-o", "mesh.ply"]) == 2
+    assert "object" in capfd.readouterr().err

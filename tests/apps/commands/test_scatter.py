@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
-from decals import load_scene
+from decals import Camera, Scene, load_scene, save_scene
 from decals.apps.cli import run
 from tests.apps.commands.pictures import picture
 
@@ -79,3 +79,23 @@ def test_a_painted_image_sets_the_density(folder: Path) -> None:
 def test_invalid_arguments(folder: Path, capsys: Capture, arguments: list[str], message: str) -> None:
     assert run(["scatter", "spheres", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_scene_gets_other_decals_and_keeps_its_images_and_camera(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    assert run(["scatter", "ball.ply", "--count", "5", "--images", "2", "-o", "scene.json"]) == 0
+    before = load_scene(folder / "scene.json")
+    assert run(["scatter", "scene.json", "--count", "20", "-o", "more.json"]) == 0
+    after = load_scene(folder / "more.json")
+    assert len(after.decals) == 20
+    assert set(after.decals.images) == {0, 1}
+    assert [image.source for image in after.images] == [image.source for image in before.images]
+    assert after.camera == before.camera
+    assert run(["scatter", "scene.json", "--count", "9", "--images", "3", "-o", "more.json"]) == 0
+    assert len(load_scene(folder / "more.json").images) == 3
+
+
+def test_a_scene_without_objects_is_refused(folder: Path, capsys: Capture) -> None:
+    save_scene(Scene(objects=(), camera=Camera((0, 0, 1))), folder / "empty.json")
+    assert run(["scatter", "empty.json", "-o", "more.json"]) == 2
+    assert "empty.json" in capsys.readouterr().err

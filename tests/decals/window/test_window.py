@@ -11,9 +11,11 @@ from blobtree.nodes.paths import node_in_world
 from decals.editing.commands import ScaleDecals
 from decals.editing.scatter_commands import RemoveObject, decals_on
 from decals.errors import InvalidEdit
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
-from decals.scenes.scene import Scene
+from decals.scenes.scene import DecalImage, Scene
 from decals.window import EditWindow
 from tests.decals.window.driver import Driver
 
@@ -110,6 +112,68 @@ def test_keys_of_pyvista_are_ours_where_the_table_says_so(driver: Driver) -> Non
     assert driver.window.overlay.help_visible
     driver.key("h")
     assert not driver.window.overlay.help_visible
+
+
+def test_p_and_u_change_how_the_window_draws_and_picks(driver: Driver) -> None:
+    subplot, modes = driver.window.subplot, driver.window.actions.state.modes
+    assert (subplot.contact, subplot.mapping) == (Contact.PRODUCT, ImageMapping.CORRECTED)
+    first = driver.shot()
+    driver.key("u")
+    assert subplot.mapping is ImageMapping.CHORD
+    assert (driver.shot() != first).any()
+    driver.key("p")
+    driver.key("p")
+    assert subplot.contact is modes.contact is Contact.RADIAL
+    assert "contact mode: radial" in driver.window.overlay.status
+    owner, _ = driver.owners()
+    places = [(x, y) for x in range(60, 120, 6) for y in range(40, 80, 6) if owner[119 - y, x] >= 0]
+    picks = [driver.window.tools.at(x, y) for x, y in places]
+    owners = [owner[119 - y, x] for x, y in places]
+    same = [pick is not None and pick.owner == own for pick, own in zip(picks, owners, strict=True)]
+    assert np.mean(same) > 0.98
+    assert driver.session.labels == ()
+
+
+def test_a_window_opens_with_the_given_modes(opened: Any) -> None:
+    subplot = opened(contact="min", mapping=ImageMapping.CHORD).window.subplot
+    assert (subplot.contact, subplot.mapping) == (Contact.MIN, ImageMapping.CHORD)
+
+
+@pytest.mark.parametrize("key", ["n", "l"])
+def test_the_first_object_of_an_empty_scene_is_made_by_key(opened: Any, key: str) -> None:
+    images = (DecalImage.load("eye"),)
+    driver = opened(Scene(objects=(), camera=Camera((1, 1, 5)), images=images))
+    assert "n: add a ball" in driver.window.overlay.status
+    empty = driver.shot()
+    driver.press(key)
+    assert len(driver.document.objects) == 1
+    assert driver.window.actions.state.primitive == (0, ())
+    middle = driver.shot()[50:70, 80:100]
+    assert (middle != empty[50:70, 80:100]).any()
+    driver.press("a", (104, 60))  # beside the handle
+    assert len(driver.document.decals) == 1
+    assert "n: add a ball" not in driver.window.overlay.status
+    driver.press("z", ctrl=True)
+    driver.press("z", ctrl=True)
+    assert not driver.document.objects
+
+
+def test_the_hint_for_help_stays(driver: Driver) -> None:
+    driver.window.actions.state.show("a message")
+    driver.window.update_overlay()
+    assert driver.window.overlay.status == "h: help   a message"
+
+
+def test_a_name_is_typed_in_the_window(opened: Any, tmp_path: Path) -> None:
+    driver = opened(path=tmp_path / "scene.json")
+    driver.key("S", ctrl=True, shift=True)
+    assert f"save as: {tmp_path / 'scene.json'}" in driver.window.overlay.status
+    for _ in "scene.json":
+        driver.key("BackSpace")
+    driver.type("Other-2.json")
+    driver.press("Return")
+    assert len(load_scene(tmp_path / "Other-2.json").decals) == len(driver.document.decals)
+    assert driver.plotter.render_window.GetWindowName().startswith("Other-2.json")
 
 
 def test_what_is_selected_is_outlined(driver: Driver) -> None:

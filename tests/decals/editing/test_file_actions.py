@@ -1,0 +1,157 @@
+"""Files by key: save as, export and images, with names that are typed."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+from PIL import Image
+
+from decals.editing import Actions, EditSession, PointerTools, ScaleDecals
+from decals.scenes.files import load_scene
+from decals.scenes.meshes import MESH_SUFFIXES
+from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
+from tests.decals.editing.scenes import scene
+
+
+class Typist:
+    """Keys for actions without a window."""
+
+    def __init__(self, actions: Any) -> None:
+        self.actions, self.state = actions, actions.state
+        self._tools = PointerTools(actions, lambda _x, _y: None)
+
+    def key(self, name: str, **modifiers: Any) -> None:
+        self._tools.key(name, 1, 1, **modifiers)
+
+    def enter(self, text: str) -> None:
+        self.key("Delete")
+        for letter in text:
+            self.key("unnamed", text=letter)
+        self.key("Return")
+
+
+@pytest.fixture
+def typist(tmp_path: Path) -> Typist:
+    return Typist(Actions(EditSession(scene()), path=tmp_path / "scene.json"))
+
+
+def test_save_as_changes_the_file(typist: Typist, tmp_path: Path) -> None:
+    typist.state.session.do(ScaleDecals([1], 2.0))
+    typist.key("s", ctrl=True, shift=True)
+    typist.enter(f"{tmp_path}/other.json")
+    assert typist.actions.files.path == tmp_path / "other.json"
+    assert typist.actions.files.title == "other.json"
+    assert load_scene(tmp_path / "other.json").decals.radii[1] == 2 * scene().decals.radii[1]
+    assert not (tmp_path / "scene.json").exists()
+
+
+def test_an_existing_file_is_replaced_after_a_second_return_only(typist: Typist, tmp_path: Path) -> None:
+    other = tmp_path / "other.json"
+    other.write_text("precious")
+    typist.key("s", ctrl=True, shift=True)
+    typist.enter(str(other))
+    assert "exists" in typist.state.message
+    assert other.read_text() == "precious"
+    typist.key("Return")
+    assert load_scene(other)
+    assert not typist.state.prompt.open
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("scene.ply", r"ends in .json"), ("nowhere/a.json", "existing folder"), ("", "expected a name")],
+    ids=["suffix", "folder", "empty"],
+)
+def test_a_wrong_name_is_named_and_can_be_corrected(
+    typist: Typist, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    typist.key("s", ctrl=True, shift=True)
+    typist.enter(name)
+    assert message in typist.state.message
+    assert typist.state.prompt.open
+    typist.enter("right.json")
+    assert (tmp_path / "right.json").exists()
+
+
+def test_escape_closes_the_prompt_and_keys_are_keys_again(typist: Typist) -> None:
+    typist.key("e", ctrl=True)
+    typist.key("h", text="h")
+    assert not typist.actions.help_visible
+    typist.key("Escape")
+    typist.key("h", text="h")
+    assert typist.actions.help_visible
+
+
+@pytest.mark.parametrize("suffix", MESH_SUFFIXES)
+def test_export_writes_all_objects(typist: Typist, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"mesh{suffix}"
+    typist.key("e", ctrl=True)
+    typist.enter(str(path))
+    assert f"exported to {path}" in typist.state.message
+    mesh = pv.read(path)
+    low, high = scene().bounds
+    assert pytest.approx(np.array([low, high]), abs=0.1) == np.reshape(mesh.bounds, (3, 2)).T
+    points = np.asarray(mesh.points)
+    assert (points[:, 0] < -1.4).sum() >= 8  # the box
+    assert (points[:, 0] > -1.1).sum() > 100  # the tree
+    assert typist.state.session.labels == ()
+
+
+def test_exported_objects_keep_their_colours(typist: Typist, tmp_path: Path) -> None:
+    typist.key("e", ctrl=True)
+    typist.enter(f"{tmp_path}/mesh.ply")
+    mesh = pv.read(tmp_path / "mesh.ply")
+    colors, box = np.asarray(mesh["RGB"]), mesh.points[:, 0] < -1.4
+    expected = np.rint(255 * np.array(scene().objects[1].color))
+    assert (colors[box] == expected).all()
+    assert (colors[~box] != expected).any()
+
+
+def test_the_first_name_of_an_export_is_that_of_the_scene(typist: Typist, tmp_path: Path) -> None:
+    typist.key("e", ctrl=True)
+    assert str(tmp_path / "scene.ply") in typist.state.prompt.text
+
+
+def test_an_empty_scene_cannot_be_exported() -> None:
+    typist = Typist(Actions(EditSession(scene().replace(objects=(), decals=scene().decals[:0]))))
+    typist.key("e", ctrl=True)
+    assert "no object" in typist.state.message
+    assert not typist.state.prompt.open
+
+
+def test_an_image_is_added_and_can_be_undone(typist: Typist, tmp_path: Path) -> None:
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "red.png")
+    typist.key("i", ctrl=True)
+    typist.enter(f"{tmp_path}/red.png")
+    images = typist.state.session.document.images
+    assert [image.source for image in images] == ["scale", "eye", f"{tmp_path}/red.png"]
+    assert images[2].pixels[0, 0].tolist() == [255, 0, 0, 255]
+    assert typist.state.session.labels == ("add an image",)
+    typist.key("z", ctrl=True)
+    assert len(typist.state.session.document.images) == 2
+
+
+def test_an_image_that_does_not_exist_is_named(typist: Typist) -> None:
+    typist.key("i", ctrl=True)
+    typist.enter("nothing.png")
+    assert "nothing.png" in typist.state.message
+    assert typist.state.prompt.open
+
+
+def test_an_export_waits_for_no_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    actions = threaded(path=tmp_path / "scene.json")
+    begun, go = hold_writing(monkeypatch)
+    press(actions, "save")
+    assert begun.wait(LONG)
+    typist = Typist(actions)
+    typist.key("e", ctrl=True)
+    typist.enter(f"{tmp_path}/mesh.stl")
+    assert "another file is being written" in actions.state.message
+    go.set()
+    finish(actions)
+    typist.key("Return")
+    finish(actions)
+    assert (tmp_path / "mesh.stl").exists()
