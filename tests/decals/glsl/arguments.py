@@ -129,6 +129,11 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         for name in ("sum", "ricci", "union", "intersection", "difference", "blend")
         for kind in ("range", "choice")
     },
+    **{
+        name: {"a": interval(2.0), "b": interval(2.0)}
+        for name in ("intersection_like_choice", "difference_like_choice", "unclaimed_choice")
+    },
+    "widened_range": {"smallest": field, "largest": field},
 }  # fmt: skip
 
 
