@@ -18,6 +18,9 @@ from decals.scenes.scene import DecalImage, Scene
 UNTITLED = "untitled"
 """Title of a scene without a file."""
 
+NOTHING = object()
+"""Mark that no changes were discarded."""
+
 
 class FileActions:
     """Actions on the scene's file.
@@ -46,9 +49,10 @@ class FileActions:
         self.path = path
         self.camera: Callable[[], Camera | None] = lambda: None
         self.leave: Callable[[], None] = lambda: None
-        self.recovery = RecoveryFile(state.session, state.background, lambda: self.camera())
+        self.recovery = RecoveryFile(state.session, state.background, lambda: self.camera(), state.end_stroke)
         self.recovery.belong_to(path)
-        self._discarded = self._closing = False
+        self._closing = False
+        self._discarded: object = NOTHING
 
     @property
     def title(self) -> str:
@@ -138,7 +142,7 @@ class FileActions:
     def may_close(self) -> bool:
         """Return True if the window may close; otherwise ask. While the question is open, return True."""
         state = self._state
-        if self._discarded:
+        if self._discarded is state.session.next_undo:
             return True
         if state.background.saving:
             self._closing = True
@@ -147,7 +151,7 @@ class FileActions:
         if not state.session.modified and not state.background.busy_editing:
             return True
         if state.prompt.asking:
-            self._discarded = True
+            self._discard_changes()
             return True
         state.prompt.begin(
             Question(
@@ -157,23 +161,30 @@ class FileActions:
         )
         return False
 
-    def update(self) -> None:
+    def update(self, *, dragging: bool = False) -> None:
         """Close the window once a save has ended, and keep the recovery file; call this regularly."""
         if self._closing and not self._state.background.saving:
             self._closing = False
             if not self._state.session.modified:
                 self.leave()
-        self.recovery.update()
+        if not dragging:
+            self.recovery.update()
 
     def finish(self) -> None:
         """Keep unsaved changes in the recovery file, unless they were discarded; call this at the end."""
-        if self._discarded or not self._state.session.modified:
+        session = self._state.session
+        if self._discarded is session.next_undo or not session.modified:
             self.recovery.remove()
         else:
             self.recovery.keep()
 
+    def _discard_changes(self) -> None:
+        """Note that the present changes may be lost; later ones count again."""
+        self._state.session.end_stroke()
+        self._discarded = self._state.session.next_undo
+
     def _discard(self) -> None:
-        self._discarded = True
+        self._discard_changes()
         self.leave()
 
     def _save_and_close(self) -> None:

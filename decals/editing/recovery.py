@@ -47,12 +47,19 @@ class RecoveryFile:
         Writes the file.
     camera
         Returns the camera to store; None for the document's.
+    end_stroke
+        Ends the open stroke.
     """
 
     def __init__(
-        self, session: EditSession, background: BackgroundJobs, camera: Callable[[], Camera | None]
+        self,
+        session: EditSession,
+        background: BackgroundJobs,
+        camera: Callable[[], Camera | None],
+        end_stroke: Callable[[], None],
     ) -> None:
-        self._session, self._background, self._camera = session, background, camera
+        self._session, self._background = session, background
+        self._camera, self._end_stroke = camera, end_stroke
         self._scene_path: Path | None = None
         self._exists = False
         self._written: object = None
@@ -114,16 +121,20 @@ class RecoveryFile:
         """True if there are changes that are not in the recovery file, or the file is to be removed."""
         if self._scene_path is None:
             return False
-        modified = self._session.modified
-        return self._exists if not modified else self._session.next_undo is not self._written
+        session = self._session
+        return (
+            self._exists
+            if not session.modified
+            else session.stroke_open or session.next_undo is not self._written
+        )
 
     def update(self) -> None:
-        """Write or remove the file if it is time to; the owner calls this regularly."""
+        """Write or remove the file if it is time to; the owner calls this regularly, but not in a drag."""
         path = self.path
         if path is None or not self.pending:
             self._changed_at = None
             return
-        if self._session.stroke_open or self._background.writing:
+        if self._background.writing:
             return
         if not self._session.modified:
             self.remove()
@@ -131,6 +142,9 @@ class RecoveryFile:
         now = time.monotonic()
         self._changed_at = now if self._changed_at is None else self._changed_at
         if now - self._changed_at < self._wait:
+            return
+        self._end_stroke()
+        if self._session.stroke_open:  # steps of the last drag are not adopted yet
             return
 
         def written() -> None:

@@ -296,7 +296,8 @@ class EditSession:
     @property
     def modified(self) -> bool:
         """True if there are edits since the last save."""
-        return self.stroke_open or self.next_undo is not self._saved
+        stroke = self._history.stroke
+        return (stroke is not None and not stroke.edit.empty) or self.next_undo is not self._saved
 
     def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
         """Write the scene to a file, completely or not at all; see `decals.save_scene`.

@@ -273,7 +273,7 @@ class EditWindow:
             self._show_status()
         else:
             self.frames.refine_when_due()
-        self.actions.files.update()
+        self.actions.files.update(dragging=dragging)
 
     def in_other_subplot(self, x: int, y: int) -> bool:
         """Return True if a pixel is in a subplot of the same plotter that another window edits."""
@@ -380,6 +380,8 @@ def edit(
     *,
     path: str | os.PathLike[str] | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
+    contact: Contact | str = Contact.PRODUCT,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
 ) -> Scene:
     """Open a window to edit a scene, and return the edited scene when the window is closed.
 
@@ -392,6 +394,10 @@ def edit(
         opened, as one undo entry.
     size : (int, int)
         Width and height of the window in pixels.
+    contact : Contact or str
+        Contact mode at the beginning; a scene does not store it.
+    mapping : ImageMapping or str
+        Image mapping at the beginning, likewise.
 
     Returns
     -------
@@ -412,6 +418,8 @@ def edit(
     >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
     >>> edited = decals.edit(scene)  # doctest: +SKIP
     """
-    with EditWindow(scene, path=path, size=size, recover=load_scene) as window:
+    with EditWindow(
+        scene, path=path, size=size, recover=load_scene, contact=contact, mapping=mapping
+    ) as window:
         window.show()
         return window.document.scene

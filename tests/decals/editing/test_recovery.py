@@ -15,6 +15,7 @@ from tests.decals.editing.scenes import digest, scene
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("decals.editing.recovery.AUTOSAVE_SECONDS", 0.0)
+    monkeypatch.setattr("decals.editing.recovery.MAX_WRITING_SHARE", float("inf"))
 
 
 def edited(path: Path, **options: Any) -> Any:
@@ -58,9 +59,32 @@ def test_a_drag_is_not_disturbed(tmp_path: Path) -> None:
     actions = edited(tmp_path / "scene.json")
     session = actions.state.session
     session.begin_stroke("a drag")
-    actions.files.update()
+    actions.files.update(dragging=True)
     assert session.stroke_open
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("at_once")
+def test_repeated_keys_are_kept_too(tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    actions = edited(path)
+    actions.files.update()
+    actions.state.selection = (2,)
+    press(actions, "larger")
+    assert actions.state.session.stroke_open
+    actions.files.update()
+    kept = load_scene(recovery_path(path)).decals
+    assert kept.radii[2] == actions.state.session.document.decals[2].radii[0] > scene().decals.radii[2]
+    press(actions, "larger")
+    assert actions.state.session.stroke_open
+
+
+def test_a_key_that_changes_nothing_leaves_no_unsaved_changes(tmp_path: Path) -> None:
+    actions = Actions(EditSession(scene()), path=tmp_path / "scene.json")
+    press(actions, "larger")
+    assert "no decal is selected" in actions.state.message
+    assert not actions.state.session.modified
+    assert actions.files.may_close()
 
 
 @pytest.mark.usefixtures("at_once")

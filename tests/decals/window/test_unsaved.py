@@ -6,8 +6,10 @@ from typing import Any
 import pytest
 
 from decals.editing import ScaleDecals, recovery_path
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
 from decals.scenes.files import load_scene
-from decals.window import EditWindow
+from decals.window import EditWindow, edit
 from tests.decals.editing.scenes import scene
 
 
@@ -127,6 +129,38 @@ def test_the_title_names_the_file_and_marks_changes(opened: Any, tmp_path: Path)
     assert title() == "*scene.json - Implicit Decals"
     driver.press("s", ctrl=True)
     assert title() == "scene.json - Implicit Decals"
+
+
+def test_changes_after_a_discard_count_again(left: list[bool], opened: Any, tmp_path: Path) -> None:
+    """A plotter of the caller may stay open when the user has discarded the changes."""
+    driver = edited(opened, path=tmp_path / "scene.json")
+    driver.key("q")
+    driver.key("q")
+    driver.key("d")
+    driver.key("q")
+    assert left == [True]
+    assert driver.window.actions.state.prompt.asking
+    driver.window.close()
+    assert list(tmp_path.iterdir()) == [tmp_path / "scene.recovery.json"]
+
+
+def test_edit_opens_the_recovery_file_and_the_given_modes(
+    opened: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "scene.json"
+    first = edited(opened, path=path)
+    first.window.close()
+    seen = []
+
+    class Window(EditWindow):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **{**options, "off_screen": True, "size": (60, 40)})
+            seen.append((self.subplot.contact, self.subplot.mapping))
+
+    monkeypatch.setattr("decals.window.window.EditWindow", Window)
+    result = edit(scene(), path=path, contact="min", mapping="chord")
+    assert len(result.decals) == len(first.document.decals)
+    assert seen == [(Contact.MIN, ImageMapping.CHORD)]
 
 
 def test_an_error_keeps_a_recovery_file(opened: Any, tmp_path: Path) -> None:
