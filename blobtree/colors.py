@@ -82,4 +82,5 @@ def _named_channels(value: Any) -> tuple[float, ...]:
 
 
 def _line(value: object) -> str:
-    return " ".join(shown(value).split())
+    text = " ".join(shown(value).split())
+    return f"{text:.60}"

@@ -5,16 +5,15 @@ import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import Float64Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.errors import InvalidPoints, InvalidResolution, MissingPackage
 from blobtree.files import replacing, write_atomically
 from blobtree.formulas.falloff import ISO
-from blobtree.meshing.mesh import Mesh
 from blobtree.tape.model import ImplicitModel
 from blobtree.validation import finite_number, finite_vector
 
@@ -43,7 +42,22 @@ LEVEL_TOLERANCE = 1e-6
 """Largest field error of a point on the line of its level."""
 
 
-def to_polydata(mesh: Mesh) -> "pv.PolyData":
+class ColoredMesh(Protocol):
+    """Mesh of these functions, a `blobtree.Mesh`."""
+
+    @property
+    def vertices(self) -> Float32Array: ...  # noqa: D102
+    @property
+    def faces(self) -> Int32Array: ...  # noqa: D102
+    @property
+    def normals(self) -> Float32Array: ...  # noqa: D102
+    @property
+    def colors(self) -> Float32Array: ...  # noqa: D102
+    @property
+    def sheet_counts(self) -> NDArray[np.uint8] | None: ...  # noqa: D102
+
+
+def to_polydata(mesh: ColoredMesh) -> "pv.PolyData":
     """Return a mesh as `pyvista.PolyData` with active normals, "RGB" (uint8) and any "sheet_counts"."""
     _require_pyvista()
     import pyvista as pv
@@ -57,6 +71,10 @@ def to_polydata(mesh: Mesh) -> "pv.PolyData":
     if mesh.sheet_counts is not None:
         surface.point_data["sheet_counts"] = mesh.sheet_counts
     return surface
+
+
+MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
+"""Formats of `write_polydata`."""
 
 
 def write_polydata(path: str | os.PathLike[str], surface: "pv.PolyData") -> None:

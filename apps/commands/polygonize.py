@@ -5,14 +5,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from blobtree.pyvista_views import write_polydata
+from blobtree.pyvista_views import MESH_SUFFIXES, write_polydata
 from decals import MeshObject, Scene
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.loading import import_definitions, load_model
 from decals.apps.output import check_output
 from decals.errors import InvalidInput, InvalidMesh, InvalidScene
-from decals.scenes.meshes import MESH_SUFFIXES, as_polydata
+from decals.scenes.meshes import as_polydata
 
 OptionalLength = Annotated[float | None, Parameter(show_default=False)]
 

@@ -5,9 +5,11 @@ neighbouring blocks are placed again, and the triangles of all blocks that use s
 copied, in the order of a mesh made from scratch: both meshes are the same bit for bit.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from blobtree.cells.grid import CHILDREN
 from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, where_negative
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import demand_memory, launch, prefaulted_array
+from blobtree.errors import InvalidFile
 from blobtree.meshing.dual_kernels import (
     SAMPLES,
     CellPatches,
@@ -41,6 +44,8 @@ from blobtree.meshing.reuse_kernels import (
 )
 from blobtree.meshing.vertex_kernels import VertexArrays, bisect_unconverged, list_patches, place_vertices
 from blobtree.progress import Progress
+from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
+from blobtree.validation import shown
 
 WORD_BYTES = 16
 """Bytes that one thread copies."""
@@ -83,6 +88,37 @@ class Mesh:
     normals: Float32Array
     colors: Float32Array
     sheet_counts: NDArray[np.uint8] | None = None
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the mesh to a file, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The file; its suffix is the format: ply (with colours), vtp (with colours and normals), obj or
+            stl.
+
+        Raises
+        ------
+        InvalidFile
+            The suffix is another one, or the mesh has no faces.
+        OSError
+            The file cannot be written; an existing file stays as it was.
+        MissingPackage
+            pyvista is not installed.
+
+        Examples
+        --------
+        >>> from blobtree import Point, polygonize
+        >>> polygonize(Point((0, 0, 0), radius=1.0), resolution=16).save("ball.ply")
+        """
+        if not isinstance(path, str | os.PathLike) or Path(path).suffix.lower() not in MESH_SUFFIXES:
+            raise InvalidFile(
+                f"path: expected a file that ends in {', '.join(MESH_SUFFIXES)}, got {shown(path)}; rename it"
+            )
+        if not len(self.faces):
+            raise InvalidFile("expected a mesh with faces, got none; its parts may be smaller than a cell")
+        write_polydata(path, to_polydata(self))
 
 
 @dataclass(frozen=True, eq=False)

@@ -503,6 +503,41 @@ class Node(ImplicitModel):
         )
         return to_polydata(split_creases(self, mesh) if split_normals else mesh)
 
+    def plot(self, *, resolution: int | None = None, **options: Any) -> Any:
+        """Show the surface in a window, or in a notebook.
+
+        Parameters
+        ----------
+        resolution : int, optional
+            Cells along the longest side of the support; 64 by default.
+        options
+            Arguments of ``pyvista.PolyData.plot``, such as ``color`` and ``screenshot``.
+
+        Returns
+        -------
+        object
+            Result of ``pyvista.PolyData.plot``.
+
+        Raises
+        ------
+        InvalidNode
+            The tree has no surface at this resolution.
+        InvalidResolution
+            The resolution is not a usable number of cells.
+        MissingPackage
+            pyvista is not installed.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0, color="tomato").plot()  # doctest: +SKIP
+        """
+        surface = self.to_pyvista(resolution=resolution)
+        if not surface.n_points:
+            raise InvalidNode("expected a tree with a surface, got none; its parts may be too small")
+        colors = {} if "color" in options else {"scalars": "RGB", "rgb": True}
+        return surface.plot(**{**colors, **options})
+
     def slice(
         self,
         origin: ArrayLike = (0.0, 0.0, 0.0),

@@ -4,7 +4,6 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -23,9 +22,9 @@ from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.record import Contact
-from decals.rendering.options import SceneLike, is_scene_like
-from decals.scenes.files import load_model
-from decals.scenes.objects import SceneObject, as_objects
+from decals.rendering.options import SceneLike
+from decals.scenes.cover import scene_or_objects
+from decals.scenes.objects import SceneObject
 from decals.surfaces.convert import Model
 from decals.validation import describe, member, optional_package, whole_number
 
@@ -39,7 +38,7 @@ MAX_SAMPLES = 16
 
 
 def bake(
-    scene: SceneLike | SceneObject | Model,
+    scene: SceneLike | SceneObject | Model | Sequence[SceneObject | Model],
     path: str | os.PathLike[str],
     *,
     size: int = 2048,
@@ -61,7 +60,8 @@ def bake(
     Parameters
     ----------
     scene : Scene, SceneObject or Model
-        A scene; or a model as `decals.cover` takes it, or the path of a model or a scene.
+        A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
+        scene.
     path : str or path
         The file, which ends in ``.glb``; its folder must exist.
     size : int
@@ -203,11 +203,10 @@ def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Pr
 
 
 def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[UInt8Array]]:
-    """Return objects, decals and images of a scene, of a model or of the file of either."""
-    loaded = load_model(scene) if isinstance(scene, str | os.PathLike) else scene
-    if not is_scene_like(loaded):
-        return as_objects([loaded]), Decals.empty(), []
-    known = cast(SceneLike, loaded)
+    """Return objects, decals and images of a scene, of models or of the file of either."""
+    known = scene_or_objects(scene)
+    if isinstance(known, list):
+        return known, Decals.empty(), []
     return known.objects, known.decals, [image.pixels for image in known.images]
 
 

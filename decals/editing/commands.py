@@ -12,6 +12,7 @@ from blobtree.validation import point_array
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
+from decals.images.load import AnyImage
 from decals.index.rows import as_numbers
 from decals.model import NO_IMAGE, Decals
 from decals.scenes.camera import Camera
@@ -407,13 +408,13 @@ class AddImage:
     2
     """
 
-    image: DecalImage
+    image: AnyImage
     label: ClassVar[str] = "add an image"
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        _check_image(self.image)
-        return document.compute_parts(images=(*document.images, self.image))
+        name = f"image {len(document.images)}"
+        return document.compute_parts(images=(*document.images, DecalImage.load(self.image, name=name)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -440,14 +441,13 @@ class ReplaceImage:
     """
 
     number: int
-    image: DecalImage
+    image: AnyImage
     label: ClassVar[str] = "replace an image"
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        _check_image(self.image)
-        images = list(document.images)
-        images[_image_index(document, self.number)] = self.image
+        images, number = list(document.images), _image_index(document, self.number)
+        images[number] = DecalImage.load(self.image, name=f"image {number}")
         return document.compute_parts(images=tuple(images))
 
 
@@ -543,7 +543,3 @@ def _broadcast(decals: Decals, name: str, value: ArrayLike) -> Any:
 
 def _image_index(document: Document, number: int) -> int:
     return whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
-
-
-def _check_image(image: object) -> None:
-    instance("image", image, DecalImage, InvalidEdit, "DecalImage.load makes one")

@@ -5,6 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from blobtree.progress import Progress
+from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.commands import AddImage
 from decals.editing.key_bindings import Group, action
@@ -12,7 +13,7 @@ from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
-from decals.scenes.meshes import MESH_SUFFIXES, write_mesh
+from decals.scenes.meshes import write_mesh
 from decals.scenes.scene import DecalImage, Scene
 
 UNTITLED = "untitled"

@@ -1,6 +1,6 @@
 """`evaluate`: decals at surface points, without graphics, for baking, experiments and tests."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,12 +15,12 @@ from blobtree.validation import real
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
-from decals.images.load import decode_srgb
+from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
 from decals.record import Contact
-from decals.validation import describe, member, require_rgba
+from decals.validation import describe, member
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ def evaluate(
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
     contact: Contact | str = Contact.PRODUCT,
     index: DecalIndex | None = None,
-    images: Sequence[UInt8Array] | None = None,
+    images: AnyImage | Iterable[AnyImage] | None = None,
     device: Any = None,
 ) -> Samples:
     """Evaluate decals at surface points: owner, image coordinates, field and colour.
@@ -73,8 +73,8 @@ def evaluate(
         Contact mode: PRODUCT (default), MIN or RADIAL.
     index : DecalIndex, optional
         Index of these decals. Built if not given; an editor has its own.
-    images : sequence of uint8[h, w, 4], optional
-        sRGB images with straight alpha, of any sizes, for `Samples.color`.
+    images : image or sequence of images, optional
+        Images of any kind and size, see `decals.images.image_pixels`, for `Samples.color`.
     device : optional
         Warp device. Default: Warp's default device.
 
@@ -131,8 +131,13 @@ def evaluate(
         indexed,
     ]
     wp.launch(loaded(sample_points, device), count, inputs, [owner, uv, field], device=device)
-    color = None if images is None else _colors(decals, images, [*inputs, owner], device)
+    color = None if images is None else _colors(decals, _each_pixels(images), [*inputs, owner], device)
     return Samples(owner.numpy(), uv.numpy(), field.numpy(), color)
+
+
+def _each_pixels(images: AnyImage | Iterable[AnyImage]) -> list[UInt8Array]:
+    """Return the pixels of one image, or of each of several."""
+    return [image_pixels(image, name=f"image {number}") for number, image in enumerate(each_image(images))]
 
 
 def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array]:
@@ -144,17 +149,12 @@ def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array
         First texel, width and height of each image.
     texels : float32[t, 4]
         Premultiplied linear colours, row after row, the upper row first.
-
-    Raises
-    ------
-    InvalidImage
-        An array that is not ``uint8[h, w, 4]``.
     """
     extents, parts, first = [], [], 0
     levels = np.arange(256, dtype=np.float32) / np.float32(255)
     linear = decode_srgb(levels.astype(np.float64)).astype(np.float32)
-    for number, image in enumerate(images):
-        height, width = require_rgba(f"image {number}", image).shape[:2]
+    for image in images:
+        height, width = image.shape[:2]
         extents.append((first, width, height))
         pixels = image.reshape(-1, 4)
         parts.append(np.column_stack([linear[pixels[:, :3]] * levels[pixels[:, 3:]], levels[pixels[:, 3]]]))

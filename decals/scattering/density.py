@@ -1,7 +1,7 @@
 """Densities and masks from data: values at vertices, regions of faces, painted images."""
 
 from collections.abc import Callable
-from pathlib import Path
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.validation import point_array
 from decals.errors import InvalidImage, InvalidScattering
-from decals.images.load import load_image
+from decals.images.load import AnyImage, image_pixels
 from decals.scattering.image_projections import Projection
 from decals.surfaces.mesh import MeshSurface
 from decals.validation import describe, function_values, instance, real_array, real_number
@@ -152,10 +152,10 @@ class PaintedImage:
 
     Parameters
     ----------
-    image : str, Path or array_like
-        A file, the name of a generated image, or an array of shape ``[h, w]``, ``[h, w, 3]`` or
-        ``[h, w, 4]``, bytes or floats from 0 to 1, top row first. Colours count by their luminance, and
-        transparent pixels as black.
+    image : str, path, PIL.Image.Image, pyvista.Texture or array_like
+        An image of any kind, see `decals.images.image_pixels`: a file, a name, or an array of shape
+        ``[h, w]``, ``[h, w, 3]`` or ``[h, w, 4]``, bytes or floats from 0 to 1, top row first. Colours count
+        by their luminance, and transparent pixels as black.
     projection : callable
         Position on the surface to position in the image: `Planar`, `Cylindrical`, `Spherical`,
         `TextureCoordinates`, or any function of ``points[n, 3]`` to ``uv[n, 2]``.
@@ -181,10 +181,9 @@ class PaintedImage:
     array([3.])
     """
 
-    def __init__(
-        self, image: str | Path | ArrayLike, projection: Projection, *, repeat: bool = False
-    ) -> None:
-        self.grey = _grey_values(load_image(str(image)) if isinstance(image, str | Path) else image)
+    def __init__(self, image: AnyImage | ArrayLike, projection: Projection, *, repeat: bool = False) -> None:
+        ready = isinstance(image, np.ndarray | list)  # these may be finer than bytes
+        self.grey = _grey_values(cast(ArrayLike, image) if ready else image_pixels(cast(AnyImage, image)))
         if not callable(projection):
             raise InvalidScattering(
                 f"projection: expected one such as Planar.over(surface), or a function of points, "

@@ -1,19 +1,24 @@
 """From models to a scene in one call: decals over all of them, and a camera that shows them."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Sequence
+from typing import cast
 
 import numpy as np
 
 from blobtree import Progress
 from blobtree._typing import Float32Array
 from decals.errors import InvalidScene
+from decals.images.load import DEFAULT_IMAGE, AnyImage
+from decals.rendering.options import SceneLike, is_scene_like
 from decals.scattering.orientation import Direction
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import THREE_QUARTER, Camera, Vector
+from decals.scenes.files import load_model
 from decals.scenes.objects import SceneObject, as_objects
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
-from decals.validation import describe
+from decals.validation import instance
 
 FRAMING_SAMPLES = 2000
 """Points per object that the camera is fitted to."""
@@ -25,7 +30,7 @@ FRAMING_MARGIN = 1.1
 def cover(
     *models: Model | SceneObject,
     count: int = 500,
-    images: Sequence[str | DecalImage] = ("scale",),
+    images: AnyImage | Iterable[AnyImage] = DEFAULT_IMAGE,
     seed: int = 0,
     direction: Direction = None,
     view_direction: Vector = THREE_QUARTER,
@@ -40,8 +45,9 @@ def cover(
         ``(vertices, faces)``, paths of models, or objects of a scene.
     count : int
         Number of decals.
-    images : sequence of str or DecalImage
-        Names of generated images, paths of pictures, or images. Each decal shows one of them at random.
+    images : image, or sequence of images
+        Names of generated images, paths of pictures, arrays, PIL images, textures or `DecalImage` objects.
+        Each decal shows one of them at random.
     seed : int
         Seed of all random choices; equal seeds give equal scenes.
     direction : optional
@@ -72,11 +78,7 @@ def cover(
     12
     """
     objects = as_objects(models)
-    try:
-        sources = list(images)
-    except TypeError:
-        raise InvalidScene(f"images: expected a list of images, got {describe(images)}") from None
-    pictures = [image if isinstance(image, DecalImage) else DecalImage.load(image) for image in sources]
+    pictures = as_images(images)
     if not objects:
         raise InvalidScene("expected at least one model, got none")
     decals = scatter(
@@ -91,7 +93,7 @@ def cover(
         objects=tuple(objects),
         camera=fitting_camera(objects, direction=view_direction),
         decals=decals,
-        images=tuple(pictures),
+        images=pictures,
     )
 
 
@@ -103,3 +105,29 @@ def fitting_camera(
         [item.surface.sample(FRAMING_SAMPLES, seed=0)[0] for item in objects]
     )
     return Camera.fitting(points, direction=direction, aspect=aspect, margin=FRAMING_MARGIN)
+
+
+def scene_or_objects(model: object) -> SceneLike | list[SceneObject]:
+    """Return a scene as it is, the scene of a file, or the objects of a model or of a list of models.
+
+    Raises
+    ------
+    InvalidScene, InvalidMesh, InvalidFile
+        If the model is of another kind, or cannot be used.
+    """
+    loaded = load_model(model) if isinstance(model, str | os.PathLike) else model
+    if is_scene_like(loaded):
+        return cast(SceneLike, loaded)
+    return as_objects(loaded if isinstance(loaded, list) and loaded else [loaded])
+
+
+def as_scene(model: object, *, aspect: float = 4 / 3) -> Scene:
+    """Return a scene as it is, or models without decals as a scene whose camera shows them.
+
+    Parameters and errors are those of `scene_or_objects`; ``aspect`` is the width of the picture over its
+    height.
+    """
+    built = scene_or_objects(model)
+    if isinstance(built, list):
+        return Scene(objects=built, camera=fitting_camera(built, aspect=aspect))
+    return instance("scene", built, Scene, InvalidScene, "decals.cover makes one; a document has `.scene`")

@@ -31,6 +31,8 @@ from msgspec import Raw, Struct
 from blobtree.files import write_atomically
 from blobtree.progress import Progress, watched
 from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.images.builtin import is_builtin
+from decals.images.load import embedded_image, is_embedded, load_image
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
 from decals.scenes.objects import SceneObject, as_object
@@ -88,7 +90,7 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
 def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
     """Write a scene to a JSON file, whole or not at all.
 
-    Meshes with a ``source`` and images are written as references, other meshes in full.
+    Meshes with a ``source`` and images with a name or a path are written as references, others in full.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "format": FORMAT,
         "version": VERSION,
         "objects": _lines(record_of(item, folder) for item in scene.objects),
-        "images": [relative(image.source, folder) for image in scene.images],
+        "images": [_image_source(image, folder) for image in scene.images],
         "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
         "decals": _lines(_decal_records(scene.decals, watched(progress, None))),
     }
@@ -212,14 +214,26 @@ def from_json(
     )
 
 
+def _image_source(image: DecalImage, folder: Path) -> str:
+    """Return the name or the path of an image; the picture itself if it has neither."""
+    if is_builtin(image.source) or is_file(Path(image.source)):
+        return relative(image.source, folder)
+    return embedded_image(image.pixels)
+
+
 def _images(sources: list[str], folder: Path, trust: bool) -> tuple[DecalImage, ...]:
     """Load the images of a scene; InvalidScene if an unknown scene has too many, or too large ones."""
     images: list[DecalImage] = []
     pixels = 0
     if not trust and len(sources) > MAX_IMAGES:
         raise InvalidScene(f"images: expected at most {MAX_IMAGES}, got {len(sources)}; {TRUST_ADVICE}")
-    for source in sources:
-        images.append(DecalImage.load(absolute(source, folder)))
+    for number, source in enumerate(sources):
+        name = f"image {number}"
+        if is_embedded(source):
+            images.append(DecalImage(name, load_image(source)))
+            source = name
+        else:
+            images.append(DecalImage.load(absolute(source, folder)))
         height, width = images[-1].pixels.shape[:2]
         pixels += height * width
         if not trust and pixels > MAX_IMAGE_PIXELS:

@@ -16,9 +16,6 @@ from decals.scenes.objects import MeshObject, SceneObject
 if TYPE_CHECKING:
     import pyvista as pv
 
-MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
-"""Formats of mesh files that are written."""
-
 
 def as_polydata(
     objects: Iterable[SceneObject],

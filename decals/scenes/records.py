@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from blobtree.io import TreeFile, from_tree_file, to_tree_file
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
+from decals.images.load import is_embedded
 from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
@@ -133,8 +134,8 @@ def absolute(source: str, folder: Path) -> str:
 
 
 def _is_name(source: str) -> bool:
-    """Return True if a source is a sample or a generated image rather than a path."""
-    return source.startswith(SAMPLE) or is_builtin(source)
+    """Return True if a source is a sample, a generated image or an embedded one rather than a path."""
+    return source.startswith(SAMPLE) or is_builtin(source) or is_embedded(source)
 
 
 Whole = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]

@@ -1,6 +1,6 @@
 """From a scene or a model to a picture in one call."""
 
-import os
+from collections.abc import Sequence
 from typing import cast
 
 from decals.field.mapping import ImageMapping
@@ -10,15 +10,13 @@ from decals.rendering.options import STUDIO, Background, RenderOptions, SceneLik
 from decals.rendering.picture import Picture
 from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Viewpoint
-from decals.scenes.cover import fitting_camera
-from decals.scenes.files import load_model
-from decals.scenes.objects import SceneObject, as_objects
-from decals.scenes.scene import Scene
+from decals.scenes.cover import as_scene
+from decals.scenes.objects import SceneObject
 from decals.surfaces.convert import Model
 
 
 def render(
-    scene: SceneLike | SceneObject | Model,
+    scene: SceneLike | SceneObject | Model | Sequence[SceneObject | Model],
     *,
     size: Size = (800, 600),
     samples: int = 2,
@@ -35,7 +33,8 @@ def render(
     Parameters
     ----------
     scene : Scene, SceneObject or Model
-        A scene; or a model as `decals.cover` takes it, or the path of a model or a scene.
+        A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
+        scene.
     size : (int, int)
         Width and height in pixels.
     samples : int
@@ -78,15 +77,7 @@ def render(
     Picture(64 × 48 pixels)
     """
     options = RenderOptions(size, samples, contact, mapping, background, lights)
-    drawn = cast(SceneLike, scene) if is_scene_like(scene) else _scene_of(scene, options.size)
+    width, height = options.size
+    drawn = cast(SceneLike, scene) if is_scene_like(scene) else as_scene(scene, aspect=width / height)
     with Renderer() as renderer:
         return Picture(renderer.render(drawn, options, viewpoint=viewpoint))
-
-
-def _scene_of(model: object, size: Size) -> Scene:
-    """Return a model without decals, or the scene of a file, as a scene that fills a picture."""
-    loaded = load_model(model) if isinstance(model, str | os.PathLike) else model
-    if isinstance(loaded, Scene):
-        return loaded
-    objects = as_objects([loaded])
-    return Scene(objects=tuple(objects), camera=fitting_camera(objects, aspect=size[0] / size[1]))

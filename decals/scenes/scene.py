@@ -1,19 +1,23 @@
 """A scene: objects, the decals that lie on them, the decals' images, and the camera."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import decals
+from blobtree.progress import Progress
 from decals import rendering
 from decals.errors import InvalidScene, NoGraphics
-from decals.images.load import load_image
+from decals.images.load import AnyImage, each_image, image_pixels
 from decals.model import Decals
 from decals.scenes.camera import Camera
-from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject, bounds_of, check_names
+from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names
+from decals.surfaces.convert import Model
 from decals.validation import describe, instance, require_rgba
 
 NOTEBOOK_SIZE = (640, 480)
@@ -54,10 +58,34 @@ class DecalImage:
         require_rgba(f"image {self.source!r}", self.pixels, InvalidScene)
 
     @classmethod
-    def load(cls, source: str, *, folder: Path | None = None) -> Self:
-        """Draw or read the picture behind ``source``; relative paths start at ``folder``."""
-        instance("an image's source", source, str, InvalidScene, "give a name or a path")
-        return cls(source, load_image(source, folder=folder))
+    def load(cls, source: AnyImage, *, folder: Path | None = None, name: str = "image") -> "DecalImage":
+        """Return the image of a name, a path, an array, a PIL image or a texture.
+
+        Parameters
+        ----------
+        source : str, path, PIL.Image.Image, numpy.ndarray, pyvista.Texture or DecalImage
+            Any image, see `decals.images.image_pixels`; a `DecalImage` is returned as it is.
+        folder : Path, optional
+            Folder of relative paths. Default: the working directory.
+        name : str
+            Source of an image without name and path.
+
+        Raises
+        ------
+        InvalidImage
+            The image is of another kind, or cannot be read.
+        """
+        if isinstance(source, DecalImage):
+            return source
+        pixels = image_pixels(source, name=name, folder=folder)
+        return cls(os.fspath(source) if isinstance(source, str | os.PathLike) else name, pixels)
+
+
+def as_images(images: AnyImage | Iterable[AnyImage]) -> tuple[DecalImage, ...]:
+    """Return images of any kind, or a single one, as images of a scene."""
+    return tuple(
+        DecalImage.load(image, name=f"image {number}") for number, image in enumerate(each_image(images))
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,14 +94,15 @@ class Scene:
 
     Parameters
     ----------
-    objects : sequence of MeshObject or TreeObject
-        Surfaces, each in the scene's own coordinates; names are unique.
+    objects : sequence of MeshObject, TreeObject or Model
+        Surfaces, each in the scene's own coordinates; names are unique. Other models become objects.
     camera : Camera
         The viewpoint of the picture.
     decals : Decals
         They lie over all objects; a decal belongs to no object in particular.
-    images : sequence of DecalImage
-        The images that ``decals.images`` indexes; index -1 is a plain tint and needs no image.
+    images : sequence of images
+        The images that ``decals.images`` indexes, or a single one; index -1 is a plain tint and needs no
+        image.
 
     Raises
     ------
@@ -100,13 +129,23 @@ class Scene:
     decals: Decals = field(default_factory=Decals.empty)
     images: tuple[DecalImage, ...] = ()
 
+    if TYPE_CHECKING:  # models and images of any kind are converted
+
+        def __init__(
+            self,
+            *,
+            objects: Iterable[SceneObject | Model],
+            camera: Camera,
+            decals: Decals = ...,
+            images: AnyImage | Iterable[AnyImage] = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
-        objects = _each(
-            "objects", self.objects, (MeshObject, TreeObject), "wrap each mesh and each tree in one"
-        )
-        images = _each("images", self.images, (DecalImage,), "DecalImage.load makes one")
+        if not isinstance(self.objects, Iterable) or isinstance(self.objects, str | Mapping):
+            raise InvalidScene(f"objects: expected a list of models, got {describe(self.objects)}")
+        objects = tuple(as_object(item, f"model {number}") for number, item in enumerate(self.objects, 1))
         object.__setattr__(self, "objects", objects)
-        object.__setattr__(self, "images", images)
+        object.__setattr__(self, "images", as_images(self.images))
         instance("camera", self.camera, Camera, InvalidScene, "Camera.framing makes one")
         instance("decals", self.decals, Decals, InvalidScene, "decals.scatter makes some")
         check_names(self.objects)
@@ -122,6 +161,50 @@ class Scene:
         """Lower and upper corner of all objects together, float32[3] each."""
         return bounds_of(self.objects)
 
+    def save(self, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
+        """Write the scene to a JSON file; see `decals.save_scene`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).save("ball.json")
+        >>> len(decals.load_scene("ball.json").decals)
+        20
+        """
+        decals.save_scene(self, path, progress=progress)
+
+    def render(self, **options: Any) -> rendering.Picture:
+        """Draw the scene; options and errors are those of `decals.render`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).render(size=(64, 48))
+        Picture(64 × 48 pixels)
+        """
+        return decals.render(self, **options)
+
+    def show(self, **options: Any) -> Any:
+        """Show the scene in a window or a notebook; options and errors are those of `decals.show`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).show()  # doctest: +SKIP
+        """
+        return decals.show(self, **options)
+
+    def edit(self, **options: Any) -> "Scene":
+        """Edit the scene in a window, and return the edited one; options are those of `decals.edit`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
+        >>> scene = scene.edit()  # doctest: +SKIP
+        """
+        return decals.edit(self, **options)
+
     def _repr_png_(self) -> bytes | None:
         """Return a PNG file for notebooks; None, so that they show text, without OpenGL."""
         try:
@@ -134,24 +217,11 @@ class Scene:
     def replace(
         self,
         *,
-        objects: Sequence[SceneObject] | None = None,
+        objects: Sequence[SceneObject | Model] | None = None,
         camera: Camera | None = None,
         decals: Decals | None = None,
-        images: Sequence[DecalImage] | None = None,
+        images: AnyImage | Sequence[AnyImage] | None = None,
     ) -> "Scene":
         """Return the same scene with some parts replaced."""
         given = {"objects": objects, "camera": camera, "decals": decals, "images": images}
         return replace(self, **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
-
-
-def _each(name: str, values: Any, kinds: tuple[type, ...], advice: str) -> tuple[Any, ...]:
-    """Give a tuple of things of some kinds, or raise InvalidScene."""
-    wanted = " or ".join(kind.__name__ for kind in kinds)
-    try:
-        found = tuple(values)
-    except TypeError:
-        raise InvalidScene(f"{name}: expected a list of {wanted}, got {describe(values)}; {advice}") from None
-    for value in found:
-        if not isinstance(value, kinds):
-            raise InvalidScene(f"{name}: expected a list of {wanted}, got {describe(value)} in it; {advice}")
-    return found

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
 from blobtree import Node
 from blobtree.colors import ColorLike
 from decals.errors import InvalidScene, NoGraphics
+from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.model import NO_IMAGE, Decals
 from decals.rendering import SceneLike
 from decals.scenes.camera import Camera
+from decals.scenes.cover import as_scene
 from decals.scenes.objects import CLAY, MeshObject, SceneObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model, as_shape
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
 from decals.vtk.exports import restore_exports, warn_of_exports
 from decals.vtk.frame import WindowContext
 from decals.vtk.subplot import PickResult, SubplotRenderer
-
-Image = str | os.PathLike[str] | DecalImage | NDArray[np.uint8]
-"""The name of a generated image, a path, an image, or ``uint8[h, w, 4]``."""
 
 UNUSED_CAMERA = Camera((0.0, 0.0, 1.0))
 """Camera of a scene without its own; the plotter has another."""
@@ -52,7 +50,7 @@ class DecalsComponent:
     >>> plotter = pyvista.Plotter(off_screen=True, window_size=(80, 60))
     >>> blob = plotter.decals.add_implicit(Point((0, 0, 0), radius=1.0))
     >>> scattered = decals.scatter([blob.surface], count=30)
-    >>> len(plotter.decals.add(scattered, images=["scale"]))
+    >>> len(plotter.decals.add(scattered, images="scale"))
     30
     >>> plotter.show()
     """
@@ -88,17 +86,26 @@ class DecalsComponent:
     def scene(self, scene: SceneLike) -> None:
         self.subplot.scene = scene
 
-    def add_implicit(self, tree: Node | TreeObject, *, name: str | None = None) -> TreeObject:
+    def add_implicit(
+        self, tree: Node | TreeObject | str | os.PathLike[str], *, name: str | None = None
+    ) -> TreeObject:
         """Add a BlobTree, which is ray traced.
 
         Parameters
         ----------
         tree
-            A tree, or an object of a scene.
+            A tree, the path of its JSON file, or an object of a scene.
         name
             Its name, unique in the subplot.
         """
-        item = tree if isinstance(tree, TreeObject) else TreeObject(self._name(name), tree)
+        if isinstance(tree, TreeObject):
+            item = tree
+        else:
+            label = self._name(name)
+            shape = as_shape(tree, name=label, error=InvalidScene)
+            if not isinstance(shape, Node):
+                raise InvalidScene(f"{label}: expected a BlobTree, got a mesh; `add_mesh` adds it")
+            item = TreeObject(label, shape)
         self._add_object(item)
         return item
 
@@ -119,11 +126,18 @@ class DecalsComponent:
         name
             Its name, unique in the subplot.
         """
-        item = mesh if isinstance(mesh, MeshObject) else self._mesh_object(mesh, self._name(name), color)
+        if isinstance(mesh, MeshObject):
+            item = mesh
+        else:
+            label = self._name(name)
+            shape = as_shape(mesh, name=label, error=InvalidScene)
+            if isinstance(shape, Node):
+                raise InvalidScene(f"{label}: expected a mesh, got a BlobTree; `add_implicit` adds it")
+            item = MeshObject(label, *shape, color)
         self._add_object(item)
         return item
 
-    def add(self, decals: Decals, *, images: Sequence[Image] = ()) -> Decals:
+    def add(self, decals: Decals, *, images: AnyImage | Iterable[AnyImage] | None = None) -> Decals:
         """Add decals to all objects of the subplot.
 
         Parameters
@@ -131,7 +145,8 @@ class DecalsComponent:
         decals
             The decals; their ``images`` are indices into the given images.
         images
-            Names, paths, arrays or `DecalImage` objects. Without any, indices refer to the present images.
+            One image or several: names, paths, arrays, PIL images, textures or `DecalImage` objects. Without
+            any, indices refer to the present images; a subplot that has none gets the default image, a scale.
 
         Returns
         -------
@@ -143,11 +158,9 @@ class DecalsComponent:
                 f"expected Decals to add, got {type(decals).__name__}; decals.scatter makes some"
             )
         scene = self.scene
-        if isinstance(images, str):
-            raise InvalidScene(f"expected a list of images, got the text {images!r}; write [{images!r}]")
-        if not isinstance(images, Sequence):
-            raise InvalidScene(f"expected a list of images, got {describe(images)}; write a list")
-        added = tuple(_image(image, number) for number, image in enumerate(images))
+        if images is None:
+            images = () if scene.images or decals.images.max(initial=NO_IMAGE) < 0 else DEFAULT_IMAGE
+        added = as_images(images)
         if added:
             shifted = np.where(decals.images == NO_IMAGE, NO_IMAGE, decals.images + len(scene.images))
             decals = decals.replace(images=shifted)
@@ -189,31 +202,31 @@ class DecalsComponent:
         """
         self.subplot.remove(actor)
 
-    def add_scene(self, scene: Scene, *, camera: bool = False) -> Scene:
+    def add_scene(self, scene: Scene | SceneObject | Model, *, camera: bool = False) -> Scene:
         """Replace the scene of the subplot.
 
         Parameters
         ----------
         scene
-            The scene.
+            The scene; or models that become one, as for `decals.render`.
         camera
             If True, the subplot gets the scene's camera. If False, it keeps the plotter's, as for any actor.
         """
-        instance("scene", scene, Scene, InvalidScene, "decals.cover makes one; for others set `scene`")
+        shown = as_scene(scene)
         instance("camera", camera, bool, InvalidScene, "True to use the scene's camera")
-        self.scene = scene
+        self.scene = shown
         if camera:
             view = self._plotter.camera
             view.position, view.focal_point, view.up = (
-                scene.camera.position,
-                scene.camera.target,
-                scene.camera.up,
+                shown.camera.position,
+                shown.camera.target,
+                shown.camera.up,
             )
-            view.view_angle = scene.camera.fov
+            view.view_angle = shown.camera.fov
             view.parallel_projection = False
             self._plotter.renderer.camera_set = True
             self._plotter.renderer.reset_camera_clipping_range()
-        return scene
+        return shown
 
     def enable_picking(
         self, callback: Callable[[PickResult], object], *, left_clicking: bool = False
@@ -332,12 +345,6 @@ class DecalsComponent:
     def _add_object(self, item: SceneObject) -> None:
         self.scene = self.scene.replace(objects=(*self.scene.objects, item))
 
-    def _mesh_object(self, model: object, name: str, color: ColorLike) -> MeshObject:
-        shape = as_shape(model, name=name, error=InvalidScene)
-        if isinstance(shape, Node):
-            raise InvalidScene(f"{name}: expected a mesh, got a BlobTree; `add_implicit` adds it")
-        return MeshObject(name, *shape, color)
-
     def _name(self, name: str | None) -> str:
         if name is not None:
             return name  # checked with the object
@@ -356,31 +363,20 @@ class DecalsComponent:
         self._context = None
 
 
-def _image(image: Any, number: int) -> DecalImage:
-    if isinstance(image, DecalImage):
-        return image
-    if isinstance(image, str | os.PathLike):
-        return DecalImage.load(os.fspath(image))
-    try:
-        pixels = np.asarray(image)
-    except ValueError:
-        raise InvalidScene(f"image {number}: expected uint8[h, w, 4], got {describe(image)}") from None
-    return DecalImage(f"image {number}", pixels)
-
-
 REMOTE = "server"
 """pyvista's backend that draws where Python runs. Browsers cannot draw decals."""
 SERVING = ("trame_pyvista", "ipywidgets", "nest_asyncio2")
 """Packages that pyvista needs for this backend; the extra ``browser`` installs them."""
 
 
-def show(scene: Scene, **options: Any) -> Any:
+def show(scene: Scene | SceneObject | Model | Sequence[SceneObject | Model], **options: Any) -> Any:
     """Show a scene in a window, or interactively in a notebook; `decals.edit` edits one.
 
     Parameters
     ----------
     scene
-        The scene.
+        The scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
+        scene.
     options
         Arguments of pyvista's ``Plotter.show``.
 
@@ -392,7 +388,7 @@ def show(scene: Scene, **options: Any) -> Any:
     Raises
     ------
     InvalidScene
-        The argument is not a `Scene`.
+        The argument is neither a `Scene` nor a model.
 
     Examples
     --------
@@ -401,10 +397,10 @@ def show(scene: Scene, **options: Any) -> Any:
     >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
     >>> decals.show(scene)  # doctest: +SKIP
     """
-    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    shown = as_scene(scene)
     plotter = pv.Plotter()
     component: DecalsComponent = plotter.decals
-    component.add_scene(scene, camera=True)
+    component.add_scene(shown, camera=True)
     if plotter.notebook and "jupyter_backend" not in options:
         options["jupyter_backend"] = REMOTE if all(map(find_spec, SERVING)) else "static"
     return plotter.show(**options)

@@ -1,7 +1,7 @@
 """The editing window."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,11 @@ from decals.errors import InvalidEdit, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering.gl_libraries import require_gl
+from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
+from decals.scenes.objects import SceneObject
 from decals.scenes.scene import Scene
+from decals.surfaces.convert import Model
 from decals.validation import describe, whole_number
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
@@ -55,8 +58,9 @@ class EditWindow:
 
     Parameters
     ----------
-    scene : Scene or EditSession
-        What to edit.
+    scene : Scene, EditSession, SceneObject or Model
+        A scene or a session; or a model as `decals.cover` takes it, a list of such models, or the path of a
+        model or a scene.
     path : str or path-like, optional
         File to save to.
     size : (int, int)
@@ -376,7 +380,7 @@ class EditWindow:
 
 
 def edit(
-    scene: Scene | EditSession,
+    scene: Scene | EditSession | SceneObject | Model | Sequence[SceneObject | Model],
     *,
     path: str | os.PathLike[str] | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
@@ -387,8 +391,9 @@ def edit(
 
     Parameters
     ----------
-    scene : Scene or EditSession
-        What to edit.
+    scene : Scene, EditSession, SceneObject or Model
+        A scene or a session; or a model as `decals.cover` takes it, a list of such models, or the path of a
+        model or a scene.
     path : str or path-like, optional
         File to save to with Ctrl + S. Unsaved changes that an earlier window left in its recovery file are
         opened, as one undo entry.
@@ -418,8 +423,9 @@ def edit(
     >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
     >>> edited = decals.edit(scene)  # doctest: +SKIP
     """
+    edited = scene if isinstance(scene, EditSession) else as_scene(scene)
     with EditWindow(
-        scene, path=path, size=size, recover=load_scene, contact=contact, mapping=mapping
+        edited, path=path, size=size, recover=load_scene, contact=contact, mapping=mapping
     ) as window:
         window.show()
         return window.document.scene

@@ -2,13 +2,23 @@
 
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import pyvista as pv
 
-from blobtree import InvalidPoints, InvalidResolution, MissingPackage, Node, Point, polygonize
+from blobtree import (
+    InvalidFile,
+    InvalidNode,
+    InvalidPoints,
+    InvalidResolution,
+    MissingPackage,
+    Node,
+    Point,
+    polygonize,
+)
 from tests.blobtree.trees import random_trees
 
 A = Point((0, 0, 0), radius=1.0, color=(1, 0.5, 0))
@@ -200,3 +210,41 @@ def test_a_slice_plots_in_one_call(tmp_path: Any) -> None:
     except RuntimeError as error:
         pytest.skip(f"no window can be opened here: {error}")
     assert (tmp_path / "slice.png").stat().st_size > 500
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp"])
+def test_a_mesh_is_saved(suffix: str, tmp_path: Path) -> None:
+    mesh = polygonize(Point((0, 0, 0), radius=1.0, color="red"), resolution=8)  # type: ignore[arg-type]
+    path = tmp_path / f"ball.{suffix}"
+    mesh.save(path)
+    loaded: Any = pv.read(path)
+    assert loaded.n_cells == len(mesh.faces)
+    np.testing.assert_allclose(loaded.bounds[1::2], mesh.vertices.max(axis=0), atol=1e-5)
+    if suffix in ("ply", "vtp"):
+        assert (loaded.point_data["RGB"] == (255, 0, 0)).all()
+    mesh.save(str(path))  # over the first file
+
+
+def test_a_mesh_that_cannot_be_saved(tmp_path: Path) -> None:
+    mesh = polygonize(Point((0, 0, 0), radius=1.0), resolution=8)
+    for wrong in (tmp_path / "ball.xyz", "ball", None, 5):
+        with pytest.raises(InvalidFile, match=r"path: expected a file that ends in \.ply"):
+            mesh.save(wrong)  # type: ignore[arg-type]
+    with pytest.raises(OSError, match="nowhere"):
+        mesh.save(tmp_path / "nowhere" / "ball.ply")
+    empty = polygonize(Point((0, 0, 0), radius=1.0) & Point((9, 0, 0), radius=1.0), resolution=8)
+    with pytest.raises(InvalidFile, match="expected a mesh with faces, got none"):
+        empty.save(tmp_path / "empty.ply")
+
+
+def test_a_tree_is_plotted_in_its_colours() -> None:
+    ball = Point((0, 0, 0), radius=1.0, color="red")  # type: ignore[arg-type]
+    choices: list[tuple[dict[str, Any], int]] = [({}, 0), ({"color": "blue"}, 2)]
+    for options, channel in choices:
+        shown = {"off_screen": True, "window_size": (60, 40), "return_img": True, "background": "black"}
+        picture = ball.plot(resolution=8, **shown, **options)
+        middle = picture[20, 30].astype(int)
+        assert middle[channel] > 100
+        assert np.delete(middle, channel).max() < 60
+    with pytest.raises(InvalidNode, match="expected a tree with a surface, got none"):
+        (ball & ball.translate((9, 0, 0))).plot(off_screen=True)

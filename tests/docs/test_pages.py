@@ -113,6 +113,14 @@ def check_scattering(session: Session) -> None:
     assert "rho=" in session["printed"]
 
 
+def check_inputs(session: Session) -> None:
+    assert float(session["middle"]) > 1.0
+    saved = load_scene("blob.json").images
+    assert [image.source for image in saved] == ["image 0", "image 1", "eye"]
+    for image, again in zip(session["scene"].images, saved, strict=True):
+        np.testing.assert_array_equal(image.pixels, again.pixels)
+
+
 def check_editing(session: Session) -> None:
     assert Path("scene.json").exists()
     assert len(session["session"].labels) == 4
@@ -154,6 +162,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "rendering": check_rendering,
     "baking": check_baking,
     "scattering": check_scattering,
+    "inputs": check_inputs,
     "editing": check_editing,
     "pyvista": check_pyvista,
     "many-runs": check_many_runs,

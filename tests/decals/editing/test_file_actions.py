@@ -8,9 +8,9 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
+from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.editing import Actions, EditSession, PointerTools, ScaleDecals
 from decals.scenes.files import load_scene
-from decals.scenes.meshes import MESH_SUFFIXES
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
 from tests.decals.editing.scenes import scene
 

@@ -41,7 +41,7 @@ from decals.editing import (
     outline,
     pick,
 )
-from decals.errors import ImplicitDecalsError, InvalidEdit, InvalidPoints, InvalidScene
+from decals.errors import ImplicitDecalsError, InvalidEdit, InvalidImage, InvalidPoints, InvalidScene
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
@@ -151,14 +151,14 @@ def test_commands_do_something_or_say_why_not(session: Any, name: str, x: Any) -
         (lambda x: EditSession(scene()).do(x), InvalidEdit),
         (lambda x: Scene(objects=(x,), camera=Camera((0, 0, 1))), InvalidScene),
         (lambda x: Scene(objects=(), camera=x), InvalidScene),
-        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), images=(x,)), InvalidScene),
+        (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), images=(x,)), InvalidImage),
         (lambda x: Scene(objects=(), camera=Camera((0, 0, 1)), decals=x), InvalidScene),
         (lambda x: TreeObject("tree", x), InvalidScene),
         (lambda x: TreeObject(x, TREE), InvalidScene),
         (lambda x: MeshObject("mesh", x, np.array([[0, 1, 2]], np.int32)), ImplicitDecalsError),
         (lambda x: DecalImage(x, RIVET.pixels), InvalidScene),
         (lambda x: DecalImage("rivet", x), InvalidScene),
-        (lambda x: DecalImage.load(x), InvalidScene),
+        (lambda x: DecalImage.load(x), InvalidImage),
         (lambda x: Camera(x), InvalidScene),
         (lambda x: Camera((0, 0, 1), fov=x), InvalidScene),
         (lambda x: pick(Document.from_scene(scene()), x, (0, 0, 1)), InvalidPoints),
@@ -169,7 +169,7 @@ def test_commands_do_something_or_say_why_not(session: Any, name: str, x: Any) -
         (lambda x: primitive_paths(x), InvalidNode),
     ],
 )
-@pytest.mark.parametrize("wrong", [None, 10**400, float("nan"), {}, object(), [None], np.zeros((2, 2))])
+@pytest.mark.parametrize("wrong", [None, 10**400, float("nan"), {}, object(), [None], np.zeros((2, 2, 2))])
 def test_what_is_of_the_wrong_kind_is_named(ask: Any, error: Any, wrong: Any) -> None:
     with pytest.raises(error, match="expected"):
         ask(wrong)

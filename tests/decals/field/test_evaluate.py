@@ -220,7 +220,7 @@ def test_refuses(points: NDArray[Any], normals: NDArray[Any], says: str) -> None
         ),
         ({"contact": "round"}, InvalidScene, "contact: expected one of .*, 'radial', got 'round'"),
         ({"device": "cuda:99"}, InvalidDevice, "got 'cuda:99'"),
-        ({"images": ["scale"]}, InvalidImage, "image 0: expected uint8 pixels .* got 'scale'"),
+        ({"images": ["skale.png"]}, InvalidImage, "expected an image, found no file 'skale.png'"),
         ({"decals": "scale"}, InvalidDecals, "expected Decals or a DecalEditor, got 'scale'"),
         ({"index": "scale"}, InvalidDecals, "index: expected the index of these 1 decals, got 'scale'"),
         ({"index": DecalIndex.build(np.zeros((9, 3)), np.ones(9))}, InvalidDecals, "got one of 9"),

@@ -204,5 +204,5 @@ def test_without_images_no_colour_and_too_few_are_refused() -> None:
     assert evaluate(decals, [[0, 0, 0]], UP).color is None
     with pytest.raises(InvalidImage, match="expected 3 or more, got 1"):
         evaluate(decals, [[0, 0, 0]], UP, images=IMAGES[:1])
-    with pytest.raises(InvalidImage, match="uint8"):
-        evaluate(decals, [[0, 0, 0]], UP, images=[np.zeros((2, 2, 4))] * 3)  # type: ignore[list-item]
+    with pytest.raises(InvalidImage, match="expected bytes, or floats from 0 to 1"):
+        evaluate(decals, [[0, 0, 0]], UP, images=[np.full((2, 2, 4), 2.0)] * 3)

@@ -272,7 +272,7 @@ def test_invalid_faces_reaches_and_samples() -> None:
 
 
 def test_errors_name_the_members_of_enumerations() -> None:
-    assert "'covering'" in error_of(scatter, BALL, count=3, sizing="cover")
-    assert "'size'" in error_of(scatter, BALL, count=3, choice="sizes")
+    assert "'covering', 'touching', 'delaunay'" in error_of(scatter, BALL, count=3, sizing="loose")
+    assert "'random', 'size', 'curvature'" in error_of(scatter, BALL, count=3, choice="largest")
     assert Sizing("covering") is Sizing.COVERING
     assert ImageChoice("size") is ImageChoice.SIZE

@@ -14,7 +14,8 @@ from tests.decals.editing.scenes import one, scene
 from tests.decals.vtk.conftest import Factory, plotter
 
 __all__ = ["plotter"]
-OTHERS: tuple[Any, ...] = (None, "x", b"x", {}, object(), [None], np.zeros((2, 2)), int, one())
+GREY = np.zeros((2, 2))
+OTHERS: tuple[Any, ...] = (None, "x", b"x", {}, object(), [None], GREY, int, one())
 WRONG = (-1, float("nan"), 10**400, *OTHERS)
 
 
@@ -35,7 +36,7 @@ def test_a_plotter(plotter: Factory) -> None:
     pl.render()
     subplot = pl.decals.subplot
     refused(lambda wrong: pl.decals.add_scene(scene(), camera=wrong))
-    refused(lambda wrong: pl.decals.add(one(), images=[wrong]), "x")
+    refused(lambda wrong: pl.decals.add(one(), images=[wrong]), "x", GREY)
     refused(lambda wrong: setattr(pl.decals, "lights", wrong))
     refused(lambda wrong: setattr(pl.decals, "scene", wrong), None)
     refused(lambda wrong: subplot.covers(wrong, 3), -1)
