@@ -123,6 +123,9 @@ def press_key(
         return False
     text = key if len(key) == 1 else ""  # other names are those of keys without a character
     used = window.tools.key(from_browser(key), x, y, ctrl=ctrl, shift=shift, text=text)
+    if not used and key in ("r", "R") and not ctrl:  # on a screen, VTK handles this key
+        window.subplot.vtk_renderer.ResetCamera()
+        used = True
     if used:
         window.redraw(whole=not window.tools.dragging)
     return used

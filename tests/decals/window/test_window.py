@@ -16,7 +16,7 @@ from decals.record import Contact
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
 from decals.scenes.scene import DecalImage, Scene
-from decals.window import EditWindow
+from decals.window import EditWindow, press_key
 from tests.decals.window.driver import Driver
 
 
@@ -96,6 +96,20 @@ def test_the_cpu_picks_what_the_window_shows(driver: Driver) -> None:
         found = driver.window.tools.at(x, y)
         wrong += owner[height - 1 - y, x] != (-1 if found is None else found.owner)
     assert wrong <= 2  # silhouettes
+
+
+def test_a_page_shows_everything_as_the_window_does(driver: Driver) -> None:
+    driver.wheel((3, 3))
+    closer = driver.plotter.camera.position
+    driver.key("r", text="r")
+    shown = driver.plotter.camera.position
+    assert shown != pytest.approx(closer)
+    driver.wheel((3, 3))
+    before = driver.shot()
+    assert press_key(driver.window, "r")
+    assert driver.plotter.camera.position == pytest.approx(shown, rel=1e-5)
+    assert (driver.shot() != before).any()
+    assert driver.session.labels == ()
 
 
 def test_keys_of_pyvista_are_ours_where_the_table_says_so(driver: Driver) -> None:
