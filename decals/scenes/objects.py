@@ -55,6 +55,8 @@ class MeshObject:
     --------
     >>> import decals
     >>> corner = decals.MeshObject("corner", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> corner
+    MeshObject('corner', 3 vertices, 1 faces)
     >>> corner.surface.area
     0.5
     """
@@ -89,6 +91,10 @@ class MeshObject:
         }
         for key, value in checked.items():
             object.__setattr__(self, key, value)
+
+    def __repr__(self) -> str:
+        """Return the name and the numbers of vertices and faces, as arrays would fill the screen."""
+        return f"MeshObject({self.name!r}, {len(self.vertices)} vertices, {len(self.faces)} faces)"
 
     @property
     def bounds(self) -> Box:
