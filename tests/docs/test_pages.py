@@ -137,6 +137,10 @@ def check_pyvista(session: Session) -> None:
         stored = np.asarray(Image.open(path).convert("RGB")).astype(int)
         assert drawn.shape == stored.shape
         assert np.abs(drawn - stored).mean() < 6
+    red, without = (np.asarray(Image.open(f"{name}.png")).astype(int) for name in ("red", "without"))
+    assert np.median(red[..., 0] - red[..., 1]) >= 0
+    assert (red[..., 0] - red[..., 2]).max() > 40
+    assert (red != without).any()
 
 
 def check_many_runs(_session: Session) -> None:
