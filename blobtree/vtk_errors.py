@@ -22,7 +22,12 @@ def vtk_errors() -> Iterator[list[str]]:
             warnings.simplefilter("always")
             with pv.VtkErrorCatcher(send_to_logging=False) as catcher:
                 yield messages
-        messages.extend(event.alert for event in catcher.error_events)
+        # A truncated file of the legacy format comes as a warning, and as arrays that are not filled.
+        messages.extend(
+            event.alert.rpartition("\n")[2] if event.kind == "" else event.alert
+            for event in catcher.events
+            if event.kind == "ERROR" or "Error reading" in event.alert
+        )
         # An error inside one of pyvista's readers comes as a warning that quotes it.
         messages.extend(
             str(w.message).partition('"')[2] for w in caught if "raised an error" in str(w.message)

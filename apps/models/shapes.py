@@ -1,7 +1,6 @@
 """Shapes of the sample models: the spheres and the creature as BlobTrees; knot, egg and box as meshes."""
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import ArrayLike
 
 from blobtree import Node, Point, Ricci, Segment, Sum
@@ -184,12 +183,16 @@ def rounded_box(center: ArrayLike, *, half: ArrayLike, rounding: float) -> MeshA
 
 def _cube() -> tuple[Float64Array, Int32Array]:
     """Return the surface of the cube from -1 to 1, in equal squares of two triangles."""
+    import pyvista as pv
+
     grid = pv.ImageData(dimensions=(_SQUARES + 1,) * 3, spacing=(2.0 / _SQUARES,) * 3, origin=(-1.0,) * 3)
     surface = grid.extract_surface(algorithm="geometry").triangulate()  # the default algorithm leaves seams
     return np.asarray(surface.points, np.float64), surface.regular_faces.astype(np.int32)
 
 
 def _ball() -> tuple[Float64Array, Int32Array]:
+    import pyvista as pv
+
     sphere = pv.Icosphere(nsub=_SUBDIVISIONS)
     points = np.asarray(sphere.points, np.float64)
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)

@@ -1,12 +1,12 @@
 """Models of other kinds as our surfaces: pyvista and trimesh meshes, arrays, files and BlobTrees."""
 
 import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypeGuard, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard, Union, runtime_checkable
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import ArrayLike
 
 import blobtree
@@ -19,6 +19,9 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, polygon_triangles, read_mesh
 from decals.surfaces.surface import Surface
 from decals.validation import describe, is_file
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 MODEL_ADVICE = (
     "give a BlobTree, a pyvista dataset, a mesh with vertices and faces, a pair of arrays (vertices, faces)"
@@ -50,9 +53,9 @@ class HasSurface(Protocol):
         ...
 
 
-Model: TypeAlias = (
-    Node | MeshLike | pv.DataSet | pv.MultiBlock | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str]
-)
+Model: TypeAlias = Union[
+    Node, MeshLike, "pv.DataSet", "pv.MultiBlock", tuple[ArrayLike, ArrayLike], str, os.PathLike[str]
+]
 """Everything that has a shape: see `as_shape`."""
 
 
@@ -87,7 +90,7 @@ def as_shape(
         if not is_file(Path(model)):
             raise error(f"{name}: expected a model, found no file {os.fspath(model)!r}; check the path")
         return read_shape(model)
-    if isinstance(model, pv.DataSet | pv.MultiBlock):
+    if _is_dataset(model):
         return dataset_triangles(model, name=name)
     if isinstance(model, MeshLike) and not isinstance(model, type):
         return _array_triangles(model.vertices, model.faces, name)
@@ -126,8 +129,14 @@ def is_surface(value: object) -> TypeGuard[Surface]:
 
 def is_model(value: object) -> bool:
     """Return True if the value is one model, so not a sequence of models."""
-    known = (Node, pv.DataSet, pv.MultiBlock, str, os.PathLike, MeshLike)
-    return is_surface(value) or isinstance(value, known) or _is_array_pair(value)
+    known = (Node, str, os.PathLike, MeshLike)
+    return is_surface(value) or isinstance(value, known) or _is_dataset(value) or _is_array_pair(value)
+
+
+def _is_dataset(value: object) -> "TypeGuard[pv.DataSet | pv.MultiBlock]":
+    """Return True for a dataset of pyvista, which is not imported for that: a dataset comes from it."""
+    pyvista = sys.modules.get("pyvista")
+    return pyvista is not None and isinstance(value, pyvista.DataSet | pyvista.MultiBlock)
 
 
 def read_shape(path: str | os.PathLike[str]) -> Node | MeshArrays:

@@ -5,26 +5,22 @@ VTK's readers of most formats crash or hang on some damaged files, so they run i
 
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import ArrayLike
-from pyvista.core.utilities.reader import CLASS_READERS
 
 from blobtree._typing import Float32Array, Int32Array
-from blobtree.vtk_errors import vtk_errors
 from decals.errors import InvalidMesh
 from decals.surfaces.ply import Polygons, read_ply
 from decals.surfaces.vtk_process import can_isolate, read_isolated
 from decals.validation import describe, is_file
 
+if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
+    import pyvista as pv
+
 MeshArrays = tuple[Float32Array, Int32Array]
 """Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
-
-_VOLUMES = (pv.UnstructuredGrid, pv.StructuredGrid, pv.MultiBlock)
-"""Kinds of datasets in files whose boundary is a surface; an image or a point set has none."""
-
 
 _ROBUST = (".obj", ".stl")
 """Suffixes of formats whose readers in VTK neither crash nor hang on damaged files; see `tests.fuzz`."""
@@ -68,20 +64,24 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     if path.suffix.lower() == ".ply":
         return polygon_triangles(*read_ply(path), name=str(path))
+    from pyvista.core.utilities.reader import CLASS_READERS
+
     if path.suffix.lower() not in CLASS_READERS or path.suffix.lower() in _ROBUST or not can_isolate():
         return dataset_triangles(read_dataset(path), name=str(path))
     return read_isolated(path)
 
 
-def dataset_triangles(dataset: pv.DataSet | pv.MultiBlock, *, name: str) -> MeshArrays:
+def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshArrays:
     """Return the vertices and triangles of a pyvista dataset's surface.
 
     Messages call the dataset by ``name``.
     """
+    import pyvista as pv
+
+    _check_cells(dataset, name)
     surface = (
         dataset if isinstance(dataset, pv.PolyData) else dataset.extract_surface(algorithm="dataset_surface")
     )
-    _check_indices(surface.face_connectivity, surface.n_points, name)
     if surface.n_strips:
         surface = surface.triangulate()
     sizes = np.diff(surface.face_offsets)
@@ -104,8 +104,29 @@ def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> Me
     areal = [polygon for polygon in polygons if len(polygon) > 2]
     if not areal:
         raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
+    import pyvista as pv
+
     surface = pv.PolyData.from_irregular_faces(vertices, areal)
     return vertices, surface.triangulate().regular_faces.astype(np.int32)
+
+
+def _check_cells(dataset: Any, name: str) -> None:
+    """Refuse cells with offsets or corners out of range in a dataset or its blocks: filters trust them."""
+    import pyvista as pv
+
+    if isinstance(dataset, pv.MultiBlock):
+        for block in dataset:
+            _check_cells(block, name)
+    elif isinstance(dataset, pv.PolyData | pv.UnstructuredGrid):
+        grid = isinstance(dataset, pv.UnstructuredGrid)
+        for cells in [dataset.GetCells()] if grid else [dataset.GetPolys(), dataset.GetStrips()]:
+            offsets: Any = pv.convert_array(cells.GetOffsetsArray())
+            corners: Any = pv.convert_array(cells.GetConnectivityArray())
+            if len(offsets) and (
+                offsets[0] != 0 or offsets[-1] != len(corners) or (np.diff(offsets) < 0).any()
+            ):
+                raise InvalidMesh(f"{name!r} has faces that do not follow each other; export it again")
+            _check_indices(corners, dataset.n_points, name)
 
 
 def _check_indices(corners: Any, count: int, name: str) -> None:
@@ -115,17 +136,37 @@ def _check_indices(corners: Any, count: int, name: str) -> None:
         raise InvalidMesh(f"{name!r} has {count} points but a face asks for number {bad}; export it again")
 
 
-def read_dataset(path: Path) -> pv.DataSet | pv.MultiBlock:
+def read_dataset(path: Path) -> "pv.DataSet | pv.MultiBlock":
     """Read a file by pyvista in this process; InvalidMesh for errors that the reader reports."""
+    import pyvista as pv
+
+    from blobtree.vtk_errors import vtk_errors
+
     try:
         with vtk_errors() as errors:
-            dataset = pv.read(path)
+            dataset = _read_legacy(path) if path.suffix.lower() == ".vtk" else pv.read(path)
     except Exception as error:  # readers and their plugins raise all sorts of exceptions
         raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(str(error))})") from error
     if errors:
         raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(errors[0])})")
-    if not isinstance(dataset, (pv.PolyData, *_VOLUMES)):
+    # An image or a point set has no boundary that is a surface.
+    if not isinstance(dataset, pv.PolyData | pv.UnstructuredGrid | pv.StructuredGrid | pv.MultiBlock):
         raise InvalidMesh(f"expected a surface mesh in {str(path)!r}, got {describe(dataset)}; convert it")
+    return dataset
+
+
+def _read_legacy(path: Path) -> "pv.DataSet | pv.MultiBlock":
+    """Read a file of VTK's legacy format, with a line end added to it.
+
+    VTK reports that a text file holds too few numbers only if white space follows the last one.
+    """
+    import pyvista as pv
+
+    content = path.read_bytes() + b"\n"
+    reader: Any = pv.get_reader(path)  # type: ignore[no-untyped-call]
+    reader.reader.SetBinaryInputString(content, len(content))
+    reader.reader.ReadFromInputStringOn()
+    dataset: pv.DataSet | pv.MultiBlock = reader.read()
     return dataset
 
 

@@ -17,6 +17,9 @@ import numpy as np
 from decals.errors import ImplicitDecalsError
 from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, read_dataset
 
+STATM = Path("/proc/self/statm")
+"""The size of this process, to which the memory for reading is added; macOS has no such file."""
+
 IDLE_SECONDS = 120.0
 """Seconds without a request after which the process ends."""
 
@@ -57,12 +60,13 @@ def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
 
 
 def _limit(request: dict[str, Any]) -> None:
-    """Limit the memory and the processor time of this process."""
+    """Limit the processor time of this process, and on Linux its memory."""
     import resource
 
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    memory = pages * resource.getpagesize() + int(request["bytes"])
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    if STATM.exists():
+        pages = int(STATM.read_text(encoding="ascii").split()[0])
+        memory = pages * resource.getpagesize() + int(request["bytes"])
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # Readers may use several threads, so processor time is more than the seconds that pass.
     processor = int(request["seconds"] * (os.cpu_count() or 1)) + 1

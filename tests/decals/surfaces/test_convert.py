@@ -1,5 +1,7 @@
 """Models of every kind that has a shape become surfaces and objects; all others are refused in one line."""
 
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -148,3 +150,15 @@ def test_strips_that_are_too_short_or_wrong(tmp_path: Path) -> None:
     path.write_text(ply_with_strips("3 0 1 9", 1))
     with pytest.raises(InvalidMesh):
         as_surface(path)
+
+
+def test_meshes_of_arrays_need_no_pyvista() -> None:
+    """Its import takes longer than all of ours."""
+    program = """
+import sys
+from decals.surfaces.convert import as_surface
+as_surface(([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]))
+print({"pyvista", "vtkmodules"} & sys.modules.keys())
+"""
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "set()", ran.stdout

@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 from decals.errors import InvalidMesh
-from decals.surfaces.mesh_file import dataset_triangles, read_mesh
+from decals.surfaces.mesh_file import dataset_triangles, read_dataset, read_mesh
 
 HEADER = """ply
 format {form} 1.0
@@ -142,6 +142,69 @@ def test_truncated_files_of_other_formats(tmp_path: Path, capfd: pytest.CaptureF
         with pytest.raises(InvalidMesh, match="cut"):
             read_mesh(path)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("kind", ["surface", "grid", "structured"])
+@pytest.mark.parametrize("suffix", ["binary.vtk", "text.vtk", "xml"])
+def test_a_vtk_file_cut_anywhere_has_no_other_faces(tmp_path: Path, kind: str, suffix: str) -> None:
+    """Without a check the reader leaves arrays unfilled: here they hold points far away."""
+    sphere = pv.Sphere(theta_resolution=8, phi_resolution=6)
+    corners = np.meshgrid(np.arange(3.0), np.arange(4.0), np.arange(2.0), indexing="ij")
+    dataset, xml = {
+        "surface": (sphere, "vtp"),
+        "grid": (sphere.cast_to_unstructured_grid(), "vtu"),
+        "structured": (pv.StructuredGrid(*corners), "vts"),
+    }[kind]
+    path = tmp_path / (f"cut.{xml}" if suffix == "xml" else f"cut.{suffix.removeprefix('text.')}")
+    dataset.save(path, binary=suffix != "text.vtk")
+    vertices, faces = dataset_triangles(read_dataset(path), name="cut")
+    whole = path.read_bytes()
+    read = 0
+    for end in np.linspace(120, len(whole) - 40, 20).astype(int):  # shorter ones may crash this process
+        path.write_bytes(whole[:end])
+        try:
+            found = dataset_triangles(read_dataset(path), name="cut")
+        except InvalidMesh:
+            continue
+        read += 1
+        assert np.array_equal(found[0], vertices)
+        assert np.array_equal(found[1], faces)
+    assert read <= 3, "nearly all cuts lose declared numbers"
+
+
+def test_text_cut_behind_a_number_is_refused(tmp_path: Path) -> None:
+    rows = "DATASET STRUCTURED_GRID\nDIMENSIONS 2 2 2\nPOINTS 8 float\n"
+    path = tmp_path / "a.vtk"
+    for count in (1, 5, 12, 23):
+        path.write_text(
+            "# vtk DataFile Version 3.0\nx\nASCII\n" + rows + " ".join("0.5" for _ in range(count))
+        )
+        with pytest.raises(InvalidMesh, match=r"a\.vtk"):
+            read_mesh(path)
+    numbers = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float).ravel()
+    path.write_text(f"# vtk DataFile Version 3.0\nx\nASCII\n{rows}{' '.join(map(str, numbers))}")
+    assert _area(path) == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(
+    "offsets", [[0, 4, 3], [0, 3, 99], [0, -5, 6]], ids=["backward", "beyond", "negative"]
+)
+@pytest.mark.parametrize("kind", ["surface", "grid"])
+def test_cells_that_do_not_follow_each_other_are_refused(offsets: list[int], kind: str) -> None:
+    cells = pv.CellArray.from_arrays(np.array([0, 3, 6]), np.array([0, 1, 2, 0, 2, 3]))
+    pv.convert_array(cells.GetOffsetsArray())[:] = offsets
+    points = pv.PolyData(np.array(SQUARE)).points
+    dataset: pv.PolyData | pv.UnstructuredGrid
+    if kind == "surface":
+        dataset = pv.PolyData()
+        dataset.points = points
+        dataset.SetPolys(cells)
+    else:
+        dataset = pv.UnstructuredGrid()
+        dataset.points = points
+        dataset.SetCells(5, cells)
+    with pytest.raises(InvalidMesh, match="follow each other"):
+        dataset_triangles(pv.MultiBlock([dataset]), name="a")
 
 
 def test_points_without_faces(tmp_path: Path) -> None:

@@ -1,7 +1,10 @@
 """Files at which VTK's readers crash or hang: one error of ours, and the next file is read as usual."""
 
+import json
 import multiprocessing
 import os
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -35,10 +38,26 @@ def check_sphere(path: Path) -> None:
 @pytest.mark.parametrize("name", ["crash.vtu", "crash.vtk", "hang.vtp"])
 def test_a_file_that_breaks_the_reader_is_refused(name: str, sphere: Path) -> None:
     begun = time.perf_counter()
-    with pytest.raises(InvalidMesh, match=f"{name}.*damaged"):
+    with pytest.raises(InvalidMesh, match=rf"{name}.*export it again"):
         read_mesh(DAMAGED / name)
     assert time.perf_counter() - begun < SECONDS + 30.0  # with the start of the process
     check_sphere(sphere)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_without_the_file_of_its_size_a_process_still_reads(sphere: Path) -> None:
+    program = f"""
+import io, json, os, pathlib
+from decals.surfaces import vtk_child
+vtk_child.STATM = pathlib.Path({str(sphere.with_name("nothing"))!r})
+answers = io.FileIO(os.open({str(sphere.with_name("answer"))!r}, os.O_WRONLY | os.O_CREAT), "w")
+request = {{"path": os.fsencode({str(sphere)!r}).hex(), "seconds": 60.0, "bytes": 1 << 30}}
+vtk_child._answer_in_fork(request, answers)
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+    header = json.loads(sphere.with_name("answer").read_bytes().splitlines()[0])
+    vertices, faces = read_mesh(sphere)
+    assert header == {"vertices": len(vertices), "faces": len(faces)}
 
 
 def test_the_process_is_kept_and_started_again(sphere: Path) -> None:
