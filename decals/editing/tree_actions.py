@@ -164,7 +164,7 @@ class TreeActions:
     @action(
         "thicker",
         "bracketright",
-        summary="the selected primitive, or the one under the cursor, thicker",
+        summary="thicken the selected primitive, else that under the cursor",
         group=Group.SHAPE,
         repeats=True,
     )
@@ -172,7 +172,7 @@ class TreeActions:
         """Enlarge the radius of a primitive."""
         self._state.run(ResizePrimitive(*self._primitive(cursor), RESIZE_STEP))
 
-    @action("thinner", "bracketleft", summary="the same primitive thinner", group=Group.SHAPE, repeats=True)
+    @action("thinner", "bracketleft", summary="thin the same primitive", group=Group.SHAPE, repeats=True)
     def thinner(self, cursor: Cursor) -> None:
         """Reduce the radius of a primitive."""
         self._state.run(ResizePrimitive(*self._primitive(cursor), 1.0 / RESIZE_STEP))
