@@ -18,12 +18,12 @@ from decals.apps.commands.options import (
     Definitions,
     MappingName,
     OptionalWhole,
-    ScatterOptions,
     Trust,
     check_count,
     parse_size,
 )
 from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_output

@@ -10,11 +10,8 @@ from rich.table import Table
 
 from decals.apps import gallery as examples
 from decals.apps.commands.options import Whole, check_count
-from decals.apps.commands.progress_bars import progress_bars
-from decals.apps.gallery.helpers import SIDE, draw
 from decals.apps.output import PICTURE_SUFFIXES, check_output, make_folder
 from decals.errors import InvalidInput
-from decals.rendering import Picture, Renderer
 
 FOLDER = Path("gallery")
 """Default folder of the pictures of all examples."""
@@ -28,7 +25,7 @@ def gallery(
     *,
     all_: Annotated[bool, Parameter(name="--all", negative=())] = False,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"), show_default=False)] = None,
-    side: Whole = SIDE,
+    side: Whole = examples.SIDE,
 ) -> None:
     """List the examples, or draw their pictures.
 
@@ -70,6 +67,11 @@ def _list_examples() -> None:
 
 def _draw(pictures: dict[str, Path], side: int) -> None:
     """Draw examples into files, also if the meshes of some cannot be downloaded."""
+    # The list of examples does without these imports, which take more than a second.
+    from decals.apps.commands.progress_bars import progress_bars
+    from decals.apps.gallery.helpers import draw
+    from decals.rendering import Picture, Renderer
+
     for path in pictures.values():
         check_output(path, PICTURE_SUFFIXES)
     failures: dict[str, InvalidInput] = {}

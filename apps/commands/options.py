@@ -1,18 +1,18 @@
-"""Values of options: types, parsers and range checks, and the decals that ``render`` and ``edit`` scatter."""
+"""Values of options: types, parsers and range checks.
+
+This module imports nothing heavy, so a command that only prints a list is fast.
+"""
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter, Token
 
-from blobtree import Progress
-from decals import DecalImage, Scene, scatter
-from decals.apps.commands.progress_bars import PREPARING
-from decals.apps.views import Size, View, frame
 from decals.errors import InvalidInput
-from decals.scenes.objects import SceneObject
+
+if TYPE_CHECKING:
+    from decals.apps.views import Size
 
 MAX_EDGE = 16384
 """Longest edge of a picture, in pixels."""
@@ -21,7 +21,6 @@ TILE = 768
 """Samples per axis that are drawn at once: small enough to interrupt a command within seconds."""
 MAX_DECALS = 1_000_000
 MAX_SEED = 2**32 - 1
-DEFAULT_COUNT = 500
 DEFAULT_IMAGES = ("scale",)
 
 
@@ -52,7 +51,7 @@ Trust = Annotated[bool, Parameter(name="--trust", negative=(), show_default=Fals
 """Permission for a scene to read files outside its folder."""
 
 
-def parse_size(text: str) -> Size:
+def parse_size(text: str) -> "Size":
     """Parse a picture size such as ``"1200x900"``."""
     match = re.fullmatch(r"(\d{1,9})[xX×](\d{1,9})", text.strip())
     if match is None:
@@ -67,38 +66,3 @@ def check_count(option: str, value: int, low: int, high: int) -> None:
     """Raise `InvalidInput` if a whole number lies outside its range."""
     if not low <= value <= high:
         raise InvalidInput(f"{option}: expected a whole number from {low} to {high}, got {value}")
-
-
-@dataclass(frozen=True)
-class ScatterOptions:
-    """Number, images and random seed of the decals."""
-
-    count: int
-    images: tuple[DecalImage, ...]
-    seed: int
-
-    @classmethod
-    def from_arguments(
-        cls, count: int | None, images: Sequence[str] | None, seed: int | None
-    ) -> "ScatterOptions":
-        """Check the arguments, fill in the defaults and read the images."""
-        count, seed = DEFAULT_COUNT if count is None else count, seed or 0
-        check_count("--decals", count, 0, MAX_DECALS)
-        check_count("--seed", seed, 0, MAX_SEED)
-        return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
-
-    def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
-        """Return a scene of the objects covered with decals, and a camera that shows them."""
-        progress(PREPARING, 0.0)
-        return Scene(
-            objects=tuple(objects),
-            camera=frame(objects, view, size),
-            images=self.images,
-            decals=scatter(
-                [item.surface for item in objects],
-                count=self.count,
-                seed=self.seed,
-                images=len(self.images),
-                progress=progress,
-            ),
-        )

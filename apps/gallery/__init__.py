@@ -34,6 +34,9 @@ EXAMPLES: tuple[Example, ...] = get_args(Example)
 DOWNLOADED = ("models", "dragon")
 """The examples whose meshes pyvista downloads on first use."""
 
+SIDE = 300
+"""Width and height of a panel of a picture, in pixels."""
+
 
 def title(name: Example) -> str:
     """Return the title of an example, without importing it."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from decals import Camera, Contact, DecalImage, Decals, ImageMapping, MeshObject, Scene
+from decals.apps.gallery import SIDE
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.models.shapes import rounded_box
 from decals.apps.views import frame, parse_view
@@ -41,8 +42,6 @@ MeshArrays = tuple[NDArray[np.float32], NDArray[np.int32]]
 CLAY = (0.74, 0.71, 0.66)
 """The colour of models without decals."""
 
-SIDE = 300
-"""Width and height of a panel, in pixels."""
 GAP = 4
 """Width of the white gap between panels, in pixels."""
 

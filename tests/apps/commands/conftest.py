@@ -8,7 +8,7 @@ import pyvista as pv
 
 from decals.apps.cli import run
 from decals.apps.commands import demo as demo_module
-from decals.apps.commands import options
+from decals.apps.commands import scatter_options
 
 Capture = pytest.CaptureFixture[str]
 
@@ -27,7 +27,7 @@ def _no_work(*_arguments: object, **_options: object) -> None:
 @pytest.fixture
 def bad(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> Callable[..., str]:
     """Run a command that must fail before any work, with one line and exit code 2; gives the line."""
-    monkeypatch.setattr(options, "scatter", _no_work)
+    monkeypatch.setattr(scatter_options, "scatter", _no_work)
     monkeypatch.setattr(demo_module, "nest_scene", _no_work)
     pv.Sphere().save(folder / "ball.ply")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from decals.apps.cli import run
-from decals.apps.commands import options
+from decals.apps.commands import scatter_options
 from tests.apps.commands.pictures import small
 
 Capture = pytest.CaptureFixture[str]
@@ -34,15 +34,15 @@ def test_the_package_runs_as_the_command() -> None:
     assert ran[0] == ran[1]
 
 
-def test_help_and_version_import_nothing_heavy() -> None:
+def test_help_version_and_gallery_import_nothing_heavy() -> None:
     script = """
 import sys
 from decals.apps.cli import run
 run(sys.argv[1:])
 print({"numpy", "warp", "vtkmodules", "pyvista", "moderngl"} & set(sys.modules), file=sys.stderr)
 """
-    for option in ("--help", "--version"):
-        command = [sys.executable, "-c", script, option]
+    for word in ("--help", "--version", "gallery"):
+        command = [sys.executable, "-c", script, word]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == "set()\n"
 
 
@@ -100,7 +100,7 @@ def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture
     def interrupt(*_arguments: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(options, "scatter", interrupt)
+    monkeypatch.setattr(scatter_options, "scatter", interrupt)
     assert run([*small("knot"), "-o", "a.png"]) == 130
     err = capfd.readouterr().err
     assert "interrupted" in err

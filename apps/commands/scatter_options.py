@@ -1,0 +1,48 @@
+"""The decals that ``render`` and ``edit`` scatter."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from blobtree import Progress
+from decals import DecalImage, Scene, scatter
+from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
+from decals.apps.commands.progress_bars import PREPARING
+from decals.apps.views import Size, View, frame
+from decals.scenes.objects import SceneObject
+
+DEFAULT_COUNT = 500
+
+
+@dataclass(frozen=True)
+class ScatterOptions:
+    """Number, images and random seed of the decals."""
+
+    count: int
+    images: tuple[DecalImage, ...]
+    seed: int
+
+    @classmethod
+    def from_arguments(
+        cls, count: int | None, images: Sequence[str] | None, seed: int | None
+    ) -> "ScatterOptions":
+        """Check the arguments, fill in the defaults and read the images."""
+        count, seed = DEFAULT_COUNT if count is None else count, seed or 0
+        check_count("--decals", count, 0, MAX_DECALS)
+        check_count("--seed", seed, 0, MAX_SEED)
+        return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
+
+    def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
+        """Return a scene of the objects covered with decals, and a camera that shows them."""
+        progress(PREPARING, 0.0)
+        return Scene(
+            objects=tuple(objects),
+            camera=frame(objects, view, size),
+            images=self.images,
+            decals=scatter(
+                [item.surface for item in objects],
+                count=self.count,
+                seed=self.seed,
+                images=len(self.images),
+                progress=progress,
+            ),
+        )
