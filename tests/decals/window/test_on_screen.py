@@ -34,6 +34,7 @@ import os, signal, sys, time
 from decals.apps.cli import run
 from decals.window import EditWindow
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background of a shell ignores it
 begin = EditWindow.begin
 
 def begin_and_interrupt(window):
