@@ -42,7 +42,15 @@ _SETS = {
     "solids": _batches(SOLID_TREES, 2e-5, 3e-4),
     "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),
 }
-_BATCHES = {f"{name}-{batch.start}": batch for name, batches in _SETS.items() for batch in batches}
+ORDINARY = 1
+"""Number of batches of a set that ordinary runs take; slow runs take the others."""
 
-EVERY_BATCH = pytest.mark.parametrize("batch", _BATCHES.values(), ids=_BATCHES)
+EVERY_BATCH = pytest.mark.parametrize(
+    "batch",
+    [
+        pytest.param(batch, id=f"{name}-{batch.start}", marks=() if place < ORDINARY else pytest.mark.slow)
+        for name, batches in _SETS.items()
+        for place, batch in enumerate(batches)
+    ],
+)
 FIRST_BATCHES = pytest.mark.parametrize("batch", [batches[0] for batches in _SETS.values()], ids=_SETS)

@@ -179,7 +179,7 @@ def test_the_same_call_gives_the_same_mesh() -> None:
         ({"chord_error": "fine"}, "chord_error: expected a finite length above 0, got 'fine'"),
         ({"cell_size": 1e-12}, "take larger cells"),
         ({"resolution": 10**9}, "take larger cells"),
-        ({"resolution": 20_000}, "take larger cells"),
+        pytest.param({"resolution": 20_000}, "take larger cells", marks=pytest.mark.slow),
     ],
 )
 def test_invalid_sizes_are_refused(options: dict[str, float], message: str) -> None:
