@@ -7,7 +7,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Tests that no ordinary machine can run: those that need a CUDA device or a browser.
 ORDINARY := not gpu and not browser
-PYTEST := $(BIN)/python -m pytest --durations=10
+PYTEST := $(BIN)/python -m pytest --durations=10 --numprocesses 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -20,7 +20,7 @@ demo: $(INSTALLED) gl  ## Draw the pictures under out/
 	$(BIN)/implicit-decals demo
 
 test: $(INSTALLED) gl  ## Run the tests, except those that are slow or need a CUDA device or a browser
-	$(PYTEST) --numprocesses 2 --dist loadfile -m "not slow and $(ORDINARY)"
+	$(PYTEST) -m "not slow and $(ORDINARY)"
 
 test-slow: $(INSTALLED) gl  ## Run the slow tests, except those that need a CUDA device or a browser
 	$(PYTEST) -m "slow and $(ORDINARY)"
