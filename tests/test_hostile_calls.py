@@ -52,6 +52,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "bounds of text": lambda: bounds_of("ball"),  # type: ignore[arg-type]
     "framing of none": lambda: decals.Camera.framing(WRONG),
     "framing of objects": lambda: decals.Camera.framing(SCENE.objects),  # type: ignore[arg-type]
+    "framing of a line": lambda: decals.Camera.framing((np.zeros(3), np.ones(3)), aspect=5e-324),
     "framing of complex numbers": lambda: decals.Camera.framing(np.zeros(3, complex)),  # type: ignore[arg-type]
     "endless sample": lambda: as_surface(TRIANGLE).sample(HUGE, 0),
     "endless factor": lambda: decals.scatter(as_surface(TRIANGLE), count=3, factor=1e308),

@@ -154,14 +154,14 @@ class Camera:
         fov : float
             Vertical angle of view in degrees.
         aspect : float
-            Width over height of the picture.
+            Width over height of the picture, from 1e-6 to 1e6.
         margin : float
-            Size of the picture relative to the box; 1 leaves no space.
+            Size of the picture relative to the box, from 1e-6 to 1e6; 1 leaves no space.
 
         Raises
         ------
         InvalidScene
-            If a number is not finite, or the direction is zero.
+            If a number is not finite or out of its range, or the direction is zero.
         """
         return cls.fitting(
             _corners(bounds), direction=direction, up=up, fov=fov, aspect=aspect, margin=margin
@@ -185,8 +185,8 @@ class Camera:
         least distance. Other arguments and errors are those of `framing`.
         """
         positions = _points(points)
-        aspect = real_number("aspect", aspect, "a number above 0", lambda value: value > 0.0, InvalidScene)
-        margin = real_number("margin", margin, "a number above 0", lambda value: value > 0.0, InvalidScene)
+        aspect = _ratio("aspect", aspect)
+        margin = _ratio("margin", margin)
         toward, upward = _orientation(direction, up)
         axes_camera = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
         half = math.tan(math.radians(axes_camera.fov) / 2) / margin
@@ -198,6 +198,13 @@ class Camera:
         centre = np.array([across, along, middle]) @ axes_camera.axes
         position = _triple(centre + (eye - middle) * axes_camera.axes[2])
         return cls(position, _triple(centre), _triple(upward), fov)
+
+
+def _ratio(name: str, value: float) -> float:
+    """Return a ratio that float64 can divide by and multiply with."""
+    return real_number(
+        name, value, "a number from 1e-6 to 1e6", lambda ratio: 1e-6 <= ratio <= 1e6, InvalidScene
+    )
 
 
 def _fit_axis(x: Float64Array, z: Float64Array, slope: float) -> tuple[float, float]:
