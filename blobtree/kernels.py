@@ -172,7 +172,7 @@ def _load(module: wp.Module, device: wp.Device) -> None:
     with _cache_errors():
         try:
             wp.load_module(module, device=device)
-        except Exception as error:
+        except Exception as error:  # Warp raises nothing more precise for a damaged file
             if not was_cached or isinstance(error, OSError):
                 raise
             _logger.info("removing damaged kernels from %s: %s", folder, error)

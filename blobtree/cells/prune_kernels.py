@@ -218,7 +218,7 @@ def prune(
     starts = _Starts()
     end = int(0)  # texels so far
     peak = int(0)  # most texels at any time, for later choices drop instructions again
-    run_at = int(-1)  # header of the run that the next primitive may extend, −1 if there is none
+    run_at = int(-1)  # header of the run that the next primitive may extend, or −1
     run = wp.vec4()
     point = center
     ball = half * HALF_DIAGONAL  # radius around `point`

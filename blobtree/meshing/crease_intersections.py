@@ -101,7 +101,7 @@ def gauss_newton_step(
     tape: wp.array(dtype=wp.vec4),
     span: wp.vec2i,
 ) -> wp.vec4:
-    """Return the step from x onto the tangent planes of the members, and 1, or 0 if there is none.
+    """Return the step from x onto the tangent planes of the members, and 1; 0 if the planes give no step.
 
     If `axis` is not negative, the plane x[axis] = plane is one more of them.
     """

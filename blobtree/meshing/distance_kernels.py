@@ -34,7 +34,7 @@ _WEIGHTS = _Weights(*(number for sample in SAMPLE_WEIGHTS for number in sample))
 
 @wp.func
 def block_at(p: wp.vec3, cells: CellBlocks) -> wp.int32:
-    """Return the block of p, −1 if there is none."""
+    """Return the block of p, −1 outside all blocks."""
     index = (p - cells.corner) / (cells.cell * float(BRANCHING))
     block = wp.vec3i(int(wp.floor(index[0])), int(wp.floor(index[1])), int(wp.floor(index[2])))
     return find_block(block - cells.base, cells.keys)

@@ -67,7 +67,7 @@ def _loops(code: int, *, join_inside: bool) -> list[int]:
 
 
 def _knotted_face(code: int) -> int:
-    """Return the alternating face whose strands belong to one patch, −1 if there is none."""
+    """Return the alternating face whose strands belong to one patch, or −1."""
     loop = _loops(code, join_inside=False)
     knotted = [
         face
@@ -93,4 +93,4 @@ def _tables() -> tuple[NDArray[np.int8], NDArray[np.int8], NDArray[np.int8]]:
 
 PATCH_OF_EDGE, PATCH_COUNT, KNOTTED_FACE = _tables()
 """By row: the patch of each edge (512, 12), −1 if it is not crossed, and the number of patches (512,).
-By code: the face (256,) that the exception may concern, −1 if there is none."""
+By code: the face (256,) that the exception may concern, or −1."""

@@ -70,7 +70,7 @@ class TreeActions:
         group=Group.SHAPE,
     )
     def toggle_primitive(self, cursor: Cursor) -> None:
-        """Select the primitive under the cursor; deselect it if it is selected, or if there is none."""
+        """Select the primitive under the cursor; deselect a selected one, or all where no primitive is."""
         selected, pick = self._state.primitive, cursor()
         if selected is not None and (pick is None or self._selectable(pick) in (None, selected)):
             self._state.primitive, self._state.message = None, "primitive deselected"

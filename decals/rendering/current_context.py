@@ -30,7 +30,7 @@ def kept_current() -> Iterator[None]:
 
 @cache
 def _library(name: str) -> Any:
-    """Return a system library whose functions take and return pointers; None if there is none."""
+    """Return a system library whose functions take and return pointers; None for a missing library."""
     if not sys.platform.startswith("linux"):
         return None
     try:
