@@ -61,6 +61,8 @@ class SpaceWarp:
     pullback: wp.Function
     stretch: wp.Function
     box: Callable[[Float64Array, Float64Array, tuple[float, ...]], Box]
+    digest: str = ""
+    """Digest of the sources of a custom warp."""
 
 
 TWIST = SpaceWarp("twist", twist_forward, twist_pullback, twist_stretch, twist_box)

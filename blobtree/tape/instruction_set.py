@@ -1,9 +1,9 @@
 """Instruction sets: the skeletons, operators and warps that the codes on a tape stand for.
 
-Kernels are written against the tables of built-in kinds. A tree with custom kinds has an instruction set of
-its own: the built-in rows, then the custom ones. The same kernels are instantiated for it, once per set of
-kinds (`transpile.specialize`), and compiled at their first launch. A tree without custom kinds has BUILT_IN,
-whose kernels are those in the files.
+Kernels are written against the tables of core kinds; a tree of core kinds has BUILT_IN, whose kernels are
+those in the files. For any other set of kinds the same kernels are instantiated (`transpile.specialize`). A
+tree with library kinds has LIBRARY: the core rows, then those of `formulas.library`. A tree with custom kinds
+has a set of its own: the rows of BUILT_IN or LIBRARY, then the custom ones.
 """
 
 import hashlib
@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from functools import cache
 from threading import RLock
 from types import FunctionType
-from typing import Any
+from typing import Any, TypeVar
 
 import warp as wp
 
+from blobtree.formulas.library import LIBRARY_OPERATORS, LIBRARY_SKELETONS, LIBRARY_WARPS
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
@@ -33,6 +34,9 @@ from blobtree.transpile.specialize import (
 
 _TABLES = (SKELETONS, OPERATORS, WARPS)
 
+Row = Skeleton | Operator | SpaceWarp
+AnyRow = TypeVar("AnyRow", bound=Row)
+
 _LOCK = RLock()
 """Held while functions are registered: Warp's registry is not safe for threads."""
 
@@ -42,7 +46,7 @@ if hasattr(os, "register_at_fork"):  # a child forked while another thread holds
 
 @dataclass(frozen=True)
 class InstructionSet:
-    """The rows that codes on a tape stand for; built-in rows come first."""
+    """The rows that codes on a tape stand for; core rows come first, then library rows."""
 
     skeletons: tuple[Skeleton, ...]
     operators: tuple[Operator, ...]
@@ -50,15 +54,19 @@ class InstructionSet:
     _kernels: dict[wp.Kernel, wp.Kernel] = field(default_factory=dict, compare=False, repr=False)
     _functions: dict[wp.Function, wp.Function] = field(default_factory=dict, compare=False, repr=False)
 
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """All rows."""
+        return (*self.skeletons, *self.operators, *self.warps)
+
     @Lazy
     def digest(self) -> str:
         """Return a digest of all rows, the same in every process."""
-        rows: tuple[Skeleton | Operator, ...] = (*self.skeletons, *self.operators)
-        names = [f"{row.name}:{row.digest}" for row in rows]
+        names = [f"{row.name}:{row.digest}" for row in self.rows]
         return hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
 
     def kernel_for(self, kernel: wp.Kernel) -> wp.Kernel:
-        """Return `kernel` compiled for tapes of this instruction set."""
+        """Return `kernel` compiled for tapes of this instruction set; itself if it reads no table."""
         if self is BUILT_IN:
             return kernel
         with _LOCK:
@@ -69,9 +77,12 @@ class InstructionSet:
     def _instantiate_kernel(self, kernel: wp.Kernel) -> wp.Kernel:
         """Return the kernel in a Warp module of its own, so that adding a kernel compiles no other again."""
         source = _python_function(kernel)
+        replaced = self._replaced(source)
+        if not replaced:
+            return kernel
         module = self._module_of(source)
         wp.get_module(module).options.update(KERNEL_OPTIONS)
-        instance: wp.Kernel = wp.kernel(rebind(source, self._replaced(source), module=module))
+        instance: wp.Kernel = wp.kernel(rebind(source, replaced, module=module))
         return instance
 
     def _instantiate(self, function: wp.Function) -> wp.Function:
@@ -114,39 +125,44 @@ def _python_function(typed: wp.Function | wp.Kernel) -> FunctionType:
 
 
 BUILT_IN = InstructionSet(*_TABLES)
-"""The instruction set of trees without custom kinds."""
+"""The instruction set of trees of core kinds."""
+
+LIBRARY = InstructionSet(
+    (*SKELETONS, *LIBRARY_SKELETONS), (*OPERATORS, *LIBRARY_OPERATORS), (*WARPS, *LIBRARY_WARPS)
+)
+"""The instruction set of trees with library kinds."""
+
+_INSTRUCTION_SETS: list[InstructionSet] = [BUILT_IN, LIBRARY]
 
 
-_INSTRUCTION_SETS: list[InstructionSet] = [BUILT_IN]
-
-
-def instruction_set_for(skeletons: Iterable[Skeleton], operators: Iterable[Operator]) -> InstructionSet:
+def instruction_set_for(
+    skeletons: Iterable[Skeleton], operators: Iterable[Operator], warps: Iterable[SpaceWarp]
+) -> InstructionSet:
     """Return an instruction set that has these rows.
 
     That is the smallest existing one, so that a tree with fewer kinds than an earlier tree compiles nothing.
-    If none fits, a new one has the built-in rows and then the custom rows in a fixed order.
+    If none fits, a new one has the rows of BUILT_IN or LIBRARY, and then the custom rows in a fixed order.
     """
-    custom_skeletons = {row for row in skeletons if row not in SKELETONS}
-    custom_operators = {row for row in operators if row not in OPERATORS}
+    needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps))
+    rows = set(needed.rows)
     with _LOCK:
-        fitting = [
-            existing
-            for existing in _INSTRUCTION_SETS
-            if custom_skeletons.issubset(existing.skeletons) and custom_operators.issubset(existing.operators)
-        ]
+        fitting = [existing for existing in _INSTRUCTION_SETS if rows.issubset(existing.rows)]
         if fitting:
-            return min(fitting, key=lambda existing: len(existing.skeletons) + len(existing.operators))
+            return min(fitting, key=lambda existing: len(existing.rows))
+        custom = rows.difference(LIBRARY.rows)
+        base = BUILT_IN if rows.issubset({*BUILT_IN.rows, *custom}) else LIBRARY
         created = InstructionSet(
-            (*SKELETONS, *sorted(custom_skeletons, key=_order)),
-            (*OPERATORS, *sorted(custom_operators, key=_order)),
-            WARPS,
+            _extended(base.skeletons, needed.skeletons),
+            _extended(base.operators, needed.operators),
+            _extended(base.warps, needed.warps),
         )
         _INSTRUCTION_SETS.append(created)
         return created
 
 
-def _order(row: Skeleton | Operator) -> tuple[str, str]:
-    return row.name, row.digest
+def _extended(table: tuple[AnyRow, ...], needed: tuple[AnyRow, ...]) -> tuple[AnyRow, ...]:
+    """Return the rows of a table, then the other needed rows in a fixed order."""
+    return (*table, *sorted(set(needed).difference(table), key=lambda row: (row.name, row.digest)))
 
 
 @cache

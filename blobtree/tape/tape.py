@@ -131,7 +131,7 @@ def compile_tape(program: list[Instruction]) -> Tape:
     skeletons = {run.skeleton for run in runs}
     warps = {step.warp for step in program if isinstance(step, EnterWarp)}
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
-    instruction_set = instruction_set_for(skeletons, operators)
+    instruction_set = instruction_set_for(skeletons, operators, warps)
     texels = [np.concatenate(list(_texels(step, instruction_set))) for step in program]
     ends = np.cumsum([len(part) for part in texels])
     return Tape(

@@ -1,0 +1,14 @@
+"""Library kinds: the rows of all built-in kinds beyond the core tables.
+
+Kernels for the core tables alone stay small and fast. A tree with a library kind uses kernels for the core
+and the library together (`tape.instruction_set.LIBRARY`). A new family of kinds is a file of formulas that
+ends in a tuple of rows, and one name here.
+"""
+
+from blobtree.formulas.operators import Operator
+from blobtree.formulas.skeletons import Skeleton
+from blobtree.formulas.warps import SpaceWarp
+
+LIBRARY_SKELETONS: tuple[Skeleton, ...] = ()
+LIBRARY_OPERATORS: tuple[Operator, ...] = ()
+LIBRARY_WARPS: tuple[SpaceWarp, ...] = ()
