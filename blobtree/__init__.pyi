@@ -21,6 +21,7 @@ from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
+from .nodes.solids import Ellipsoid
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
 from .progress import Cancel, Progress
 from .tape.tape import Tape
@@ -37,6 +38,7 @@ __all__ = [
     "CustomPrimitive",
     "Difference",
     "Disc",
+    "Ellipsoid",
     "Hits",
     "ImplicitDecalsError",
     "Intersection",

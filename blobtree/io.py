@@ -25,8 +25,9 @@ from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.files import write_atomically
+from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import parameters_of
-from blobtree.nodes.tree import NODE_KINDS, Node
+from blobtree.nodes.tree import Node
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
 from blobtree.validation import Vector
@@ -102,7 +103,6 @@ def _record_type(kind: type[Node]) -> type[NodeRecord]:
     return cast("type[NodeRecord]", record)
 
 
-# `custom.skeleton` imports all modules of built-in nodes, so NODE_KINDS is complete here.
 RECORD_OF_KIND = {kind: _record_type(kind) for kind in NODE_KINDS.values()}
 """Records of the built-in classes of nodes."""
 

@@ -67,6 +67,14 @@ def non_negative_vector(name: str, value: object) -> Vector:
     return vector
 
 
+def positive_vector(name: str, value: object) -> Vector:
+    """Return `value` as three floats above 0; raise `InvalidNode` otherwise."""
+    vector = finite_vector(name, value)
+    if min(vector) <= 0.0:
+        raise InvalidNode(f"{name}: expected three numbers above 0, got {shown(value)}")
+    return vector
+
+
 def positive_number(name: str, value: object) -> float:
     """Return `value` as a finite float above 0; raise `InvalidNode` otherwise."""
     number = finite_number(name, value)

@@ -31,6 +31,7 @@ from blobtree.validation import (
     non_negative_vector,
     nonzero_vector,
     positive_number,
+    positive_vector,
 )
 
 LARGEST_INTEGER = 1 << 24
@@ -50,6 +51,8 @@ class Quantity(Enum):
     """A length above 0; it scales with the node."""
     RADIUS = "radius"
     """Visible radius around the skeleton, above 0; offsets and resizing change it."""
+    SEMI_AXES = "semi_axes"
+    """Visible radii (3,) along the axes of the node's space, above 0; resizing changes them."""
     DISTANCE = "distance"
     """A signed length."""
     ANGLE = "angle"
@@ -69,6 +72,7 @@ UNITS = {
     Quantity.EXTENTS: "model units",
     Quantity.LENGTH: "model units",
     Quantity.RADIUS: "model units",
+    Quantity.SEMI_AXES: "model units",
     Quantity.DISTANCE: "model units",
 }
 """Units of quantities that have one."""
@@ -163,6 +167,7 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.EXTENTS: non_negative_vector,
     Quantity.LENGTH: positive_number,
     Quantity.RADIUS: positive_number,
+    Quantity.SEMI_AXES: positive_vector,
     Quantity.DISTANCE: finite_number,
     Quantity.ANGLE: finite_number,
     Quantity.FACTOR: finite_number,

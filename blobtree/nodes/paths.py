@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Quantity, parameters_of
-from blobtree.nodes.primitives import Primitive
+from blobtree.nodes.primitives import Leaf
 from blobtree.nodes.tree import Combination, Node, Transform
 from blobtree.tape.model import checked_tree
 from blobtree.validation import finite_vector
@@ -26,7 +26,7 @@ def primitive_paths(tree: Node) -> list[Path]:
     pending: list[tuple[Path, Node]] = [((), tree)]
     while pending:
         path, node = pending.pop()
-        if isinstance(node, Primitive):
+        if isinstance(node, Leaf):
             paths.append(path)
         pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
     return paths
@@ -51,10 +51,10 @@ def node_at(tree: Node, path: Path) -> Node:
     return node
 
 
-def primitive_at(tree: Node, path: Path) -> Primitive:
+def primitive_at(tree: Node, path: Path) -> Leaf:
     """Return the primitive at the end of a path, below any maps there; raise `InvalidNode` otherwise."""
     node = node_at(tree, primitive_path(tree, path))
-    assert isinstance(node, Primitive)
+    assert isinstance(node, Leaf)
     return node
 
 
@@ -63,7 +63,7 @@ def primitive_path(tree: Node, path: Path) -> Path:
     node = node_at(tree, path)
     while isinstance(node, Transform):
         path, node = (*path, 0), node.child
-    if not isinstance(node, Primitive):
+    if not isinstance(node, Leaf):
         raise InvalidNode(f"expected the path of a primitive, {path} leads to a {type(node).__name__}")
     return path
 
@@ -154,11 +154,13 @@ def moved(node: Node, offset: ArrayLike) -> Node:
     return replace(node, **points) if points else node.translate(shift)  # type: ignore[type-var]  # every node is a dataclass
 
 
-def resized(primitive: Primitive, factor: float) -> Primitive:
+def resized(primitive: Leaf, factor: float) -> Leaf:
     """Return a primitive whose visible radii are larger by a factor."""
-    radii = {
-        name: factor * getattr(primitive, name)
-        for name, parameter in parameters_of(type(primitive)).items()
-        if parameter.quantity is Quantity.RADIUS
-    }
+    radii: dict[str, float | tuple[float, ...]] = {}
+    for name, parameter in parameters_of(type(primitive)).items():
+        value = getattr(primitive, name)
+        if parameter.quantity is Quantity.RADIUS:
+            radii[name] = factor * value
+        elif parameter.quantity is Quantity.SEMI_AXES:
+            radii[name] = tuple(factor * component for component in value)
     return replace(primitive, **radii)  # type: ignore[type-var]  # every node is a dataclass

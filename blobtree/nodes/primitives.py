@@ -45,12 +45,17 @@ Columns = dict[str, Float64Array]
 """Values (n, size) of n primitives by the names of their parameters."""
 
 
-class Primitive(ProgramPrimitive, Node):
+class Leaf(Node):
+    """A node without operands: a shape of one colour."""
+
+    color: Vector
+
+
+class Primitive(ProgramPrimitive, Leaf):
     """A skeleton with a visible radius and a colour: a leaf of the tree."""
 
     skeleton: ClassVar[Skeleton]
     radius: float
-    color: Vector
 
     @classmethod
     def radii(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:

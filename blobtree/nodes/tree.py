@@ -584,6 +584,23 @@ class Node(ImplicitModel):
         return slice_tree(self, origin, normal, resolution=resolution, values=values)
 
 
+class Macro(Node):
+    """A node that stands for a tree of other nodes.
+
+    Programs hold that tree. Files, `repr`, paths and edits know the node with its parameters and operands.
+    """
+
+    @property
+    def expanded(self) -> Node:
+        """The tree that this node stands for; subclasses compute it once, see `Lazy`."""
+        raise NotImplementedError
+
+    @property
+    def program_children(self) -> tuple[Node, ...]:
+        """The expanded tree alone."""
+        return (self.expanded,)
+
+
 class Combination(Node):
     """An operator folded over its operands from left to right."""
 

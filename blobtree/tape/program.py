@@ -3,14 +3,15 @@
 A run folds primitives of one kind into the accumulator. A subtree that cannot be folded in directly gets an
 accumulator of its own (push) and is combined afterwards (pop). The subtree that needs most registers goes
 first (Sethi & Ullman 1970): a tree of n leaves needs at most log₂ n registers, a spine of any length none.
-Affine maps and offsets fold into the primitives below them.
+Affine maps and offsets fold into the primitives below them. The tree that a macro stands for replaces it.
 
 The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state what it reads of a node.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, NamedTuple, TypeVar, cast
+from operator import attrgetter
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class ProgramNode:
     """A node of a tree, as the compiler of programs reads it.
 
     A primitive has a `skeleton`, a combination an `operator` and a deformation a `warp`. A node without any
-    of them has one child, and `child_placement` says what it does to that child.
+    of them has one program child, and `child_placement` says what it does to that child.
     """
 
     skeleton: ClassVar[Skeleton | None] = None
@@ -77,6 +78,11 @@ class ProgramNode:
     def children(self) -> tuple["ProgramNode", ...]:
         """The operands of this node, from left to right; empty for a primitive."""
         return ()
+
+    @property
+    def program_children(self) -> tuple["ProgramNode", ...]:
+        """The nodes below this one in programs: its children, or for a macro the tree that it stands for."""
+        return self.children
 
     @property
     def operator_parameter(self) -> float:
@@ -97,13 +103,17 @@ AnyNode = TypeVar("AnyNode", bound=ProgramNode)
 
 
 def postorder(
-    root: AnyNode, *, into: Callable[[AnyNode], bool] = lambda _node: True, leaves: bool = True
+    root: AnyNode,
+    *,
+    into: Callable[[AnyNode], bool] = lambda _node: True,
+    leaves: bool = True,
+    below: Callable[[AnyNode], tuple[Any, ...]] = attrgetter("children"),
 ) -> list[AnyNode]:
     """Return every distinct node object from `root` down, children before parents.
 
     The walk does not recurse, so memory alone limits the depth of a tree. Nodes below a node for which `into`
     is False are left out, unless another path leads to them. So are nodes without children if `leaves` is
-    False.
+    False. `below` returns the children of a node.
     """
     order: list[AnyNode] = []
     seen: set[int] = set()
@@ -114,10 +124,10 @@ def postorder(
             order.append(node)
         elif id(node) not in seen:
             seen.add(id(node))
-            children: tuple[Any, ...] = node.children
+            children = below(node)
             if children and into(node):
                 pending.append((node, True))
-                pending.extend([(child, False) for child in reversed(children) if leaves or child.children])
+                pending.extend([(child, False) for child in reversed(children) if leaves or below(child)])
             elif children or leaves:
                 order.append(node)
     return order
@@ -128,6 +138,11 @@ class ProgramPrimitive(ProgramNode):
 
     skeleton: ClassVar[Skeleton]
     color: Vector
+
+    @property
+    def program_children(self) -> tuple[ProgramNode, ...]:
+        """No nodes: a primitive stands for itself."""
+        return ()
 
     @classmethod
     def radii(cls, primitives: Sequence["ProgramPrimitive"]) -> Float64Array:
@@ -156,6 +171,8 @@ class PlacedPrimitive(NamedTuple):
     primitive: ProgramPrimitive
     placement: Placement
 
+
+PROGRAM_CHILDREN: Callable[[ProgramNode], tuple[ProgramNode, ...]] = attrgetter("program_children")
 
 _PlacedNode = tuple[ProgramNode, Placement]
 """Another node and its placement."""
@@ -293,8 +310,8 @@ def _weights(root: ProgramNode) -> dict[int, int]:
     """Return the weight of every node with children; raise `InvalidNode` for too many primitives."""
     weights: dict[int, int] = {}
     counts: dict[int, int] = {}
-    for node in postorder(root, leaves=False):
-        children = [id(child) for child in node.children]
+    for node in postorder(root, leaves=False, below=PROGRAM_CHILDREN):
+        children = [id(child) for child in node.program_children]
         counts[id(node)] = sum([counts.get(child, 1) for child in children])
         weights[id(node)] = _weight(node, [weights.get(child, SIMPLE) for child in children])
     if counts.get(id(root), 1) > MAX_PRIMITIVES:
@@ -330,7 +347,7 @@ def _expand_warp(step: _Emit, node: ProgramNode, warp: SpaceWarp) -> Iterator[_E
     """Yield the steps of a warp: its child in a space of its own."""
     outer = Placement(step.placement.matrix)
     entry = EnterWarp(warp, node.warp_parameters, outer, step.warp_register)
-    (child,) = node.children
+    (child,) = node.program_children
     inner = _Emit(child, Placement(np.eye(4), step.placement.growth), step.register, step.warp_register + 1)
     yield from (entry, inner, LeaveWarp(entry))
 
@@ -364,7 +381,7 @@ def _expand_commutative(
 def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
     """Yield the left operand first, unless the right one needs more registers."""
     operator, parameter = _operation(node)
-    left, right = node.children
+    left, right = node.program_children
     left_placement = step.placement
     cuts = operator.support is Support.LEFT
     right_placement = replace(left_placement, growth=-left_placement.growth) if cuts else left_placement
@@ -407,17 +424,17 @@ def _operation(node: ProgramNode) -> tuple[Operator, float]:
 
 
 def _strip(node: ProgramNode, placement: Placement) -> tuple[ProgramNode, Placement]:
-    """Return the node below maps, offsets and one-operand combinations, and its placement."""
-    while len(node.children) == 1 and node.warp is None:
+    """Return the node below maps, offsets, macros and one-operand combinations, and its placement."""
+    while len(node.program_children) == 1 and node.warp is None:
         placement = node.child_placement(placement)
-        (node,) = node.children
+        (node,) = node.program_children
     return node, placement
 
 
 def _flatten(root: ProgramNode, placement: Placement) -> Iterator[PlacedPrimitive | _PlacedNode]:
     """Yield the operands of `root`; nested combinations by the same operator yield theirs."""
     operation = _operation(root)
-    pending = _placed(root.children, placement)
+    pending = _placed(root.program_children, placement)
     while pending:
         placed = pending.pop()
         if isinstance(placed, PlacedPrimitive):
@@ -425,16 +442,16 @@ def _flatten(root: ProgramNode, placement: Placement) -> Iterator[PlacedPrimitiv
             continue
         node, node_placement = _strip(*placed)
         if node.operator is not None and _operation(node) == operation:
-            pending.extend(_placed(node.children, node_placement))
-        elif node.children:
-            yield node, node_placement
+            pending.extend(_placed(node.program_children, node_placement))
+        elif isinstance(node, ProgramPrimitive):
+            yield PlacedPrimitive(node, node_placement)
         else:
-            yield PlacedPrimitive(cast(ProgramPrimitive, node), node_placement)
+            yield node, node_placement
 
 
 def _placed(nodes: tuple[ProgramNode, ...], placement: Placement) -> list[PlacedPrimitive | _PlacedNode]:
     """Return nodes and their placements, the last one first."""
     return [
-        (node, placement) if node.children else PlacedPrimitive(cast(ProgramPrimitive, node), placement)
+        PlacedPrimitive(node, placement) if isinstance(node, ProgramPrimitive) else (node, placement)
         for node in reversed(nodes)
     ]

@@ -14,6 +14,7 @@ from blobtree import (
     Cone,
     Difference,
     Disc,
+    Ellipsoid,
     Intersection,
     Node,
     Offset,
@@ -60,14 +61,16 @@ def random_leaf(rng: np.random.Generator, more: MoreKinds | None = None) -> Node
 
 
 def random_solid(rng: np.random.Generator) -> Node:
-    """A torus, a disc or a box."""
+    """A torus, a disc, a box or an ellipsoid."""
     center, axis = triple(rng.uniform(-1.0, 1.0, 3)), triple(rng.normal(size=3))
     radius, color = float(rng.uniform(0.15, 0.5)), triple(rng.uniform(0.0, 1.0, 3))
-    breadth, kind = float(rng.uniform(0.2, 0.9)), rng.integers(0, 3)
+    breadth, kind = float(rng.uniform(0.2, 0.9)), rng.integers(0, 4)
     if kind == 0:
         return Torus(center, axis, breadth, radius=radius, color=color)
     if kind == 1:
         return Disc(center, axis, breadth, radius=radius, color=color)
+    if kind == 2:
+        return Ellipsoid(center, triple(rng.uniform(0.15, 0.9, 3)), color=color)
     size = triple(rng.uniform(0.0, 1.2, 3) * (rng.random(3) < 0.9))  # now and then flat
     return Box(center, size, radius=radius, color=color)
 
@@ -156,6 +159,7 @@ def trees(max_leaves: int = 12) -> st.SearchStrategy[Node]:
         st.builds(Segment, _vector, _vector, radius=_radius, color=_color),
         st.builds(Box, _vector, _extents, radius=_radius, color=_color),
         st.builds(Torus, _vector, _direction, _radius, radius=_radius, color=_color),
+        st.builds(Ellipsoid, _vector, st.tuples(*[st.floats(0.1, 10.0)] * 3), color=_color),
         st.builds(Disc, _vector, _direction, _radius, radius=_radius, color=_color),
     )
     return st.recursive(leaves, _extend, max_leaves=max_leaves)

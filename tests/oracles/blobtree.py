@@ -19,6 +19,7 @@ from blobtree import (
     CustomPrimitive,
     Difference,
     Disc,
+    Ellipsoid,
     Intersection,
     Node,
     Offset,
@@ -66,6 +67,8 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
         case Box(center=center, size=size, radius=radius, color=color):
             beyond = np.maximum(np.abs(q - np.array(center)) - 0.5 * np.array(size), 0.0)
             return _leaf(beyond, radius, color)
+        case Ellipsoid(center=center, semi_axes=semi_axes, color=color):
+            return _leaf((q - np.array(center)) / np.array(semi_axes), 1.0, color)
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -118,6 +121,9 @@ def grown(node: Node, distance: float) -> Node:
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
         case Point() | Segment() | Torus() | Disc() | Box() | CustomPrimitive():
             return replace(node, radius=node.radius + distance)  # type: ignore[type-var]  # all are dataclasses
+        case Ellipsoid():  # an offset of the unit ball that is scaled
+            larger = 1.0 + distance / float(np.cbrt(np.prod(node.semi_axes)))
+            return replace(node, semi_axes=tuple(larger * np.array(node.semi_axes)))
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Offset(child=child, distance=more):

@@ -1,4 +1,4 @@
-"""Torus, disc and box: their shapes, maps, offsets and meshes; and what follows from declared parameters."""
+"""Torus, disc, box and ellipsoid: shapes, maps, offsets and meshes; what follows from declared parameters."""
 
 import inspect
 import json
@@ -9,12 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Box, Disc, InvalidNode, Node, Point, Torus, from_json, polygonize, to_json
+from blobtree import (
+    ISO,
+    Box,
+    Disc,
+    Ellipsoid,
+    InvalidNode,
+    Node,
+    Point,
+    Torus,
+    from_json,
+    polygonize,
+    to_json,
+)
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
-from blobtree.nodes.primitives import Primitive
+from blobtree.nodes.primitives import Leaf, Primitive
 from blobtree.nodes.tree import NODE_KINDS
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
@@ -23,7 +35,12 @@ from tests.oracles import blobtree as oracle
 TORUS = Torus((0.1, 0.2, 0.3), (1, 2, 2), 1.0, radius=0.25)
 DISC = Disc((0.1, 0.2, 0.3), (2, -1, 2), 1.0, radius=0.2)
 BOX = Box((0.1, 0.2, 0.3), (1.0, 0.5, 2.0), radius=0.2)
-EACH = pytest.mark.parametrize("node", [TORUS, DISC, BOX], ids=["torus", "disc", "box"])
+ELLIPSOID = Ellipsoid((0.1, 0.2, 0.3), (0.5, 1.0, 0.8))
+EACH = pytest.mark.parametrize(
+    "node", [TORUS, DISC, BOX, ELLIPSOID], ids=["torus", "disc", "box", "ellipsoid"]
+)
+
+KINDS = {"Torus": Torus, "Disc": Disc, "Box": Box, "Ellipsoid": Ellipsoid}
 
 PLACEMENTS = {
     "as it is": lambda node: node,
@@ -97,13 +114,16 @@ def test_one_kind_is_one_run_and_maps_fold_into_tori_and_discs() -> None:
 
 
 @EACH
-def test_a_move_and_a_resize_keep_the_kind(node: Primitive) -> None:
+def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
     shifted = moved(node, (1, 2, 3))
     assert type(shifted) is type(node)
     points = points_around(np.random.default_rng(3), node, 100)
     np.testing.assert_allclose(shifted(points + np.array([1, 2, 3])), node(points), atol=2e-5)
     thick = resized(node, 2.0)
-    assert thick == replace(node, radius=2.0 * node.radius)  # type: ignore[type-var]
+    larger: Any = (
+        {"semi_axes": (1.0, 2.0, 1.6)} if node is ELLIPSOID else {"radius": 0.4 if node is not TORUS else 0.5}
+    )
+    assert thick == replace(node, **larger)  # type: ignore[type-var]
 
 
 @pytest.mark.parametrize(
@@ -114,6 +134,9 @@ def test_a_move_and_a_resize_keep_the_kind(node: Primitive) -> None:
         (lambda: Disc((0, 0, 0), (0, 0, 1), -1.0, radius=0.2), "disc_radius: expected a number above 0"),
         (lambda: Disc((0, 0, 0), "z", 1.0, radius=0.2), "axis: expected three finite numbers"),  # type: ignore[arg-type]
         (lambda: Box((0, 0, 0), (1, -1, 1), radius=0.2), "size: expected three numbers from 0"),
+        (lambda: Ellipsoid((0, 0, 0), (1, 0, 1)), "semi_axes: expected three numbers above 0"),
+        (lambda: Ellipsoid((0, 0, 0), (1, 1)), "semi_axes: expected three finite numbers"),  # type: ignore[arg-type]
+        (lambda: Ellipsoid((0, 0, 0), (1, 1, 1e-9)), "semi_axes: expected lengths whose ratio is at most"),
         (lambda: Box((0, 0, 0), (1, 1, 1), radius=0.0), "radius: expected a number above 0"),
     ],
 )
@@ -153,7 +176,7 @@ def test_files_hold_the_declared_parameters(node: Node) -> None:
     (record,) = json.loads(to_json(node))["nodes"]
     assert NODE_KINDS[record.pop("type")] is type(node)
     assert list(record) == list(parameters_of(type(node)))
-    assert from_json(to_json(node)) == node == eval(repr(node), {"Torus": Torus, "Disc": Disc, "Box": Box})
+    assert from_json(to_json(node)) == node == eval(repr(node), KINDS)
 
 
 def test_a_point_keeps_its_place_on_the_tape() -> None:
@@ -163,7 +186,7 @@ def test_a_point_keeps_its_place_on_the_tape() -> None:
 def test_the_guide_lists_every_primitive_with_its_parameters() -> None:
     guide = (Path(__file__).parents[3] / "docs" / "modelling.md").read_text()
     for kind in NODE_KINDS.values():
-        if issubclass(kind, Primitive):
+        if issubclass(kind, Leaf):
             declared = [p for p in parameters_of(kind).values() if p.quantity is not Quantity.COLOR]
             arguments = [p.name + "=…" * (p.quantity is Quantity.RADIUS) for p in declared]
             assert f"`{kind.__name__}({', '.join(arguments)})`" in guide
