@@ -18,8 +18,10 @@ from blobtree.transpile.glsl import uniform_struct
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-MAX_STEPS = 1024
-"""Most steps in a block; a ray that grazes the surface in more of them is a miss."""
+MAX_STEPS = 4096
+"""More steps of a tolerance than a block has along its diagonal, so that every ray leaves its block.
+
+Blocks are 64 along the longest side of a box, and a tolerance is 1e-5 of its diagonal: 2,707 steps at most."""
 
 MISS = -1.0
 
@@ -69,7 +71,10 @@ def first_hit(
 ) -> wp.float32:
     """Return the distance along the unit `direction` to the first point inside in [t_min, t_max], or MISS.
 
-    A ray that starts inside hits at t_min.
+    A point is a hit if it lies inside, or if a Newton step along the gradient takes it to the surface within
+    a tolerance: ISO − f ≤ tolerance · |∇f|. A slope bound alone is no hit, because behind warps it may be far
+    above the slope. A ray that starts inside hits at t_min. No step is shorter than a tolerance. So rays miss
+    only parts in which they stay inside for less than a tolerance.
     """
     t = t_min
     reach = wp.max(t_max - t_min, 4.0 * tolerance)
@@ -79,31 +84,27 @@ def first_hit(
         bound = field_bound(origin + direction * t, direction, reach, tape, span)
         gap = ISO - bound[0]
         free = reach
+        if gap <= 0.0:
+            return t
         if bound[1] * reach > gap:
             free = gap / bound[1]
             if free <= tolerance:
-                return refine_hit(origin, direction, t, tolerance, tape, span)
+                f = field_gradient(origin + direction * t, tape, span)
+                slope = wp.vec3(f[1], f[2], f[3])
+                if gap <= tolerance * wp.length(slope):
+                    return t + newton_step(gap, wp.dot(slope, direction), tolerance)
+                free = tolerance
         t += free
         reach = 2.0 * free
     return MISS
 
 
 @wp.func
-def refine_hit(
-    origin: wp.vec3,
-    direction: wp.vec3,
-    t: wp.float32,
-    tolerance: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-) -> wp.float32:
-    """Return t after one Newton step of at most 2 tolerances, from within a tolerance of the surface."""
-    f = field_gradient(origin + direction * t, tape, span)
-    rise = f[1] * direction[0] + f[2] * direction[1] + f[3] * direction[2]
-    gap = ISO - f[0]
-    if gap <= 0.0 or rise * tolerance * 2.0 <= gap:
-        return t
-    return t + gap / rise
+def newton_step(gap: wp.float32, rise: wp.float32, tolerance: wp.float32) -> wp.float32:
+    """Return gap / rise, or 0 if that is 2 tolerances or more."""
+    if rise * tolerance * 2.0 <= gap:
+        return 0.0
+    return gap / rise
 
 
 @wp.func

@@ -117,6 +117,27 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     assert hits > 40
 
 
+@pytest.mark.parametrize("degrees", [120.0, 400.0])
+def test_no_ray_hits_where_only_the_bound_is_steep(degrees: float) -> None:
+    """Behind nested warps bounds exceed slopes by far; each hit is on the surface all the same."""
+    rod = Segment((0.3, 0, -0.5), (0.3, 0, 0.5), radius=0.3)
+    tree = rod.twist(degrees).rotate((1, 0, 0), 90).twist(degrees)
+    origins, directions = rays_through(np.random.default_rng(0), tree, 400)
+    reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
+    places = np.linspace(0.0, reach, STEPS)
+    samples = origins[:, None] + places[:, None] * directions[:, None]
+    inside = oracle.value(tree, samples.reshape(-1, 3)).reshape(400, STEPS) > 0.5 + 1e-5
+    first = np.where(inside.any(axis=1), places[inside.argmax(axis=1)], np.inf)
+    seen = cast(tree, origins, directions)
+    tolerance = trace_tolerance(tree.support)
+    assert (seen <= first + 2.0 * tolerance).all()
+    hit = np.isfinite(seen)
+    points = origins[hit] + seen[hit, None] * directions[hit]
+    steepest = 1.0 + np.linalg.norm(oracle.gradient(tree, points), axis=1)
+    assert (np.abs(oracle.value(tree, points) - 0.5) <= 4.0 * tolerance * steepest).all()
+    assert hit.sum() > 35
+
+
 def test_raycast_returns_position_normal_and_color() -> None:
     """Distances are `trace`'s; place, normal and colour are the field's at the hit."""
     several = 0
@@ -152,6 +173,11 @@ BALL = Point((0, 0, 0), radius=1.0)
 def test_a_ray_that_starts_inside_hits_at_once() -> None:
     inside = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, -0.9]])
     assert (cast(BALL, inside, [[1, 0, 0], [0, 1, 1], [0, 0, 3]]) == 0.0).all()
+
+
+def test_a_ray_that_starts_just_inside_hits_at_once_whatever_its_direction() -> None:
+    starts = [[0.999, 0, 0], [0, 0.999, 0]]
+    assert (cast(BALL, starts, [[1, 0, 0], [1, 1, 0]]) == 0.0).all()
 
 
 def test_a_ray_that_points_away_misses() -> None:

@@ -68,6 +68,10 @@ MODELS = {
     "one point": Point((0, 0, 0), radius=1.0),
     "one segment": Segment((0, 0, 0), (1, 1, 0), radius=0.4),
     "a tiny model": (Point((0, 0, 0), radius=1.0) - Point((0.5, 0, 1), radius=0.7)).scale(1e-4),
+    "a twist in a twist": Segment((0.3, 0, -0.5), (0.3, 0, 0.5), radius=0.3)
+    .twist(400)
+    .rotate((1, 0, 0), 90)
+    .twist(400),
     "random trees side by side": random_trees(seed=5, count=1)[0]
     | random_trees(seed=6, count=1)[0].translate((2, 0, 0)),
 }
