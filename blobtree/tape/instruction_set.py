@@ -24,6 +24,7 @@ from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.lazy import Lazy
+from blobtree.transpile.derivative import differentiated, directional_derivative
 from blobtree.transpile.specialize import (
     original_function,
     rebind,
@@ -87,6 +88,12 @@ class InstructionSet:
 
     def _instantiate(self, function: wp.Function) -> wp.Function:
         """Return `function` for this instruction set; itself if it reads no table."""
+        if function not in self._functions and (primal := differentiated(function)):
+            source_function, varying = primal
+            instance = self._instantiate(source_function)
+            self._functions[function] = (
+                function if instance is source_function else directional_derivative(instance, varying)
+            )
         if function not in self._functions:
             loops_over_table = original_function(function)
             source = loops_over_table or _python_function(function)

@@ -3,7 +3,8 @@
 The subset: typed scalars and vectors, arithmetic, comparisons, `if`, `for … in range`, `while`, Warp's
 maths, and calls of other such functions; docs/custom-nodes.md lists it for users. An array becomes a 2D
 texture, 4096 texels wide, that is read with `texelFetch`. A struct of uniforms (`uniform_struct`) becomes the
-uniforms themselves. Everything else is refused with file and line.
+uniforms themselves. A function that returns several values has `out` parameters for them. Everything else is
+refused with file and line.
 """
 
 import ast
@@ -11,7 +12,7 @@ import inspect
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import warp as wp
 
@@ -33,6 +34,9 @@ _COMPONENTS = {
     "ivec4": "int",
 }
 _SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x"), "ivec4_sampler": ("ivec4", "")}
+_RESULT = "returned_"
+"""Beginning of the names of `out` parameters."""
+
 _UNIFORM_STRUCTS: dict[Any, dict[str, Expression]] = {}
 
 
@@ -136,7 +140,7 @@ class _Translator:
     function: wp.Function
     types: dict[str, str] = field(default_factory=dict)
     structs: dict[str, Any] = field(default_factory=dict)
-    returned: str = ""
+    returned: tuple[str, ...] = ()
     callees: list[wp.Function] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -156,9 +160,13 @@ class _Translator:
     def signature(self) -> str:
         """Return the declaration: type of the result, name, parameters; structs of uniforms are left out."""
         self.structs = {name: hint for name, hint in self.hints.items() if uniforms_of(hint) is not None}
-        annotations = {name: type_name(hint) for name, hint in self.hints.items() if name not in self.structs}
-        returned = annotations.pop("return", None)
-        if returned is None:
+        annotations = {
+            name: type_name(hint)
+            for name, hint in self.hints.items()
+            if name not in self.structs and name != "return"
+        }
+        returned = returned_types(self.hints)
+        if not returned:
             raise self.refusal(self.definition, "it does not say what it returns")
         for name, glsl_type in annotations.items():
             if glsl_type is None:
@@ -167,8 +175,11 @@ class _Translator:
             raise self.refusal(self.definition, "a parameter lacks its type")
         self.returned = returned
         self.types = {name: str(glsl_type) for name, glsl_type in annotations.items()}
-        parameters = ", ".join(f"{glsl_type} {spell(name)}" for name, glsl_type in self.types.items())
-        return f"{returned} {self.function.key}({parameters})"
+        parameters = [f"{glsl_type} {spell(name)}" for name, glsl_type in self.types.items()]
+        if len(returned) > 1:
+            parameters += [f"out {glsl_type} {_RESULT}{i}" for i, glsl_type in enumerate(returned)]
+        result = returned[0] if len(returned) == 1 else "void"
+        return f"{result} {self.function.key}({', '.join(parameters)})"
 
     def source(self) -> str:
         """Return the definition."""
@@ -196,10 +207,9 @@ class _Translator:
             case ast.Expr(value=ast.Constant()) | ast.Pass():
                 return
             case ast.Return(value=value) if value is not None:
-                result = self.expression(value)
-                if result.type != self.returned:
-                    raise self.refusal(node, f"it returns {result.type}, not {self.returned}")
-                yield f"    return {result.code};"
+                yield from self.returning(node, value)
+            case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Call() as call):
+                yield self.unpacking(node, targets, call)
             case ast.Assign(targets=[target], value=value):
                 yield self.assignment(target, self.expression(value))
             case ast.AnnAssign(target=target, value=value) if value is not None:
@@ -224,6 +234,30 @@ class _Translator:
                 yield "    continue;"
             case _:
                 raise self.refusal(node, f"{type(node).__name__} statement")
+
+    def returning(self, node: ast.Return, value: ast.expr) -> Iterator[str]:
+        values = value.elts if isinstance(value, ast.Tuple) else [value]
+        results = [self.expression(item) for item in values]
+        types = tuple(result.type for result in results)
+        if types != self.returned:
+            raise self.refusal(node, f"it returns {', '.join(types)}, not {', '.join(self.returned)}")
+        if len(results) == 1:
+            yield f"    return {results[0].code};"
+        else:
+            yield from (f"    {_RESULT}{i} = {result.code};" for i, result in enumerate(results))
+            yield "    return;"
+
+    def unpacking(self, node: ast.Assign, targets: list[ast.expr], call: ast.Call) -> str:
+        """Return the call of a function that returns several values to several variables."""
+        callee, arguments, types = self.called(call)
+        names = [target.id for target in targets if isinstance(target, ast.Name)]
+        if not len(names) == len(targets) == len(types):
+            raise self.refusal(node, f"{len(types)} values assigned to {ast.unparse(node.targets[0])}")
+        for name, glsl_type in zip(names, types, strict=True):
+            if self.types.setdefault(name, glsl_type) != glsl_type:
+                raise self.refusal(node, f"{name!r} changes its type to {glsl_type}")
+        codes = [*(argument.code for argument in arguments), *map(spell, names)]
+        return f"    {callee.key}({', '.join(codes)});"
 
     def block(self, statements: list[ast.stmt]) -> Iterator[str]:
         for statement in statements:
@@ -389,29 +423,39 @@ class _Translator:
         if node.keywords:
             raise self.refusal(node, "keyword arguments")
         callee = self.resolve(node.func)
-        hints = dict(getattr(getattr(callee, "func", None), "__annotations__", {}))
-        returned = type_name(hints.pop("return", None))
-        arguments = [self.expression(argument) for argument in self.passed(node, list(hints.values()))]
-        codes = ", ".join(argument.code for argument in arguments)
         constructor = CASTS[callee] if isinstance(callee, str) else type_name(callee)
         if constructor is not None:
+            codes = ", ".join(self.expression(argument).code for argument in node.args)
             return Expression(f"{constructor}({codes or '0.0'})", constructor)
-        if not isinstance(callee, wp.Function):
-            raise self.refusal(node, f"{ast.unparse(node.func)} is not a typed function")
-        if callee.is_builtin():
+        if isinstance(callee, wp.Function) and callee.is_builtin():
             if callee.key not in BUILTINS:
                 raise self.refusal(node, f"wp.{callee.key} has no equivalent in GLSL")
-            return BUILTINS[callee.key](*arguments)
+            return BUILTINS[callee.key](*(self.expression(argument) for argument in node.args))
+        function, arguments, returned = self.called(node)
+        if len(returned) > 1:
+            raise self.refusal(node, f"{len(returned)} values of {ast.unparse(node)} in an expression")
+        codes = ", ".join(argument.code for argument in arguments)
+        return Expression(f"{function.key}({codes})", returned[0])
+
+    def called(self, node: ast.Call) -> tuple[wp.Function, list[Expression], tuple[str, ...]]:
+        """Return the typed function of a call, its arguments, and the types of its results."""
+        callee = self.resolve(node.func)
+        if not isinstance(callee, wp.Function) or callee.is_builtin():
+            raise self.refusal(node, f"{ast.unparse(node.func)} is not a typed function")
+        hints = dict(callee.func.__annotations__)
+        returned = returned_types(hints)
+        hints.pop("return", None)
+        arguments = [self.expression(argument) for argument in self.passed(node, list(hints.values()))]
         if callee not in self.callees:
             self.callees.append(callee)
-        if returned is None:
+        if not returned:
             raise self.refusal(node, f"{written_name(callee)} does not say what it returns")
         expected = [type_name(hint) for hint in hints.values() if uniforms_of(hint) is None]
         types = [argument.type for argument in arguments]
         if expected != types:
             takes = ", ".join(map(str, expected))
             raise self.refusal(node, f"{written_name(callee)} takes {takes}, got {', '.join(types)}")
-        return Expression(f"{callee.key}({codes})", returned)
+        return callee, arguments, returned
 
     def passed(self, node: ast.Call, hints: list[Any]) -> Iterator[ast.expr]:
         """Yield the arguments that a call has in GLSL: all but the structs of uniforms, which must fit."""
@@ -421,6 +465,14 @@ class _Translator:
                 yield argument
             elif not (isinstance(argument, ast.Name) and self.structs.get(argument.id) is hint):
                 raise self.refusal(node, f"{ast.unparse(argument)} is not the struct of uniforms expected")
+
+
+def returned_types(hints: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the types in GLSL of a function's results; none if one of them has no type there."""
+    hint = hints.get("return")
+    results = get_args(hint) if get_origin(hint) is tuple else (hint,)
+    types = [type_name(result) for result in results]
+    return () if None in types else tuple(map(str, types))
 
 
 def written_name(function: wp.Function) -> str:

@@ -4,8 +4,8 @@ They are only translated: no test runs them.
 """
 
 # mypy: disable-error-code="attr-defined, call-arg, call-overload, name-defined"
-# mypy: disable-error-code="no-untyped-call, no-untyped-def"
-# ruff: noqa: A001, A002, E731, F821, F841, F842, RET504, RET507
+# mypy: disable-error-code="misc, no-untyped-call, no-untyped-def"
+# ruff: noqa: A001, A002, E731, F821, F841, F842, RET504, RET507, RUF059
 # (kernel code is Python only in form: its names have Warp types)
 
 import math
@@ -118,6 +118,35 @@ def everything(x: wp.float32, n: wp.int32, v: wp.vec3) -> wp.float32:
 @wp.func
 def returns_a_tuple(x: wp.float32) -> wp.float32:
     return x, x
+
+
+@wp.func
+def two_results(x: wp.float32) -> tuple[wp.float32, wp.vec3]:
+    return x * 2.0, wp.vec3(x)
+
+
+@wp.func
+def uses_two_results(x: wp.float32) -> wp.float32:
+    a, v = two_results(x)
+    return a + v[1]
+
+
+@wp.func
+def unpacks_too_few(x: wp.float32) -> wp.float32:
+    a, b, c = two_results(x)
+    return a
+
+
+@wp.func
+def unpacks_into_another_type(x: wp.float32) -> wp.float32:
+    b = 1.0
+    a, b = two_results(x)
+    return a
+
+
+@wp.func
+def uses_a_tuple(x: wp.float32) -> wp.float32:
+    return two_results(x) * 2.0
 
 
 @wp.func

@@ -16,8 +16,11 @@ from tests.blobtree.transpile import glsl_samples as samples
 glsl_samples: Any = samples  # to mypy, whatever Warp has decorated is still a plain function
 
 REFUSED = {
-    "returns_a_tuple": ("return x, x", r"\(x, x\) is a Tuple expression"),
+    "returns_a_tuple": ("return x, x", "it returns float, float, not float"),
     "unpacks": ("a, b = x, x", "Tuple"),
+    "unpacks_too_few": ("a, b, c = two_results(x)", "2 values assigned to "),
+    "unpacks_into_another_type": ("a, b = two_results(x)", "'b' changes its type to vec3"),
+    "uses_a_tuple": ("return two_results(x) * 2.0", "2 values of two_results"),
     "has_a_string": ('name = "x"', r"'x' is no number"),
     "names_a_string": ("name = NAME", "NAME is no number"),
     "has_a_list": ("values = [x, x]", "List expression"),
@@ -85,9 +88,16 @@ def test_code_outside_the_subset_is_refused_with_file_and_line(name: str) -> Non
 
 def test_each_sample_is_accepted_or_refused() -> None:
     accepted = {"doubled", "quadrupled", "texel", "entry", "slot", "reserved", "everything"}
-    accepted |= {"from_uniforms", "entry_of"}
+    accepted |= {"from_uniforms", "entry_of", "two_results", "uses_two_results"}
     samples = {name for name, value in vars(glsl_samples).items() if isinstance(value, wp.Function)}
     assert samples == accepted | set(REFUSED)
+
+
+def test_several_results_are_out_parameters() -> None:
+    text = translate_library([glsl_samples.uses_two_results])
+    assert "void two_results(float x, out float returned_0, out vec3 returned_1) {" in text
+    assert "    returned_0 = (x * 2.0);\n    returned_1 = vec3(x);\n    return;" in text
+    assert "    two_results(x, a, v);" in text
 
 
 def test_callees_come_first_and_once() -> None:
