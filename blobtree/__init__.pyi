@@ -20,6 +20,7 @@ from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
+from .nodes.fields import FieldPrimitive, Superquadric
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
 from .nodes.solids import Ellipsoid
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
@@ -39,6 +40,7 @@ __all__ = [
     "Difference",
     "Disc",
     "Ellipsoid",
+    "FieldPrimitive",
     "Hits",
     "ImplicitDecalsError",
     "Intersection",
@@ -58,6 +60,7 @@ __all__ = [
     "Ricci",
     "Segment",
     "Sum",
+    "Superquadric",
     "Tape",
     "Torus",
     "Transform",

@@ -9,12 +9,12 @@ returns its first operand if the second is 0. The next level is pruned as usual.
 import warp as wp
 
 from blobtree.cells.block_kernels import ChildGrid, LevelBlocks, block_center, child_offset
-from blobtree.cells.prune_kernels import primitive_range, range_in_ball
+from blobtree.cells.prune_kernels import direct_range, primitive_range, range_in_ball
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE, write_block
 from blobtree.formulas.skeletons import HALF_DIAGONAL
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.evaluators import to_local
-from blobtree.tape.tape import PREFIX, STRETCHED
+from blobtree.tape.tape import FIELD, PREFIX, STRETCHED
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -25,7 +25,9 @@ def reaches(
 ) -> wp.bool:
     """Return True if a primitive may differ from 0 somewhere in the cube center ± half."""
     r = wp.vec2()
-    if code >= STRETCHED:
+    if code >= FIELD:
+        r = direct_range(code - FIELD, center, half * HALF_DIAGONAL, tape, at)
+    elif code >= STRETCHED:
         ball = half * HALF_DIAGONAL * tape[at + 3][0]
         r = range_in_ball(code - STRETCHED, to_local(center, tape, at), ball, tape, at + PREFIX)
     else:

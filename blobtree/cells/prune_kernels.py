@@ -12,9 +12,27 @@ from blobtree.formulas.falloff import falloff_range
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
 from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.dispatch import closest, min_influence, stride, warp_forward, warp_stretch
+from blobtree.tape.dispatch import (
+    closest,
+    direct_bounds,
+    direct_stride,
+    min_influence,
+    stride,
+    warp_forward,
+    warp_stretch,
+)
 from blobtree.tape.evaluators import to_local
-from blobtree.tape.tape import POP_SWAPPED, PREFIX, PUSH, REGISTERS, STRETCHED, UNWARP, WARP, WARP_REGISTERS
+from blobtree.tape.tape import (
+    FIELD,
+    POP_SWAPPED,
+    PREFIX,
+    PUSH,
+    REGISTERS,
+    STRETCHED,
+    UNWARP,
+    WARP,
+    WARP_REGISTERS,
+)
 from blobtree.transpile.specialize import unrolled
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -59,6 +77,16 @@ def range_in_ball(
     c = closest(kind, center, tape, at)
     distances = squared_distances_to_ball(center, radius, c, min_influence(kind, tape, at))
     return widened(falloff_range(distances[0], distances[1]))
+
+
+@wp.func
+def direct_range(
+    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Return the range of a direct field over a ball in front of its map, which is at tape[at]."""
+    local = to_local(center, tape, at)
+    bounds = direct_bounds(kind, local, radius * tape[at + 3][0], tape, at + PREFIX)
+    return widened(wp.vec2(bounds[0], bounds[1]))
 
 
 @unrolled
@@ -234,15 +262,24 @@ def prune(
         count = int(header[2])
         at += 1
         if code >= 0:
-            stretched = code >= STRETCHED
+            direct = code >= FIELD
+            stretched = code >= STRETCHED and not direct
             kind = code
             size = int(0)
-            if stretched:
+            if direct:
+                kind = code - FIELD
+                size = PREFIX + direct_stride(kind)
+            elif stretched:
                 kind = code - STRETCHED
-                size = PREFIX
-            size += stride(kind)
+                size = PREFIX + stride(kind)
+            else:
+                size = stride(kind)
             for _i in range(count):
-                r = range_anywhere(kind, stretched, warped > 0, point, half, ball, tape, at)
+                r = wp.vec2()
+                if direct:
+                    r = direct_range(kind, point, ball, tape, at)
+                else:
+                    r = range_anywhere(kind, stretched, warped > 0, point, half, ball, tape, at)
                 accumulator, end, run_at, run, needed = fold_range(
                     header, r, accumulator, accumulator_start, end, run_at, run
                 )

@@ -5,6 +5,8 @@ and the library together (`tape.instruction_set.LIBRARY`). A new family of kinds
 ends in a tuple of rows, and one name here.
 """
 
+from blobtree.formulas.direct_fields import DIRECT_FIELDS
+from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.operators import Operator
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.warps import SpaceWarp
@@ -12,3 +14,4 @@ from blobtree.formulas.warps import SpaceWarp
 LIBRARY_SKELETONS: tuple[Skeleton, ...] = ()
 LIBRARY_OPERATORS: tuple[Operator, ...] = ()
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = ()
+LIBRARY_FIELDS: tuple[FieldKind, ...] = DIRECT_FIELDS

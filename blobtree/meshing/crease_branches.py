@@ -13,7 +13,15 @@ import warp as wp
 
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.dispatch import closest, partials, stride, warp_forward, warp_pullback
+from blobtree.tape.dispatch import (
+    closest,
+    direct_stride,
+    direct_value_gradient,
+    partials,
+    stride,
+    warp_forward,
+    warp_pullback,
+)
 from blobtree.tape.evaluators import (
     gradient_combine,
     gradient_leaf,
@@ -22,6 +30,7 @@ from blobtree.tape.evaluators import (
     value_leaf,
 )
 from blobtree.tape.tape import (
+    FIELD,
     POP,
     POP_SWAPPED,
     PREFIX,
@@ -186,6 +195,15 @@ def branch_leaf(
 
 
 @wp.func
+def direct_branch(
+    q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> Branch:
+    """Return the branch of a direct field, which is smooth."""
+    f = direct_value_gradient(kind, q, tape, at)
+    return make_branch(direct_value_gradient(kind, r, tape, at)[0], 0, f)
+
+
+@wp.func
 def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> Branch:
     """Return the branch active at r, evaluated at q: the loop of `interpreter` over two points at once."""
     accumulator = Branch()
@@ -202,7 +220,17 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.ve
         count = int(header[2])
         parameter = header[3]
         at += 1
-        if code >= STRETCHED:
+        if code >= FIELD:
+            kind = code - FIELD
+            for _i in range(count):
+                leaf = direct_branch(
+                    to_local(point, tape, at), to_local(reference, tape, at), kind, tape, at + PREFIX
+                )
+                f = gradient_pullback_affine(field_of(leaf), tape, at)
+                leaf = make_branch(leaf[0], 0, f)
+                accumulator = branch_combine(operator, accumulator, leaf, parameter)
+                at += PREFIX + direct_stride(kind)
+        elif code >= STRETCHED:
             kind = code - STRETCHED
             for _i in range(count):
                 leaf = branch_leaf(
@@ -253,7 +281,10 @@ def has_choice(tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.bool:
         code = int(header[0])
         operator = int(header[1])
         at += 1
-        if code >= STRETCHED:
+        if code >= FIELD:
+            at += int(header[2]) * (PREFIX + direct_stride(code - FIELD))
+            kinked = chooses(operator)
+        elif code >= STRETCHED:
             at += int(header[2]) * (PREFIX + stride(code - STRETCHED))
             kinked = chooses(operator)
         elif code >= 0:

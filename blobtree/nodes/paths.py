@@ -15,6 +15,9 @@ from blobtree.nodes.tree import Combination, Node, Transform
 from blobtree.tape.model import checked_tree
 from blobtree.validation import finite_vector
 
+_RADII = (Quantity.RADIUS, Quantity.SEMI_AXES)
+_LENGTHS = (Quantity.LENGTH, Quantity.EXTENTS)
+
 Path = tuple[int, ...]
 """Indices of children, from the root down."""
 
@@ -155,12 +158,13 @@ def moved(node: Node, offset: ArrayLike) -> Node:
 
 
 def resized(primitive: Leaf, factor: float) -> Leaf:
-    """Return a primitive whose visible radii are larger by a factor."""
-    radii: dict[str, float | tuple[float, ...]] = {}
-    for name, parameter in parameters_of(type(primitive)).items():
+    """Return a leaf whose visible radii are larger by a factor, or all lengths if it has no radii."""
+    parameters = parameters_of(type(primitive)).items()
+    radii = [name for name, parameter in parameters if parameter.quantity in _RADII]
+    lengths = [name for name, parameter in parameters if parameter.quantity in _LENGTHS]
+    sizes: dict[str, float | tuple[float, ...]] = {}
+    for name in radii or lengths:
         value = getattr(primitive, name)
-        if parameter.quantity is Quantity.RADIUS:
-            radii[name] = factor * value
-        elif parameter.quantity is Quantity.SEMI_AXES:
-            radii[name] = tuple(factor * component for component in value)
-    return replace(primitive, **radii)  # type: ignore[type-var]  # every node is a dataclass
+        vector = isinstance(value, tuple)
+        sizes[name] = tuple(factor * component for component in value) if vector else factor * value
+    return replace(primitive, **sizes)  # type: ignore[type-var]  # every node is a dataclass

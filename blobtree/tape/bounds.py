@@ -1,10 +1,12 @@
 """Boxes outside of which a tree's field is exactly 0."""
 
 from itertools import product
+from typing import cast
 
 import numpy as np
 
 from blobtree._typing import Box, Float32Array
+from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.operators import Operator, Support
 from blobtree.tape.program import (
     EnterWarp,
@@ -12,9 +14,11 @@ from blobtree.tape.program import (
     LeaveWarp,
     PlacedPrimitive,
     Pop,
+    ProgramPrimitive,
     Push,
     Run,
     distinct_placements,
+    grown_fields,
     influence_radii,
 )
 
@@ -37,8 +41,9 @@ def support_box(program: list[Instruction]) -> tuple[Float32Array, Float32Array]
             case Pop(register, operator, _, swapped):
                 left, right = (box, registers[register]) if swapped else (registers[register], box)
                 box = _combine(operator, left, right)
-            case Run(primitives=primitives, operator=operator):
-                boxes = primitive_boxes(primitives)
+            case Run(kind=kind, primitives=primitives, operator=operator):
+                direct = isinstance(kind, FieldKind)
+                boxes = field_boxes(primitives) if direct else primitive_boxes(primitives)
                 fallback = fallback or (boxes[0][0], boxes[1][0])
                 box = _combine_all(operator, box, boxes)
             case LeaveWarp(entry):
@@ -58,13 +63,31 @@ def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
     InvalidNode
         An offset leaves nothing of a primitive.
     """
-    points = primitives[0].primitive.hulls([placed.primitive for placed in primitives])
+    leaves = cast("list[ProgramPrimitive]", [placed.primitive for placed in primitives])
+    points = leaves[0].hulls(leaves)
     placements, placed_by = distinct_placements(primitives)
     matrices = np.array([placement.matrix for placement in placements])[placed_by]
     influences = influence_radii(primitives).max(axis=1)
     placed_points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
     margins = influences[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)
     return placed_points.min(axis=1) - margins, placed_points.max(axis=1) + margins
+
+
+def field_boxes(placed_fields: list[PlacedPrimitive]) -> Box:
+    """Return boxes (n, 3), (n, 3) around the supports of direct fields, under their maps.
+
+    Raises
+    ------
+    InvalidNode
+        A field has an offset and cannot grow, or nothing is left of it.
+    """
+    leaves = grown_fields(placed_fields)
+    lower, upper = leaves[0].boxes(leaves)
+    matrices = np.array([placed.placement.matrix for placed in placed_fields])
+    linear, offset = matrices[:, :3, :3], matrices[:, :3, 3]
+    middle = np.einsum("nij,nj->ni", linear, 0.5 * (lower + upper)) + offset
+    half = np.einsum("nij,nj->ni", np.abs(linear), 0.5 * (upper - lower))
+    return middle - half, middle + half
 
 
 def _combine_all(operator: Operator, box: Box, boxes: Box) -> Box:

@@ -5,6 +5,7 @@
 
 import warp as wp
 
+from blobtree.formulas.fields import FIELDS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
@@ -51,6 +52,38 @@ def is_convex(kind: wp.int32) -> wp.bool:
     for code in range(wp.static(len(SKELETONS))):
         if kind == code:
             result = bool(wp.static(SKELETONS[code].convex))
+    return result
+
+
+@unrolled
+def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (value, ∇f) of a direct field."""
+    result = wp.vec4()
+    for code in range(wp.static(len(FIELDS))):
+        if kind == code:
+            result = wp.static(FIELDS[code].value_gradient)(q, tape, at)
+    return result
+
+
+@unrolled
+def direct_bounds(
+    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Return (smallest value, largest value, largest |∇f|) of a direct field over a ball."""
+    result = wp.vec3()
+    for code in range(wp.static(len(FIELDS))):
+        if kind == code:
+            result = wp.static(FIELDS[code].bounds)(center, radius, tape, at)
+    return result
+
+
+@unrolled
+def direct_stride(kind: wp.int32) -> wp.int32:
+    """Return the number of texels of a direct field behind its map: its parameters and its colour."""
+    result = int(0)
+    for code in range(wp.static(len(FIELDS))):
+        if kind == code:
+            result = wp.static(FIELDS[code].parameters + 1)
     return result
 
 

@@ -4,6 +4,8 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
 
 * `leaf(q, c, color, direction, reach, rate)`: the contribution of a primitive at q. c is its closest point
   and the influence there; `rate` bounds how fast |q − c| / influence changes;
+* `direct(kind, q, tape, at, color, direction, reach, speed)`: the contribution of a direct field at q, whose
+  parameters are at tape[at]; q moves at most at `speed`;
 * `pullback_affine(f, tape, at)`: a result behind the map at tape[at], seen in front of it;
 * `pullback_warp(kind, f, q, tape, at)`: a subtree's result behind a warp and the map at tape[at], seen in
   front;
@@ -31,9 +33,20 @@ from blobtree.formulas.falloff import (
     falloff_steepest,
 )
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.dispatch import is_monotone, partials, slope, warp_pullback, warp_stretch
+from blobtree.tape.dispatch import (
+    direct_bounds,
+    direct_value_gradient,
+    is_monotone,
+    partials,
+    slope,
+    warp_pullback,
+    warp_stretch,
+)
 
 wp.set_module_options(KERNEL_OPTIONS)
+
+BALL_MARGIN = wp.constant(1.0 + 1e-6)
+"""Widening of the ball around a segment of a ray, for rounding."""
 
 
 @wp.func
@@ -80,6 +93,21 @@ def value_leaf(
 ) -> wp.float32:
     """Return the field of one primitive."""
     return falloff(squared_distance(q, c))
+
+
+@wp.func
+def value_direct(
+    kind: wp.int32,
+    q: wp.vec3,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    speed: wp.float32,
+) -> wp.float32:
+    """Return the value of a direct field."""
+    return direct_value_gradient(kind, q, tape, at)[0]
 
 
 @wp.func
@@ -138,6 +166,31 @@ def bound_leaf(
     if growth > 0.0:
         rise = -growth * falloff_shallowest(d, farthest)
     return wp.vec3(falloff(z), rise, rate * falloff_steepest(nearest, farthest))
+
+
+@wp.func
+def bound_direct(
+    kind: wp.int32,
+    q: wp.vec3,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    speed: wp.float32,
+) -> wp.vec3:
+    """Return (value at q, bound on the rise of a direct field ahead, bound on its fall).
+
+    Both are its largest slope over the ball around the way ahead, or around all points within reach.
+    """
+    value = direct_value_gradient(kind, q, tape, at)[0]
+    rate = wp.length(direction)
+    if rate > 0.0:
+        middle = q + direction * (0.5 * reach)
+        ahead = direct_bounds(kind, middle, 0.5 * reach * rate * BALL_MARGIN, tape, at)[2] * rate
+        return wp.vec3(value, ahead, ahead)
+    around = direct_bounds(kind, q, reach * speed, tape, at)[2] * speed
+    return wp.vec3(value, around, around)
 
 
 @wp.func
@@ -201,6 +254,21 @@ def gradient_leaf(
 
 
 @wp.func
+def gradient_direct(
+    kind: wp.int32,
+    q: wp.vec3,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    speed: wp.float32,
+) -> wp.vec4:
+    """Return (value, ∇f) of a direct field."""
+    return direct_value_gradient(kind, q, tape, at)
+
+
+@wp.func
 def gradient_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """Return (value, ∇f) pulled back by the transposed map."""
     g = tape[at] * f[1] + tape[at + 1] * f[2] + tape[at + 2] * f[3]
@@ -239,6 +307,21 @@ def color_leaf(
 
 
 @wp.func
+def color_direct(
+    kind: wp.int32,
+    q: wp.vec3,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    speed: wp.float32,
+) -> wp.vec4:
+    """Return (value, red, green, blue) of a direct field."""
+    return wp.vec4(direct_value_gradient(kind, q, tape, at)[0], color[0], color[1], color[2])
+
+
+@wp.func
 def color_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """Return `f`: colours are the same in every space."""
     return f
@@ -274,6 +357,7 @@ class Evaluator:
     """The functions over which the interpreter's loop is closed, and the type of their results."""
 
     leaf: wp.Function
+    direct: wp.Function
     pullback_affine: wp.Function
     pullback_warp: wp.Function
     scale_speed: wp.Function
@@ -284,6 +368,7 @@ class Evaluator:
 
 VALUE = Evaluator(
     value_leaf,
+    value_direct,
     value_pullback_affine,
     value_pullback_warp,
     constant_speed,
@@ -293,6 +378,7 @@ VALUE = Evaluator(
 )
 BOUND = Evaluator(
     bound_leaf,
+    bound_direct,
     bound_pullback_affine,
     bound_pullback_warp,
     bound_scale_speed,
@@ -302,6 +388,7 @@ BOUND = Evaluator(
 )
 GRADIENT = Evaluator(
     gradient_leaf,
+    gradient_direct,
     gradient_pullback_affine,
     gradient_pullback_warp,
     constant_speed,
@@ -311,6 +398,7 @@ GRADIENT = Evaluator(
 )
 COLOR = Evaluator(
     color_leaf,
+    color_direct,
     color_pullback_affine,
     color_pullback_warp,
     constant_speed,

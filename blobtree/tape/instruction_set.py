@@ -18,7 +18,8 @@ from typing import Any, TypeVar
 
 import warp as wp
 
-from blobtree.formulas.library import LIBRARY_OPERATORS, LIBRARY_SKELETONS, LIBRARY_WARPS
+from blobtree.formulas.fields import FIELDS, FieldKind
+from blobtree.formulas.library import LIBRARY_FIELDS, LIBRARY_OPERATORS, LIBRARY_SKELETONS, LIBRARY_WARPS
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
@@ -33,9 +34,10 @@ from blobtree.transpile.specialize import (
     warp_function,
 )
 
-_TABLES = (SKELETONS, OPERATORS, WARPS)
+_TABLES = {"SKELETONS": SKELETONS, "OPERATORS": OPERATORS, "WARPS": WARPS, "FIELDS": FIELDS}
+"""The core tables by the names under which functions read them: all empty tables are the same object."""
 
-Row = Skeleton | Operator | SpaceWarp
+Row = Skeleton | Operator | SpaceWarp | FieldKind
 AnyRow = TypeVar("AnyRow", bound=Row)
 
 _LOCK = RLock()
@@ -52,13 +54,14 @@ class InstructionSet:
     skeletons: tuple[Skeleton, ...]
     operators: tuple[Operator, ...]
     warps: tuple[SpaceWarp, ...]
+    fields: tuple[FieldKind, ...]
     _kernels: dict[wp.Kernel, wp.Kernel] = field(default_factory=dict, compare=False, repr=False)
     _functions: dict[wp.Function, wp.Function] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def rows(self) -> tuple[Row, ...]:
         """All rows."""
-        return (*self.skeletons, *self.operators, *self.warps)
+        return (*self.skeletons, *self.operators, *self.warps, *self.fields)
 
     @Lazy
     def digest(self) -> str:
@@ -108,14 +111,14 @@ class InstructionSet:
     def _replaced(self, function: FunctionType) -> dict[str, Any]:
         """Return the values that replace names in `function`."""
         substitutes = {
-            name: (value, self._substitute(value)) for name, value in referenced_values(function).items()
+            name: (value, self._substitute(name, value))
+            for name, value in referenced_values(function).items()
         }
         return {name: new for name, (old, new) in substitutes.items() if new is not old}
 
-    def _substitute(self, value: Any) -> Any:
-        for table, rows in zip(_TABLES, (self.skeletons, self.operators, self.warps), strict=True):
-            if value is table:
-                return rows
+    def _substitute(self, name: str, value: Any) -> Any:
+        if name in _TABLES and value is _TABLES[name]:
+            return getattr(self, name.lower())
         if isinstance(value, wp.Function) and not value.is_builtin():
             return self._instantiate(value)
         return value
@@ -131,11 +134,14 @@ def _python_function(typed: wp.Function | wp.Kernel) -> FunctionType:
     return function
 
 
-BUILT_IN = InstructionSet(*_TABLES)
+BUILT_IN = InstructionSet(SKELETONS, OPERATORS, WARPS, FIELDS)
 """The instruction set of trees of core kinds."""
 
 LIBRARY = InstructionSet(
-    (*SKELETONS, *LIBRARY_SKELETONS), (*OPERATORS, *LIBRARY_OPERATORS), (*WARPS, *LIBRARY_WARPS)
+    (*SKELETONS, *LIBRARY_SKELETONS),
+    (*OPERATORS, *LIBRARY_OPERATORS),
+    (*WARPS, *LIBRARY_WARPS),
+    (*FIELDS, *LIBRARY_FIELDS),
 )
 """The instruction set of trees with library kinds."""
 
@@ -143,14 +149,17 @@ _INSTRUCTION_SETS: list[InstructionSet] = [BUILT_IN, LIBRARY]
 
 
 def instruction_set_for(
-    skeletons: Iterable[Skeleton], operators: Iterable[Operator], warps: Iterable[SpaceWarp]
+    skeletons: Iterable[Skeleton],
+    operators: Iterable[Operator],
+    warps: Iterable[SpaceWarp],
+    fields: Iterable[FieldKind],
 ) -> InstructionSet:
     """Return an instruction set that has these rows.
 
     That is the smallest existing one, so that a tree with fewer kinds than an earlier tree compiles nothing.
     If none fits, a new one has the rows of BUILT_IN or LIBRARY, and then the custom rows in a fixed order.
     """
-    needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps))
+    needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps), tuple(fields))
     rows = set(needed.rows)
     with _LOCK:
         fitting = [existing for existing in _INSTRUCTION_SETS if rows.issubset(existing.rows)]
@@ -162,6 +171,7 @@ def instruction_set_for(
             _extended(base.skeletons, needed.skeletons),
             _extended(base.operators, needed.operators),
             _extended(base.warps, needed.warps),
+            _extended(base.fields, needed.fields),
         )
         _INSTRUCTION_SETS.append(created)
         return created
@@ -175,4 +185,4 @@ def _extended(table: tuple[AnyRow, ...], needed: tuple[AnyRow, ...]) -> tuple[An
 @cache
 def single_skeleton_set(skeleton: Skeleton) -> InstructionSet:
     """Return the instruction set of one skeleton, whose code is 0."""
-    return InstructionSet((skeleton,), OPERATORS, WARPS)
+    return InstructionSet((skeleton,), OPERATORS, WARPS, FIELDS)

@@ -8,7 +8,7 @@ from typing import Any
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.dispatch import closest, is_convex, min_influence, stride, warp_forward
+from blobtree.tape.dispatch import closest, direct_stride, is_convex, min_influence, stride, warp_forward
 from blobtree.tape.evaluators import (
     BOUND,
     COLOR,
@@ -19,6 +19,7 @@ from blobtree.tape.evaluators import (
     to_local,
 )
 from blobtree.tape.tape import (
+    FIELD,
     POP,
     POP_SWAPPED,
     PREFIX,
@@ -42,7 +43,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
     Slopes are bounded from q along `direction` (unit, or 0 for all directions) as far as `reach`. The tape is
     read from texel span[0] up to span[1].
     """
-    leaf, combine, empty = evaluator.leaf, evaluator.combine, evaluator.empty
+    leaf, direct, combine, empty = evaluator.leaf, evaluator.direct, evaluator.combine, evaluator.empty
     pullback_affine, pullback_warp = evaluator.pullback_affine, evaluator.pullback_warp
     scale_speed = evaluator.scale_speed
     result_type = evaluator.type
@@ -105,6 +106,31 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
         return accumulator
 
     @wp.func
+    def fold_direct(
+        before: result_type,
+        header: wp.vec4,
+        point: wp.vec3,
+        direction: wp.vec3,
+        speed: wp.float32,
+        reach: wp.float32,
+        tape: wp.array(dtype=wp.vec4),
+        first: wp.int32,
+    ) -> result_type:
+        """Do the same for a run of direct fields, each behind its map."""
+        accumulator = before
+        kind = int(header[0]) - FIELD
+        operator = int(header[1])
+        at = first
+        for _i in range(int(header[2])):
+            local = to_local(point, tape, at)
+            v = direction_to_local(direction, tape, at)
+            end = at + PREFIX + direct_stride(kind)
+            f = direct(kind, local, tape, at + PREFIX, tape[end - 1], v, reach, speed * tape[at + 3][0])
+            accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3])
+            at = end
+        return accumulator
+
+    @wp.func
     def walk(
         q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
     ) -> result_type:
@@ -123,7 +149,10 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             operator = int(header[1])
             count = int(header[2])
             at += 1
-            if code >= STRETCHED:
+            if code >= FIELD:
+                accumulator = fold_direct(accumulator, header, point, local_direction, speed, reach, tape, at)
+                at += count * (PREFIX + direct_stride(code - FIELD))
+            elif code >= STRETCHED:
                 accumulator = fold_stretched(
                     accumulator, header, point, local_direction, speed, reach, tape, at
                 )

@@ -11,13 +11,14 @@ The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 
-from blobtree._typing import Float64Array, IndexArray
+from blobtree._typing import Box, Float64Array, IndexArray
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
+from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.operators import RICCI, SUM, Operator, Support
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.warps import SpaceWarp
@@ -53,8 +54,10 @@ class Placement:
             return None
         return float(np.sqrt(squared))
 
-    def folds_into(self, skeleton: Skeleton) -> bool:
-        """Return True if the map folds into the parameters of a skeleton; else primitives carry it."""
+    def folds_into(self, skeleton: Skeleton | FieldKind) -> bool:
+        """Return True if the map folds into the parameters of a leaf; else leaves of this kind carry it."""
+        if isinstance(skeleton, FieldKind):
+            return False
         if skeleton.folds_maps:
             return self.uniform_scale is not None
         return np.array_equal(self.matrix, WORLD.matrix)
@@ -66,8 +69,8 @@ WORLD = Placement(np.eye(4))
 class ProgramNode:
     """A node of a tree, as the compiler of programs reads it.
 
-    A primitive has a `skeleton`, a combination an `operator` and a deformation a `warp`. A node without any
-    of them has one program child, and `child_placement` says what it does to that child.
+    A primitive has a `skeleton` or a `field_kind`, a combination an `operator` and a deformation a `warp`. A
+    node without any of them has one program child, and `child_placement` says what it does to that child.
     """
 
     skeleton: ClassVar[Skeleton | None] = None
@@ -133,16 +136,21 @@ def postorder(
     return order
 
 
-class ProgramPrimitive(ProgramNode):
+class ProgramLeaf(ProgramNode):
     """A leaf of a tree, as the compiler of programs reads it."""
 
-    skeleton: ClassVar[Skeleton]
     color: Vector
 
     @property
     def program_children(self) -> tuple[ProgramNode, ...]:
-        """No nodes: a primitive stands for itself."""
+        """No nodes: a leaf stands for itself."""
         return ()
+
+
+class ProgramPrimitive(ProgramLeaf):
+    """A leaf around a skeleton."""
+
+    skeleton: ClassVar[Skeleton]
 
     @classmethod
     def radii(cls, primitives: Sequence["ProgramPrimitive"]) -> Float64Array:
@@ -165,10 +173,46 @@ class ProgramPrimitive(ProgramNode):
         raise NotImplementedError
 
 
-class PlacedPrimitive(NamedTuple):
-    """A primitive and its placement."""
+class ProgramField(ProgramLeaf):
+    """A leaf whose field is a function of position itself."""
 
-    primitive: ProgramPrimitive
+    field_kind: ClassVar[FieldKind]
+
+    def grown(self, distance: float) -> Self:
+        """Return this leaf with its visible surface farther out by a distance, in its own units.
+
+        Raises
+        ------
+        InvalidNode
+            The kind has no measure of size that an offset could change, or nothing is left.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def boxes(cls, leaves: Sequence[Any]) -> Box:
+        """Return lower and upper corners (n, 3) of boxes outside which the fields of n leaves are 0."""
+        raise NotImplementedError
+
+    @classmethod
+    def packed_fields(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return the parameters (n, ·, 4) on the tape of n leaves of this kind."""
+        raise NotImplementedError
+
+
+LeafKind = Skeleton | FieldKind
+
+
+def leaf_kind(leaf: ProgramLeaf) -> LeafKind:
+    """Return the row of the tables for a leaf."""
+    kind = leaf.field_kind if isinstance(leaf, ProgramField) else leaf.skeleton
+    assert kind is not None
+    return kind
+
+
+class PlacedPrimitive(NamedTuple):
+    """A leaf and its placement."""
+
+    primitive: ProgramLeaf
     placement: Placement
 
 
@@ -196,7 +240,8 @@ def influence_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
     InvalidNode
         An offset leaves nothing of a primitive.
     """
-    radii = primitives[0].primitive.radii([placed.primitive for placed in primitives])
+    leaves = cast("list[ProgramPrimitive]", [placed.primitive for placed in primitives])
+    radii = leaves[0].radii(leaves)
     placements, placed_by = distinct_placements(primitives)
     growth = np.array([placement.growth for placement in placements])[placed_by]
     influences: Float64Array = radii / RIM + (growth / RIM)[:, None]
@@ -206,11 +251,19 @@ def influence_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
     return influences
 
 
+def grown_fields(leaves: list[PlacedPrimitive]) -> list[ProgramField]:
+    """Return direct fields with the offsets of their placements applied."""
+    return [
+        leaf.grown(placement.growth) if placement.growth else leaf
+        for leaf, placement in cast("list[tuple[ProgramField, Placement]]", leaves)
+    ]
+
+
 @dataclass(frozen=True)
 class Run:
     """Instruction: fold `primitives`, one after the other, into the accumulator."""
 
-    skeleton: Skeleton
+    kind: LeafKind
     stretched: bool
     """True if maps do not fold into the parameters, so that each primitive carries its inverse map."""
     operator: Operator
@@ -219,8 +272,8 @@ class Run:
 
     def accepts(self, other: "Run") -> bool:
         """Return True if `other` only continues this run."""
-        key = (self.skeleton, self.stretched, self.operator, self.parameter)
-        return key == (other.skeleton, other.stretched, other.operator, other.parameter)
+        key = (self.kind, self.stretched, self.operator, self.parameter)
+        return key == (other.kind, other.stretched, other.operator, other.parameter)
 
 
 @dataclass(frozen=True)
@@ -334,7 +387,7 @@ def _weight(node: ProgramNode, child_weights: list[int]) -> int:
 def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
     """Yield smaller steps for a step that starts from an empty accumulator."""
     node, placement = _strip(step.node, step.placement)
-    if isinstance(node, ProgramPrimitive):
+    if isinstance(node, ProgramLeaf):
         yield from _runs([PlacedPrimitive(node, placement)], SUM, 0.0)
     elif node.warp is not None:
         yield from _expand_warp(replace(step, node=node, placement=placement), node, node.warp)
@@ -387,7 +440,7 @@ def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> 
     right_placement = replace(left_placement, growth=-left_placement.growth) if cuts else left_placement
     if weights.get(id(right), SIMPLE) == SIMPLE:
         leaf, placement = _strip(right, right_placement)
-        assert isinstance(leaf, ProgramPrimitive)
+        assert isinstance(leaf, ProgramLeaf)
         yield step.into(left, left_placement)
         yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameter)
         return
@@ -402,14 +455,14 @@ def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> 
 
 def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
     """Yield one run per kind of primitive, in the order in which the kinds first occur."""
-    runs: dict[tuple[Skeleton, bool], Run] = {}
+    runs: dict[tuple[LeafKind, bool], Run] = {}
     run: Run | None = None
     placement: Placement | None = None
     for placed in primitives:
-        skeleton = placed.primitive.skeleton
-        if run is None or placed.placement is not placement or skeleton is not run.skeleton:
+        kind = leaf_kind(placed.primitive)
+        if run is None or placed.placement is not placement or kind is not run.kind:
             placement = placed.placement
-            key = skeleton, not placement.folds_into(skeleton)
+            key = kind, not placement.folds_into(kind)
             run = runs.setdefault(key, Run(*key, operator, parameter))
         run.primitives.append(placed)
     yield from runs.values()
@@ -443,7 +496,7 @@ def _flatten(root: ProgramNode, placement: Placement) -> Iterator[PlacedPrimitiv
         node, node_placement = _strip(*placed)
         if node.operator is not None and _operation(node) == operation:
             pending.extend(_placed(node.program_children, node_placement))
-        elif isinstance(node, ProgramPrimitive):
+        elif isinstance(node, ProgramLeaf):
             yield PlacedPrimitive(node, node_placement)
         else:
             yield node, node_placement
@@ -452,6 +505,6 @@ def _flatten(root: ProgramNode, placement: Placement) -> Iterator[PlacedPrimitiv
 def _placed(nodes: tuple[ProgramNode, ...], placement: Placement) -> list[PlacedPrimitive | _PlacedNode]:
     """Return nodes and their placements, the last one first."""
     return [
-        PlacedPrimitive(node, placement) if isinstance(node, ProgramPrimitive) else (node, placement)
+        PlacedPrimitive(node, placement) if isinstance(node, ProgramLeaf) else (node, placement)
         for node in reversed(nodes)
     ]

@@ -7,20 +7,23 @@ Layout, in texels (vec4 of float32):
                    parameters, then a texel of colour
       code ≥ STRETCHED  the same for skeletons[code − STRETCHED], each behind PREFIX texels: the rows of its
                    world → local map, then (largest stretch of that map, 0, 0, 0)
+      code ≥ FIELD  a run of `count` direct fields of fields[code − FIELD], each behind PREFIX texels of the
+                   same meaning: parameters, then a texel of colour
       PUSH         register[count] = accumulator; accumulator = 0
       POP          accumulator = operator(register[count], accumulator)
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
       WARP         before PREFIX texels: the rows of a world → local map, then (its largest stretch, and the
                    warp's parameters); `operator` is the warp's code, `count` the register for the point
-      UNWARP       the same; ends what WARP began
+        UNWARP       the same; ends what WARP began
 
 All texels of a primitive are adjacent, so a slice of a tape is a tape.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
+from typing import cast
 
 import numpy as np
 import warp as wp
@@ -28,16 +31,22 @@ from numpy.typing import NDArray
 
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
+from blobtree.formulas.fields import FieldKind
+from blobtree.formulas.skeletons import Skeleton
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, instruction_set_for
 from blobtree.tape.program import (
     EnterWarp,
     Instruction,
     LeaveWarp,
     PlacedPrimitive,
+    Placement,
     Pop,
+    ProgramLeaf,
+    ProgramPrimitive,
     Push,
     Run,
     distinct_placements,
+    grown_fields,
     influence_radii,
     registers_needed,
     warp_registers_needed,
@@ -49,6 +58,7 @@ POP_SWAPPED = -3
 WARP = -4
 UNWARP = -5
 STRETCHED = 1024
+FIELD = 2048
 PREFIX = 4
 REGISTERS = 24
 """Registers that the interpreters hold: enough for any tree of 2²⁴ leaves."""
@@ -78,11 +88,13 @@ class Tape:
     skeletons, operators, warps
         Codes of the kinds in use, to which shaders are specialised.
     stretched
-        True if a primitive carries its own map.
+        True if a primitive around a skeleton carries its own map.
     instruction_set
         The kinds that the codes stand for.
     headers
         int64[k]: indices in `data` where the instructions begin.
+    fields
+        Codes of the direct fields in use.
 
     Examples
     --------
@@ -100,6 +112,7 @@ class Tape:
     warp_registers: int = 0
     instruction_set: InstructionSet = BUILT_IN
     headers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    fields: tuple[int, ...] = ()
 
     def on(self, device: str | None = None) -> DeviceTape:
         """Return this tape on a Warp device, by default the current one."""
@@ -128,10 +141,11 @@ def compile_tape(program: list[Instruction]) -> Tape:
     if warp_registers > WARP_REGISTERS:
         raise InvalidNode(f"tree: warps nest {warp_registers} deep, at most {WARP_REGISTERS} may")
     runs = [step for step in program if isinstance(step, Run)]
-    skeletons = {run.skeleton for run in runs}
+    skeletons = {run.kind for run in runs if isinstance(run.kind, Skeleton)}
+    fields = {run.kind for run in runs if isinstance(run.kind, FieldKind)}
     warps = {step.warp for step in program if isinstance(step, EnterWarp)}
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
-    instruction_set = instruction_set_for(skeletons, operators, warps)
+    instruction_set = instruction_set_for(skeletons, operators, warps, fields)
     texels = [np.concatenate(list(_texels(step, instruction_set))) for step in program]
     ends = np.cumsum([len(part) for part in texels])
     return Tape(
@@ -139,9 +153,10 @@ def compile_tape(program: list[Instruction]) -> Tape:
         registers=registers,
         skeletons=tuple(sorted(map(instruction_set.skeletons.index, skeletons))),
         operators=tuple(sorted(map(instruction_set.operators.index, operators))),
-        stretched=any(run.stretched for run in runs),
+        stretched=any(run.stretched for run in runs if isinstance(run.kind, Skeleton)),
         warps=tuple(sorted(map(instruction_set.warps.index, warps))),
         warp_registers=warp_registers,
+        fields=tuple(sorted(map(instruction_set.fields.index, fields))),
         instruction_set=instruction_set,
         headers=np.concatenate([[0], ends[:-1]]).astype(np.int64),
     )
@@ -159,8 +174,12 @@ def _texels(step: Instruction, instruction_set: InstructionSet) -> Iterator[NDAr
             yield _warp_texels(WARP, step, instruction_set)
         case LeaveWarp(entry):
             yield _warp_texels(UNWARP, entry, instruction_set)
-        case Run(skeleton, stretched, operator, parameter, primitives):
-            code = instruction_set.skeletons.index(skeleton) + (STRETCHED if stretched else 0)
+        case Run(FieldKind() as kind, _, operator, parameter, primitives):
+            code = instruction_set.fields.index(kind) + FIELD
+            yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
+            yield _field_texels(primitives)
+        case Run(Skeleton() as kind, stretched, operator, parameter, primitives):
+            code = instruction_set.skeletons.index(kind) + (STRETCHED if stretched else 0)
             yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
             yield _primitive_texels(primitives, stretched=stretched)
 
@@ -187,7 +206,7 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
     Similarity maps fold into the parameters. Under other maps each primitive carries its map, and points are
     taken to the primitive's own space.
     """
-    nodes = [placed.primitive for placed in primitives]
+    nodes = cast("list[ProgramPrimitive]", [placed.primitive for placed in primitives])
     placements, placed_by = distinct_placements(primitives)
     grown = influence_radii(primitives)
     matrices = None
@@ -195,11 +214,28 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
         matrices = np.array([placement.matrix for placement in placements])[placed_by]
         scales = np.array([placement.uniform_scale for placement in placements])[placed_by]
         grown = grown * scales[:, None]
-    parameters = nodes[0].packed(nodes, grown, matrices)
-    colors = np.ones((len(nodes), 1, 4))
-    components = chain.from_iterable(node.color for node in nodes)
-    colors[:, 0, :3] = np.fromiter(components, np.float64, 3 * len(nodes)).reshape(-1, 3)
-    parts = [parameters, colors]
+    parts = [nodes[0].packed(nodes, grown, matrices), _color_texels(nodes)]
     if stretched:
-        parts.insert(0, np.array([_map_texels(placement.matrix) for placement in placements])[placed_by])
+        parts.insert(0, _prefixes(placements)[placed_by])
     return np.concatenate(parts, axis=1).reshape(-1, 4)
+
+
+def _field_texels(placed_fields: list[PlacedPrimitive]) -> NDArray[np.float64]:
+    """Return maps, parameters and colours of a run's direct fields, all at once."""
+    placements, placed_by = distinct_placements(placed_fields)
+    leaves = grown_fields(placed_fields)
+    parts = [_prefixes(placements)[placed_by], leaves[0].packed_fields(leaves), _color_texels(leaves)]
+    return np.concatenate(parts, axis=1).reshape(-1, 4)
+
+
+def _prefixes(placements: list[Placement]) -> NDArray[np.float64]:
+    """Return the PREFIX texels (n, PREFIX, 4) of placements."""
+    return np.array([_map_texels(placement.matrix) for placement in placements])
+
+
+def _color_texels(leaves: Sequence[ProgramLeaf]) -> NDArray[np.float64]:
+    """Return the colours of leaves as texels (n, 1, 4)."""
+    colors = np.ones((len(leaves), 1, 4))
+    components = chain.from_iterable(leaf.color for leaf in leaves)
+    colors[:, 0, :3] = np.fromiter(components, np.float64, 3 * len(leaves)).reshape(-1, 3)
+    return colors

@@ -14,11 +14,20 @@ import numpy as np
 
 from blobtree import Node
 from blobtree._typing import Float64Array
-from blobtree.tape.dispatch import is_monotone, partials, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.tape.dispatch import (
+    direct_bounds,
+    direct_value_gradient,
+    is_monotone,
+    partials,
+    slope,
+    warp_forward,
+    warp_pullback,
+    warp_stretch,
+)
 from blobtree.tape.evaluators import BOUND, COLOR, GRADIENT, Evaluator, direction_to_local, to_local
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
-from blobtree.tape.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
+from blobtree.tape.tape import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.tracing.ray_kernels import trace_ray
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from blobtree.transpile.glsl import translate_choice, translate_library
@@ -54,6 +63,7 @@ class Kinds:
     stretched: bool
     warps: tuple[int, ...]
     warp_registers: int
+    fields: tuple[int, ...] = ()
     instruction_set: InstructionSet = BUILT_IN
 
     @classmethod
@@ -66,6 +76,7 @@ class Kinds:
             tape.stretched,
             tape.warps,
             tape.warp_registers,
+            tape.fields,
             tape.instruction_set,
         )
 
@@ -100,6 +111,7 @@ def _library(kinds: Kinds) -> str:
             for f in (evaluator.leaf, evaluator.pullback_affine, evaluator.combine)
         ),
         *(evaluator.pullback_warp for evaluator in evaluators if kinds.warps),
+        *(evaluator.direct for evaluator in evaluators if kinds.fields),
         to_local,
         direction_to_local,
         trace_ray,
@@ -110,12 +122,15 @@ def _library(kinds: Kinds) -> str:
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
     """Return the functions that choose by a code on the tape, and their alternatives."""
     operators, warps = kinds.instruction_set.operators, kinds.instruction_set.warps
+    fields = kinds.instruction_set.fields
     choices: dict[Any, dict[int, Any]] = {
         partials: {code: operators[code].partials for code in kinds.operators},
         slope: {code: operators[code].slope for code in kinds.operators},
         warp_forward: {code: warps[code].forward for code in kinds.warps},
         warp_pullback: {code: warps[code].pullback for code in kinds.warps},
         warp_stretch: {code: warps[code].stretch for code in kinds.warps},
+        direct_value_gradient: {code: fields[code].value_gradient for code in kinds.fields},
+        direct_bounds: {code: fields[code].bounds for code in kinds.fields},
     }
     return {chooser: among for chooser, among in choices.items() if among}
 
@@ -139,6 +154,7 @@ def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) 
             "INTERPRET": f"interpret_{name}",
             "FIELD": glsl_type,
             "LEAF": evaluator.leaf.key,
+            "DIRECT": evaluator.direct.key,
             "PULLBACK_AFFINE": evaluator.pullback_affine.key,
             "PULLBACK_WARP": evaluator.pullback_warp.key,
             "COMBINE": evaluator.combine.key,
@@ -176,6 +192,9 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
                 stride=skeleton.parameters + PREFIX + 1,
                 prefix=PREFIX,
             )
+    for code in kinds.fields:
+        stride = kinds.instruction_set.fields[code].parameters + PREFIX + 1
+        yield _DIRECT_RUN.format(code=code + FIELD, kind=code, stride=stride, prefix=PREFIX)
 
 
 _RUN = """\
@@ -200,6 +219,22 @@ case {code}:
         float rate = local_speed / {min_influence}(tape, map + {prefix});
         at += {stride};
         FIELD field = LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate);
+        accumulator = COMBINE(operator_, accumulator, PULLBACK_AFFINE(field, tape, map), reach, header.w);
+    }}
+    break;
+"""
+
+
+_DIRECT_RUN = """\
+case {code}:
+    for (int i = 0; i < count; i++) {{
+        int map = at;
+        vec3 local = to_local(point, tape, map);
+        vec3 along = direction_to_local(local_direction, tape, map);
+        float local_speed = speed * tape_texel(tape, map + {prefix} - 1).x;
+        at += {stride};
+        FIELD field = DIRECT(
+            {kind}, local, tape, map + {prefix}, PRIMITIVE_COLOR, along, reach, local_speed);
         accumulator = COMBINE(operator_, accumulator, PULLBACK_AFFINE(field, tape, map), reach, header.w);
     }}
     break;

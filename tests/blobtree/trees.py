@@ -22,6 +22,7 @@ from blobtree import (
     Ricci,
     Segment,
     Sum,
+    Superquadric,
     Torus,
     Transform,
     Twist,
@@ -76,6 +77,16 @@ def random_solid(rng: np.random.Generator) -> Node:
 
 
 SOLIDS = MoreKinds(random_solid)
+
+
+def random_field(rng: np.random.Generator) -> Node:
+    """A direct field of any kind."""
+    center, color = triple(rng.uniform(-1.0, 1.0, 3)), triple(rng.uniform(0.0, 1.0, 3))
+    vertical, horizontal = rng.choice([0.2, 0.5, 1.0, 1.5, 2.0], 2).tolist()
+    return Superquadric(center, triple(rng.uniform(0.2, 0.8, 3)), vertical, horizontal, color=color)
+
+
+FIELDS = MoreKinds(random_field)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:

@@ -27,6 +27,7 @@ from blobtree import (
     Ricci,
     Segment,
     Sum,
+    Superquadric,
     Torus,
     Transform,
     Twist,
@@ -69,6 +70,12 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return _leaf(beyond, radius, color)
         case Ellipsoid(center=center, semi_axes=semi_axes, color=color):
             return _leaf((q - np.array(center)) / np.array(semi_axes), 1.0, color)
+        case Superquadric(center=center, semi_axes=semi_axes, color=color):
+            x, y, z = (np.abs(q - np.array(center)) / np.array(semi_axes)).T
+            vertical, horizontal = node.vertical, node.horizontal
+            across = (x ** (2.0 / horizontal) + y ** (2.0 / horizontal)) ** (horizontal / vertical)
+            leaf = _leaf_at((across + z ** (2.0 / vertical)) ** (vertical / 2.0) * RIM, color)
+            return replace(leaf, margin=np.minimum(np.minimum(x, y), z))  # diamonds have edges there
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -124,6 +131,9 @@ def grown(node: Node, distance: float) -> Node:
         case Ellipsoid():  # an offset of the unit ball that is scaled
             larger = 1.0 + distance / float(np.cbrt(np.prod(node.semi_axes)))
             return replace(node, semi_axes=tuple(larger * np.array(node.semi_axes)))
+        case Superquadric():
+            x, y, z = node.semi_axes
+            return replace(node, semi_axes=(x + distance, y + distance, z + distance))
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Offset(child=child, distance=more):

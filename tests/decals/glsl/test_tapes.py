@@ -1,17 +1,19 @@
 """Whole tapes in Warp and GLSL, and pictures of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from blobtree import Node, Point, Segment
+from blobtree import Node, Point, Segment, Superquadric
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
-from decals.rendering.tree import tracing_shader
+from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
-from tests.blobtree.trees import SOLIDS, points_around, random_trees
+from tests.blobtree.trees import FIELDS, SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
 from tests.decals.glsl.functions import ALL_KINDS, run_program
 from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
@@ -19,13 +21,19 @@ from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 
 TREES = random_trees(seed=31, count=24) + random_trees(seed=33, count=12, more=SOLIDS)
+FIELD_TREES = random_trees(seed=35, count=6, more=FIELDS)
 
 
 def read_tape(
-    context: Context, tree: Node, reading: int, points: Array, heading: tuple[float, ...] = (0.0, 0.0, 0.0)
+    context: Context,
+    tree: Node,
+    reading: int,
+    points: Array,
+    heading: tuple[float, ...] = (0.0, 0.0, 0.0),
+    kinds: Kinds = ALL_KINDS,
 ) -> Array:
     """What the tracing shader's own functions give for `tree`, in place of a picture."""
-    shader, _, _ = tracing_shader(ALL_KINDS).text.partition("void main()")
+    shader, _, _ = tracing_shader(kinds).text.partition("void main()")
     textures = {"tape": tree.tape.data, "points": padded(points)}
     uniforms = {"reading": reading, "part": (0, len(tree.tape.data)), "heading": heading}
     return run_program(context, shader + MAIN, len(points), textures, uniforms)
@@ -40,31 +48,45 @@ def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
 
 @pytest.mark.parametrize("start", range(0, len(TREES), 6))
 def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int) -> None:
-    rng = np.random.default_rng(start)
+    assert_same_in_both_languages(context, TREES[start : start + 6], ALL_KINDS, start)
+
+
+def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
+    used = FIELD_TREES[0].tape.instruction_set
+    kinds = replace(ALL_KINDS, fields=tuple(range(len(used.fields))), instruction_set=used)
+    assert {code for tree in FIELD_TREES for code in tree.tape.fields} == set(kinds.fields)
+    assert_same_in_both_languages(context, FIELD_TREES, kinds, 0)
+
+
+def assert_same_in_both_languages(context: Context, trees: list[Node], kinds: Kinds, seed: int) -> None:
+    rng = np.random.default_rng(seed)
     compared = 0
-    for tree in TREES[start : start + 6]:
+    for tree in trees:
         points = points_around(rng, tree, 500)
         reach = (10.0 ** rng.uniform(-3.0, 0.5, 500)).astype(np.float32)
-        seen = read_tape(context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]))
+        seen = read_tape(context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), kinds=kinds)
         assert_close(seen[:, :2], bounds_at(tree.tape, points, reach))
         heading = units(rng, 4)[3]
         seen = read_tape(
-            context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist())
+            context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist()), kinds
         )
         assert_close(seen[:, :3], bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach))
         field = oracle.evaluate(tree, points)
         smooth = field.margin > 1e-5
         assert_close(
-            read_tape(context, tree, GRADIENT, points)[smooth], gradients_at(tree.tape, points)[smooth]
+            read_tape(context, tree, GRADIENT, points, kinds=kinds)[smooth],
+            gradients_at(tree.tape, points)[smooth],
         )
         strong = smooth & (field.value > 1e-3)
-        seen = read_tape(context, tree, COLOR, points)[:, 1:]
+        seen = read_tape(context, tree, COLOR, points, kinds=kinds)[:, 1:]
         assert_close(seen[strong], colors_at(tree.tape, points)[strong])
         compared += int(strong.sum())
     assert compared > 0.3 * 6 * 500
 
 
 MODELS = {
+    "a superquadric": Superquadric((0, 0, 0), (1, 0.6, 0.8), 0.4, 0.6).rotate((1, 2, 3), 30)
+    + Point((1, 0, 0), radius=0.5),
     "one point": Point((0, 0, 0), radius=1.0),
     "one segment": Segment((0, 0, 0), (1, 1, 0), radius=0.4),
     "a tiny model": (Point((0, 0, 0), radius=1.0) - Point((0.5, 0, 1), radius=0.7)).scale(1e-4),

@@ -1,0 +1,129 @@
+"""Direct fields as leaves of a tree: each a function of position, with a bounded support and a colour.
+
+A new one is a row of a table of `FieldKind` and a class here. The class names that row, declares its
+parameters, and returns a box outside which the field is 0. If the formula reads its parameters in the order
+of declaration, `texels` need not be written.
+"""
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+
+from blobtree._typing import Box, Float64Array
+from blobtree.errors import InvalidNode
+from blobtree.formulas.direct_fields import SUPERQUADRIC
+from blobtree.formulas.falloff import RIM
+from blobtree.formulas.fields import FieldKind
+from blobtree.nodes.parameters import Color, Parameter, Quantity, columns_of, parameters_of
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf
+from blobtree.tape.program import ProgramField
+from blobtree.validation import Vector
+
+BOX_MARGIN = 2e-6
+"""Relative widening of boxes, so that float32 leaves nothing of a field outside."""
+
+
+class FieldPrimitive(ProgramField, Leaf):
+    """A direct field and a colour: a leaf of the tree."""
+
+    field_kind: ClassVar[FieldKind]
+
+    def grown(self, distance: float) -> Self:
+        """Refuse an offset; kinds with a measure of size replace this."""
+        raise InvalidNode(
+            f"offset: expected primitives with a radius, got a {type(self).__name__}; scale it instead"
+        )
+
+    @classmethod
+    def boxes(cls, leaves: Sequence[Any]) -> Box:
+        """Return lower and upper corners (n, 3) of boxes outside which the fields of n leaves are 0."""
+        lower, upper = cls.box(cls._columns(leaves))
+        margin = BOX_MARGIN * (upper - lower)
+        return lower - margin, upper + margin
+
+    @classmethod
+    def packed_fields(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return the parameters (n, ·, 4) on the tape of n leaves of this kind."""
+        return cls.texels(cls._columns(leaves))
+
+    @classmethod
+    def box(cls, columns: Columns) -> Box:
+        """Return the corners (n, 3) of boxes around n supports, from the leaves' parameters."""
+        raise NotImplementedError
+
+    @classmethod
+    def texels(cls, columns: Columns) -> Float64Array:
+        """Return parameters as texels (n, ·, 4); by default the numbers follow each other as declared."""
+        numbers = np.concatenate(list(columns.values()), axis=1)
+        texels = 4 * cls.field_kind.parameters
+        return np.pad(numbers, ((0, 0), (0, texels - numbers.shape[1]))).reshape(len(numbers), -1, 4)
+
+    @classmethod
+    def _columns(cls, leaves: Sequence[Any]) -> Columns:
+        """Return the values (n, size) of the parameters of n leaves by name, without their colours."""
+        return {
+            name: columns_of(leaves, parameter)
+            for name, parameter in parameters_of(cls).items()
+            if parameter.quantity is not Quantity.COLOR
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Superquadric(FieldPrimitive):
+    """A superquadric ellipsoid: a box with rounded edges, a cylinder, an ellipsoid, a diamond (Barr 1981).
+
+    Its field is g(RIM · h) with h = ((X^(2/ε₂) + Y^(2/ε₂))^(ε₂/ε₁) + Z^(2/ε₁))^(ε₁/2), where X, Y and Z are
+    the distances from the centre in semi-axes. This norm is 1 on the surface.
+
+    Examples
+    --------
+    >>> from blobtree import Superquadric
+    >>> pillow = Superquadric((0, 0, 0), (2, 1, 1), 0.5, 0.5)
+    >>> pillow([[2, 0, 0], [0, 1, 0], [0, 0, 0]]).round(3).tolist()
+    [0.5, 0.5, 1.0]
+    """
+
+    file_tag = "superquadric"
+    field_kind = SUPERQUADRIC
+
+    center: Annotated[Vector, Parameter(Quantity.POINT, "centre")]
+    semi_axes: Annotated[Vector, Parameter(Quantity.SEMI_AXES, "visible radii along x, y and z, above 0")]
+    vertical: Annotated[
+        float,
+        Parameter(Quantity.FACTOR, "exponent ε₁ between z and the others: 0.1 square, 1 round, 2 a diamond",
+                  low=0.1, high=2.0, hint="larger exponents make concave edges without a slope bound"),
+    ] = 1.0  # fmt: skip
+    horizontal: Annotated[
+        float,
+        Parameter(Quantity.FACTOR, "exponent ε₂ between x and y", low=0.1, high=2.0,
+                  hint="larger exponents make concave edges without a slope bound"),
+    ] = 1.0  # fmt: skip
+    _: KW_ONLY
+    color: Color = DEFAULT_COLOR
+
+    def grown(self, distance: float) -> "Superquadric":
+        """Return this superquadric with semi-axes longer by a distance."""
+        if min(self.semi_axes) + distance <= 0.0:
+            raise InvalidNode(f"offset: {distance:g} leaves nothing of {self!r}")
+        x, y, z = self.semi_axes
+        return replace(self, semi_axes=(x + distance, y + distance, z + distance))
+
+    @classmethod
+    def box(cls, columns: Columns) -> Box:
+        """Return the boxes in which h ≤ 1 / RIM."""
+        half = columns["semi_axes"] / RIM
+        return columns["center"] - half, columns["center"] + half
+
+    @classmethod
+    def texels(cls, columns: Columns) -> Float64Array:
+        """Return centre and 2/ε₂; reciprocals of the semi-axes and 2/ε₁; the largest slope of the norm."""
+        inverses = 1.0 / columns["semi_axes"]
+        powers = 2.0 / np.concatenate([columns["horizontal"], columns["vertical"]], axis=1)
+        # A p-norm of two numbers exceeds their Euclidean norm by at most 2^(1/p − 1/2), for p < 2.
+        excess = 2.0 ** np.maximum(1.0 / powers - 0.5, 0.0).sum(axis=1, keepdims=True)
+        slopes = inverses.max(axis=1, keepdims=True) * excess
+        rest = np.zeros((len(inverses), 3))
+        numbers = [columns["center"], powers[:, :1], inverses, powers[:, 1:], slopes, rest]
+        return np.concatenate(numbers, axis=1).reshape(-1, 3, 4)

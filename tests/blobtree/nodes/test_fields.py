@@ -1,0 +1,132 @@
+"""Direct fields: their shapes, maps, offsets, meshes, rays and files."""
+
+import json
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import (
+    ISO,
+    RIM,
+    FieldPrimitive,
+    InvalidNode,
+    Node,
+    Point,
+    Superquadric,
+    from_json,
+    polygonize,
+    to_json,
+)
+from blobtree.nodes.parameters import Quantity, parameters_of
+from blobtree.nodes.paths import moved, primitive_at, primitive_paths, resized
+from blobtree.nodes.surgery import dominant_primitive
+from blobtree.nodes.tree import NODE_KINDS
+from blobtree.tape.tape import FIELD, PREFIX
+from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
+from tests.blobtree.nodes.test_primitives import PLACEMENTS
+from tests.blobtree.trees import points_around
+from tests.oracles import blobtree as oracle
+
+PILLOW = Superquadric((0.1, 0.2, 0.3), (1.0, 0.5, 0.7), 0.4, 1.5, color=(1, 0, 0))
+EACH = pytest.mark.parametrize("node", [PILLOW], ids=["superquadric"])
+
+
+@EACH
+@pytest.mark.parametrize("place", PLACEMENTS.values(), ids=PLACEMENTS)
+def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:
+    placed = place(node)
+    points = points_around(np.random.default_rng(2), placed, 300)
+    field = oracle.evaluate(placed, points)
+    np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
+    smooth = field.margin > 1e-3
+    np.testing.assert_allclose(
+        placed.gradient(points[smooth]), oracle.gradient(placed, points[smooth]), atol=5e-4
+    )
+
+
+@EACH
+def test_meshes_are_closed_and_rays_end_on_the_surface(node: Node) -> None:
+    tree = node + Point((1.2, 0, 0), radius=0.4)
+    mesh = polygonize(tree, resolution=40)
+    assert_valid(mesh)
+    assert_closed(mesh)
+    np.testing.assert_allclose(oracle.value(tree, mesh.vertices), ISO, atol=2e-5)
+    eye = np.array([5.0, 4.0, 3.0])
+    hits = tree.raycast(np.tile(eye, (200, 1)), mesh.vertices[:200] - eye)
+    assert hits.hit.mean() > 0.9
+    np.testing.assert_allclose(oracle.value(tree, hits.positions[hits.hit]), ISO, atol=1e-3)
+
+
+def test_a_superquadric_of_exponents_one_is_an_ellipsoid() -> None:
+    ellipsoid = Point((0, 0, 0), radius=1.0).scale((1.0, 0.5, 0.7)).translate((0.1, 0.2, 0.3))
+    points = points_around(np.random.default_rng(4), ellipsoid, 500)
+    round_one = Superquadric((0.1, 0.2, 0.3), (1.0, 0.5, 0.7))
+    np.testing.assert_allclose(round_one(points), ellipsoid(points), atol=2e-6)
+    np.testing.assert_allclose(round_one.gradient(points), ellipsoid.gradient(points), atol=1e-5)
+
+
+def test_square_exponents_reach_into_the_corners() -> None:
+    cube = Superquadric((0, 0, 0), (1, 1, 1), 0.1, 0.1)
+    corner = 3.0**-0.05
+    np.testing.assert_allclose(cube([[corner] * 3, [1, 0, 0], [0, 0, -1]]), ISO, atol=1e-5)
+
+
+def test_a_field_leaf_is_one_run_behind_its_map() -> None:
+    tape = (PILLOW + PILLOW.translate((1, 0, 0)) + Point((0, 0, 0), radius=0.5)).tape
+    code = FIELD + tape.fields[0]
+    at = int(tape.headers[tape.data[tape.headers, 0] == code][0])
+    assert tape.data[at, 2] == 2
+    np.testing.assert_array_equal(tape.data[at + 1 : at + 4, :3], np.eye(3))
+    np.testing.assert_allclose(tape.data[at + 1 + PREFIX, :3], PILLOW.center)
+    assert tape.data[at + 1 + PREFIX + PILLOW.field_kind.parameters].tolist() == [1, 0, 0, 1]
+    assert not tape.stretched
+
+
+@EACH
+def test_nodes_survive_files_pickles_and_their_own_text(node: FieldPrimitive) -> None:
+    (record,) = json.loads(to_json(node))["nodes"]
+    assert NODE_KINDS[record.pop("type")] is type(node)
+    assert list(record) == list(parameters_of(type(node)))
+    assert from_json(to_json(node)) == node == pickle.loads(pickle.dumps(node))
+    assert eval(repr(node), {type(node).__name__: type(node)}) == node
+
+
+@EACH
+def test_every_field_has_a_colour_and_is_found_by_paths(node: FieldPrimitive) -> None:
+    quantities = [parameter.quantity for parameter in parameters_of(type(node)).values()]
+    assert quantities.count(Quantity.COLOR) == 1
+    tree = Point((3, 0, 0), radius=1.0) + node.rotate((0, 0, 1), 30)
+    assert primitive_paths(tree) == [(0,), (1, 0)]
+    assert primitive_at(tree, (1,)) == node
+    assert dominant_primitive(tree, node.rotate((0, 0, 1), 30).bounds[0]) == (1, 0)
+
+
+def test_moves_and_sizes_change_the_declared_lengths() -> None:
+    assert moved(PILLOW, (1, 0, 0)) == Superquadric(
+        (1.1, 0.2, 0.3), (1.0, 0.5, 0.7), 0.4, 1.5, color=(1, 0, 0)
+    )
+    twice = resized(PILLOW, 2.0)
+    assert isinstance(twice, Superquadric)
+    assert twice.semi_axes == (2.0, 1.0, 1.4)
+
+
+def test_the_support_holds_the_field() -> None:
+    lower, upper = PILLOW.support
+    np.testing.assert_allclose(upper - lower, 2.0 * np.array(PILLOW.semi_axes) / RIM, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Superquadric((0, 0, 0), (1, 0, 1)), "semi_axes: expected three numbers above 0"),
+        (lambda: Superquadric((0, 0, 0), (1, np.nan, 1)), "semi_axes: expected three"),
+        (lambda: Superquadric((0, 0, 0), (1, 1, 1), 0.0), "vertical: expected 0.1 to 2, got 0.0"),
+        (lambda: Superquadric((0, 0, 0), (1, 1, 1), 1.0, 2.5), "horizontal: expected 0.1 to 2, got 2.5"),
+        (lambda: PILLOW.offset(-0.5).tape, "offset: -0.5 leaves nothing of Superquadric"),
+    ],
+)
+def test_wrong_parameters_are_refused(make: Any, message: str) -> None:
+    with pytest.raises(InvalidNode, match=message):
+        make()
