@@ -1,6 +1,7 @@
 from ._version import __version__
 from .custom.operator import CustomCombination, define_operator
 from .custom.skeleton import CustomPrimitive, define_skeleton
+from .derivatives.curvature import Curvatures
 from .errors import (
     Cancelled,
     ImplicitDecalsError,
@@ -35,6 +36,7 @@ __all__ = [
     "Cancel",
     "Cancelled",
     "Cone",
+    "Curvatures",
     "CustomCombination",
     "CustomPrimitive",
     "Difference",

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
 from blobtree.cells.prune_kernels import measure_range
+from blobtree.derivatives.curvature import Curvatures, curvatures_of, hessians_at
 from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
@@ -31,7 +32,14 @@ from blobtree.pyvista_views import LEVELS, SLICE_RESOLUTION, slice_tree, to_poly
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.program import Placement
 from blobtree.tracing.trace import Hits, raycast
-from blobtree.validation import Matrix, affine_matrix, finite_number, finite_vector, point_array
+from blobtree.validation import (
+    Matrix,
+    affine_matrix,
+    finite_number,
+    finite_vector,
+    point_array,
+    points_or_point,
+)
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -349,6 +357,65 @@ class Node(ImplicitModel):
         True
         """
         return super().gradient(points)
+
+    def hessian(self, points: ArrayLike) -> Float32Array:
+        """Return the exact second derivatives of the field at points.
+
+        Parameters
+        ----------
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n, 3, 3], or float32[3, 3] at one point, per squared model unit: symmetric matrices. Where
+            the gradient has a kink it is the matrix of one side.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0).hessian([0, 0, 0]).round(3).diagonal().tolist()
+        [-1.238, -1.238, -1.238]
+        """
+        array, single = points_or_point(points)
+        _, hessians = hessians_at(self.tape, array)
+        return hessians[0] if single else hessians
+
+    def curvatures(self, points: ArrayLike) -> Curvatures:
+        """Return mean, Gauss and principal curvatures at points of the surface.
+
+        Parameters
+        ----------
+        points : array-like (n, 3) or (3,)
+            Points in the world, in model units. Elsewhere than on the surface the curvatures are those of the
+            level set through the point.
+
+        Returns
+        -------
+        Curvatures
+            Curvatures per model unit, positive where the model is convex, and the principal directions. All
+            of it is NaN where the gradient is 0.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=2.0).curvatures([[2, 0, 0]]).mean.round(3).tolist()
+        [0.5]
+        """
+        array, _ = points_or_point(points)
+        f, hessians = hessians_at(self.tape, array)
+        return curvatures_of(f[:, 1:].astype(np.float64), hessians.astype(np.float64))
 
     def colors(self, points: ArrayLike) -> Float32Array:
         """Return the blended colours at points.

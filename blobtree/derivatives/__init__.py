@@ -1,0 +1,1 @@
+"""Exact derivatives of fields: Hessians and curvatures, and kernels for derivatives by parameters."""
