@@ -8,6 +8,7 @@ cache on disk, under a hash of the source. `loaded` does more than that:
 * Where there are none, all files of kernels that the package of the launched kernel has imported compile at
   the same time, one per core, and report their progress.
 * A damaged file of the cache is removed, and its kernels are compiled again.
+* Warp's own headers are parsed once per machine, not once per thread of every process (`_kept_headers`).
 """
 
 import logging
@@ -19,7 +20,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,9 @@ instruction set of one processor runs no faster either, and could not be shipped
 
 SHIPPED = Path(__file__).with_name("compiled")
 """Folder of kernels compiled ahead of time: ``<Warp version>/<module and hash>/``, as in Warp's cache."""
+
+HEADERS = "headers"
+"""Folder of the kernel cache for Warp's parsed headers, 5 MB."""
 
 CUDA_BLOCK = 256
 """Threads of a block, where a module of kernels sets no other number; Warp's default."""
@@ -169,7 +173,7 @@ def _load(module: wp.Module, device: wp.Device) -> None:
     """Load a module; remove it from the cache and compile it again if its files are damaged."""
     folder = kernel_cache() / _folder_name(module, device)
     was_cached = folder.is_dir()
-    with _cache_errors():
+    with _cache_errors(), nullcontext() if was_cached else _kept_headers():
         try:
             wp.load_module(module, device=device)
         except Exception as error:  # Warp raises nothing more precise for a damaged file
@@ -179,6 +183,40 @@ def _load(module: wp.Module, device: wp.Device) -> None:
             shutil.rmtree(folder)
             _copy_shipped(folder)
             wp.load_module(module, device=device)
+
+
+@contextmanager
+def _kept_headers() -> Iterator[None]:
+    """Within a ``with`` block, kernels compile with Warp's parsed headers from the kernel cache.
+
+    Warp parses its headers once per thread into a temporary folder, which takes two seconds. Warp itself
+    removes a file there that is damaged or does not fit its headers; then the kept one is removed too. This
+    function is a no-op for versions of Warp without such a folder.
+    """
+    folder_of_thread = getattr(wp._src.context.runtime, "get_clang_pch_dir", lambda: None)()
+    if folder_of_thread is None:
+        yield
+        return
+    kept, used = kernel_cache() / HEADERS, Path(folder_of_thread)
+    _copy_newer(kept, used)
+    yield
+    for file in kept.glob("*.pch"):
+        if not (used / file.name).exists():
+            file.unlink(missing_ok=True)
+    _copy_newer(used, kept)
+
+
+def _copy_newer(source: Path, target: Path) -> None:
+    """Copy files that the other folder lacks or has in another version; other processes may do so too."""
+    for file in source.glob("*.pch"):
+        copy = target / file.name
+        if copy.exists() and copy.stat().st_mtime_ns == file.stat().st_mtime_ns:
+            continue
+        target.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=target, delete=False) as temporary:
+            temporary.write(file.read_bytes())
+        shutil.copystat(file, temporary.name)
+        Path(temporary.name).replace(copy)
 
 
 def _compile(modules: list[wp.Module], device: wp.Device) -> None:

@@ -1,7 +1,9 @@
 """Kernels are compiled once, taken from the package if they fit, and compiled again if a file is damaged."""
 
 import logging
+import shutil
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ import warp as wp
 import blobtree.kernels as kernels
 from blobtree.device import start_warp
 from blobtree.errors import UnusableCache
-from blobtree.kernels import KERNEL_OPTIONS, compilation_displayed, loaded
+from blobtree.kernels import HEADERS, KERNEL_OPTIONS, compilation_displayed, loaded
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -131,3 +133,33 @@ def test_a_display_takes_the_place_of_the_log(
     with caplog.at_level(logging.WARNING), compilation_displayed(lambda done, total: None):
         _doubled()
     assert not caplog.records
+
+
+def test_headers_are_parsed_once_per_machine(cache: Path) -> None:
+    _doubled()
+    (kept,) = (cache / HEADERS).glob("*.pch")
+    parsed = kept.stat().st_mtime_ns
+
+    def compile_in_thread() -> None:
+        with kernels._kept_headers():
+            (used,) = Path(wp._src.context.runtime.get_clang_pch_dir()).glob("*.pch")
+            assert used.read_bytes() == kept.read_bytes()
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(compile_in_thread).result()
+    assert kept.stat().st_mtime_ns == parsed
+
+
+def test_damaged_headers_are_replaced(cache: Path) -> None:
+    _doubled()
+    (kept,) = (cache / HEADERS).glob("*.pch")
+    whole = kept.read_bytes()
+    kept.write_bytes(whole[:1000])
+    shutil.rmtree(_object_file(cache).parent)
+    _forget()
+    with ThreadPoolExecutor(1) as thread:
+        assert thread.submit(_doubled).result() == [2.0, 5.0]
+        shutil.rmtree(_object_file(cache).parent)
+        _forget()
+        assert thread.submit(_doubled).result() == [2.0, 5.0]
+    assert kept.stat().st_size > len(whole) / 2
