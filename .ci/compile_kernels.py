@@ -34,11 +34,17 @@ def compile_all(cache: Path) -> None:
     import warp as wp
 
     from blobtree.device import start_warp
+    from blobtree.tape.instruction_set import LIBRARY
 
     start_warp()
-    for name in kernel_files():
-        importlib.import_module(name)
-    modules = [wp.get_module(name) for name in kernel_files()]
+    kernels = [
+        value
+        for name in kernel_files()
+        for value in vars(importlib.import_module(name)).values()
+        if isinstance(value, wp.Kernel) and value.module.name == name
+    ]
+    instances = [LIBRARY.kernel_for(kernel) for kernel in kernels]
+    modules = list({kernel.module.name: kernel.module for kernel in (*kernels, *instances)}.values())
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         list(threads.map(lambda module: wp.load_module(module, device="cpu"), modules))
 

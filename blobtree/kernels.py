@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -105,17 +105,35 @@ def loaded(kernel: wp.Kernel, device: Any = None) -> wp.Kernel:
     UnusableCache
         The kernel cache cannot be written.
     """
-    warp_device = wp.get_device(device)
-    module = kernel.module
-    key = module.name, str(warp_device)
-    if _state.loaded.get(key) != _module_hash(module, warp_device):
-        with _state.lock:
-            missing = [other for other in _neighbors(module) if not _is_cached(other, warp_device)]
-            if missing:
-                _compile([module, *(other for other in missing if other is not module)], warp_device)
-            _load(module, warp_device)
-            _state.loaded[key] = _module_hash(module, warp_device)
+    load_together([kernel], device)
     return kernel
+
+
+def load_together(kernels: Iterable[wp.Kernel], device: Any = None) -> None:
+    """Load kernels on `device`; those to compile are compiled at the same time, one file of them per core.
+
+    Raises
+    ------
+    UnusableCache
+        The kernel cache cannot be written.
+    """
+    warp_device = wp.get_device(device)
+    modules = {kernel.module.name: kernel.module for kernel in kernels}
+    unloaded = [module for module in modules.values() if not _is_loaded(module, warp_device)]
+    if not unloaded:
+        return
+    with _state.lock:
+        related = {other.name: other for module in unloaded for other in _neighbors(module)}
+        missing = [other for other in related.values() if not _is_cached(other, warp_device)]
+        if missing:
+            _compile([*unloaded, *(other for other in missing if other not in unloaded)], warp_device)
+        for module in unloaded:
+            _load(module, warp_device)
+            _state.loaded[module.name, str(warp_device)] = _module_hash(module, warp_device)
+
+
+def _is_loaded(module: wp.Module, device: wp.Device) -> bool:
+    return _state.loaded.get((module.name, str(device))) == _module_hash(module, device)
 
 
 def _block_size(module: wp.Module, device: wp.Device) -> int:

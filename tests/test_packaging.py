@@ -122,6 +122,8 @@ def test_only_files_of_kernels_are_excused_from_types() -> None:
             if re.fullmatch(name.replace(".", r"\.").replace("*", ".*"), module)
         ]
         assert paths, name
-        for path in paths:
-            source = path.read_text(encoding="utf-8")
-            assert re.search(r"^\s*@(wp\.(func|kernel|struct)|unrolled)", source, re.MULTILINE), name
+        sources = [path.read_text(encoding="utf-8") for path in paths]
+        typed = [
+            re.search(r"^\s*@(wp\.(func|kernel|struct)|unrolled)", text, re.MULTILINE) for text in sources
+        ]
+        assert any(typed), name

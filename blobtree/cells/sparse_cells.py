@@ -52,6 +52,9 @@ MIN_CULLED_TEXELS = 4096
 MIN_CULLED_SHARE = 0.9
 """Smallest share of a tape in runs that culling can shorten; all other texels are copied to every block."""
 
+CELL_KERNELS = (count_child_texels, write_children)
+"""Kernels of every refinement that read the instruction set, for `load_together`."""
+
 _NEUTRAL_OPERATORS = (SUM, RICCI, UNION, DIFFERENCE)
 """Operators that return their first operand if the second is 0."""
 

@@ -19,11 +19,14 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.cells.grid import Grid, aligned_grid
-from blobtree.cells.sparse_cells import build_cells
-from blobtree.device import launch
+from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
+from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
+from blobtree.kernels import load_together
 from blobtree.meshing.creases import sharpened
+from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
+from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, watched
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.validation import LARGEST_NUMBER, shown
@@ -246,6 +249,8 @@ class Polygonizer:
         self._device = device
         self._creases = creases
         self._cell_size = _cell_size(tree, resolution, cell_size)
+        kernels = (*CELL_KERNELS, sample_blocks, place_vertices)
+        load_together(map(tree.tape.instruction_set.kernel_for, kernels), known_device(device))
         report = watched(progress, cancel)
         self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
         self._tree = tree

@@ -8,8 +8,10 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array
+from blobtree.cells.sparse_cells import CELL_KERNELS
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints
+from blobtree.kernels import load_together
 from blobtree.tape.model import ImplicitModel
 from blobtree.tracing.ray_kernels import shade_hits, trace_rays
 from blobtree.tracing.tree_cells import device_cells
@@ -69,6 +71,7 @@ def trace(
         Origins and directions differ in number, or a direction is zero.
     """
     rays = _uploaded(origins, directions, device)
+    _load(tree, rays, trace_rays)
     distances: Float32Array = trace_arrays(tree, *rays)[0].numpy()
     return distances
 
@@ -78,6 +81,7 @@ def raycast(
 ) -> Hits:
     """Return the first hits of rays, with normals and colours; arguments and errors are those of `trace`."""
     rays = _uploaded(origins, directions, device)
+    _load(tree, rays, trace_rays, shade_hits)
     distances, spans = trace_arrays(tree, *rays)
     device = str(distances.device)
     shaded = [wp.zeros(len(distances), dtype=wp.vec3, device=device) for _ in range(3)]
@@ -100,6 +104,12 @@ def trace_arrays(tree: ImplicitModel, origins: Any, directions: Any) -> tuple[An
     inputs = [origins, directions, cells.arrays]
     launch(cells.instruction_set.kernel_for(trace_rays), len(origins), inputs, [distances, spans], device)
     return distances, spans
+
+
+def _load(tree: ImplicitModel, rays: list[Any], *kernels: wp.Kernel) -> None:
+    """Load kernels for rays, and those for cells, so that they compile at the same time."""
+    kernel_for = tree.tape.instruction_set.kernel_for
+    load_together([kernel_for(kernel) for kernel in (*CELL_KERNELS, *kernels)], rays[0].device)
 
 
 def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> list[Any]:

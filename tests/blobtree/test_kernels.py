@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -142,7 +143,7 @@ def test_headers_are_parsed_once_per_machine(cache: Path) -> None:
 
     def compile_in_thread() -> None:
         with kernels._kept_headers():
-            (used,) = Path(wp._src.context.runtime.get_clang_pch_dir()).glob("*.pch")
+            (used,) = Path(cast(Any, wp._src.context.runtime).get_clang_pch_dir()).glob("*.pch")
             assert used.read_bytes() == kept.read_bytes()
 
     with ThreadPoolExecutor(1) as thread:
