@@ -21,9 +21,11 @@ from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
+from .nodes.curves import Arc, Circle, CubicBezier, QuadraticBezier
 from .nodes.fields import FieldPrimitive, Superquadric
+from .nodes.flats import Rectangle, Triangle
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
-from .nodes.solids import Ellipsoid
+from .nodes.solids import Cylinder, Ellipsoid
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
 from .progress import Cancel, Progress
 from .tape.tape import Tape
@@ -32,13 +34,17 @@ from .tracing.trace import Hits
 __all__ = [
     "ISO",
     "RIM",
+    "Arc",
     "Box",
     "Cancel",
     "Cancelled",
+    "Circle",
     "Cone",
+    "CubicBezier",
     "Curvatures",
     "CustomCombination",
     "CustomPrimitive",
+    "Cylinder",
     "Difference",
     "Disc",
     "Ellipsoid",
@@ -59,6 +65,8 @@ __all__ = [
     "Point",
     "Polygonizer",
     "Progress",
+    "QuadraticBezier",
+    "Rectangle",
     "Ricci",
     "Segment",
     "Sum",
@@ -66,6 +74,7 @@ __all__ = [
     "Tape",
     "Torus",
     "Transform",
+    "Triangle",
     "Twist",
     "Union",
     "UnknownKind",

@@ -5,13 +5,16 @@ and the library together (`tape.instruction_set.LIBRARY`). A new family of kinds
 ends in a tuple of rows, and one name here.
 """
 
+from blobtree.formulas.curve_skeletons import CURVE_SKELETONS
 from blobtree.formulas.direct_fields import DIRECT_FIELDS
 from blobtree.formulas.fields import FieldKind
+from blobtree.formulas.flat_skeletons import FLAT_SKELETONS
 from blobtree.formulas.operators import Operator
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.formulas.solid_skeletons import SOLID_SKELETONS
 from blobtree.formulas.warps import SpaceWarp
 
-LIBRARY_SKELETONS: tuple[Skeleton, ...] = ()
+LIBRARY_SKELETONS: tuple[Skeleton, ...] = (*CURVE_SKELETONS, *FLAT_SKELETONS, *SOLID_SKELETONS)
 LIBRARY_OPERATORS: tuple[Operator, ...] = ()
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = ()
 LIBRARY_FIELDS: tuple[FieldKind, ...] = DIRECT_FIELDS

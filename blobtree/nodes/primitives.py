@@ -168,7 +168,7 @@ class Segment(Primitive):
         squares = (axes**2).sum(axis=1)
         short = squares <= SHORTEST_AXIS * influences[:, 0] ** 2
         inverses = np.where(short, 0.0, 1.0 / np.where(short, 1.0, squares))
-        return np.stack([_beside(columns["start"], influences[:, 0]), _beside(axes, inverses)], axis=1)
+        return np.stack([beside(columns["start"], influences[:, 0]), beside(axes, inverses)], axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -196,9 +196,7 @@ class Cone(Primitive):
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
         """Return start and influence radius there; axis and influence radius at the end."""
         axes = columns["end"] - columns["start"]
-        return np.stack(
-            [_beside(columns["start"], influences[:, 0]), _beside(axes, influences[:, 1])], axis=1
-        )
+        return np.stack([beside(columns["start"], influences[:, 0]), beside(axes, influences[:, 1])], axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,7 +224,7 @@ class Torus(Primitive):
     @classmethod
     def hull(cls, columns: Columns) -> Float64Array:
         """Return the corners of an octagon around the circle."""
-        return _octagons(columns["center"], columns["axis"], columns["ring_radius"])
+        return octagons(columns["center"], columns["axis"], columns["ring_radius"])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -254,7 +252,7 @@ class Disc(Primitive):
     @classmethod
     def hull(cls, columns: Columns) -> Float64Array:
         """Return the corners of an octagon around the disc."""
-        return _octagons(columns["center"], columns["axis"], columns["disc_radius"])
+        return octagons(columns["center"], columns["axis"], columns["disc_radius"])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -285,12 +283,12 @@ class Box(Primitive):
         return corners
 
 
-def _beside(vectors: Float64Array, numbers: Float64Array) -> Float64Array:
+def beside(vectors: Float64Array, numbers: Float64Array) -> Float64Array:
     """Return `vectors` (n, 3) and `numbers` (n,) as texels (n, 4)."""
     return np.column_stack([vectors, numbers])
 
 
-def _octagons(centers: Float64Array, axes: Float64Array, radii: Float64Array) -> Float64Array:
+def octagons(centers: Float64Array, axes: Float64Array, radii: Float64Array) -> Float64Array:
     """Return the corners (n, 8, 3) of regular octagons around circles with radii (n, 1)."""
     normals = unit_vectors(axes)
     smallest = np.eye(3)[np.abs(normals).argmin(axis=1)]

@@ -1,14 +1,16 @@
-"""Solid shapes that are other nodes under a map: macros without operands."""
+"""Solid shapes: the cylinder, and the ellipsoid as a ball under a map."""
 
 from dataclasses import KW_ONLY, dataclass
 from typing import Annotated
 
 import numpy as np
 
+from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
+from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity
-from blobtree.nodes.primitives import DEFAULT_COLOR, Leaf, Point
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Point, Primitive, beside, octagons
 from blobtree.nodes.tree import Macro, Node
 from blobtree.validation import Vector
 
@@ -51,3 +53,53 @@ class Ellipsoid(Macro, Leaf):
         """Return a ball of radius 1 under a scale and a translation."""
         ball = Point((0.0, 0.0, 0.0), radius=1.0, color=self.color)
         return ball.transform(np.column_stack([np.diag(self.semi_axes), self.center]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cylinder(Primitive):
+    """A solid cylinder with rounded edges: everything within `radius` of the cylinder.
+
+    Raises
+    ------
+    InvalidNode
+        The axis has no length: then use a `Disc`.
+
+    Examples
+    --------
+    >>> from blobtree import Cylinder
+    >>> drum = Cylinder((0, 0, 0), (0, 0, 2), 1.0, radius=0.1)
+    >>> drum([[1.1, 0, 1], [0.5, 0, 2.1], [0, 0, 1]]).round(3).tolist()
+    [0.5, 0.5, 1.0]
+    """
+
+    file_tag = "cylinder"
+    skeleton = CYLINDER
+
+    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the axis")]
+    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the axis")]
+    cylinder_radius: Annotated[
+        float, Parameter(Quantity.LENGTH, "radius of the cylinder, without its rounded edge")
+    ]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edges")]
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.start == self.end:
+            raise InvalidNode(f"end: expected another point than the start {self.start}; use a Disc")
+
+    @classmethod
+    def hull(cls, columns: Columns) -> Float64Array:
+        """Return the corners of octagons around both ends."""
+        axes = columns["end"] - columns["start"]
+        ends = [octagons(columns[name], axes, columns["cylinder_radius"]) for name in ("start", "end")]
+        return np.concatenate(ends, axis=1)
+
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start and influence radius; axis and radius of the cylinder."""
+        axes = columns["end"] - columns["start"]
+        return np.stack(
+            [beside(columns["start"], influences[:, 0]), beside(axes, columns["cylinder_radius"])], axis=1
+        )

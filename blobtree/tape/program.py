@@ -272,8 +272,13 @@ class Run:
 
     def accepts(self, other: "Run") -> bool:
         """Return True if `other` only continues this run."""
-        key = (self.kind, self.stretched, self.operator, self.parameter)
-        return key == (other.kind, other.stretched, other.operator, other.parameter)
+        key = (self.packer, self.stretched, self.operator, self.parameter)
+        return key == (other.packer, other.stretched, other.operator, other.parameter)
+
+    @property
+    def packer(self) -> type[ProgramLeaf]:
+        """The class of the primitives, which packs them; several classes may have one skeleton."""
+        return type(self.primitives[0].primitive)
 
 
 @dataclass(frozen=True)
@@ -455,15 +460,16 @@ def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> 
 
 def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
     """Yield one run per kind of primitive, in the order in which the kinds first occur."""
-    runs: dict[tuple[LeafKind, bool], Run] = {}
+    runs: dict[tuple[type[ProgramLeaf], bool], Run] = {}
     run: Run | None = None
+    packer: type[ProgramLeaf] | None = None
     placement: Placement | None = None
     for placed in primitives:
-        kind = leaf_kind(placed.primitive)
-        if run is None or placed.placement is not placement or kind is not run.kind:
-            placement = placed.placement
-            key = kind, not placement.folds_into(kind)
-            run = runs.setdefault(key, Run(*key, operator, parameter))
+        if run is None or placed.placement is not placement or type(placed.primitive) is not packer:
+            packer, placement = type(placed.primitive), placed.placement
+            kind = leaf_kind(placed.primitive)
+            stretched = not placement.folds_into(kind)
+            run = runs.setdefault((packer, stretched), Run(kind, stretched, operator, parameter))
         run.primitives.append(placed)
     yield from runs.values()
 

@@ -10,8 +10,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from blobtree import (
+    Arc,
     Box,
+    Circle,
     Cone,
+    CubicBezier,
+    Cylinder,
     Difference,
     Disc,
     Ellipsoid,
@@ -19,12 +23,15 @@ from blobtree import (
     Node,
     Offset,
     Point,
+    QuadraticBezier,
+    Rectangle,
     Ricci,
     Segment,
     Sum,
     Superquadric,
     Torus,
     Transform,
+    Triangle,
     Twist,
     Union,
 )
@@ -87,6 +94,32 @@ def random_field(rng: np.random.Generator) -> Node:
 
 
 FIELDS = MoreKinds(random_field)
+
+
+def random_shape(rng: np.random.Generator) -> Node:
+    """A curve, a flat or a solid of the library."""
+    a, b, c, d = map(triple, rng.uniform(-1.0, 1.0, (4, 3)))
+    axis, side = map(triple, rng.normal(size=(2, 3)))
+    radius, color = float(rng.uniform(0.15, 0.5)), triple(rng.uniform(0.0, 1.0, 3))
+    breadth, height = (float(length) for length in rng.uniform(0.2, 0.9, 2))
+    match rng.integers(0, 8):
+        case 0:
+            return Circle(a, axis, breadth, radius=radius, color=color)
+        case 1:
+            return Arc(a, b, c, radius=radius, color=color)
+        case 2:
+            return QuadraticBezier(a, b, c, radius=radius, color=color)
+        case 3:
+            return CubicBezier(a, b, c, d, radius=radius, color=color)
+        case 4:
+            return Rectangle(a, axis, side, breadth, height, radius=radius, color=color)
+        case 5:
+            return Triangle(a, b, c, radius=radius, color=color)
+        case _:
+            return Cylinder(a, b, breadth, radius=radius, color=color)
+
+
+SHAPES = MoreKinds(random_shape)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:
@@ -172,5 +205,8 @@ def trees(max_leaves: int = 12) -> st.SearchStrategy[Node]:
         st.builds(Torus, _vector, _direction, _radius, radius=_radius, color=_color),
         st.builds(Ellipsoid, _vector, st.tuples(*[st.floats(0.1, 10.0)] * 3), color=_color),
         st.builds(Disc, _vector, _direction, _radius, radius=_radius, color=_color),
+        st.builds(Circle, _vector, _direction, _radius, radius=_radius, color=_color),
+        st.builds(QuadraticBezier, _vector, _vector, _vector, radius=_radius, color=_color),
+        st.builds(CubicBezier, *[_vector] * 4, radius=_radius, color=_color),
     )
     return st.recursive(leaves, _extend, max_leaves=max_leaves)

@@ -13,10 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import (
+    Arc,
     Box,
+    Circle,
     Cone,
+    CubicBezier,
     CustomCombination,
     CustomPrimitive,
+    Cylinder,
     Difference,
     Disc,
     Ellipsoid,
@@ -24,17 +28,21 @@ from blobtree import (
     Node,
     Offset,
     Point,
+    QuadraticBezier,
+    Rectangle,
     Ricci,
     Segment,
     Sum,
     Superquadric,
     Torus,
     Transform,
+    Triangle,
     Twist,
     Union,
 )
 from blobtree.formulas.operators import Support
-from tests.oracles import custom_kinds
+from blobtree.nodes.primitives import Primitive
+from tests.oracles import custom_kinds, shapes
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +66,10 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return _leaf(q - np.array(center), radius, color)
         case Segment(start=start, end=end, radius=radius, color=color):
             return _leaf(q - _closest_on_segment(q, np.array(start), np.array(end)), radius, color)
-        case Torus(center=center, axis=axis, ring_radius=ring, radius=radius, color=color):
+        case (
+            Circle(center=center, axis=axis, circle_radius=ring, radius=radius, color=color)
+            | Torus(center=center, axis=axis, ring_radius=ring, radius=radius, color=color)
+        ):
             across, along = _cylindrical(q, center, axis)
             leaf = _leaf_at(np.hypot(across - ring, along) * RIM / radius, color)
             return replace(leaf, margin=across)  # on the axis all points of the circle are closest
@@ -76,6 +87,11 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             across = (x ** (2.0 / horizontal) + y ** (2.0 / horizontal)) ** (horizontal / vertical)
             leaf = _leaf_at((across + z ** (2.0 / vertical)) ** (vertical / 2.0) * RIM, color)
             return replace(leaf, margin=np.minimum(np.minimum(x, y), z))  # diamonds have edges there
+        case Arc() | QuadraticBezier() | CubicBezier() | Rectangle() | Triangle() | Cylinder():
+            distance, other = shapes.distances(node, q)
+            leaf, next_leaf = (_leaf_at(d * RIM, node.color) for d in (distance, other))
+            apart = np.where(next_leaf.value > 0.0, leaf.value - next_leaf.value, np.inf)
+            return replace(leaf, margin=apart)
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -126,8 +142,6 @@ def grown(node: Node, distance: float) -> Node:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
         case CustomCombination():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
-        case Point() | Segment() | Torus() | Disc() | Box() | CustomPrimitive():
-            return replace(node, radius=node.radius + distance)  # type: ignore[type-var]  # all are dataclasses
         case Ellipsoid():  # an offset of the unit ball that is scaled
             larger = 1.0 + distance / float(np.cbrt(np.prod(node.semi_axes)))
             return replace(node, semi_axes=tuple(larger * np.array(node.semi_axes)))
@@ -136,6 +150,8 @@ def grown(node: Node, distance: float) -> Node:
             return replace(node, semi_axes=(x + distance, y + distance, z + distance))
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
+        case Primitive():
+            return replace(node, radius=node.radius + distance)  # type: ignore[type-var]  # all are dataclasses
         case Offset(child=child, distance=more):
             return grown(child, distance + more)
         case Transform(child=child, matrix=matrix):

@@ -1,4 +1,4 @@
-"""Torus, disc, box and ellipsoid: shapes, maps, offsets and meshes; what follows from declared parameters."""
+"""Primitives beyond points, segments and cones, and what follows from declared parameters."""
 
 import inspect
 import json
@@ -9,20 +9,29 @@ from typing import Any
 import numpy as np
 import pytest
 
+import blobtree
 from blobtree import (
     ISO,
+    Arc,
     Box,
+    Circle,
+    CubicBezier,
+    Cylinder,
     Disc,
     Ellipsoid,
     InvalidNode,
     Node,
     Point,
+    QuadraticBezier,
+    Rectangle,
     Torus,
+    Triangle,
     from_json,
     polygonize,
     to_json,
 )
 from blobtree.formulas.falloff import RIM
+from blobtree.formulas.library import LIBRARY_SKELETONS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
@@ -36,11 +45,19 @@ TORUS = Torus((0.1, 0.2, 0.3), (1, 2, 2), 1.0, radius=0.25)
 DISC = Disc((0.1, 0.2, 0.3), (2, -1, 2), 1.0, radius=0.2)
 BOX = Box((0.1, 0.2, 0.3), (1.0, 0.5, 2.0), radius=0.2)
 ELLIPSOID = Ellipsoid((0.1, 0.2, 0.3), (0.5, 1.0, 0.8))
-EACH = pytest.mark.parametrize(
-    "node", [TORUS, DISC, BOX, ELLIPSOID], ids=["torus", "disc", "box", "ellipsoid"]
-)
+SHAPES: list[Node] = [
+    Circle((0.1, 0.2, 0.3), (1, 2, 2), 1.0, radius=0.25),
+    Arc((1.0, 0.2, 0.3), (0.3, 0.9, -0.2), (-0.7, -0.6, 0.1), radius=0.2),
+    QuadraticBezier((-1.0, 0.0, 0.2), (0.2, 1.5, 0.3), (0.7, -0.5, -0.4), radius=0.2),
+    CubicBezier((-1.0, 0.1, 0.2), (0.9, 1.4, 0.3), (-0.8, 1.1, -0.9), (1.0, -0.3, 0.1), radius=0.2),
+    Rectangle((0.1, 0.2, 0.3), (1, 2, 2), (3, 0, 1), 1.5, 0.7, radius=0.2),
+    Triangle((-0.7, 0.2, 0.3), (0.9, 0.5, -0.3), (0.1, -0.8, 0.4), radius=0.2),
+    Cylinder((-0.3, 0.2, 0.3), (0.4, 0.5, -0.6), 0.5, radius=0.2),
+]
+NODES = [TORUS, DISC, BOX, ELLIPSOID, *SHAPES]
+EACH = pytest.mark.parametrize("node", NODES, ids=[type(node).__name__.lower() for node in NODES])
 
-KINDS = {"Torus": Torus, "Disc": Disc, "Box": Box, "Ellipsoid": Ellipsoid}
+KINDS = {kind: getattr(blobtree, kind) for kind in blobtree.__all__}
 
 PLACEMENTS = {
     "as it is": lambda node: node,
@@ -120,9 +137,9 @@ def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
     points = points_around(np.random.default_rng(3), node, 100)
     np.testing.assert_allclose(shifted(points + np.array([1, 2, 3])), node(points), atol=2e-5)
     thick = resized(node, 2.0)
-    larger: Any = (
-        {"semi_axes": (1.0, 2.0, 1.6)} if node is ELLIPSOID else {"radius": 0.4 if node is not TORUS else 0.5}
-    )
+    larger: Any = {"semi_axes": (1.0, 2.0, 1.6)}
+    if node is not ELLIPSOID:
+        larger = {"radius": 2.0 * getattr(node, "radius")}  # noqa: B009  (leaves need not have one)
     assert thick == replace(node, **larger)  # type: ignore[type-var]
 
 
@@ -138,6 +155,25 @@ def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
         (lambda: Ellipsoid((0, 0, 0), (1, 1)), "semi_axes: expected three finite numbers"),  # type: ignore[arg-type]
         (lambda: Ellipsoid((0, 0, 0), (1, 1, 1e-9)), "semi_axes: expected lengths whose ratio is at most"),
         (lambda: Box((0, 0, 0), (1, 1, 1), radius=0.0), "radius: expected a number above 0"),
+        (lambda: Circle((0, 0, 0), (0, 0, 1), np.nan, radius=0.2), "circle_radius: expected a finite number"),
+        (
+            lambda: Arc((0, 0, 0), (1, 1, 1), (2, 2, 2), radius=0.2),
+            "lie on a line or are equal; use a Segment",
+        ),
+        (lambda: Arc((0, 0, 0), (1, 0, 0), (0, 0, 0), radius=0.2), "or a Circle if start and end are equal"),
+        (lambda: Arc((0, 0, 0), (0, 0, 0), (1, 0, 0), radius=0.2), "expected three points on a circle"),
+        (
+            lambda: Rectangle((0, 0, 0), (0, 0, 1), (0, 0, 2), 1, 1, radius=0.2),
+            "side: expected a direction in",
+        ),
+        (
+            lambda: Rectangle((0, 0, 0), (0, 0, 1), (1, 0, 2), 1, 0, radius=0.2),
+            "height: expected a number above",
+        ),
+        (lambda: Triangle((0, 0, 0), (1, 1, 1), (2, 2, 2), radius=0.2), "expected three corners that span a"),
+        (lambda: Triangle((0, 0, 0), (1, 1, 1), (1, 1, 1), radius=0.2), "expected three corners that span a"),
+        (lambda: Triangle((1, 1, 1), (1, 1, 1), (1, 1, 1), radius=0.2), "expected three corners that span a"),
+        (lambda: Cylinder((0, 0, 1), (0, 0, 1), 1.0, radius=0.2), "end: expected another point"),
     ],
 )
 def test_wrong_parameters_are_refused(make: Any, message: str) -> None:
@@ -163,7 +199,7 @@ def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -
 
 def test_every_skeleton_has_a_primitive_with_a_radius_and_a_color() -> None:
     kinds = [kind for kind in NODE_KINDS.values() if issubclass(kind, Primitive)]
-    assert [kind.skeleton for kind in kinds] == list(SKELETONS)
+    assert {kind.skeleton for kind in kinds} == {*SKELETONS, *LIBRARY_SKELETONS}
     for kind in kinds:
         quantities = [parameter.quantity for parameter in parameters_of(kind).values()]
         assert quantities.count(Quantity.COLOR) == 1

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
+from blobtree.tape.instruction_set import LIBRARY
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
 from decals.rendering.context import Context
@@ -28,7 +29,17 @@ ALL_KINDS = Kinds(
     warps=tuple(range(len(WARPS))),
     warp_registers=4,
 )
-"""All that a tape can hold, in one program."""
+"""All that a tape of core kinds can hold, in one program."""
+ALL_LIBRARY_KINDS = Kinds(
+    tuple(range(len(LIBRARY.skeletons))),
+    tuple(range(len(LIBRARY.operators))),
+    6,
+    stretched=True,
+    warps=tuple(range(len(LIBRARY.warps))),
+    warp_registers=4,
+    instruction_set=LIBRARY,
+)
+"""All that a tape with library kinds can hold, in one program."""
 VERTEX = """#version 330 core
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 """

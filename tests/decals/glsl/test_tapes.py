@@ -13,15 +13,16 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
-from tests.blobtree.trees import FIELDS, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import FIELDS, SHAPES, SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
-from tests.decals.glsl.functions import ALL_KINDS, run_program
+from tests.decals.glsl.functions import ALL_KINDS, ALL_LIBRARY_KINDS, run_program
 from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 
 TREES = random_trees(seed=31, count=24) + random_trees(seed=33, count=12, more=SOLIDS)
 FIELD_TREES = random_trees(seed=35, count=6, more=FIELDS)
+LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
 
 
 def read_tape(
@@ -41,6 +42,8 @@ def read_tape(
 
 def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
     assert {code for tree in TREES for code in tree.tape.skeletons} == set(ALL_KINDS.skeletons)
+    drawn = {code for tree in (*TREES, *LIBRARY_TREES) for code in tree.tape.skeletons}
+    assert drawn == set(ALL_LIBRARY_KINDS.skeletons)
     assert {code for tree in TREES for code in tree.tape.operators} == set(ALL_KINDS.operators)
     assert 2 <= max(tree.tape.registers for tree in TREES) <= ALL_KINDS.registers
     assert sum(tree.tape.stretched for tree in TREES) > 5
@@ -56,6 +59,10 @@ def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     kinds = replace(ALL_KINDS, fields=tuple(range(len(used.fields))), instruction_set=used)
     assert {code for tree in FIELD_TREES for code in tree.tape.fields} == set(kinds.fields)
     assert_same_in_both_languages(context, FIELD_TREES, kinds, 0)
+
+
+def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> None:
+    assert_same_in_both_languages(context, LIBRARY_TREES, ALL_LIBRARY_KINDS, 0)
 
 
 def assert_same_in_both_languages(context: Context, trees: list[Node], kinds: Kinds, seed: int) -> None:

@@ -1,0 +1,255 @@
+"""Skeletons along curves: circular arcs, and polynomial curves up to cubics or with a varying radius.
+
+`formulas.skeletons` states what a skeleton is. For a curve c(t) with the influence s(t), 0 ≤ t ≤ 1, the
+closest point minimises |q − c(t)| / s(t). Its derivative has the sign of a polynomial N of degree 5 at most,
+so every local minimum is found: the roots of N''' bracket those of N'', these bracket those of N', and these
+bracket the minima. No start value can lead to the wrong one of two minima.
+"""
+
+import warp as wp
+
+from blobtree.formulas.skeletons import (
+    HALF_DIAGONAL,
+    Skeleton,
+    min_influence_of_one,
+    squared_distances_to_ball,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+ROOT_STEPS = 20
+"""Most steps of a bracketed root: bisection alone then leaves an interval of 1e-6."""
+
+ROOT_TOLERANCE = 1e-7
+"""Change of a root, for parameters from 0 to 1, that ends its iteration."""
+
+
+@wp.func
+def closest_on_arc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (centre, influence); tape[at + 1], tape[at + 2] = (r·u, cos h), (r·v, sin h).
+
+    The arc of radius r reaches from −h to h about the unit vector u; v is perpendicular to u in its plane.
+    """
+    center = tape[at]
+    first = tape[at + 1]
+    second = tape[at + 2]
+    u = wp.vec3(first[0], first[1], first[2])
+    v = wp.vec3(second[0], second[1], second[2])
+    w = q - wp.vec3(center[0], center[1], center[2])
+    x = wp.dot(w, u)
+    y = wp.dot(w, v)
+    across = wp.sqrt(x * x + y * y)
+    cosine = float(1.0)
+    sine = float(0.0)
+    if across > 1.0e-6 * wp.length(w) * wp.length(u):
+        cosine = x / across
+        sine = y / across
+    if cosine < first[3]:
+        cosine = first[3]
+        sine = second[3] * wp.sign(sine)
+    c = u * cosine + v * sine
+    return wp.vec4(center[0] + c[0], center[1] + c[1], center[2] + c[2], center[3])
+
+
+@wp.func
+def polynomial(t: wp.float32, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.float32:
+    """Return Σ cₖ tᵏ for k from 0 to 5."""
+    return c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c4 + t * c5))))
+
+
+@wp.func
+def polynomial_slope(t: wp.float32, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.float32:
+    """Return Σ k cₖ tᵏ⁻¹."""
+    return c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c4 + t * 5.0 * c5)))
+
+
+@wp.func
+def root_between(low: wp.float32, high: wp.float32, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.float32:
+    """Return the root of a polynomial that is monotone from `low` to `high`; `high` if it has none there.
+
+    Newton's method, and a bisection where a step of it would leave the bracket.
+    """
+    left = float(low)
+    right = float(high)
+    rises = polynomial(low, c, c4, c5) < 0.0
+    if rises == (polynomial(high, c, c4, c5) < 0.0):
+        return high
+    t = 0.5 * (left + right)
+    for _step in range(ROOT_STEPS):
+        value = polynomial(t, c, c4, c5)
+        if (value < 0.0) == rises:
+            left = t
+        else:
+            right = t
+        slope = polynomial_slope(t, c, c4, c5)
+        following = 0.5 * (left + right)
+        if (t - left) * wp.abs(slope) > wp.abs(value) or (right - t) * wp.abs(slope) > wp.abs(value):
+            newton = t - value / slope
+            if newton > left and newton < right:
+                following = newton
+        change = wp.abs(following - t)
+        t = following
+        if change <= ROOT_TOLERANCE:
+            break
+    return t
+
+
+@wp.func
+def unit_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
+    """Return a / b clamped to [0, 1]; 0 for 0 / 0."""
+    numerator = a * wp.sign(b)
+    denominator = wp.abs(b)
+    if numerator <= 0.0:
+        return 0.0
+    if numerator >= denominator:
+        return 1.0
+    return numerator / denominator
+
+
+@wp.func
+def quadratic_roots(c: wp.float32, b: wp.float32, a: wp.float32) -> wp.vec2:
+    """Return the roots of a t² + b t + c in ascending order, clamped to [0, 1]; its extremum if it has none.
+
+    The form −2c / (b ± …) of the smaller root does not cancel (Press et al., Numerical Recipes, 5.6).
+    """
+    discriminant = b * b - 4.0 * a * c
+    if discriminant <= 0.0:
+        extremum = unit_quotient(-b, 2.0 * a)
+        return wp.vec2(extremum, extremum)
+    k = -0.5 * (b + wp.sign(b) * wp.sqrt(discriminant))
+    first = unit_quotient(k, a)
+    second = unit_quotient(c, k)
+    return wp.vec2(wp.min(first, second), wp.max(first, second))
+
+
+@wp.func
+def roots_between(ends: wp.vec4, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.vec4:
+    """Return `root_between` of the four intervals from 0 through the ascending `ends`."""
+    roots = wp.vec4()
+    low = float(0.0)
+    for k in range(4):
+        roots[k] = root_between(low, ends[k], c, c4, c5)
+        low = ends[k]
+    return roots
+
+
+@wp.func
+def extrema(c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.vec4:
+    """Return numbers in [0, 1], ascending, between which a polynomial of degree 5 is monotone."""
+    inflections = quadratic_roots(6.0 * c[3], 24.0 * c4, 60.0 * c5)
+    ends = wp.vec4(inflections[0], inflections[1], 1.0, 1.0)
+    turns = roots_between(ends, wp.vec4(2.0 * c[2], 6.0 * c[3], 12.0 * c4, 20.0 * c5), 0.0, 0.0)
+    slope = wp.vec4(c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c4)
+    return roots_between(turns, slope, 5.0 * c5, 0.0)
+
+
+@wp.func
+def curve_point(t: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return the point of a curve, and the influence there."""
+    return tape[at] + (tape[at + 1] + (tape[at + 2] + tape[at + 3] * t) * t) * t
+
+
+@wp.func
+def curve_ratio(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return (|q − c(t)| / s(t))²."""
+    c = curve_point(t, tape, at)
+    w = q - wp.vec3(c[0], c[1], c[2])
+    return wp.dot(w, w) / (c[3] * c[3])
+
+
+@wp.func
+def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return t after a Newton step for N(t) = ½ (|c − q|²)' s − |c − q|² s'.
+
+    Its vectors cancel less than the coefficients of N.
+    """
+    c = curve_point(t, tape, at)
+    slope = tape[at + 1] + (tape[at + 2] * 2.0 + tape[at + 3] * (3.0 * t)) * t
+    bend = tape[at + 2] * 2.0 + tape[at + 3] * (6.0 * t)
+    w = wp.vec3(c[0], c[1], c[2]) - q
+    d = wp.vec3(slope[0], slope[1], slope[2])
+    n = wp.dot(w, d) * c[3] - wp.dot(w, w) * slope[3]
+    rate = (wp.dot(d, d) + wp.dot(w, wp.vec3(bend[0], bend[1], bend[2]))) * c[3]
+    rate -= wp.dot(w, d) * slope[3] + wp.dot(w, w) * bend[3]
+    if rate * 1.0e-3 <= wp.abs(n):
+        return t  # N is flat here, or t is an end
+    return wp.clamp(t - n / rate, 0.0, 1.0)
+
+
+@wp.func
+def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at + k] = coefficient of tᵏ in (c(t), s(t)), k from 0 to 3; s is constant if that of t³ is not 0.
+
+    With c − q = w + b t + a t² + g t³ and s = s₀ + s₁ t + s₂ t², N = ½ (|c − q|²)' s − |c − q|² s'.
+    """
+    k0 = tape[at]
+    k1 = tape[at + 1]
+    k2 = tape[at + 2]
+    k3 = tape[at + 3]
+    w = wp.vec3(k0[0], k0[1], k0[2]) - q
+    b = wp.vec3(k1[0], k1[1], k1[2])
+    a = wp.vec3(k2[0], k2[1], k2[2])
+    g = wp.vec3(k3[0], k3[1], k3[2])
+    h0 = wp.dot(w, b)
+    h1 = wp.dot(b, b) + 2.0 * wp.dot(w, a)
+    h2 = 3.0 * wp.dot(a, b)
+    h3 = 2.0 * wp.dot(a, a)
+    e0 = wp.dot(w, w)
+    n0 = h0 * k0[3] - e0 * k1[3]
+    n1 = h1 * k0[3] - h0 * k1[3] - 2.0 * e0 * k2[3]
+    n2 = (h2 + 3.0 * wp.dot(w, g)) * k0[3] - 3.0 * h0 * k2[3]
+    n3 = (h3 + 4.0 * wp.dot(b, g)) * k0[3] + h2 * k1[3] / 3.0 - h1 * k2[3]
+    n4 = 5.0 * wp.dot(a, g) * k0[3] + 0.5 * h3 * k1[3] - h2 * k2[3] / 3.0
+    n5 = 3.0 * wp.dot(g, g) * k0[3]
+    largest = wp.max(wp.max(wp.abs(n0), wp.abs(n1)), wp.max(wp.abs(n2), wp.abs(n3)))
+    largest = wp.max(largest, wp.max(wp.abs(n4), wp.abs(n5)))
+    scale = 1.0 / wp.max(largest, 1.0e-30)
+    n = wp.vec4(n0, n1, n2, n3) * scale
+    n4 *= scale
+    n5 *= scale
+    ends = extrema(n, n4, n5)
+    best = float(0.0)
+    least = curve_ratio(0.0, q, tape, at)
+    low = float(0.0)
+    for k in range(6):
+        high = float(1.0)
+        t = float(1.0)
+        if k < 4:
+            high = ends[k]
+        if k < 5 and polynomial(low, n, n4, n5) < 0.0:
+            t = root_between(low, high, n, n4, n5)
+        ratio = curve_ratio(t, q, tape, at)
+        if ratio < least:
+            least = ratio
+            best = t
+        low = high
+    best = polished(best, q, tape, at)
+    return curve_point(best, tape, at)
+
+
+@wp.func
+def min_influence_of_curve(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """Return the smallest of the influences s₀, s₀ + s₁ / 2, s₀ + s₁ + s₂, whose hull holds all of s(t)."""
+    start = tape[at][3]
+    first = tape[at + 1][3]
+    return wp.min(start, wp.min(start + 0.5 * first, start + first + tape[at + 2][3]))
+
+
+@wp.func
+def box_to_arc(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − arc| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_arc(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+
+
+@wp.func
+def box_to_curve(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+    """Bounds on (|x − curve| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_curve(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_curve(tape, at))
+
+
+ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, box_to_arc, parameters=3)
+CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, box_to_curve, parameters=4)
+
+CURVE_SKELETONS = (ARC, CURVE)

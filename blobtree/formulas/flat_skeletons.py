@@ -1,0 +1,88 @@
+"""Flat skeletons: rectangles and triangles. `formulas.skeletons` states what a skeleton is."""
+
+import warp as wp
+
+from blobtree.formulas.skeletons import (
+    HALF_DIAGONAL,
+    Skeleton,
+    min_influence_of_one,
+    squared_distances_to_ball,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def closest_on_rectangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (centre, influence); tape[at + 1 and + 2] = (unit vector along a side, half its length)."""
+    center = tape[at]
+    first = tape[at + 1]
+    second = tape[at + 2]
+    u = wp.vec3(first[0], first[1], first[2])
+    v = wp.vec3(second[0], second[1], second[2])
+    w = q - wp.vec3(center[0], center[1], center[2])
+    c = u * wp.clamp(wp.dot(w, u), -first[3], first[3]) + v * wp.clamp(wp.dot(w, v), -second[3], second[3])
+    return wp.vec4(center[0] + c[0], center[1] + c[1], center[2] + c[2], center[3])
+
+
+@wp.func
+def from_edge(w: wp.vec3, edge: wp.vec3) -> wp.vec3:
+    """Return w − c, c being the point of the line segment from 0 to `edge` that is closest to w."""
+    return w - edge * wp.clamp(wp.dot(w, edge) / wp.max(wp.dot(edge, edge), 1.0e-37), 0.0, 1.0)
+
+
+@wp.func
+def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (corner a, influence); tape[at + 1] = (b − a, 0); tape[at + 2] = (c − a, 0).
+
+    tape[at + 3] = (unit normal, 0), which float32 could not compute for slivers.
+    """
+    corner = tape[at]
+    to_b = tape[at + 1]
+    to_c = tape[at + 2]
+    upright = tape[at + 3]
+    w = q - wp.vec3(corner[0], corner[1], corner[2])
+    ab = wp.vec3(to_b[0], to_b[1], to_b[2])
+    ac = wp.vec3(to_c[0], to_c[1], to_c[2])
+    bc = ac - ab
+    n = wp.vec3(upright[0], upright[1], upright[2])
+    inside = wp.dot(wp.cross(n, ab), w) >= 0.0 and wp.dot(wp.cross(n, ac), w) <= 0.0
+    away = n * wp.dot(w, n)
+    if not (inside and wp.dot(wp.cross(n, bc), w - ab) >= 0.0):
+        away = from_edge(w, ab)
+        other = from_edge(w, ac)
+        if wp.dot(other, other) < wp.dot(away, away):
+            away = other
+        other = from_edge(w - ab, bc)
+        if wp.dot(other, other) < wp.dot(away, away):
+            away = other
+    c = q - away
+    return wp.vec4(c[0], c[1], c[2], corner[3])
+
+
+@wp.func
+def box_to_rectangle(
+    center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Bounds on (|x − rectangle| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_rectangle(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+
+
+@wp.func
+def box_to_triangle(
+    center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Bounds on (|x − triangle| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_triangle(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+
+
+RECTANGLE = Skeleton(
+    "rectangle", closest_on_rectangle, min_influence_of_one, box_to_rectangle, parameters=3, convex=True
+)
+TRIANGLE = Skeleton(
+    "triangle", closest_on_triangle, min_influence_of_one, box_to_triangle, parameters=4, convex=True
+)
+
+FLAT_SKELETONS = (RECTANGLE, TRIANGLE)

@@ -1,0 +1,44 @@
+"""Solid skeletons: the cylinder. `formulas.skeletons` states what a skeleton is, and has the box."""
+
+import warp as wp
+
+from blobtree.formulas.skeletons import (
+    HALF_DIAGONAL,
+    Skeleton,
+    min_influence_of_one,
+    squared_distances_to_ball,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def closest_on_cylinder(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """tape[at] = (start of the axis, influence); tape[at + 1] = (end − start, radius of the cylinder)."""
+    start = tape[at]
+    end = tape[at + 1]
+    ab = wp.vec3(end[0], end[1], end[2])
+    axis = wp.normalize(ab)
+    w = q - wp.vec3(start[0], start[1], start[2])
+    x = wp.dot(w, axis)
+    c = w - axis * x
+    if wp.length(c) > end[3]:
+        c = wp.normalize(c) * end[3]
+    c += axis * wp.clamp(x, 0.0, wp.length(ab))
+    return wp.vec4(start[0] + c[0], start[1] + c[1], start[2] + c[2], start[3])
+
+
+@wp.func
+def box_to_cylinder(
+    center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Bounds on (|x − cylinder| / influence)² over the ball around the cube center ± half."""
+    c = closest_on_cylinder(center, tape, at)
+    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
+
+
+CYLINDER = Skeleton(
+    "cylinder", closest_on_cylinder, min_influence_of_one, box_to_cylinder, parameters=2, convex=True
+)
+
+SOLID_SKELETONS = (CYLINDER,)
