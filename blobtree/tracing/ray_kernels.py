@@ -21,7 +21,8 @@ wp.set_module_options(KERNEL_OPTIONS)
 MAX_STEPS = 4096
 """More steps of a tolerance than a block has along its diagonal, so that every ray leaves its block.
 
-Blocks are 64 along the longest side of a box, and a tolerance is 1e-5 of its diagonal: 2,707 steps at most."""
+Blocks are 64 along the longest side of a box, and a tolerance is 1e-5 of its diagonal: 2,707 steps at most.
+"""
 
 MISS = -1.0
 
