@@ -24,6 +24,13 @@ from .meshing.polygonize import Polygonizer, polygonize
 from .nodes.curves import Arc, Circle, CubicBezier, QuadraticBezier
 from .nodes.fields import FieldPrimitive, Superquadric
 from .nodes.flats import Rectangle, Triangle
+from .nodes.numeric_parameters import (
+    NumericParameter,
+    numeric_parameters,
+    numeric_values,
+    with_numeric_values,
+)
+from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
 from .nodes.solids import Cylinder, Ellipsoid
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
@@ -61,7 +68,9 @@ __all__ = [
     "Mesh",
     "MissingPackage",
     "Node",
+    "NumericParameter",
     "Offset",
+    "ParameterGradient",
     "Point",
     "Polygonizer",
     "Progress",
@@ -85,8 +94,11 @@ __all__ = [
     "define_skeleton",
     "from_json",
     "load",
+    "numeric_parameters",
+    "numeric_values",
     "polygonize",
     "save",
     "split_creases",
     "to_json",
+    "with_numeric_values",
 ]

@@ -25,6 +25,8 @@ from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
+from blobtree.nodes.numeric_parameters import NumericParameter
+from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradient_of
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
 from blobtree.nodes.values import equal, from_records, hash_of, outline, text_of, to_records
 from blobtree.progress import Cancel, Progress
@@ -416,6 +418,40 @@ class Node(ImplicitModel):
         array, _ = points_or_point(points)
         f, hessians = hessians_at(self.tape, array)
         return curvatures_of(f[:, 1:].astype(np.float64), hessians.astype(np.float64))
+
+    def parameter_gradient(
+        self, points: ArrayLike, parameters: Iterable[NumericParameter] | None = None
+    ) -> ParameterGradient:
+        """Return the derivatives of the field at points by the parameters of the nodes.
+
+        Parameters
+        ----------
+        points : array-like (n, 3)
+            Points in the world, in model units.
+        parameters : iterable of NumericParameter, optional
+            Parameters of this tree, see `numeric_parameters`; all by default. Each component of a vector is
+            one; colours and whole numbers are none.
+
+        Returns
+        -------
+        ParameterGradient
+            float32[n, p] `values` and the p `parameters`.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> gradient = Point((0, 0, 0), radius=1.0).parameter_gradient([[1, 0, 0]])
+        >>> [str(parameter) for parameter in gradient.parameters]
+        ['root: center[0]', 'root: center[1]', 'root: center[2]', 'root: radius']
+        >>> gradient.values.round(3).tolist()
+        [[0.491, 0.0, 0.0, 0.491]]
+        """
+        return parameter_gradient_of(self, point_array(points), parameters)
 
     def colors(self, points: ArrayLike) -> Float32Array:
         """Return the blended colours at points.

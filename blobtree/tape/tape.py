@@ -23,7 +23,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -51,6 +51,8 @@ from blobtree.tape.program import (
     registers_needed,
     warp_registers_needed,
 )
+
+Precision = type[np.float32] | type[np.float64]
 
 PUSH = -1
 POP = -2
@@ -103,7 +105,7 @@ class Tape:
     (5, 4)
     """
 
-    data: NDArray[np.float32]
+    data: NDArray[Any]
     registers: int
     skeletons: tuple[int, ...]
     operators: tuple[int, ...]
@@ -124,8 +126,10 @@ def _upload(tape: Tape, device: str) -> DeviceTape:
     return DeviceTape(wp.array(tape.data, dtype=wp.vec4, device=device), wp.vec2i(0, len(tape.data)))
 
 
-def compile_tape(program: list[Instruction]) -> Tape:
+def compile_tape(program: list[Instruction], precision: Precision = np.float32) -> Tape:
     """Return the tape of a tree's program.
+
+    Devices read tapes in float32; differences of tapes need float64.
 
     Raises
     ------
@@ -149,7 +153,7 @@ def compile_tape(program: list[Instruction]) -> Tape:
     texels = [np.concatenate(list(_texels(step, instruction_set))) for step in program]
     ends = np.cumsum([len(part) for part in texels])
     return Tape(
-        data=np.concatenate(texels).astype(np.float32),
+        data=np.concatenate(texels).astype(precision),
         registers=registers,
         skeletons=tuple(sorted(map(instruction_set.skeletons.index, skeletons))),
         operators=tuple(sorted(map(instruction_set.operators.index, operators))),

@@ -1,0 +1,159 @@
+"""The numbers of a tree as a vector: every component of every numeric parameter, by path and name.
+
+Colours, whole numbers and names are no such parameters: the field does not change smoothly with them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float64Array
+from blobtree.errors import InvalidNode
+from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
+from blobtree.nodes.values import parameter_values
+from blobtree.tape.program import ProgramNode
+
+AnyNode = TypeVar("AnyNode", bound=ProgramNode)
+Path = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class NumericParameter:
+    """One number of a tree.
+
+    Attributes
+    ----------
+    path
+        Indices of children, from the root to the node.
+    name
+        Name of the node's parameter.
+    index
+        Place of the number in the parameter's value: () for a number, (i,) in a vector, (i, j) in a matrix.
+    declaration
+        What the node's class says about the parameter: meaning and range.
+    """
+
+    path: Path
+    name: str
+    index: tuple[int, ...]
+    declaration: Parameter
+
+    def __str__(self) -> str:
+        place = "".join(f"[{i}]" for i in self.index)
+        return f"{'.'.join(map(str, self.path)) or 'root'}: {self.name}{place}"
+
+
+def numeric_parameters(tree: ProgramNode) -> list[NumericParameter]:
+    """Return all numbers of a tree on which its field depends, node by node from the root, left to right."""
+    return [parameter for path, node in nodes_with_paths(tree) for parameter in _numbers_of(path, node)]
+
+
+def numeric_values(tree: ProgramNode, parameters: Sequence[NumericParameter]) -> Float64Array:
+    """Return the values (p,) of numbers of a tree."""
+    return np.array([_number(getattr(node_along(tree, p.path), p.name), p.index) for p in parameters])
+
+
+def with_numeric_values(tree: AnyNode, parameters: Sequence[NumericParameter], values: ArrayLike) -> AnyNode:
+    """Return the tree with other values (p,) for some of its numbers.
+
+    Raises
+    ------
+    InvalidNode
+        A node refuses its value.
+    """
+    changed: dict[Path, dict[str, Any]] = {}
+    for parameter, value in zip(parameters, np.asarray(values, np.float64).tolist(), strict=True):
+        own = changed.setdefault(parameter.path, {})
+        old = own.get(parameter.name, None)
+        if old is None:
+            old = getattr(node_along(tree, parameter.path), parameter.name)
+        own[parameter.name] = with_number(old, parameter.index, value)
+    return rebuilt(tree, changed)
+
+
+def rebuilt(tree: AnyNode, changed: dict[Path, dict[str, Any]]) -> AnyNode:
+    """Return a tree whose nodes at these paths have other parameters, or are copies if none is given."""
+    above = {path[:length] for path in changed for length in range(len(path) + 1)}
+    made: dict[Path, ProgramNode] = {}
+    for path in sorted(above, key=len, reverse=True):
+        node = node_along(tree, path)
+        children = [made.get((*path, i), child) for i, child in enumerate(node.children)]
+        made[path] = _copy(node, changed.get(path, {}), children)
+    result: AnyNode = made[()] if made else tree  # type: ignore[assignment]  # a copy is of the same class
+    return result
+
+
+def without_sharing(tree: AnyNode) -> AnyNode:
+    """Return a tree in which each path leads to a node object of its own."""
+    paths = dict(nodes_with_paths(tree))
+    if len({id(node) for node in paths.values()}) == len(paths):
+        return tree
+    return rebuilt(tree, {path: {} for path in paths})
+
+
+def nodes_with_paths(tree: ProgramNode) -> Iterator[tuple[Path, ProgramNode]]:
+    """Yield the paths and nodes of a tree from the root, left to right."""
+    pending: list[tuple[Path, ProgramNode]] = [((), tree)]
+    while pending:
+        path, node = pending.pop()
+        yield path, node
+        pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
+
+
+def node_along(tree: ProgramNode, path: Path) -> ProgramNode:
+    """Return the node at the end of a path; raise `InvalidNode` if the tree has no such path."""
+    node = tree
+    for step in path:
+        if not 0 <= step < len(node.children):
+            raise InvalidNode(f"expected a path through the tree, got {path}; {step} is no child there")
+        node = node.children[step]
+    return node
+
+
+def with_number(value: Any, index: tuple[int, ...], number: float) -> Any:
+    """Return nested tuples with another number at a place."""
+    if not index:
+        return number
+    first, *rest = index
+    return (*value[:first], with_number(value[first], tuple(rest), number), *value[first + 1 :])
+
+
+def _numbers_of(path: Path, node: ProgramNode) -> Iterator[NumericParameter]:
+    for name, declaration in parameters_of(type(node)).items():
+        if declaration.quantity is not Quantity.COLOR:
+            for index in _places(getattr(node, name)):
+                yield NumericParameter(path, name, index, declaration)
+
+
+def _places(value: Any) -> Iterator[tuple[int, ...]]:
+    """Yield the places of all floats in nested tuples."""
+    if isinstance(value, float):
+        yield ()
+    elif isinstance(value, tuple):
+        for i, item in enumerate(value):
+            yield from ((i, *rest) for rest in _places(item))
+
+
+def _number(value: Any, index: tuple[int, ...]) -> float:
+    for i in index:
+        value = value[i]
+    return float(value)
+
+
+def _copy(node: ProgramNode, values: dict[str, Any], children: list[ProgramNode]) -> ProgramNode:
+    """Return a node of the same class with other parameters and operands."""
+    own = parameter_values(node)
+    remaining = iter(children)
+    arguments: dict[str, Any] = {}
+    for item in fields(node):  # type: ignore[arg-type]  # every node is a dataclass
+        value = getattr(node, item.name)
+        if item.name in own:
+            arguments[item.name] = values.get(item.name, value)
+        elif isinstance(value, tuple):
+            arguments[item.name] = tuple(next(remaining) for _ in value)
+        else:
+            arguments[item.name] = next(remaining)
+    return type(node)(**arguments)
