@@ -3,6 +3,7 @@
 //@ include surface.glsl
 // blobtree.tracing.tree_cells.TracingCells
 uniform sampler2D tape;
+uniform int tape_start;
 uniform isampler2D blocks;
 uniform vec3 grid_lower;
 uniform float block_size;

@@ -44,6 +44,7 @@ class CellBlocks:
     cell: wp.float32
     """Side of a cell."""
     whole: wp.array(dtype=wp.vec4)
+    whole_span: wp.vec2i
 
 
 @wp.func

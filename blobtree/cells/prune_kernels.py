@@ -90,22 +90,26 @@ def direct_range(
 
 
 @unrolled
-def operator_range(operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
+def operator_range(
+    operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
+) -> wp.vec2:
     """Return the range of an operator's result."""
     result = wp.vec2()
     for code in range(wp.static(len(OPERATORS))):
         if operator == code:
-            result = wp.static(OPERATORS[code].range)(a, b, parameter)
+            result = wp.static(OPERATORS[code].range)(a, b, parameter, tape)
     return result
 
 
 @unrolled
-def operator_choice(operator: wp.int32, a: wp.vec2, b: wp.vec2) -> wp.int32:
+def operator_choice(
+    operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
+) -> wp.int32:
     """Return the operands on which an operator's result depends, as KEEP_…."""
     result = int(KEEP_BOTH)
     for code in range(wp.static(len(OPERATORS))):
         if operator == code:
-            result = wp.static(OPERATORS[code].choice)(a, b)
+            result = wp.static(OPERATORS[code].choice)(a, b, parameter, tape)
     return result
 
 
@@ -163,13 +167,14 @@ def fold_range(
     end: wp.int32,
     run_at: wp.int32,
     run: wp.vec4,
+    tape: wp.array(dtype=wp.vec4),
 ) -> tuple[wp.vec2, wp.int32, wp.int32, wp.vec4, wp.bool]:
     """Fold a primitive of range `r` into the accumulator.
 
     Return (accumulator, end, run_at, run) after that, see `prune`, and True if the primitive matters.
     """
     operator = int(header[1])
-    choice = operator_choice(operator, accumulator, r)
+    choice = operator_choice(operator, accumulator, r, header[3], tape)
     if choice == KEEP_NONE:
         return wp.vec2(0.0, 0.0), accumulator_start, -1, run, False
     if choice == KEEP_LEFT:
@@ -181,7 +186,7 @@ def fold_range(
         if first_operator(operator) != operator:
             first[3] = 0.0
         return result, accumulator_start + 1, accumulator_start, first, True
-    result = operator_range(operator, accumulator, r, header[3])
+    result = operator_range(operator, accumulator, r, header[3], tape)
     if run_at >= 0 and run[1] == first[1] and run[0] == first[0] and run[3] == first[3]:
         return result, end, run_at, wp.vec4(run[0], run[1], run[2] + 1.0, run[3]), True
     return result, end + 1, end, first, True
@@ -195,6 +200,7 @@ def pop_range(
     accumulator: wp.vec2,
     accumulator_start: wp.int32,
     end: wp.int32,
+    tape: wp.array(dtype=wp.vec4),
     out: wp.array(dtype=wp.vec4),
     start: wp.int32,
     write: wp.bool,
@@ -210,7 +216,7 @@ def pop_range(
     if swapped:
         a = accumulator
         b = left
-    choice = operator_choice(operator, a, b)
+    choice = operator_choice(operator, a, b, header[3], tape)
     if choice == KEEP_NONE:
         return wp.vec2(0.0, 0.0), left_start
     if (choice == KEEP_LEFT and not swapped) or (choice == KEEP_RIGHT and swapped):
@@ -218,7 +224,7 @@ def pop_range(
     if choice == KEEP_BOTH:
         if write:
             out[start + end] = header
-        return operator_range(operator, a, b, header[3]), end + 1
+        return operator_range(operator, a, b, header[3], tape), end + 1
     if write:
         copy_texels(out, start + accumulator_start, end - accumulator_start, out, start + left_start)
     return accumulator, left_start + end - accumulator_start
@@ -281,7 +287,7 @@ def prune(
                 else:
                     r = range_anywhere(kind, stretched, warped > 0, point, half, ball, tape, at)
                 accumulator, end, run_at, run, needed = fold_range(
-                    header, r, accumulator, accumulator_start, end, run_at, run
+                    header, r, accumulator, accumulator_start, end, run_at, run, tape
                 )
                 if needed:
                     if write:
@@ -339,6 +345,7 @@ def prune(
                 accumulator,
                 accumulator_start,
                 end,
+                tape,
                 out,
                 start,
                 write,

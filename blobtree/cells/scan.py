@@ -16,8 +16,8 @@ MAX_TOTAL = (1 << 31) - 1
 """Largest int32."""
 
 
-def exclusive_scan(counts: DeviceArray, noun: str) -> tuple[DeviceArray, int]:
-    """Return the exclusive prefix sums of int32 `counts` (n + 1), and their total.
+def exclusive_scan(counts: DeviceArray, noun: str, *, start: int = 0) -> tuple[DeviceArray, int]:
+    """Return `start` plus the exclusive prefix sums of int32 `counts` (n + 1), and `start` plus their total.
 
     The last count is 0, so the last sum is the total. `noun` names the counted objects in the error.
 
@@ -26,6 +26,11 @@ def exclusive_scan(counts: DeviceArray, noun: str) -> tuple[DeviceArray, int]:
     InvalidResolution
         The total exceeds 32 bits.
     """
+    if start > 0:
+        behind: DeviceArray = wp.full(len(counts) + 1, start, dtype=wp.int32, device=counts.device)
+        wp.copy(behind, counts, dest_offset=1)
+        starts, total = exclusive_scan(behind, noun)
+        return starts[1:], total
     starts = wp.empty_like(counts)
     wp.utils.array_scan(counts, starts, inclusive=False)
     if counts.device.is_cpu:  # a launch would take longer than the sum

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree._typing import Int32Array
+from blobtree._typing import Float32Array, Int32Array
 from blobtree.cells.block_kernels import CellBlocks, ChildGrid, LevelBlocks
 from blobtree.cells.cull_kernels import count_reaching, write_reached_children, write_reaching
 from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
@@ -33,7 +33,6 @@ from blobtree.device import demand_memory, known_device, launch
 from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.formulas.operators import DIFFERENCE, RICCI, SUM, UNION
 from blobtree.progress import Progress
-from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.tape import UNWARP, WARP, Tape
 
 MAX_BLOCKS = 1 << 21
@@ -63,7 +62,8 @@ _NEUTRAL_OPERATORS = (SUM, RICCI, UNION, DIFFERENCE)
 class Level:
     """The blocks of one level that the surface may cross, in key order.
 
-    `tape` holds the pruned tape of every block, each behind a texel (its length, 0, 0, 0).
+    `tape` holds the data region of the whole tape, then the pruned tape of every block, each behind a texel
+    (its length, 0, 0, 0).
     """
 
     blocks: "wp.array[wp.vec3i]"
@@ -113,7 +113,8 @@ class SparseCells:
         arrays.spans, arrays.tape = leaves.spans, leaves.tape
         arrays.base, arrays.corner = wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner)
         arrays.cell = grid.cell_size
-        arrays.whole = self.tape.on(self.device).data
+        whole = self.tape.on(self.device)
+        arrays.whole, arrays.whole_span = whole.data, whole.span
         return arrays
 
 
@@ -144,23 +145,24 @@ def build_cells(
     levels = [_root(tape, grid, previous, device)]
     for number in range(1, grid.depth + 1):
         report("finding the surface", (number - 1) / grid.depth)
-        step = _Refinement(levels[-1], number, grid, previous, device, tape.instruction_set)
+        step = _Refinement(levels[-1], number, grid, previous, device, tape)
         levels.append(step.level(pieces_to_cull(tape, device) if number == 1 else None))
     report("finding the surface", 1.0)
     return SparseCells(grid, tuple(levels), device, tape)
 
 
 def _comparable(previous: SparseCells, tape: Tape, grid: Grid, device: str) -> bool:
-    """Return True if two sets of cells can share blocks: same lattice, device and meaning of codes."""
+    """Return True if two sets of cells can share blocks: same lattice, device, codes and data region."""
     other = previous.grid
     same_cells = (grid.cell_size, grid.corner, device) == (other.cell_size, other.corner, previous.device)
-    return same_cells and tape.instruction_set == previous.tape.instruction_set
+    same_codes = tape.instruction_set == previous.tape.instruction_set
+    return same_cells and same_codes and _same_bits(_data_region(tape), _data_region(previous.tape))
 
 
 def _root(tape: Tape, grid: Grid, previous: SparseCells | None, device: str) -> Level:
     """Return the level of the root block."""
     uploaded = tape.on(device)
-    same = previous is not None and previous.grid == grid and _same_bits(previous.tape, tape)
+    same = previous is not None and previous.grid == grid and _same_bits(previous.tape.data, tape.data)
     return Level(
         wp.zeros(1, dtype=wp.vec3i, device=device),
         wp.zeros(1, dtype=wp.int64, device=device),
@@ -171,9 +173,13 @@ def _root(tape: Tape, grid: Grid, previous: SparseCells | None, device: str) -> 
     )
 
 
-def _same_bits(first: Tape, second: Tape) -> bool:
-    """Return True if two tapes are the same bit for bit, so that −0 differs from 0."""
-    return np.array_equal(first.data.view(np.int32), second.data.view(np.int32))
+def _data_region(tape: Tape) -> Float32Array:
+    return tape.data[: tape.start]
+
+
+def _same_bits(first: Float32Array, second: Float32Array) -> bool:
+    """Return True if texels (n, 4) are the same bit for bit, so that −0 differs from 0."""
+    return np.array_equal(first.view(np.int32), second.view(np.int32))
 
 
 class _Refinement:
@@ -186,10 +192,10 @@ class _Refinement:
         grid: Grid,
         previous: SparseCells | None,
         device: str,
-        instruction_set: InstructionSet,
+        tape: Tape,
     ) -> None:
         self._above, self._device = above, device
-        self._kernel = instruction_set.kernel_for
+        self._kernel, self._start = tape.instruction_set.kernel_for, tape.start
         self._grid = _child_grid(grid, number)
         self._old, self._shift = _old_level(previous, grid, number)
         if self._old is not None and previous is not None and previous.grid.pad == grid.pad:
@@ -207,19 +213,35 @@ class _Refinement:
         flags, texels = self._counts(count), self._counts(count)
         self._count_texels([children, flags, texels])
         slots, blocks = exclusive_scan(flags, "blocks")
-        starts, total = exclusive_scan(texels, "texels of the blocks' tapes")
+        starts, total = exclusive_scan(texels, "texels of the blocks' tapes", start=self._start)
         if blocks > MAX_BLOCKS:
             raise InvalidResolution(
                 f"expected a surface that crosses at most {MAX_BLOCKS:,} blocks of {BRANCHING}³ cells, got "
                 f"{blocks:,}; take larger cells"
             )
-        level = _empty_level(blocks, total, children, self._device)
+        level = self._empty_level(blocks, total, children)
         self._write(level, slots, starts)
         return level
 
     def _counts(self, count: int) -> DeviceArray:
         """Return `count` zeros, and one more for the total."""
         return wp.zeros(count + 1, dtype=wp.int32, device=self._device)
+
+    def _empty_level(self, blocks: int, texels: int, children: DeviceArray) -> Level:
+        """Return a level whose arrays are not written yet, save the data region."""
+        device = self._device
+        demand_memory(TEXEL_BYTES * texels, device, f"the tapes of {blocks:,} blocks")
+        level = Level(
+            wp.empty(blocks, dtype=wp.vec3i, device=device),
+            wp.empty(blocks, dtype=wp.int64, device=device),
+            wp.empty(blocks, dtype=wp.vec2i, device=device),
+            wp.empty(texels, dtype=wp.vec4, device=device),
+            children,
+            wp.full(blocks, -1, dtype=wp.int32, device=device),
+        )
+        if self._start > 0:
+            wp.copy(level.tape, self._above.tape, count=self._start)
+        return level
 
     def _culled(self, pieces: DeviceArray) -> Level:
         """Return the root's children that primitives reach."""
@@ -229,8 +251,8 @@ class _Refinement:
         inputs = [pieces, self._above.tape, self._grid]
         launch(self._kernel(count_reaching), count, inputs, [flags, texels], self._device)
         slots, blocks = exclusive_scan(flags, "blocks")
-        starts, total = exclusive_scan(texels, "texels of the blocks' tapes")
-        level = _empty_level(blocks, total, children, self._device)
+        starts, total = exclusive_scan(texels, "texels of the blocks' tapes", start=self._start)
+        level = self._empty_level(blocks, total, children)
         launch(self._kernel(write_reaching), count, [*inputs, starts], [level.tape], self._device)
         outputs = [children, level.arrays]
         launch(write_reached_children, CHILDREN, [len(pieces), slots, starts], outputs, self._device)
@@ -292,19 +314,6 @@ def _old_level(
     return previous.levels[old_number], (x, y, z)
 
 
-def _empty_level(blocks: int, texels: int, children: DeviceArray, device: str) -> Level:
-    """Return a level whose arrays are not written yet."""
-    demand_memory(TEXEL_BYTES * texels, device, f"the tapes of {blocks:,} blocks")
-    return Level(
-        wp.empty(blocks, dtype=wp.vec3i, device=device),
-        wp.empty(blocks, dtype=wp.int64, device=device),
-        wp.empty(blocks, dtype=wp.vec2i, device=device),
-        wp.empty(texels, dtype=wp.vec4, device=device),
-        children,
-        wp.full(blocks, -1, dtype=wp.int32, device=device),
-    )
-
-
 def pieces_to_cull(tape: Tape, device: str) -> Int32Array | None:
     """Return the pieces of a tape (n, 4), see `split_tape`; None if `prune` alone is faster."""
     if wp.get_device(device).is_cpu or len(tape.data) < MIN_CULLED_TEXELS:
@@ -324,7 +333,7 @@ def split_tape(tape: Tape) -> Int32Array | None:
     warped = np.cumsum(code == WARP) - np.cumsum(code == UNWARP) > 0
     neutral = [tape.instruction_set.operators.index(row) for row in _NEUTRAL_OPERATORS]
     run = (code >= 0) & ~warped & np.isin(operator, neutral)
-    if lengths[run].sum() < MIN_CULLED_SHARE * len(tape.data):
+    if lengths[run].sum() < MIN_CULLED_SHARE * (len(tape.data) - tape.start):
         return None
     parts = np.where(run, -(-count // PRIMITIVES_PER_PIECE), 1)
     instruction = np.repeat(np.arange(len(headers)), parts)

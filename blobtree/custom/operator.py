@@ -33,6 +33,7 @@ from blobtree.formulas.operators import (
 )
 from blobtree.nodes.parameters import Parameter
 from blobtree.nodes.tree import AssociativeCombination, Node
+from blobtree.tape.data_region import TEXEL
 from blobtree.validation import finite_number
 
 Like = Literal["blend", "intersection", "difference"]
@@ -73,13 +74,8 @@ class CustomCombination(AssociativeCombination, metaclass=CustomKind):
 
     @property
     def values(self) -> dict[str, Any]:
-        """The operator's parameter by name, if it has one."""
+        """The operator's parameters by name."""
         return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
-
-    @property
-    def operator_parameter(self) -> float:
-        """The number that the operator takes besides its operands."""
-        return float(sum(self.values.values()))
 
 
 def define_operator(
@@ -97,11 +93,11 @@ def define_operator(
     Parameters
     ----------
     function
-        ``(a: wp.float32, b: wp.float32) -> wp.vec3``, or with one wp.float32 more, its parameter; with or
-        without ``@wp.func``. F must be continuous, nowhere negative, and 0 where both operands are.
+        ``(a: wp.float32, b: wp.float32) -> wp.vec3``, or with any number of wp.float32 more, its parameters;
+        with or without ``@wp.func``. F must be continuous, nowhere negative, and 0 where both operands are.
     steepest
         Upper bound of ``abs(∂F/∂a)`` and ``abs(∂F/∂b)`` for all operands; or a typed function
-        ``(max_a, max_b, parameter if any) -> wp.vec2`` of the largest values that the operands may have.
+        ``(max_a, max_b, parameters if any) -> wp.vec2`` of the largest values that the operands may have.
     like
         What F is where an operand is absent (0): with "blend" it is the other operand, with "intersection" 0,
         with "difference" a where b is absent and 0 where a is. Cells and boxes are pruned by it.
@@ -117,7 +113,7 @@ def define_operator(
     Returns
     -------
     type[CustomCombination]
-        A node class: a tuple of operands, then the parameter by position or name.
+        A node class: a tuple of operands, then the parameters by position or name.
 
     Raises
     ------
@@ -166,11 +162,11 @@ def define_operator(
 
 
 def _parameters(source: CustomSource, limits: Mapping[str, Limits] | None) -> tuple[Parameter, ...]:
-    """Return the parameter beside the two operands, if any."""
+    """Return the parameters beside the two operands."""
     names = list(source.parameters)
     floats = all(hint in (wp.float32, float) for hint in source.parameters.values())
-    if not floats or len(names) not in (2, 3):
-        raise source.refusal("expected (a: wp.float32, b: wp.float32), and at most one wp.float32 more")
+    if not floats or len(names) < 2:
+        raise source.refusal("expected (a: wp.float32, b: wp.float32), and parameters of type wp.float32")
     return custom_parameters(source, names[2:], limits, CustomCombination)
 
 
@@ -215,14 +211,15 @@ _SHAPES: dict[str | None, _Shape] = {
 }
 
 _PARTIALS = '''\
-def {name}(a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
+def {name}(a: wp.float32, b: wp.float32, parameter: wp.float32{tape}) -> wp.vec3:
     """The user's operator, exact where an operand is absent."""
-{absent}    return {function}(a, b{parameter})
+{absent}    return {function}(a, b{extra})
 '''
 
 _SLOPE = '''\
 def {name}(
-    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, parameter: wp.float32
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32,
+    parameter: wp.float32{tape}
 ) -> wp.float32:
     """|F'| ≤ |∂F/∂a| |a'| + |∂F/∂b| |b'|; an operand that falls makes no F rise that rises with it."""
     k = {steepest}
@@ -230,43 +227,53 @@ def {name}(
 '''
 
 _MONOTONE_RANGE = '''\
-def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
+def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32{tape}) -> wp.vec2:
     """F is monotone, so its extremes lie at corners."""
-    return widened_range({partials}({low}, parameter)[0], {partials}({high}, parameter)[0])
+    return widened_range({partials}({low}, parameter{passed})[0], {partials}({high}, parameter{passed})[0])
 '''
 
 _RANGE = '''\
-def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
+def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32{tape}) -> wp.vec2:
     """From the middle of the operands' ranges F changes no faster than `steepest` says."""
     max_a = a[1]
     max_b = b[1]
     k = {steepest}
-    middle = {partials}(0.5 * (a[0] + a[1]), 0.5 * (b[0] + b[1]), parameter)[0]
+    middle = {partials}(0.5 * (a[0] + a[1]), 0.5 * (b[0] + b[1]), parameter{passed})[0]
     change = 0.5 * (k[0] * (a[1] - a[0]) + k[1] * (b[1] - b[0]))
     return widened_range(middle - change, middle + change)
 '''
 
 
+def _slots(count: int) -> dict[str, str]:
+    """Return the text of generated functions that depends on the number of parameters.
+
+    One parameter is the number `parameter` itself; several are on the tape from texel `parameter` on.
+    """
+    if count <= 1:
+        return {"tape": "", "passed": "", "extra": ", parameter" * count}
+    readings = [f", tape[int(parameter) + {number // TEXEL}][{number % TEXEL}]" for number in range(count)]
+    return {"tape": ", tape: wp.array(dtype=wp.vec4)", "passed": ", tape", "extra": "".join(readings)}
+
+
 def _row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operator:
     """Return the row of the table, with functions generated around the user's."""
     shape, bound = _SHAPES[claims.like], claims.steepest
-    extra = ", parameter" if len(source.parameters) == 3 else ""
+    slots = _slots(len(source.parameters) - 2)
     names = {part: f"custom_{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
     if isinstance(bound, float):
         steepest = f"wp.vec2({bound!r}, {bound!r})"
         scope: dict[str, Any] = {}
     else:
-        steepest = f"{bound.function.key}(max_a, max_b{extra})"
+        steepest = f"{bound.function.key}(max_a, max_b{slots['extra']})"
         scope = {bound.function.key: bound.function}
     function = source.function
-    text = _PARTIALS.format(
-        name=names["partials"], absent=shape.absent, function=function.key, parameter=extra
-    )
+    text = _PARTIALS.format(name=names["partials"], absent=shape.absent, function=function.key, **slots)
     partials = generated(names["partials"], text, {function.key: function})
-    slope = generated(names["slope"], _SLOPE.format(name=names["slope"], steepest=steepest), scope)
+    text = _SLOPE.format(name=names["slope"], steepest=steepest, **slots)
+    slope = generated(names["slope"], text, scope)
     low, high = shape.corners
     text = (_MONOTONE_RANGE if claims.monotone else _RANGE).format(
-        name=names["range"], partials=names["partials"], low=low, high=high, steepest=steepest
+        name=names["range"], partials=names["partials"], low=low, high=high, steepest=steepest, **slots
     )
     scope = {**scope, names["partials"]: partials, "widened_range": widened_range}
     return Operator(

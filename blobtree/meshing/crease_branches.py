@@ -170,17 +170,19 @@ def make_branch(value: wp.float32, label: wp.int32, f: wp.vec4) -> Branch:
 
 
 @wp.func
-def branch_combine(operator: wp.int32, a: Branch, b: Branch, parameter: wp.float32) -> Branch:
+def branch_combine(
+    operator: wp.int32, a: Branch, b: Branch, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
+) -> Branch:
     """Return the operator's result at q, with the choice that the operator makes at the reference."""
     side = side_of(operator, a[0], b[0])
-    value = partials(operator, a[0], b[0], parameter)[0]
+    value = partials(operator, a[0], b[0], parameter, tape)[0]
     f = field_of(a)
     if side == RIGHT:
         f = right_result(operator, field_of(a), field_of(b))
     elif side == NEITHER:
         f = wp.vec4()
     elif side == BLENDED:
-        f = gradient_combine(operator, field_of(a), field_of(b), 0.0, parameter)
+        f = gradient_combine(operator, field_of(a), field_of(b), 0.0, parameter, tape)
     return make_branch(value, label_of(side, a, b), f)
 
 
@@ -228,7 +230,7 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.ve
                 )
                 f = gradient_pullback_affine(field_of(leaf), tape, at)
                 leaf = make_branch(leaf[0], 0, f)
-                accumulator = branch_combine(operator, accumulator, leaf, parameter)
+                accumulator = branch_combine(operator, accumulator, leaf, parameter, tape)
                 at += PREFIX + direct_stride(kind)
         elif code >= STRETCHED:
             kind = code - STRETCHED
@@ -238,20 +240,20 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.ve
                 )
                 f = gradient_pullback_affine(field_of(leaf), tape, at)
                 leaf = make_branch(leaf[0], 0, f)
-                accumulator = branch_combine(operator, accumulator, leaf, parameter)
+                accumulator = branch_combine(operator, accumulator, leaf, parameter, tape)
                 at += PREFIX + stride(kind)
         elif code >= 0:
             for _i in range(count):
                 leaf = branch_leaf(point, reference, code, tape, at)
-                accumulator = branch_combine(operator, accumulator, leaf, parameter)
+                accumulator = branch_combine(operator, accumulator, leaf, parameter, tape)
                 at += stride(code)
         elif code == PUSH:
             registers[count] = accumulator
             accumulator = Branch()
         elif code == POP:
-            accumulator = branch_combine(operator, registers[count], accumulator, parameter)
+            accumulator = branch_combine(operator, registers[count], accumulator, parameter, tape)
         elif code == POP_SWAPPED:
-            accumulator = branch_combine(operator, accumulator, registers[count], parameter)
+            accumulator = branch_combine(operator, accumulator, registers[count], parameter, tape)
         elif code == WARP:
             p = tape[at + 3]
             points[count] = point

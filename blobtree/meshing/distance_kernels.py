@@ -45,7 +45,7 @@ def value_at(p: wp.vec3, cells: CellBlocks) -> wp.float32:
     """Return the field at p, by the whole tape if p is in no block."""
     block = block_at(p, cells)
     if block < 0:
-        return field_value(p, cells.whole, wp.vec2i(0, cells.whole.shape[0]))
+        return field_value(p, cells.whole, cells.whole_span)
     return field_value(p, cells.tape, cells.spans[block])
 
 
@@ -54,7 +54,7 @@ def gradient_at(p: wp.vec3, cells: CellBlocks) -> wp.vec4:
     """Return (value, ∂x, ∂y, ∂z) at p, by the whole tape if p is in no block."""
     block = block_at(p, cells)
     if block < 0:
-        return field_gradient(p, cells.whole, wp.vec2i(0, cells.whole.shape[0]))
+        return field_gradient(p, cells.whole, cells.whole_span)
     return field_gradient(p, cells.tape, cells.spans[block])
 
 

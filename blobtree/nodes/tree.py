@@ -705,9 +705,18 @@ class Macro(Node):
 
 
 class Combination(Node):
-    """An operator folded over its operands from left to right."""
+    """An operator folded over its operands from left to right.
+
+    The operator takes the parameters that the class declares, in their order.
+    """
 
     operator: ClassVar[Operator]
+
+    @property
+    def operator_parameters(self) -> tuple[float, ...]:
+        """The numbers that the operator takes besides its operands."""
+        values = ((p, getattr(self, name)) for name, p in parameters_of(type(self)).items())
+        return tuple(number for p, value in values for number in p.components(value))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -790,11 +799,6 @@ class Ricci(AssociativeCombination):
         float,
         Parameter(Quantity.FACTOR, "exponent n", low=1.0, high=LARGEST_EXPONENT, hint="for more use a union"),
     ] = field(kw_only=True)
-
-    @property
-    def operator_parameter(self) -> float:
-        """The exponent n."""
-        return self.exponent
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,6 +1,8 @@
 """Dispatch by a code on the tape: functions that call the functions of one row of a table.
 
-`decals/rendering/tree.py` writes the same dispatch in GLSL, over the kinds in use alone.
+A row's function may declare fewer parameters than its dispatch: it gets the first ones. So operators without
+several parameters do not take the tape. `decals/rendering/tree.py` writes the same dispatch in GLSL, over the
+kinds in use alone.
 """
 
 import warp as wp
@@ -98,12 +100,14 @@ def is_monotone(operator: wp.int32) -> wp.bool:
 
 
 @unrolled
-def partials(operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
+def partials(
+    operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
+) -> wp.vec3:
     """Return the value and the partial derivatives of an operator."""
     result = wp.vec3()
     for code in range(wp.static(len(OPERATORS))):
         if operator == code:
-            result = wp.static(OPERATORS[code].partials)(a, b, parameter)
+            result = wp.static(OPERATORS[code].partials)(a, b, parameter, tape)
     return result
 
 
@@ -115,12 +119,13 @@ def slope(
     max_a: wp.float32,
     max_b: wp.float32,
     parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
 ) -> wp.float32:
     """Return the slope bound of an operator."""
     result = float(0.0)
     for code in range(wp.static(len(OPERATORS))):
         if operator == code:
-            result = wp.static(OPERATORS[code].slope)(slope_a, slope_b, max_a, max_b, parameter)
+            result = wp.static(OPERATORS[code].slope)(slope_a, slope_b, max_a, max_b, parameter, tape)
     return result
 
 

@@ -11,7 +11,7 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
   front;
 * `scale_speed(kind, q, speed, reach, p)`: a bound on the speed behind a warp of a point that moves at most at
   `speed` in front of it;
-* `combine(operator, a, b, reach, parameter)`, and the `empty` field.
+* `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field.
 
 Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): along q + u ·
 direction for u from 0 to `reach`, per unit of u. Behind an affine map the ray is still a line, along the
@@ -126,10 +126,15 @@ def value_pullback_warp(
 
 @wp.func
 def value_combine(
-    operator: wp.int32, a: wp.float32, b: wp.float32, reach: wp.float32, parameter: wp.float32
+    operator: wp.int32,
+    a: wp.float32,
+    b: wp.float32,
+    reach: wp.float32,
+    parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
 ) -> wp.float32:
     """Return F(a, b)."""
-    return partials(operator, a, b, parameter)[0]
+    return partials(operator, a, b, parameter, tape)[0]
 
 
 # -- slope bound ----------------------------------------------------------------------------------------
@@ -217,20 +222,25 @@ def bound_scale_speed(
 
 @wp.func
 def bound_combine(
-    operator: wp.int32, a: wp.vec3, b: wp.vec3, reach: wp.float32, parameter: wp.float32
+    operator: wp.int32,
+    a: wp.vec3,
+    b: wp.vec3,
+    reach: wp.float32,
+    parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
 ) -> wp.vec3:
     """Return the bounds of F(a, b).
 
     Ahead, an operand exceeds its value at q by at most reach · its rise. The rise of a monotone operator is
     bounded by its `slope` at the operands' rises, its fall by its `slope` at their falls.
     """
-    value = partials(operator, a[0], b[0], parameter)[0]
+    value = partials(operator, a[0], b[0], parameter, tape)[0]
     max_a = a[0] + reach * wp.max(a[1], 0.0)
     max_b = b[0] + reach * wp.max(b[1], 0.0)
     if is_monotone(operator):
-        rise = slope(operator, a[1], b[1], max_a, max_b, parameter)
-        return wp.vec3(value, rise, slope(operator, a[2], b[2], max_a, max_b, parameter))
-    either = slope(operator, wp.max(a[1], a[2]), wp.max(b[1], b[2]), max_a, max_b, parameter)
+        rise = slope(operator, a[1], b[1], max_a, max_b, parameter, tape)
+        return wp.vec3(value, rise, slope(operator, a[2], b[2], max_a, max_b, parameter, tape))
+    either = slope(operator, wp.max(a[1], a[2]), wp.max(b[1], b[2]), max_a, max_b, parameter, tape)
     return wp.vec3(value, either, either)
 
 
@@ -287,10 +297,15 @@ def gradient_pullback_warp(
 
 @wp.func
 def gradient_combine(
-    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32
+    operator: wp.int32,
+    a: wp.vec4,
+    b: wp.vec4,
+    reach: wp.float32,
+    parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
 ) -> wp.vec4:
     """Return (F, ∇F) by the chain rule."""
-    p = partials(operator, a[0], b[0], parameter)
+    p = partials(operator, a[0], b[0], parameter, tape)
     g = a * p[1] + b * p[2]
     return wp.vec4(p[0], g[1], g[2], g[3])
 
@@ -337,10 +352,15 @@ def color_pullback_warp(
 
 @wp.func
 def color_combine(
-    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32
+    operator: wp.int32,
+    a: wp.vec4,
+    b: wp.vec4,
+    reach: wp.float32,
+    parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
 ) -> wp.vec4:
     """Return F and the colours weighted by |∂F/∂a|·a and |∂F/∂b|·b; the stronger operand's if both are 0."""
-    p = partials(operator, a[0], b[0], parameter)
+    p = partials(operator, a[0], b[0], parameter, tape)
     weight_a = wp.abs(p[1]) * a[0]
     weight_b = wp.abs(p[2]) * b[0]
     t = float(0.0)

@@ -73,7 +73,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             rate = speed / min_influence(code, tape, at)
             at += texels
             f = leaf(point, c, tape[at - 1], v, reach, rate)
-            accumulator = combine(operator, accumulator, f, reach, header[3])
+            accumulator = combine(operator, accumulator, f, reach, header[3], tape)
         return accumulator
 
     @wp.func
@@ -101,7 +101,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             rate = speed * tape[at + 3][0] / min_influence(kind, tape, at + PREFIX)
             end = at + PREFIX + stride(kind)
             f = leaf(local, c, tape[end - 1], v, reach, rate)
-            accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3])
+            accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator
 
@@ -126,7 +126,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             v = direction_to_local(direction, tape, at)
             end = at + PREFIX + direct_stride(kind)
             f = direct(kind, local, tape, at + PREFIX, tape[end - 1], v, reach, speed * tape[at + 3][0])
-            accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3])
+            accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator
 
@@ -164,9 +164,9 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
                 registers[count] = accumulator
                 accumulator = empty()
             elif code == POP:
-                accumulator = combine(operator, registers[count], accumulator, reach, header[3])
+                accumulator = combine(operator, registers[count], accumulator, reach, header[3], tape)
             elif code == POP_SWAPPED:
-                accumulator = combine(operator, accumulator, registers[count], reach, header[3])
+                accumulator = combine(operator, accumulator, registers[count], reach, header[3], tape)
             elif code == WARP:
                 points[count] = point
                 speeds[count] = speed

@@ -14,6 +14,7 @@ from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blobtree._typing import Box, Float64Array, IndexArray
 from blobtree.errors import InvalidNode
@@ -88,9 +89,9 @@ class ProgramNode:
         return self.children
 
     @property
-    def operator_parameter(self) -> float:
-        """The number that the operator takes besides its operands."""
-        return 0.0
+    def operator_parameters(self) -> tuple[float, ...]:
+        """The numbers that the operator takes besides its operands."""
+        return ()
 
     @property
     def warp_parameters(self) -> tuple[float, ...]:
@@ -145,6 +146,11 @@ class ProgramLeaf(ProgramNode):
     def program_children(self) -> tuple[ProgramNode, ...]:
         """No nodes: a leaf stands for itself."""
         return ()
+
+    @property
+    def data(self) -> ArrayLike | None:
+        """Numbers for the tape's data region, None for none; see `blobtree.tape.tape`."""
+        return None
 
 
 class ProgramPrimitive(ProgramLeaf):
@@ -267,13 +273,13 @@ class Run:
     stretched: bool
     """True if maps do not fold into the parameters, so that each primitive carries its inverse map."""
     operator: Operator
-    parameter: float
+    parameters: tuple[float, ...]
     primitives: list[PlacedPrimitive] = field(default_factory=list)
 
     def accepts(self, other: "Run") -> bool:
         """Return True if `other` only continues this run."""
-        key = (self.packer, self.stretched, self.operator, self.parameter)
-        return key == (other.packer, other.stretched, other.operator, other.parameter)
+        key = (self.packer, self.stretched, self.operator, self.parameters)
+        return key == (other.packer, other.stretched, other.operator, other.parameters)
 
     @property
     def packer(self) -> type[ProgramLeaf]:
@@ -294,7 +300,7 @@ class Pop:
 
     register: int
     operator: Operator
-    parameter: float
+    parameters: tuple[float, ...]
     swapped: bool = False
 
 
@@ -393,7 +399,7 @@ def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instructio
     """Yield smaller steps for a step that starts from an empty accumulator."""
     node, placement = _strip(step.node, step.placement)
     if isinstance(node, ProgramLeaf):
-        yield from _runs([PlacedPrimitive(node, placement)], SUM, 0.0)
+        yield from _runs([PlacedPrimitive(node, placement)], SUM, ())
     elif node.warp is not None:
         yield from _expand_warp(replace(step, node=node, placement=placement), node, node.warp)
     elif node.operator is not None:
@@ -414,7 +420,7 @@ def _expand_commutative(
     step: _Emit, node: ProgramNode, weights: dict[int, int]
 ) -> Iterator[_Emit | Instruction]:
     """Yield the heaviest operand first; primitives fold in at the end, kind by kind."""
-    operator, parameter = _operation(node)
+    operator, parameters = _operation(node)
     subtrees: list[_PlacedNode] = []
     primitives: list[PlacedPrimitive] = []
     for placed in _flatten(node, step.placement):
@@ -429,16 +435,16 @@ def _expand_commutative(
         else:
             yield Push(step.register)
             yield step.into(operand, placement, deeper=1)
-            yield Pop(step.register, operator, parameter)
+            yield Pop(step.register, operator, parameters)
     if not subtrees and not operator.starts_from_zero:
         first, *primitives = primitives
-        yield from _runs([first], SUM, 0.0)
-    yield from _runs(primitives, operator, parameter)
+        yield from _runs([first], SUM, ())
+    yield from _runs(primitives, operator, parameters)
 
 
 def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
     """Yield the left operand first, unless the right one needs more registers."""
-    operator, parameter = _operation(node)
+    operator, parameters = _operation(node)
     left, right = node.program_children
     left_placement = step.placement
     cuts = operator.support is Support.LEFT
@@ -447,7 +453,7 @@ def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> 
         leaf, placement = _strip(right, right_placement)
         assert isinstance(leaf, ProgramLeaf)
         yield step.into(left, left_placement)
-        yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameter)
+        yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameters)
         return
     swapped = weights[id(right)] > weights.get(id(left), SIMPLE)
     operands = [(left, left_placement), (right, right_placement)]
@@ -455,10 +461,12 @@ def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> 
     yield step.into(*first)
     yield Push(step.register)
     yield step.into(*second, deeper=1)
-    yield Pop(step.register, operator, parameter, swapped)
+    yield Pop(step.register, operator, parameters, swapped)
 
 
-def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: float) -> Iterator[Run]:
+def _runs(
+    primitives: Iterable[PlacedPrimitive], operator: Operator, parameters: tuple[float, ...]
+) -> Iterator[Run]:
     """Yield one run per kind of primitive, in the order in which the kinds first occur."""
     runs: dict[tuple[type[ProgramLeaf], bool], Run] = {}
     run: Run | None = None
@@ -469,17 +477,17 @@ def _runs(primitives: Iterable[PlacedPrimitive], operator: Operator, parameter: 
             packer, placement = type(placed.primitive), placed.placement
             kind = leaf_kind(placed.primitive)
             stretched = not placement.folds_into(kind)
-            run = runs.setdefault((packer, stretched), Run(kind, stretched, operator, parameter))
+            run = runs.setdefault((packer, stretched), Run(kind, stretched, operator, parameters))
         run.primitives.append(placed)
     yield from runs.values()
 
 
-def _operation(node: ProgramNode) -> tuple[Operator, float]:
-    """Return operator and parameter; a Ricci blend of exponent 1 is the sum (GLSL has no pow(0, 0))."""
+def _operation(node: ProgramNode) -> tuple[Operator, tuple[float, ...]]:
+    """Return operator and parameters; a Ricci blend of exponent 1 is the sum (GLSL has no pow(0, 0))."""
     assert node.operator is not None
-    if node.operator is RICCI and node.operator_parameter == 1.0:
-        return SUM, 0.0
-    return node.operator, node.operator_parameter
+    if node.operator is RICCI and node.operator_parameters == (1.0,):
+        return SUM, ()
+    return node.operator, node.operator_parameters
 
 
 def _strip(node: ProgramNode, placement: Placement) -> tuple[ProgramNode, Placement]:

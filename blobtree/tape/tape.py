@@ -1,6 +1,7 @@
 """Program → tape: one flat array that Warp and GLSL read alike, and that an edit overwrites in place.
 
-Layout, in texels (vec4 of float32):
+Layout, in texels (vec4 of float32). First the data region, `Tape.start` texels without instructions, then one
+instruction after the other:
 
     header     (code, operator, count, parameter)
       code ≥ 0     a run of `count` primitives of the instruction set's skeletons[code], behind the header:
@@ -14,9 +15,20 @@ Layout, in texels (vec4 of float32):
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
       WARP         before PREFIX texels: the rows of a world → local map, then (its largest stretch, and the
                    warp's parameters); `operator` is the warp's code, `count` the register for the point
-        UNWARP       the same; ends what WARP began
+      UNWARP       the same; ends what WARP began
 
-All texels of a primitive are adjacent, so a slice of a tape is a tape.
+`parameter` is the number that the operator takes. An operator with several parameters has them in the data
+region, four to a texel, and `parameter` is the index of the first of these texels.
+
+All texels of a primitive are adjacent, so a slice of the instructions is a tape, as long as the data region
+stays where it is. Every pruned tape (of cells, meshes and rays) lies in an array that begins with the same
+data region, so an index into it holds in all of them.
+
+The region holds what an instruction reads besides its own texels: parameters of operators, vertices, samples
+of grids. `DataRegion.add` stores a block of numbers and returns the index of its first texel; the instruction
+holds this index in one of its own texels. Equal blocks are stored once. For leaves this is automatic: if
+`ProgramLeaf.data` returns numbers, their index becomes the first number of the leaf's parameters.
+Without such instructions the region is empty.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,12 +39,13 @@ from typing import Any, cast
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.data_region import DataRegion
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, instruction_set_for
 from blobtree.tape.program import (
     EnterWarp,
@@ -97,6 +110,8 @@ class Tape:
         int64[k]: indices in `data` where the instructions begin.
     fields
         Codes of the direct fields in use.
+    start
+        Number of texels of the data region, behind which the instructions begin.
 
     Examples
     --------
@@ -115,6 +130,7 @@ class Tape:
     instruction_set: InstructionSet = BUILT_IN
     headers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     fields: tuple[int, ...] = ()
+    start: int = 0
 
     def on(self, device: str | None = None) -> DeviceTape:
         """Return this tape on a Warp device, by default the current one."""
@@ -123,7 +139,7 @@ class Tape:
 
 @lru_cache(maxsize=64)
 def _upload(tape: Tape, device: str) -> DeviceTape:
-    return DeviceTape(wp.array(tape.data, dtype=wp.vec4, device=device), wp.vec2i(0, len(tape.data)))
+    return DeviceTape(wp.array(tape.data, dtype=wp.vec4, device=device), wp.vec2i(tape.start, len(tape.data)))
 
 
 def compile_tape(program: list[Instruction], precision: Precision = np.float32) -> Tape:
@@ -150,10 +166,12 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     warps = {step.warp for step in program if isinstance(step, EnterWarp)}
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
     instruction_set = instruction_set_for(skeletons, operators, warps, fields)
-    texels = [np.concatenate(list(_texels(step, instruction_set))) for step in program]
-    ends = np.cumsum([len(part) for part in texels])
+    region = DataRegion(precision)
+    texels = [np.concatenate(list(_texels(step, instruction_set, region))) for step in program]
+    start = len(region.texels)
+    ends = start + np.cumsum([len(part) for part in texels])
     return Tape(
-        data=np.concatenate(texels).astype(precision),
+        data=np.concatenate([region.texels, *texels]).astype(precision),
         registers=registers,
         skeletons=tuple(sorted(map(instruction_set.skeletons.index, skeletons))),
         operators=tuple(sorted(map(instruction_set.operators.index, operators))),
@@ -162,30 +180,43 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
         warp_registers=warp_registers,
         fields=tuple(sorted(map(instruction_set.fields.index, fields))),
         instruction_set=instruction_set,
-        headers=np.concatenate([[0], ends[:-1]]).astype(np.int64),
+        headers=np.concatenate([[start], ends[:-1]]).astype(np.int64),
+        start=start,
     )
 
 
-def _texels(step: Instruction, instruction_set: InstructionSet) -> Iterator[NDArray[np.float64]]:
+def _texels(
+    step: Instruction, instruction_set: InstructionSet, region: DataRegion
+) -> Iterator[NDArray[np.float64]]:
     """Yield the texels (·, 4) of one instruction."""
     match step:
         case Push(register):
             yield np.array([[PUSH, 0.0, register, 0.0]])
-        case Pop(register, operator, parameter, swapped):
+        case Pop(register, operator, parameters, swapped):
             code = POP_SWAPPED if swapped else POP
+            parameter = _parameter(parameters, region)
             yield np.array([[code, instruction_set.operators.index(operator), register, parameter]])
         case EnterWarp():
             yield _warp_texels(WARP, step, instruction_set)
         case LeaveWarp(entry):
             yield _warp_texels(UNWARP, entry, instruction_set)
-        case Run(FieldKind() as kind, _, operator, parameter, primitives):
+        case Run(FieldKind() as kind, _, operator, parameters, primitives):
             code = instruction_set.fields.index(kind) + FIELD
+            parameter = _parameter(parameters, region)
             yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
-            yield _field_texels(primitives)
-        case Run(Skeleton() as kind, stretched, operator, parameter, primitives):
+            yield _field_texels(primitives, region)
+        case Run(Skeleton() as kind, stretched, operator, parameters, primitives):
             code = instruction_set.skeletons.index(kind) + (STRETCHED if stretched else 0)
+            parameter = _parameter(parameters, region)
             yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
-            yield _primitive_texels(primitives, stretched=stretched)
+            yield _primitive_texels(primitives, region, stretched=stretched)
+
+
+def _parameter(parameters: tuple[float, ...], region: DataRegion) -> float:
+    """Return the number of a header that stands for an operator's parameters."""
+    if len(parameters) > 1:
+        return region.add(parameters)
+    return parameters[0] if parameters else 0.0
 
 
 def _warp_texels(code: int, entry: EnterWarp, instruction_set: InstructionSet) -> NDArray[np.float64]:
@@ -204,7 +235,9 @@ def _map_texels(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.vstack([inverse[:3], [stretch, 0.0, 0.0, 0.0]])
 
 
-def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> NDArray[np.float64]:
+def _primitive_texels(
+    primitives: list[PlacedPrimitive], region: DataRegion, *, stretched: bool
+) -> NDArray[np.float64]:
     """Return parameters and colours of a run's primitives, all at once, for there may be a million.
 
     Similarity maps fold into the parameters. Under other maps each primitive carries its map, and points are
@@ -218,18 +251,29 @@ def _primitive_texels(primitives: list[PlacedPrimitive], *, stretched: bool) -> 
         matrices = np.array([placement.matrix for placement in placements])[placed_by]
         scales = np.array([placement.uniform_scale for placement in placements])[placed_by]
         grown = grown * scales[:, None]
-    parts = [nodes[0].packed(nodes, grown, matrices), _color_texels(nodes)]
+    parameters = _with_data(nodes[0].packed(nodes, grown, matrices), nodes, region)
+    parts = [parameters, _color_texels(nodes)]
     if stretched:
         parts.insert(0, _prefixes(placements)[placed_by])
     return np.concatenate(parts, axis=1).reshape(-1, 4)
 
 
-def _field_texels(placed_fields: list[PlacedPrimitive]) -> NDArray[np.float64]:
+def _field_texels(placed_fields: list[PlacedPrimitive], region: DataRegion) -> NDArray[np.float64]:
     """Return maps, parameters and colours of a run's direct fields, all at once."""
     placements, placed_by = distinct_placements(placed_fields)
     leaves = grown_fields(placed_fields)
-    parts = [_prefixes(placements)[placed_by], leaves[0].packed_fields(leaves), _color_texels(leaves)]
+    parameters = _with_data(leaves[0].packed_fields(leaves), leaves, region)
+    parts = [_prefixes(placements)[placed_by], parameters, _color_texels(leaves)]
     return np.concatenate(parts, axis=1).reshape(-1, 4)
+
+
+def _with_data(
+    parameters: NDArray[np.float64], leaves: Sequence[ProgramLeaf], region: DataRegion
+) -> NDArray[np.float64]:
+    """Return parameters (n, ·, 4), the first number of which is the index of the leaf's data, if any."""
+    if leaves[0].data is not None:
+        parameters[:, 0, 0] = [region.add(cast("ArrayLike", leaf.data)) for leaf in leaves]
+    return parameters
 
 
 def _prefixes(placements: list[Placement]) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from blobtree.transpile.glsl import uniform_struct
 wp.set_module_options(KERNEL_OPTIONS)
 
 MAX_STEPS = 4096
-"""More steps of a tolerance than a block has along its diagonal, so that every ray leaves its block.
+"""More steps of a tolerance than a block has along its diagonal, so every ray leaves its block.
 
 Blocks are 64 along the longest side of a box, and a tolerance is 1e-5 of its diagonal: 2,707 steps at most.
 """
@@ -47,6 +47,7 @@ BLOCK_OVERLAP = 0.1
     counts="grid_counts",
     tolerance="tolerance",
     tape="tape",
+    start="tape_start",
     blocks="blocks",
 )
 class RayCells:
@@ -57,6 +58,7 @@ class RayCells:
     counts: wp.vec3i
     tolerance: wp.float32
     tape: wp.array(dtype=wp.vec4)
+    start: wp.int32
     blocks: wp.array(dtype=wp.int32)
 
 
@@ -173,7 +175,8 @@ def trace_ray(origin: wp.vec3, direction: wp.vec3, cells: RayCells) -> wp.vec3:
         leave = exit_distance(entry, inverse, corner, corner + wp.vec3(size, size, size))
         leave = wp.max(leave, t) + BLOCK_OVERLAP * cells.tolerance
         if block == SURELY_INSIDE:
-            return wp.vec3(interval[0] + t, 1.0, 1.0 + cells.tape[0][0])
+            whole = float(cells.start + 1)
+            return wp.vec3(interval[0] + t, whole, whole + cells.tape[cells.start][0])
         if block >= 0:
             span = wp.vec2i(block + 1, block + 1 + int(cells.tape[block][0]))
             hit = first_hit(entry, direction, t, leave, cells.tolerance, cells.tape, span)

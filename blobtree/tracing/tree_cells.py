@@ -36,7 +36,10 @@ class TracingCells:
     Attributes
     ----------
     tape
-        float32[m, 4]: the whole tape and the blocks' pruned ones, each behind a texel with its length.
+        float32[m, 4]: the data region, then the whole tape and the blocks' pruned ones, each behind a texel
+        with its length.
+    start
+        Number of texels of the data region.
     blocks
         int32[nx ny nz], the last axis fastest: for each block the texel in front of its tape, SURELY_INSIDE,
         or the number of empty layers around it (see `ray_kernels.EMPTY`).
@@ -49,6 +52,7 @@ class TracingCells:
     """
 
     tape: Float32Array
+    start: int
     blocks: Int32Array
     lower: Float32Array
     block_size: float
@@ -95,12 +99,14 @@ def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> Tra
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
     cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
     cells = build_cells(tape, grid_from(*bounds, cell_size), device=device)
-    whole = np.array([[len(tape.data), 0.0, 0.0, 0.0]], np.float32)
-    first_texels = cells.leaves.spans.numpy()[:, 0] + len(tape.data)
+    region, whole = np.split(tape.data, [tape.start])
+    length = np.array([[len(whole), 0.0, 0.0, 0.0]], np.float32)
+    first_texels = cells.leaves.spans.numpy()[:, 0] + len(whole)
     block_size = cell_size * BRANCHING
     blocks = _table(cells, first_texels, np.ceil((bounds[1] - bounds[0]) / block_size).astype(int))
     return TracingCells(
-        tape=np.concatenate([whole, tape.data, cells.leaves.tape.numpy()]),
+        tape=np.concatenate([region, length, whole, cells.leaves.tape.numpy()[tape.start :]]),
+        start=tape.start,
         blocks=blocks.ravel(),
         lower=cells.grid.origin.astype(np.float32),
         block_size=block_size,
@@ -167,5 +173,6 @@ def _device_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> Devi
     arrays.lower, arrays.counts = wp.vec3(*cells.lower.tolist()), wp.vec3i(*cells.counts)
     arrays.block_size, arrays.tolerance = cells.block_size, cells.tolerance
     arrays.tape = wp.array(cells.tape, dtype=wp.vec4, device=device)
+    arrays.start = cells.start
     arrays.blocks = wp.array(cells.blocks, dtype=wp.int32, device=device)
     return DeviceCells(arrays.tape, arrays, cells.instruction_set)

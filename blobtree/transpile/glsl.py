@@ -18,6 +18,7 @@ import warp as wp
 
 from blobtree.errors import UntranslatableFunction
 from blobtree.transpile.builtins import BUILTINS, CASTS, HELPERS, RESERVED_WORDS, Expression, type_name
+from blobtree.transpile.specialize import parameter_count
 
 TEXTURE_WIDTH_BITS = 12
 """Data textures are 1 << 12 = 4096 texels wide: room for an index of millions."""
@@ -110,12 +111,16 @@ def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ())
 def translate_choice(chooser: Any, choices: Mapping[int, Any]) -> str:
     """Return GLSL of `chooser`: a call of the function whose code is the first argument, with the others.
 
-    The last function of `choices` takes all codes that are left.
+    A function that declares fewer parameters gets the first ones. The last function of `choices` takes all
+    codes that are left.
     """
     translator = _Translator(chooser)
     signature = translator.signature()
     selector, *arguments = (spell(name) for name in translator.types)
-    calls = {code: f"{choice.key}({', '.join(arguments)})" for code, choice in choices.items()}
+    calls = {
+        code: f"{choice.key}({', '.join(arguments[: parameter_count(choice)])})"
+        for code, choice in choices.items()
+    }
     last = list(calls)[-1]
     tests = [
         f"    if ({selector} == {code}) {{ return {call}; }}" for code, call in calls.items() if code != last

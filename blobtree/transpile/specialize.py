@@ -3,7 +3,8 @@
 `unrolled` replaces ``for code in range(wp.static(len(TABLE)))`` by a copy of the loop's body for each row.
 Warp unrolls such loops too, but only at compile time. The functions in the table are then no reliable part of
 the key of Warp's kernel cache: stale kernels are kept, and others are compiled twice. An unrolled function
-names its callees, so the key covers them.
+names its callees, so the key covers them. A row's function that declares fewer parameters than the call has
+arguments gets the first ones.
 """
 
 import ast
@@ -62,6 +63,11 @@ def warp_function(_function: FunctionType) -> wp.Function:
     Warp looks for overloads among the local variables of its caller. This function has none.
     """
     return cast("wp.Function", wp.func(_function))
+
+
+def parameter_count(function: wp.Function) -> int:
+    """Return the number of parameters that a typed function declares."""
+    return len(inspect.signature(cast("FunctionType", function.func)).parameters)
 
 
 def _is_filled(cell: CellType) -> bool:
@@ -145,6 +151,8 @@ class _Unroller(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> Any:
         """Replace `wp.static(...)` by its value."""
+        if isinstance(node.func, ast.Call) and _is_static(node.func):
+            node.args = node.args[: parameter_count(self._evaluate(node.func))]
         if not _is_static(node):
             return self.generic_visit(node)
         value = self._evaluate(node)

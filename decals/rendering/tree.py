@@ -204,7 +204,7 @@ case {code}:
         float rate = speed / {min_influence}(tape, at);
         at += {stride};
         FIELD field = LEAF(point, c, PRIMITIVE_COLOR, {direction}, reach, rate);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}
     break;
 """
@@ -219,7 +219,8 @@ case {code}:
         float rate = local_speed / {min_influence}(tape, map + {prefix});
         at += {stride};
         FIELD field = LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate);
-        accumulator = COMBINE(operator_, accumulator, PULLBACK_AFFINE(field, tape, map), reach, header.w);
+        field = PULLBACK_AFFINE(field, tape, map);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}
     break;
 """
@@ -235,7 +236,8 @@ case {code}:
         at += {stride};
         FIELD field = DIRECT(
             {kind}, local, tape, map + {prefix}, PRIMITIVE_COLOR, along, reach, local_speed);
-        accumulator = COMBINE(operator_, accumulator, PULLBACK_AFFINE(field, tape, map), reach, header.w);
+        field = PULLBACK_AFFINE(field, tape, map);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}
     break;
 """
@@ -255,8 +257,8 @@ case {POP_SWAPPED}: {{
     FIELD kept = r0;
     switch (count) {{ {load} }}
     accumulator = int(header.x) == {POP}
-        ? COMBINE(operator_, kept, accumulator, reach, header.w)
-        : COMBINE(operator_, accumulator, kept, reach, header.w);
+        ? COMBINE(operator_, kept, accumulator, reach, header.w, tape)
+        : COMBINE(operator_, accumulator, kept, reach, header.w, tape);
     break;
 }}
 """
@@ -405,6 +407,7 @@ def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
         "block_size": cells.block_size,
         "grid_counts": cells.counts,
         "tolerance": cells.tolerance,
+        "tape_start": cells.start,
     }
 
 

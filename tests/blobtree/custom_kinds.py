@@ -3,10 +3,23 @@
 import numpy as np
 
 from blobtree import Node, define_operator, define_skeleton
-from tests.blobtree.kernels import brick, carve, carve_steepest, mean, path, ring, shared, soft, swell
+from tests.blobtree.kernels import (
+    brick,
+    carve,
+    carve_steepest,
+    mean,
+    path,
+    ring,
+    shared,
+    soft,
+    stew,
+    stew_steepest,
+    swell,
+)
 from tests.blobtree.trees import MoreKinds, random_trees, triple
 
 SOFTEST = 4.0
+STEW_PARAMETERS = ("left", "right", "both", "less_left", "less_right")
 
 Ring = define_skeleton(ring, limits={"axis": (1e-3, None), "size": (0.0, None)})
 Brick = define_skeleton(brick, convex=True)
@@ -16,8 +29,11 @@ Carve = define_operator(carve, steepest=carve_steepest, like="difference", monot
 Shared = define_operator(shared, steepest=2.0, like="intersection", monotone=True)
 Mean = define_operator(mean, steepest=0.5)
 Swell = define_operator(swell, steepest=1.0, like="blend", monotone=True, order_free=True)
+Stew = define_operator(
+    stew, steepest=stew_steepest, monotone=True, limits=dict.fromkeys(STEW_PARAMETERS, (0.0, 1.0))
+)
 
-KINDS = (Ring, Brick, Path, Soft, Carve, Shared, Mean, Swell)
+KINDS = (Ring, Brick, Path, Soft, Carve, Shared, Mean, Swell, Stew)
 
 
 def random_custom_leaf(rng: np.random.Generator) -> Node:
@@ -34,7 +50,9 @@ def random_custom_leaf(rng: np.random.Generator) -> Node:
 
 
 def random_custom_combination(rng: np.random.Generator, operands: list[Node]) -> Node:
-    kind = int(rng.integers(0, 5))
+    kind = int(rng.integers(0, 6))
+    if kind == 5:
+        return Stew(tuple(operands[:2]), *rng.uniform(0.0, 1.0, 5).tolist())
     if kind == 0:
         return Soft(tuple(operands[:2]), float(rng.choice([0.5, 2.0, SOFTEST])))
     if kind == 1:
@@ -49,7 +67,10 @@ def everything() -> Node:
     """A tree of all kinds: once its tape is made, trees of fewer kinds share its kernels."""
     first, second = Ring((0, 0, 0), (0, 0, 1), 0.7, radius=0.2), Brick((1, 0, 0), (1, 1, 1), radius=0.2)
     third = Path((0, 0, 0), (0, 1, 0), (0, 1, 1), radius=0.2)
-    return Swell((Mean((Soft((first, second), 1.0), third)), Carve((second, Shared((first, second))))))
+    stewed = Stew((first, third), 0.9, 0.8, 0.7, 0.6, 0.5)
+    return Swell(
+        (stewed, Mean((Soft((first, second), 1.0), third)), Carve((second, Shared((first, second)))))
+    )
 
 
 EVERYTHING = everything()

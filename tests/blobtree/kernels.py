@@ -109,3 +109,34 @@ def swell(a: wp.float32, b: wp.float32) -> wp.vec3:
     y = b / larger
     root = wp.sqrt(x * x + y * y)
     return wp.vec3(larger * root, x / root, y / root)
+
+
+@wp.func
+def stew(
+    a: wp.float32,
+    b: wp.float32,
+    left: wp.float32,
+    right: wp.float32,
+    both: wp.float32,
+    less_left: wp.float32,
+    less_right: wp.float32,
+) -> wp.vec3:
+    """F = left·a + right·b + both·a b / (1 + less_left·a + less_right·b); a texel holds four."""
+    base = 1.0 + less_left * a + less_right * b
+    by_a = both * b * (1.0 + less_right * b) / (base * base)
+    by_b = both * a * (1.0 + less_left * a) / (base * base)
+    return wp.vec3(left * a + right * b + both * a * b / base, left + by_a, right + by_b)
+
+
+@wp.func
+def stew_steepest(
+    max_a: wp.float32,
+    max_b: wp.float32,
+    left: wp.float32,
+    right: wp.float32,
+    both: wp.float32,
+    less_left: wp.float32,
+    less_right: wp.float32,
+) -> wp.vec2:
+    """Bounds on the partial derivatives, whose fractions are at most the other operand."""
+    return wp.vec2(left + both * max_b, right + both * max_a)

@@ -84,6 +84,20 @@ def swell(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return value, a / safe, b / safe, np.full(len(a), np.inf)
 
 
+def stew(
+    a: Floats, b: Floats, left: float, right: float, both: float, less_left: float, less_right: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """The partial derivatives by central differences."""
+
+    def value(a: Floats, b: Floats) -> Floats:
+        return left * a + right * b + both * a * b / (1.0 + less_left * a + less_right * b)
+
+    step = 1e-5
+    by_a = (value(a + step, b) - value(a - step, b)) / (2.0 * step)
+    by_b = (value(a, b + step) - value(a, b - step)) / (2.0 * step)
+    return value(a, b), by_a, by_b, np.full(len(a), np.inf)
+
+
 CLOSEST: dict[str, Callable[..., tuple[Floats, Floats]]] = {"ring": ring, "brick": brick, "path": path}
 OPERATORS: dict[str, Callable[..., tuple[Floats, Floats, Floats, Floats]]] = {
     "soft": soft,
@@ -91,4 +105,5 @@ OPERATORS: dict[str, Callable[..., tuple[Floats, Floats, Floats, Floats]]] = {
     "shared": shared,
     "mean": mean,
     "swell": swell,
+    "stew": stew,
 }

@@ -23,6 +23,12 @@ def test_sums_leave_out_their_own_count(counts: list[int]) -> None:
     assert starts.numpy().tolist() == np.cumsum([0, *counts[:-1]], dtype=np.int64).tolist()
 
 
+def test_sums_may_begin_at_a_number() -> None:
+    starts, total = exclusive_scan(uploaded([3, 0, 2, 0]), "things", start=7)
+    assert starts.numpy().tolist() == [7, 10, 10, 12]
+    assert total == 12
+
+
 @pytest.mark.parametrize(
     "counts", [[LARGEST, 1, 0], [LARGEST] * 4 + [0]], ids=["one too many", "twice around"]
 )

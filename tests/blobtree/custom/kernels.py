@@ -134,10 +134,6 @@ def vanishes_in_single_precision(a: wp.float32, b: wp.float32) -> wp.vec3:
     return wp.vec3(f, a / f, b / f)
 
 
-def takes_two_parameters(a: wp.float32, b: wp.float32, c: wp.float32, d: wp.float32) -> wp.vec3:
-    return wp.vec3(a + b, 1.0, 1.0)
-
-
 def takes_a_vector(a: wp.float32, b: wp.vec2) -> wp.vec3:
     return wp.vec3(a, 1.0, 0.0)
 

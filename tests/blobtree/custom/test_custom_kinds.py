@@ -51,7 +51,7 @@ def test_no_ray_passes_through_unseen(seed: int, kinds: MoreKinds) -> None:
         reached = tree(origins[hit] + seen[hit, None] * directions[hit])
         hits += int(hit.sum())
         on_surface += int((np.abs(reached - ISO) < 0.01).sum())
-    assert hits > 50
+    assert hits > 40
     assert on_surface > 0.95 * hits
 
 

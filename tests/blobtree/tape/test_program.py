@@ -115,7 +115,7 @@ def test_a_run_holds_one_skeleton_one_operator_and_one_kind_of_map() -> None:
     assert [s.operator for s in compile_program(Union((ball, ball))) if isinstance(s, Run)] == [UNION]
     assert [s.operator for s in compile_program(ball & ball) if isinstance(s, Run)] == [SUM, INTERSECTION]
     different = Ricci((ball, Ricci((ball, ball), exponent=2.0)), exponent=3.0)
-    assert [s.parameter for s in compile_program(different) if isinstance(s, Run)] == [2.0, 3.0]
+    assert [s.parameters for s in compile_program(different) if isinstance(s, Run)] == [(2.0,), (3.0,)]
 
 
 def test_nested_combinations_of_one_kind_are_one_run() -> None:

@@ -37,7 +37,7 @@ PICTURES = {
 def read_tape(context: Context, tree: Any, kinds: Kinds, reading: int, points: NDArray[Any]) -> Any:
     shader, _, _ = tracing_shader(kinds).text.partition("void main()")
     textures = {"tape": tree.tape.data, "points": padded(points)}
-    uniforms = {"reading": reading, "part": (0, len(tree.tape.data))}
+    uniforms = {"reading": reading, "part": (tree.tape.start, len(tree.tape.data))}
     return run_program(context, shader + MAIN, len(points), textures, uniforms)
 
 

@@ -36,7 +36,7 @@ def read_tape(
     """What the tracing shader's own functions give for `tree`, in place of a picture."""
     shader, _, _ = tracing_shader(kinds).text.partition("void main()")
     textures = {"tape": tree.tape.data, "points": padded(points)}
-    uniforms = {"reading": reading, "part": (0, len(tree.tape.data)), "heading": heading}
+    uniforms = {"reading": reading, "part": (tree.tape.start, len(tree.tape.data)), "heading": heading}
     return run_program(context, shader + MAIN, len(points), textures, uniforms)
 
 
