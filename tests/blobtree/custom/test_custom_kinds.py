@@ -24,7 +24,8 @@ UNIT_RING = Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.2)
 def test_the_random_trees_hold_every_custom_kind_and_maps_among_them() -> None:
     kinds = {type(node) for tree in CUSTOM_TREES for node in postorder(tree)}
     assert set(KINDS) <= kinds
-    assert {tree.tape.instruction_set for tree in CUSTOM_TREES} == {BUILT_IN, EVERYTHING.tape.instruction_set}
+    used = {tree.tape.instruction_set for tree in CUSTOM_TREES}
+    assert EVERYTHING.tape.instruction_set in used <= {BUILT_IN, EVERYTHING.tape.instruction_set}
     assert sum(tree.tape.stretched for tree in CUSTOM_TREES) > 30
 
 
