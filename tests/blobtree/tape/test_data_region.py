@@ -66,7 +66,7 @@ def test_the_region_lies_in_front_of_the_instructions() -> None:
     np.testing.assert_array_equal(tape.data[:4, 0], [-1, 1, 0, 0])
     np.testing.assert_array_equal(tape.data[[5, 7], 0], [0, 2])
     assert tape.headers.tolist() == [4]
-    span = tape.on("cpu").span
+    span: Any = tape.on("cpu").span
     assert (span[0], span[1]) == (4, len(tape.data))
     assert (PAIRS | PAIRS.translate((0, 0, 1))).tape.start == 4, "the map is not in the data"
     assert Point((0, 0, 0), radius=1.0).tape.start == 0
