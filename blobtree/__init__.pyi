@@ -21,9 +21,9 @@ from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
-from .nodes.curves import Arc, Circle, CubicBezier, QuadraticBezier
+from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
 from .nodes.fields import FieldPrimitive, Superquadric
-from .nodes.flats import Rectangle, Triangle
+from .nodes.flats import Polygon, Rectangle, Triangle
 from .nodes.numeric_parameters import (
     NumericParameter,
     numeric_parameters,
@@ -32,7 +32,7 @@ from .nodes.numeric_parameters import (
 )
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
-from .nodes.solids import Cylinder, Ellipsoid
+from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
 from .progress import Cancel, Progress
 from .tape.tape import Tape
@@ -56,6 +56,7 @@ __all__ = [
     "Disc",
     "Ellipsoid",
     "FieldPrimitive",
+    "HalfSpace",
     "Hits",
     "ImplicitDecalsError",
     "Intersection",
@@ -72,15 +73,19 @@ __all__ = [
     "Offset",
     "ParameterGradient",
     "Point",
+    "Polygon",
     "Polygonizer",
+    "Polyline",
     "Progress",
     "QuadraticBezier",
     "Rectangle",
     "Ricci",
     "Segment",
+    "Stroke",
     "Sum",
     "Superquadric",
     "Tape",
+    "TaperedBezier",
     "Torus",
     "Transform",
     "Triangle",

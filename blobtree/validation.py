@@ -51,6 +51,25 @@ def finite_vector(name: str, value: object) -> Vector:
     return numbers
 
 
+def finite_points(name: str, value: object) -> tuple[Vector, ...]:
+    """Return `value` as points of three floats; raise `InvalidNode` if they are no rows of finite numbers."""
+    try:
+        values = real(value).tolist() if isinstance(value, np.ndarray) else value
+        rows = tuple(cast(Iterable[Any], values))
+    except TypeError:
+        raise InvalidNode(f"{name}: expected points (x, y, z), got {reprlib.repr(value)}") from None
+    return tuple(finite_vector(f"{name}[{place}]", row) for place, row in enumerate(rows))
+
+
+def positive_numbers(name: str, value: object) -> tuple[float, ...]:
+    """Return `value` as floats above 0, a single number as one; raise `InvalidNode` otherwise."""
+    try:
+        numbers = tuple(cast(Iterable[Any], value))
+    except TypeError:
+        return (positive_number(name, value),)
+    return tuple(positive_number(f"{name}[{place}]", number) for place, number in enumerate(numbers))
+
+
 def nonzero_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats that are not all 0; raise `InvalidNode` otherwise."""
     vector = finite_vector(name, value)

@@ -1,6 +1,7 @@
-"""Primitives along curves: circles, arcs and Bézier curves with a visible radius around them."""
+"""Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii."""
 
 from dataclasses import KW_ONLY, dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -9,8 +10,10 @@ from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.curve_skeletons import ARC, CURVE
 from blobtree.formulas.skeletons import CIRCLE
+from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Primitive, beside, octagons
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Primitive, Segment, beside, octagons
+from blobtree.nodes.tree import Macro, Node, Union
 from blobtree.validation import Vector
 
 STRAIGHTEST_ARC = 1e3
@@ -21,6 +24,9 @@ ARC_PIECES = 4
 
 BERNSTEIN_TO_POWERS = np.array([[1, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]], np.float64)
 """Coefficients of t⁰ to t³, as rows, from the control points of a cubic Bézier curve."""
+
+STEEPEST_RADIUS = 0.5
+"""Part of a stroke's radius at a point by which the radius of the next control point may differ from it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,3 +199,154 @@ class CubicBezier(BezierCurve):
     _: KW_ONLY
     radius: Radius
     color: Color = DEFAULT_COLOR
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TaperedBezier(Primitive):
+    """A tube around a parabola, whose radius varies as the fourth coordinate of a quadratic Bézier curve.
+
+    The radius is (1 − t)² r₀ + 2 t (1 − t) r₁ + t² r₂, with `control_radius` as r₁.
+
+    Examples
+    --------
+    >>> from blobtree import TaperedBezier
+    >>> horn = TaperedBezier(
+    ...     (-1, 0, 0), (0, 2, 0), (1, 0, 0), radius=0.3, control_radius=0.2, end_radius=0.1
+    ... )
+    >>> horn([[0, 1, 0.2]]).round(2).tolist()
+    [0.5]
+    """
+
+    file_tag = "tapered_bezier"
+    skeleton = CURVE
+
+    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the curve")]
+    control: Annotated[Vector, Parameter(Quantity.POINT, "where the tangents of the ends meet")]
+    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the curve")]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the start")]
+    control_radius: Annotated[float, Parameter(Quantity.RADIUS, "second Bernstein coefficient of the radius")]
+    end_radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the end")]
+    color: Color = DEFAULT_COLOR
+
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return the coefficients of powers of t of the curve and of its influence radius."""
+        balls = np.concatenate([np.stack(list(columns.values()), axis=1), influences[:, :, None]], axis=2)
+        start, control, end = balls.transpose(1, 0, 2)
+        powers = [start, 2.0 * (control - start), start - 2.0 * control + end, np.zeros_like(start)]
+        return np.stack(powers, axis=1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Polyline(Macro, Leaf):
+    """A tube around straight lines from point to point: the union of segments.
+
+    Raises
+    ------
+    InvalidNode
+        There are less than two points, or all are equal.
+
+    Examples
+    --------
+    >>> from blobtree import Polyline
+    >>> pipe = Polyline([(0, 0, 0), (1, 0, 0), (1, 1, 0)], radius=0.1)
+    >>> pipe([[0.5, 0.1, 0], [1.1, 0.5, 0]]).round(3).tolist()
+    [0.5, 0.5]
+    """
+
+    file_tag = "polyline"
+
+    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
+    _: KW_ONLY
+    radius: Radius
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(set(self.points)) < 2:
+            raise InvalidNode(
+                f"points: expected at least two different points, got {self.points}; use a Point for one"
+            )
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return the union of segments between different neighbours."""
+        ends = [pair for pair in pairwise(self.points) if pair[0] != pair[1]]
+        return Union(tuple(Segment(*pair, radius=self.radius, color=self.color) for pair in ends))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stroke(Macro, Leaf):
+    """A smooth tube through points, with the given radii there: a Catmull–Rom spline of any length.
+
+    The tangents are those of the chordal Catmull–Rom spline (Catmull & Rom 1974; Barry & Goldman 1988). Two
+    parabolas in the four coordinates x, y, z and radius join two points, so curve and radius are C¹. Where
+    radii change steeply, their slope is limited, so that they stay above 0. The pieces join in a union.
+
+    Raises
+    ------
+    InvalidNode
+        There are less than two points, neighbours are equal, or the number of radii is another.
+
+    Examples
+    --------
+    >>> from blobtree import Stroke
+    >>> worm = Stroke([(0, 0, 0), (1, 1, 0), (2, 0, 0)], [0.1, 0.3, 0.1])
+    >>> worm([[1, 1.3, 0], [1, 1, 0.3]]).round(3).tolist()
+    [0.5, 0.5]
+    """
+
+    file_tag = "stroke"
+
+    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
+    radii: Annotated[
+        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
+    ]
+    _: KW_ONLY
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.points) < 2 or any(a == b for a, b in pairwise(self.points)):
+            raise InvalidNode(
+                f"points: expected two or more points, each other than the one before, got {self.points}"
+            )
+        if len(self.radii) == 1:
+            object.__setattr__(self, "radii", self.radii * len(self.points))
+        if len(self.radii) != len(self.points):
+            raise InvalidNode(
+                f"radii: expected one for each of {len(self.points)} points, or one for all, "
+                f"got {len(self.radii)}"
+            )
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return the union of two parabolas per span."""
+        balls = np.column_stack([self.points, self.radii])
+        lengths = np.linalg.norm(np.diff(balls[:, :3], axis=0), axis=1)[:, None]
+        slopes = _chordal_slopes(balls, lengths)
+        longest = np.maximum(np.vstack([lengths, [[0.0]]]), np.vstack([[[0.0]], lengths]))[:, 0]
+        steepest = 4.0 * STEEPEST_RADIUS * balls[:, 3] / longest
+        slopes[:, 3] = np.clip(slopes[:, 3], -steepest, steepest)
+        after = balls[:-1] + 0.25 * lengths * slopes[:-1]
+        before = balls[1:] - 0.25 * lengths * slopes[1:]
+        middles = 0.5 * (after + before)
+        first = np.stack([balls[:-1], after, middles], axis=1)
+        second = np.stack([middles, before, balls[1:]], axis=1)
+        pieces = np.stack([first, second], axis=1).reshape(-1, 3, 4).tolist()
+        return Union(tuple(_piece(*controls, color=self.color) for controls in pieces))
+
+
+def _chordal_slopes(balls: Float64Array, lengths: Float64Array) -> Float64Array:
+    """Return derivatives (n, 4) by length: of parabolas through three neighbours, of lines at the ends."""
+    chords = np.diff(balls, axis=0) / lengths
+    inner = (lengths[1:] * chords[:-1] + lengths[:-1] * chords[1:]) / (lengths[1:] + lengths[:-1])
+    slopes: Float64Array = np.concatenate([chords[:1], inner, chords[-1:]])
+    return slopes
+
+
+def _piece(start: list[float], control: list[float], end: list[float], *, color: Vector) -> TaperedBezier:
+    a, b, c = (tuple(ball[:3]) for ball in (start, control, end))
+    radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
+    return TaperedBezier(a, b, c, **radii, color=color)  # type: ignore[arg-type]  # lists of four

@@ -1,4 +1,4 @@
-"""Primitives around flat skeletons: rectangles and triangles, with rounded edges."""
+"""Primitives around flat skeletons: rectangles, triangles and polygons, with rounded edges."""
 
 from dataclasses import KW_ONLY, dataclass
 from itertools import product
@@ -9,12 +9,17 @@ import numpy as np
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.flat_skeletons import RECTANGLE, TRIANGLE
+from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Primitive, beside
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Primitive, beside
+from blobtree.nodes.tree import Macro, Node, Union
 from blobtree.validation import Vector
 
 SMALLEST_SINE = 1e-6
 """Sine of an angle below which two directions count as parallel."""
+
+FLATNESS = 1e-5
+"""Distance of a polygon's corners from a plane, over its size, up to which it counts as planar."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,3 +132,124 @@ class Triangle(Primitive):
         zeros = np.zeros(len(a))
         rows = [beside(vectors, zeros) for vectors in (b - a, c - a, normals)]
         return np.stack([beside(a, influences[:, 0]), *rows], axis=1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Polygon(Macro, Leaf):
+    """A flat polygon with a rounded edge, also a concave one: the union of triangles that fill it.
+
+    The triangles are ears of the polygon (Meisters 1975), and differ from it by `FLATNESS` at most.
+
+    Raises
+    ------
+    InvalidNode
+        There are less than three corners, they do not lie in a plane, or edges cross or touch each other.
+
+    Examples
+    --------
+    >>> from blobtree import Polygon
+    >>> arrow = Polygon([(0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)], radius=0.1)
+    >>> arrow([[1, 1, 0.1], [0.4, 1, 0]]).round(3).tolist()
+    [0.5, 0.5]
+    """
+
+    file_tag = "polygon"
+
+    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "corners in order, at least three")]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.points) < 3:
+            raise InvalidNode(f"points: expected at least three corners, got {self.points}; use a Segment")
+        if crossing := _crossing(_in_plane(np.array(self.points))):
+            raise InvalidNode(
+                f"points: expected a simple polygon, got edges from corners {crossing[0]} and {crossing[1]} "
+                "that meet; remove repeated corners, and split the polygon where it crosses itself"
+            )
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return the union of ears."""
+        ears = _ears(_in_plane(np.array(self.points)))
+        corners = [[self.points[place] for place in ear] for ear in ears]
+        return Union(tuple(Triangle(*ear, radius=self.radius, color=self.color) for ear in corners))
+
+
+def _in_plane(points: Float64Array) -> Float64Array:
+    """Return the corners of a polygon (n, 3) in its plane (n, 2), in units of its size, counter-clockwise."""
+    centered = points - points.mean(axis=0)
+    size = np.abs(centered).max()
+    if size > 0.0:
+        centered = centered / size
+    _, _, axes = np.linalg.svd(centered, full_matrices=False)
+    away = np.abs(centered @ axes[2]).max()
+    if size == 0.0 or away > FLATNESS:
+        raise InvalidNode(
+            f"points: expected corners in one plane, got corners up to {away * size:g} away from it; "
+            "split the polygon into triangles"
+        )
+    flat: Float64Array = centered @ axes[:2].T
+    if _cross(flat, np.roll(flat, -1, axis=0)).sum() < 0.0:
+        flat[:, 1] *= -1.0
+    return flat
+
+
+def _cross(a: Float64Array, b: Float64Array) -> Float64Array:
+    """Return the cross products of vectors in the plane."""
+    result: Float64Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return result
+
+
+def _crossing(points: Float64Array) -> tuple[int, int] | None:
+    """Return the first corners of two edges of a polygon that meet where they should not, None if none do."""
+    count = len(points)
+    ends = np.roll(points, -1, axis=0)
+    for first in range(count):
+        rest = np.arange(first + 1, count)
+        a, b, c, d = points[first], ends[first], points[rest], ends[rest]
+        sides = [_cross(b - a, c - a), _cross(b - a, d - a), _cross(d - c, a - c), _cross(d - c, b - c)]
+        c_ab, d_ab, a_cd, b_cd = (np.where(np.abs(side) <= SMALLEST_SINE**2, 0.0, side) for side in sides)
+        overlap = (np.minimum(a, b) <= np.maximum(c, d)) & (np.minimum(c, d) <= np.maximum(a, b))
+        meet = (c_ab * d_ab <= 0.0) & (a_cd * b_cd <= 0.0) & overlap.all(axis=1)
+        neighbours = (rest == first + 1) | ((first == 0) & (rest == count - 1))
+        folded = (c_ab == 0.0) & (d_ab == 0.0) & (((b - a) * (d - c)).sum(axis=1) < 0.0)
+        short = (c == d).all(axis=1) | bool((a == b).all())
+        meet = np.where(neighbours, folded | short, meet)
+        if meet.any():
+            return first, int(rest[meet.argmax()])
+    return None
+
+
+def _ears(points: Float64Array) -> list[tuple[int, int, int]]:
+    """Return triangles, by their corners, that fill a simple polygon; corners on a line are left out."""
+    left = list(range(len(points)))
+    ears: list[tuple[int, int, int]] = []
+    while len(left) > 2:
+        place, flat = _ear(points, left)
+        if not flat:
+            ears.append((left[place - 1], left[place], left[(place + 1) % len(left)]))
+        del left[place]
+    return ears
+
+
+def _ear(points: Float64Array, left: list[int]) -> tuple[int, bool]:
+    """Return a corner to cut off a polygon: one on a line (then True), or else the roundest ear."""
+    corners = points[left]
+    before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
+    turns = _cross(corners - before, after - corners)
+    edges = [np.linalg.norm(a - b, axis=1) for a, b in ((corners, before), (after, corners), (before, after))]
+    roundness = turns / np.maximum(np.max(edges, axis=0) ** 2, 1e-300)
+    flat = np.abs(roundness) <= 2.0 * SMALLEST_SINE
+    if flat.any():
+        return int(flat.argmax()), True
+    for place in np.argsort(-roundness):
+        a, b, c = before[place], corners[place], after[place]
+        inside = (_cross(b - a, corners - a) >= 0.0) & (_cross(c - b, corners - b) >= 0.0)
+        inside &= _cross(a - c, corners - c) >= 0.0
+        inside &= (corners != a).any(axis=1) & (corners != b).any(axis=1) & (corners != c).any(axis=1)
+        if not inside.any():
+            return int(place), False
+    return int(np.argmax(roundness)), False  # rounding hides the ear that every simple polygon has

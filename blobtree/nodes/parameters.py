@@ -27,10 +27,12 @@ from blobtree.validation import (
     Vector,
     affine_matrix,
     finite_number,
+    finite_points,
     finite_vector,
     non_negative_vector,
     nonzero_vector,
     positive_number,
+    positive_numbers,
     positive_vector,
 )
 
@@ -43,6 +45,8 @@ class Quantity(Enum):
 
     POINT = "point"
     """A point (3,) in the node's space; it moves with the node."""
+    POINTS = "points"
+    """Points (n, 3) in the node's space; they move with the node."""
     DIRECTION = "direction"
     """A vector (3,) of any length above 0; rotations turn it."""
     EXTENTS = "extents"
@@ -53,6 +57,8 @@ class Quantity(Enum):
     """Visible radius around the skeleton, above 0; offsets and resizing change it."""
     SEMI_AXES = "semi_axes"
     """Visible radii (3,) along the axes of the node's space, above 0; resizing changes them."""
+    RADII = "radii"
+    """Visible radii (n,), one for each of the points, above 0; resizing changes them."""
     DISTANCE = "distance"
     """A signed length."""
     ANGLE = "angle"
@@ -69,10 +75,12 @@ class Quantity(Enum):
 
 UNITS = {
     Quantity.POINT: "model units",
+    Quantity.POINTS: "model units",
     Quantity.EXTENTS: "model units",
     Quantity.LENGTH: "model units",
     Quantity.RADIUS: "model units",
     Quantity.SEMI_AXES: "model units",
+    Quantity.RADII: "model units",
     Quantity.DISTANCE: "model units",
 }
 """Units of quantities that have one."""
@@ -137,6 +145,8 @@ class Parameter:
 
     def components(self, value: Any) -> tuple[float, ...]:
         """Return a checked value as floats."""
+        if self.quantity is Quantity.POINTS:
+            return tuple(chain.from_iterable(value))
         return tuple(value) if isinstance(value, tuple) else (float(value),)
 
     def _checked_numbers(self, value: Any) -> Any:
@@ -163,11 +173,13 @@ class Parameter:
 
 CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.POINT: finite_vector,
+    Quantity.POINTS: finite_points,
     Quantity.DIRECTION: nonzero_vector,
     Quantity.EXTENTS: non_negative_vector,
     Quantity.LENGTH: positive_number,
     Quantity.RADIUS: positive_number,
     Quantity.SEMI_AXES: positive_vector,
+    Quantity.RADII: positive_numbers,
     Quantity.DISTANCE: finite_number,
     Quantity.ANGLE: finite_number,
     Quantity.FACTOR: finite_number,

@@ -15,7 +15,7 @@ from blobtree.nodes.tree import Combination, Node, Transform
 from blobtree.tape.model import checked_tree
 from blobtree.validation import finite_vector
 
-_RADII = (Quantity.RADIUS, Quantity.SEMI_AXES)
+_RADII = (Quantity.RADIUS, Quantity.SEMI_AXES, Quantity.RADII)
 _LENGTHS = (Quantity.LENGTH, Quantity.EXTENTS)
 
 Path = tuple[int, ...]
@@ -150,9 +150,9 @@ def moved(node: Node, offset: ArrayLike) -> Node:
         matrix[:3, 3] += shift
         return node.child.transform(matrix)
     points = {
-        name: tuple((np.asarray(getattr(node, name)) + shift).tolist())
+        name: (np.asarray(getattr(node, name)) + shift).tolist()
         for name, parameter in parameters_of(type(node)).items()
-        if parameter.quantity is Quantity.POINT
+        if parameter.quantity in (Quantity.POINT, Quantity.POINTS)
     }
     return replace(node, **points) if points else node.translate(shift)  # type: ignore[type-var]  # every node is a dataclass
 

@@ -1,4 +1,4 @@
-"""Solid shapes: the cylinder, and the ellipsoid as a ball under a map."""
+"""Solid shapes: the cylinder, the half-space, and the ellipsoid as a ball under a map."""
 
 from dataclasses import KW_ONLY, dataclass
 from typing import Annotated
@@ -9,7 +9,7 @@ from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
-from blobtree.nodes.parameters import Color, Parameter, Quantity
+from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
 from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Point, Primitive, beside, octagons
 from blobtree.nodes.tree import Macro, Node
 from blobtree.validation import Vector
@@ -103,3 +103,36 @@ class Cylinder(Primitive):
         return np.stack(
             [beside(columns["start"], influences[:, 0]), beside(axes, columns["cylinder_radius"])], axis=1
         )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HalfSpace(Macro, Leaf):
+    """All that lies below a plane, clipped by bounds: its field is exact within `extent` of a point.
+
+    It is a solid `Cylinder` with rounded edges, below the plane, whose radius and depth are `extent`. Choose
+    an extent larger than the model that it blends with or cuts.
+
+    Examples
+    --------
+    >>> from blobtree import HalfSpace
+    >>> ground = HalfSpace((0, 0, 1), (0, 0, 1), 10.0, radius=0.2)
+    >>> ground([[3, 4, 1], [0, 0, 0.5], [0, 0, 2]]).round(3).tolist()
+    [0.5, 1.0, 0.0]
+    """
+
+    file_tag = "half_space"
+
+    point: Annotated[Vector, Parameter(Quantity.POINT, "a point of the plane, the middle of the bounds")]
+    normal: Annotated[Vector, Parameter(Quantity.DIRECTION, "outward normal of the plane, of any length")]
+    extent: Annotated[float, Parameter(Quantity.LENGTH, "distance from the point up to which it is exact")]
+    _: KW_ONLY
+    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edges: how far it blends")]
+    color: Color = DEFAULT_COLOR
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return a cylinder whose rounded top touches the plane."""
+        (normal,) = unit_vectors(np.array([self.normal]))
+        top = np.array(self.point) - self.radius * normal
+        start, end = tuple(top.tolist()), tuple((top - self.extent * normal).tolist())
+        return Cylinder(start, end, self.extent, radius=self.radius, color=self.color)

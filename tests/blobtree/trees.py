@@ -19,16 +19,21 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    HalfSpace,
     Intersection,
     Node,
     Offset,
     Point,
+    Polygon,
+    Polyline,
     QuadraticBezier,
     Rectangle,
     Ricci,
     Segment,
+    Stroke,
     Sum,
     Superquadric,
+    TaperedBezier,
     Torus,
     Transform,
     Triangle,
@@ -102,7 +107,7 @@ def random_shape(rng: np.random.Generator) -> Node:
     axis, side = map(triple, rng.normal(size=(2, 3)))
     radius, color = float(rng.uniform(0.15, 0.5)), triple(rng.uniform(0.0, 1.0, 3))
     breadth, height = (float(length) for length in rng.uniform(0.2, 0.9, 2))
-    match rng.integers(0, 8):
+    match rng.integers(0, 14):
         case 0:
             return Circle(a, axis, breadth, radius=radius, color=color)
         case 1:
@@ -115,6 +120,21 @@ def random_shape(rng: np.random.Generator) -> Node:
             return Rectangle(a, axis, side, breadth, height, radius=radius, color=color)
         case 5:
             return Triangle(a, b, c, radius=radius, color=color)
+        case 6:
+            radii = rng.uniform(0.15, 0.5, 3).tolist()
+            return TaperedBezier(
+                a, b, c, radius=radii[0], control_radius=radii[1], end_radius=radii[2], color=color
+            )
+        case 7:
+            return Polyline((a, b, c, d), radius=radius, color=color)
+        case 8:
+            return Stroke((a, b, c, d), rng.uniform(0.15, 0.5, 4), color=color)  # type: ignore[arg-type]
+        case 9:
+            angles, lengths = 0.7 * np.arange(9), 0.5 + 0.5 * (np.arange(9) % 2)
+            star = np.column_stack([lengths * np.cos(angles), lengths * np.sin(angles), 0.0 * angles])
+            return Polygon(star, radius=radius, color=color).rotate(axis, 70.0).translate(a)  # type: ignore[arg-type]
+        case 10:
+            return HalfSpace(a, axis, breadth, radius=radius, color=color)
         case _:
             return Cylinder(a, b, breadth, radius=radius, color=color)
 

@@ -13,35 +13,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import (
-    Arc,
     Box,
     Circle,
     Cone,
-    CubicBezier,
     CustomCombination,
     CustomPrimitive,
-    Cylinder,
     Difference,
     Disc,
     Ellipsoid,
+    HalfSpace,
     Intersection,
     Node,
     Offset,
     Point,
-    QuadraticBezier,
-    Rectangle,
+    Polygon,
+    Polyline,
     Ricci,
     Segment,
+    Stroke,
     Sum,
     Superquadric,
+    TaperedBezier,
     Torus,
     Transform,
-    Triangle,
     Twist,
     Union,
 )
 from blobtree.formulas.operators import Support
-from blobtree.nodes.primitives import Primitive
+from blobtree.nodes.primitives import Leaf, Primitive
 from tests.oracles import custom_kinds, shapes
 
 Floats = NDArray[np.float64]
@@ -87,7 +86,7 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             across = (x ** (2.0 / horizontal) + y ** (2.0 / horizontal)) ** (horizontal / vertical)
             leaf = _leaf_at((across + z ** (2.0 / vertical)) ** (vertical / 2.0) * RIM, color)
             return replace(leaf, margin=np.minimum(np.minimum(x, y), z))  # diamonds have edges there
-        case Arc() | QuadraticBezier() | CubicBezier() | Rectangle() | Triangle() | Cylinder():
+        case Leaf() if isinstance(node, shapes.KINDS):
             distance, other = shapes.distances(node, q)
             leaf, next_leaf = (_leaf_at(d * RIM, node.color) for d in (distance, other))
             apart = np.where(next_leaf.value > 0.0, leaf.value - next_leaf.value, np.inf)
@@ -148,9 +147,17 @@ def grown(node: Node, distance: float) -> Node:
         case Superquadric():
             x, y, z = node.semi_axes
             return replace(node, semi_axes=(x + distance, y + distance, z + distance))
+        case TaperedBezier(radius=radius, control_radius=control, end_radius=end):
+            radius, control, end = (value + distance for value in (radius, control, end))
+            return replace(node, radius=radius, control_radius=control, end_radius=end)
+        case Stroke(radii=radii):
+            return replace(node, radii=tuple(radius + distance for radius in radii))
+        case HalfSpace(point=point, normal=normal, radius=radius):
+            moved = np.array(point) + distance * np.array(normal) / np.linalg.norm(normal)
+            return replace(node, point=tuple(moved), radius=radius + distance)
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
-        case Primitive():
+        case Primitive() | Polyline() | Polygon():
             return replace(node, radius=node.radius + distance)  # type: ignore[type-var]  # all are dataclasses
         case Offset(child=child, distance=more):
             return grown(child, distance + more)

@@ -10,7 +10,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree import Arc, CubicBezier, Cylinder, QuadraticBezier, Rectangle, Triangle
+from blobtree import (
+    Arc,
+    CubicBezier,
+    Cylinder,
+    HalfSpace,
+    Polygon,
+    Polyline,
+    QuadraticBezier,
+    Rectangle,
+    Stroke,
+    TaperedBezier,
+    Triangle,
+)
 
 Floats = NDArray[np.float64]
 Curve = Callable[[Floats], Floats]
@@ -18,18 +30,41 @@ Curve = Callable[[Floats], Floats]
 
 SAMPLES = 300
 
+KINDS = (
+    Arc,
+    CubicBezier,
+    Cylinder,
+    HalfSpace,
+    Polygon,
+    Polyline,
+    QuadraticBezier,
+    Rectangle,
+    Stroke,
+    TaperedBezier,
+    Triangle,
+)
+"""Kinds of nodes of which `distances` are known."""
+
 
 def distances(node: object, q: Floats) -> tuple[Floats, Floats]:
     """Return both for a node of any of these kinds at points (n, 3)."""
     match node:
-        case Arc() | QuadraticBezier() | CubicBezier():
+        case Arc() | QuadraticBezier() | CubicBezier() | TaperedBezier() | Stroke():
             return along_curve(q, curve_of(node))
+        case Polyline(points=points, radius=radius):
+            return along_lines(q, np.array(points), radius)
         case Rectangle():
             return _alone(_from_rectangle(q, node) / node.radius)
         case Triangle(a=a, b=b, c=c):
             return _alone(from_triangle(q, np.array([a, b, c])) / node.radius)
-        case Cylinder():
-            return _alone(_from_cylinder(q, node) / node.radius)
+        case Cylinder(start=start, end=end, cylinder_radius=across):
+            return _alone(_from_cylinder(q, np.array(start), np.array(end), across) / node.radius)
+        case HalfSpace(point=point, extent=extent):
+            normal = np.array(node.normal) / np.linalg.norm(node.normal)
+            top = np.array(point) - node.radius * normal
+            return _alone(_from_cylinder(q, top, top - extent * normal, extent) / node.radius)
+        case Polygon():
+            return _from_polygon(q, np.array(node.points), node.radius)
     raise TypeError(type(node))
 
 
@@ -37,13 +72,49 @@ def _alone(distance: Floats) -> tuple[Floats, Floats]:
     return distance, np.full(len(distance), np.inf)
 
 
-def curve_of(node: Arc | QuadraticBezier | CubicBezier) -> Curve:
+def curve_of(node: object) -> Curve:
     if isinstance(node, Arc):
         return _arc(node)
+    if isinstance(node, Stroke):
+        return _stroke(np.column_stack([node.points, node.radii]))
+    if isinstance(node, TaperedBezier):
+        radii = (node.radius, node.control_radius, node.end_radius)
+        points = (node.start, node.control, node.end)
+        return bezier([(*point, radius) for point, radius in zip(points, radii, strict=True)])
     if isinstance(node, QuadraticBezier):
         return bezier([(*point, node.radius) for point in (node.start, node.control, node.end)])
-    points = (node.start, node.start_control, node.end_control, node.end)
-    return bezier([(*point, node.radius) for point in points])
+    assert isinstance(node, CubicBezier)
+    controls = (node.start, node.start_control, node.end_control, node.end)
+    return bezier([(*point, node.radius) for point in controls])
+
+
+def _stroke(balls: Floats) -> Curve:
+    """A C¹ spline of two parabolas per span, from their values and slopes at the ends."""
+    lengths = np.linalg.norm(np.diff(balls[:, :3], axis=0), axis=1)
+    knots = np.concatenate([[0.0], np.cumsum(lengths)])
+    slopes = np.empty_like(balls)
+    slopes[0], slopes[-1] = np.diff(balls[:2], axis=0) / lengths[0], np.diff(balls[-2:], axis=0) / lengths[-1]
+    for i in range(1, len(balls) - 1):
+        for axis in range(4):
+            parabola = np.polyfit(knots[i - 1 : i + 2] - knots[i], balls[i - 1 : i + 2, axis], 2)
+            slopes[i, axis] = parabola[1]
+    for i, ball in enumerate(balls):
+        limit = 2.0 * ball[3] / lengths[max(i - 1, 0) : i + 1].max()
+        slopes[i, 3] = np.clip(slopes[i, 3], -limit, limit)
+
+    def curve(t: Floats) -> Floats:
+        places = np.clip(t * (len(balls) - 1), 0.0, len(balls) - 1)
+        span = np.minimum(places.astype(int), len(balls) - 2)
+        x = (places - span)[..., None]
+        a, b, h = balls[span], balls[span + 1], lengths[span][..., None]
+        start, end = h * slopes[span], h * slopes[span + 1]
+        bend, unbend = 2.0 * (b - a) - 1.5 * start - 0.5 * end, 1.5 * end + 0.5 * start - 2.0 * (b - a)
+        first = a + start * x + bend * x**2
+        second = b - end * (1.0 - x) + unbend * (1.0 - x) ** 2
+        result: Floats = np.where(x < 0.5, first, second)
+        return result
+
+    return curve
 
 
 def bezier(controls: ArrayLike) -> Curve:
@@ -121,26 +192,42 @@ def from_triangle(q: Floats, corners: Floats) -> Floats:
     shares = np.linalg.solve(sides @ sides.T, sides @ (q - corners[0]).T)
     above = np.linalg.norm(q - corners[0] - shares.T @ sides, axis=1)
     inside = (shares >= 0.0).all(axis=0) & (shares.sum(axis=0) <= 1.0)
-    return np.where(inside, above, from_edges(q, corners, closed=True))
+    edges, _ = along_lines(q, np.vstack([corners, corners[:1]]), 1.0)
+    return np.where(inside, above, edges)
 
 
-def from_edges(q: Floats, points: Floats, *, closed: bool) -> Floats:
-    """Distances from a polyline through points (m, 3)."""
-    starts, ends = points, np.roll(points, -1, axis=0)
-    if not closed:
-        starts, ends = starts[:-1], ends[:-1]
-    ways = ends - starts
-    shares = np.einsum("nmi,mi->nm", q[:, None] - starts, ways) / (ways**2).sum(axis=1)
+def along_lines(q: Floats, points: Floats, radius: float) -> tuple[Floats, Floats]:
+    """By the closest point of each line from one of the points (m, 3) to the next."""
+    starts, ways = points[:-1], np.diff(points, axis=0)
+    squares = np.maximum((ways**2).sum(axis=1), 1e-300)
+    shares = np.einsum("nmi,mi->nm", q[:, None] - starts, ways) / squares
     feet = starts + np.clip(shares, 0.0, 1.0)[:, :, None] * ways
-    distance: Floats = np.linalg.norm(q[:, None] - feet, axis=2).min(axis=1)
-    return distance
+    ratios = np.linalg.norm(q[:, None] - feet, axis=2) / radius
+    rows, best = np.arange(len(q)), ratios.argmin(axis=1)
+    elsewhere = np.linalg.norm(feet - feet[rows, best][:, None], axis=2) > 1e-6
+    return ratios[rows, best], np.where(elsewhere, ratios, np.inf).min(axis=1)
 
 
-def _from_cylinder(q: Floats, node: Cylinder) -> Floats:
-    way = np.array(node.end) - np.array(node.start)
+def _from_cylinder(q: Floats, start: Floats, end: Floats, radius: float) -> Floats:
+    way = end - start
     length = float(np.linalg.norm(way))
-    along = (q - np.array(node.start)) @ way / length
-    across = np.linalg.norm(q - np.array(node.start) - along[:, None] * way / length, axis=1)
+    along = (q - start) @ way / length
+    across = np.linalg.norm(q - start - along[:, None] * way / length, axis=1)
     beyond = np.maximum(np.abs(along - 0.5 * length) - 0.5 * length, 0.0)
-    distance: Floats = np.hypot(beyond, np.maximum(across - node.cylinder_radius, 0.0))
+    distance: Floats = np.hypot(beyond, np.maximum(across - radius, 0.0))
     return distance
+
+
+def _from_polygon(q: Floats, corners: Floats, radius: float) -> tuple[Floats, Floats]:
+    """By the number of edges that a ray in the plane crosses; outside, by the boundary."""
+    center = corners.mean(axis=0)
+    axes = np.linalg.svd(corners - center)[2]
+    flat, x = (corners - center) @ axes[:2].T, (q - center) @ axes[:2].T
+    inside = np.zeros(len(q), np.bool_)
+    for a, b in pairwise([*flat, flat[0]]):
+        if a[1] != b[1]:
+            crosses = (a[1] > x[:, 1]) != (b[1] > x[:, 1])
+            inside ^= crosses & (x[:, 0] < a[0] + (x[:, 1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1]))
+    edge, other = along_lines(q, np.vstack([corners, corners[:1]]), radius)
+    above = np.abs((q - center) @ axes[2]) / radius
+    return np.where(inside, above, edge), np.where(inside, np.inf, other)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import blobtree
 from blobtree import (
@@ -19,11 +21,16 @@ from blobtree import (
     Cylinder,
     Disc,
     Ellipsoid,
+    HalfSpace,
     InvalidNode,
     Node,
     Point,
+    Polygon,
+    Polyline,
     QuadraticBezier,
     Rectangle,
+    Stroke,
+    TaperedBezier,
     Torus,
     Triangle,
     from_json,
@@ -53,7 +60,15 @@ SHAPES: list[Node] = [
     Rectangle((0.1, 0.2, 0.3), (1, 2, 2), (3, 0, 1), 1.5, 0.7, radius=0.2),
     Triangle((-0.7, 0.2, 0.3), (0.9, 0.5, -0.3), (0.1, -0.8, 0.4), radius=0.2),
     Cylinder((-0.3, 0.2, 0.3), (0.4, 0.5, -0.6), 0.5, radius=0.2),
+    TaperedBezier(
+        (-1.0, 0.0, 0.2), (0.2, 1.5, 0.3), (0.7, -0.5, -0.4), radius=0.3, control_radius=0.2, end_radius=0.15
+    ),
+    Polyline(((-1.0, 0.0, 0.2), (0.2, 0.8, 0.3), (0.2, 0.8, 0.3), (0.7, -0.5, -0.4)), radius=0.2),
+    Polygon(((-1, -1, 0.2), (1, -1, 0.2), (1, 1, 0.2), (0, -0.2, 0.2), (-1, 1, 0.2)), radius=0.2),
 ]
+WORM = Stroke(((-1, 0, 0), (0.1, 0.8, 0.3), (0.5, 0, -0.4), (1, 0.3, 0)), (0.1, 0.3, 0.2, 0.25))
+GROUND = HalfSpace((0.1, 0.2, 0.3), (1, 2, 2), 0.8, radius=0.2)
+SQUARE: tuple[tuple[float, float, float], ...] = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 NODES = [TORUS, DISC, BOX, ELLIPSOID, *SHAPES]
 EACH = pytest.mark.parametrize("node", NODES, ids=[type(node).__name__.lower() for node in NODES])
 
@@ -93,6 +108,50 @@ def test_the_visible_radius_is_the_distance_of_the_surface_from_the_skeleton(nod
     hits = node.raycast(np.tile([[5.0, 4.0, 3.0]], (50, 1)), mesh.vertices[:50] - np.array([5.0, 4.0, 3.0]))
     assert hits.hit.mean() > 0.9
     np.testing.assert_allclose(oracle.value(node, hits.positions[hits.hit]), ISO, atol=1e-3)
+
+
+@pytest.mark.parametrize("node", [WORM, GROUND], ids=["stroke", "half_space"])
+def test_strokes_and_half_spaces_are_those_of_float64(node: Leaf) -> None:
+    for placed in (node, node.rotate((1, 2, 3), 50).scale(0.8), node.scale((1, 2, 1)), node.twist(30.0)):
+        points = points_around(np.random.default_rng(2), placed, 300)
+        field = oracle.evaluate(placed, points)
+        np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
+        smooth = field.margin > 1e-3
+        expected = oracle.gradient(placed, points[smooth])
+        np.testing.assert_allclose(placed.gradient(points[smooth]), expected, atol=5e-4)
+    assert from_json(to_json(node)) == node == eval(repr(node), KINDS)
+    grown = node.offset(0.1)
+    assert grown(points_around(np.random.default_rng(1), node, 50)).max() <= 1.0
+    shifted = moved(node, (1, 2, 3))
+    assert type(shifted) is type(node)
+
+
+def test_a_stroke_passes_through_its_points_with_its_radii() -> None:
+    np.testing.assert_array_equal(WORM(np.array(WORM.points)), 1.0)
+    assert len(WORM.expanded.children) == 6
+    assert Stroke(SQUARE, 0.1) == Stroke(SQUARE, (0.1,) * 4)  # type: ignore[arg-type]
+    steep = Stroke(((0, 0, 0), (1, 0, 0), (2, 0, 0)), (1e-3, 1.0, 1e-3))
+    assert min(min(c.radius, c.control_radius, c.end_radius) for c in pieces(steep)) > 0.0
+
+
+def pieces(stroke: Stroke) -> list[TaperedBezier]:
+    return [piece for piece in stroke.expanded.children if isinstance(piece, TaperedBezier)]
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 1.0), st.floats(0.3, 1.0)), min_size=3, max_size=30))
+@settings(max_examples=50, deadline=None)
+def test_ears_fill_a_polygon(steps: list[tuple[float, float]]) -> None:
+    turns = np.cumsum([turn for turn, _ in steps])
+    angles = turns * 2.0 * np.pi / (turns[-1] + 0.1)
+    lengths = np.array([length for _, length in steps])
+    if np.diff(angles, append=angles[0] + 2.0 * np.pi).max() > 3.0:
+        return  # not a star about its centre
+    x, y = lengths * np.cos(angles), lengths * np.sin(angles)
+    star = Polygon(tuple(zip(x.tolist(), y.tolist(), (0.3 * x).tolist(), strict=True)), radius=0.1)
+    area = abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+    ears = [np.array([ear.a, ear.b, ear.c]) for ear in star.expanded.children if isinstance(ear, Triangle)]
+    covered = [abs(np.cross(ear[1] - ear[0], ear[2] - ear[0])[2]) for ear in ears]
+    assert sum(covered) == pytest.approx(area, rel=1e-5)
 
 
 def test_known_points_of_each_surface() -> None:
@@ -139,7 +198,8 @@ def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
     thick = resized(node, 2.0)
     larger: Any = {"semi_axes": (1.0, 2.0, 1.6)}
     if node is not ELLIPSOID:
-        larger = {"radius": 2.0 * getattr(node, "radius")}  # noqa: B009  (leaves need not have one)
+        names = [name for name, p in parameters_of(type(node)).items() if p.quantity is Quantity.RADIUS]
+        larger = {name: 2.0 * getattr(node, name) for name in names}
     assert thick == replace(node, **larger)  # type: ignore[type-var]
 
 
@@ -174,6 +234,19 @@ def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
         (lambda: Triangle((0, 0, 0), (1, 1, 1), (1, 1, 1), radius=0.2), "expected three corners that span a"),
         (lambda: Triangle((1, 1, 1), (1, 1, 1), (1, 1, 1), radius=0.2), "expected three corners that span a"),
         (lambda: Cylinder((0, 0, 1), (0, 0, 1), 1.0, radius=0.2), "end: expected another point"),
+        (lambda: Polyline(((0, 0, 1),), radius=0.2), "points: expected at least two different points"),
+        (lambda: Polyline(((0, 0, 1),) * 3, radius=0.2), "points: expected at least two different points"),
+        (lambda: Polyline(5, radius=0.2), "points: expected points"),  # type: ignore[arg-type]
+        (lambda: Polyline(((0, 0, 1), (0, np.nan, 1)), radius=0.2), r"points\[1\]: expected three finite"),
+        (lambda: Stroke(((0, 0, 1), (0, 0, 1)), (0.2,)), "points: expected two or more points, each other"),
+        (lambda: Stroke(((0, 0, 1), (0, 0, 2)), (0.2,) * 3), "radii: expected one for each of 2 points"),
+        (lambda: Stroke(((0, 0, 1), (0, 0, 2)), (0.2, 0)), r"radii\[1\]: expected a number above 0"),
+        (lambda: Polygon(SQUARE[:2], radius=0.2), "points: expected at least three corners"),
+        (lambda: Polygon((*SQUARE[:3], (0, 1, 0.1)), radius=0.2), "points: expected corners in one plane"),
+        (lambda: Polygon(tuple(SQUARE[k] for k in (0, 2, 1, 3)), radius=0.2), "expected a simple polygon"),
+        (lambda: Polygon(tuple(SQUARE[k] for k in (0, 1, 1, 3)), radius=0.2), "expected a simple polygon"),
+        (lambda: Polygon((*SQUARE, (0.5, 0, 0)), radius=0.2), "expected a simple polygon"),
+        (lambda: HalfSpace((0, 0, 0), (0, 0, 0), 1.0, radius=0.2), "normal: expected a direction"),
     ],
 )
 def test_wrong_parameters_are_refused(make: Any, message: str) -> None:
