@@ -21,6 +21,7 @@ from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
+from .nodes.contact import Contact, ContactSurface, Press, RatedUnion
 from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
 from .nodes.fields import FieldPrimitive, Superquadric
 from .nodes.flats import Polygon, Rectangle, Triangle
@@ -47,6 +48,8 @@ __all__ = [
     "Cancelled",
     "Circle",
     "Cone",
+    "Contact",
+    "ContactSurface",
     "CubicBezier",
     "Curvatures",
     "CustomCombination",
@@ -76,8 +79,10 @@ __all__ = [
     "Polygon",
     "Polygonizer",
     "Polyline",
+    "Press",
     "Progress",
     "QuadraticBezier",
+    "RatedUnion",
     "Rectangle",
     "Ricci",
     "Segment",

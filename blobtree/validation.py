@@ -113,6 +113,25 @@ def finite_number(name: str, value: object) -> float:
     return number
 
 
+def finite_numbers(name: str, value: object) -> tuple[float, ...]:
+    """Return a number, numbers, or rows of numbers as finite floats; raise `InvalidNode` otherwise."""
+    try:
+        numbers = np.asarray(real(value), np.float64).ravel().tolist()
+    except (TypeError, ValueError, OverflowError):
+        numbers = [math.nan]
+    if not all(abs(number) <= LARGEST_NUMBER for number in numbers):
+        raise InvalidNode(f"{name}: expected finite numbers, got {shown(value)}; {LIMIT}")
+    return tuple(numbers)
+
+
+def texts(name: str, value: object) -> tuple[str, ...]:
+    """Return several texts; raise `InvalidNode` if one is empty or no text."""
+    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (None,)
+    if not all(isinstance(item, str) and item for item in items):
+        raise InvalidNode(f"{name}: expected texts that are not empty, got {shown(value)}")
+    return cast("tuple[str, ...]", items)
+
+
 def affine_matrix(value: ArrayLike) -> Matrix:
     """Return `value` (3×4 or 4×4) as an invertible affine map; raise `InvalidNode` otherwise."""
     try:

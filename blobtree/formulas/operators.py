@@ -284,6 +284,8 @@ class Operator:
     monotone: bool = False
     """F never falls where its operands rise, and `slope` takes slopes below 0, of operands that fall."""
     support: Support = Support.EITHER
+    paints: bool = True
+    """True if the second operand's colour shows where F depends on it; else F has the first one's."""
     digest: str = ""
     """Digest of the sources of a custom operator."""
 

@@ -27,6 +27,7 @@ from blobtree.validation import (
     Vector,
     affine_matrix,
     finite_number,
+    finite_numbers,
     finite_points,
     finite_vector,
     non_negative_vector,
@@ -34,6 +35,7 @@ from blobtree.validation import (
     positive_number,
     positive_numbers,
     positive_vector,
+    texts,
 )
 
 LARGEST_INTEGER = 1 << 24
@@ -65,6 +67,12 @@ class Quantity(Enum):
     """An angle or a rate of turning, in degrees."""
     FACTOR = "factor"
     """A number without unit."""
+    FACTORS = "factors"
+    """Numbers without unit, any number of them; rows of a table one after the other."""
+    DISTANCES = "distances"
+    """Signed lengths, any number of them."""
+    NAMES = "names"
+    """Texts that are not empty, any number of them."""
     COLOR = "color"
     """Red, green and blue (3,) from 0 to 1."""
     MATRIX = "matrix"
@@ -82,6 +90,7 @@ UNITS = {
     Quantity.SEMI_AXES: "model units",
     Quantity.RADII: "model units",
     Quantity.DISTANCE: "model units",
+    Quantity.DISTANCES: "model units",
 }
 """Units of quantities that have one."""
 
@@ -183,6 +192,9 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.DISTANCE: finite_number,
     Quantity.ANGLE: finite_number,
     Quantity.FACTOR: finite_number,
+    Quantity.FACTORS: finite_numbers,
+    Quantity.DISTANCES: finite_numbers,
+    Quantity.NAMES: texts,
     Quantity.COLOR: color_rgb,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }

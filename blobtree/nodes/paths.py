@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf
-from blobtree.nodes.tree import Combination, Node, Transform
+from blobtree.nodes.tree import Node, Transform
 from blobtree.tape.model import checked_tree
 from blobtree.validation import finite_vector
 
@@ -111,7 +111,7 @@ def node_in_world(tree: Node, path: Path) -> Node:
     nodes = list(nodes_along(tree, path))
     result = nodes[-1]
     for parent, step in zip(reversed(nodes[:-1]), reversed(path), strict=True):
-        if not isinstance(parent, Combination):
+        if not parent.combines:
             result = _with_child(parent, step, result)
     return result
 

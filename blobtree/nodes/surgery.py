@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
+from blobtree.formulas.operators import Support
+from blobtree.nodes.contact import Contact
 from blobtree.nodes.paths import (
     Path,
     moved,
@@ -24,7 +26,6 @@ from blobtree.nodes.paths import (
     world_matrix,
 )
 from blobtree.nodes.tree import (
-    Combination,
     Difference,
     Intersection,
     Node,
@@ -112,7 +113,7 @@ def remove_branch(tree: Node, path: Path) -> Node:
     *above, _ = nodes_along(tree, path)
     while above:
         parent, step, path = above.pop(), path[-1], path[:-1]
-        if isinstance(parent, Combination) and not (isinstance(parent, Difference) and step == 0):
+        if parent.combines and not (_cuts(parent) and step == 0):
             others = _without_child(parent, step)
             if others is not None:
                 return with_node(tree, path, others)
@@ -165,7 +166,7 @@ def rejoin_branch(tree: Node, path: Path, join: Join) -> tuple[Node, Path]:
 def branch_path(tree: Node, path: Path) -> Path:
     """Shorten a path to the operand of a combination: the maps above a primitive belong to its branch."""
     *above, _ = nodes_along(tree, path)
-    while above and not isinstance(above.pop(), Combination):
+    while above and not above.pop().combines:
         path = path[:-1]
     return path
 
@@ -173,7 +174,7 @@ def branch_path(tree: Node, path: Path) -> Path:
 def world_space_path(tree: Node, path: Path) -> Path:
     """Shorten a path to its first node that is no combination: that node lies in the world's space."""
     for depth, node in enumerate(nodes_along(tree, path)):
-        if not isinstance(node, Combination):
+        if not node.combines:
             return path[:depth]
     return path
 
@@ -235,8 +236,15 @@ def _takes_operand(node: Node, join: Join) -> bool:
     return join is not Join.DIFFERENCE and JOIN_OF_KIND.get(type(node)) is join and alike
 
 
+def _cuts(node: Node) -> bool:
+    """Return True if the result is the first operand, changed by the second."""
+    return node.operator is not None and node.operator.support is Support.LEFT
+
+
 def _without_child(parent: Node, step: int) -> Node | None:
     """Return a combination without one of its children, None if it had no other."""
+    if isinstance(parent, Contact) and len(parent.operands) > 1:
+        return parent.without(step)
     others = (*parent.children[:step], *parent.children[step + 1 :])
     if len(others) > 1:
         return replace(parent, operands=others)  # type: ignore[type-var]  # every node is a dataclass

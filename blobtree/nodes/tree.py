@@ -80,6 +80,8 @@ class Node(ImplicitModel):
 
     file_tag: ClassVar[str]
     """Name of this kind in files."""
+    combines: ClassVar[bool] = False
+    """True if the node combines its operands; else it places or deforms one."""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -710,6 +712,7 @@ class Combination(Node):
     The operator takes the parameters that the class declares, in their order.
     """
 
+    combines = True
     operator: ClassVar[Operator]
 
     @property

@@ -100,6 +100,16 @@ def is_monotone(operator: wp.int32) -> wp.bool:
 
 
 @unrolled
+def paints(operator: wp.int32) -> wp.bool:
+    """Return `Operator.paints`."""
+    result = bool(True)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = bool(wp.static(OPERATORS[code].paints))
+    return result
+
+
+@unrolled
 def partials(
     operator: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
 ) -> wp.vec3:

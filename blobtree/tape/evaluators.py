@@ -37,6 +37,7 @@ from blobtree.tape.dispatch import (
     direct_bounds,
     direct_value_gradient,
     is_monotone,
+    paints,
     partials,
     slope,
     warp_pullback,
@@ -359,7 +360,10 @@ def color_combine(
     parameter: wp.float32,
     tape: wp.array(dtype=wp.vec4),
 ) -> wp.vec4:
-    """Return F and the colours weighted by |∂F/∂a|·a and |∂F/∂b|·b; the stronger operand's if both are 0."""
+    """Return F and the colours weighted by |∂F/∂a|·a and |∂F/∂b|·b; the stronger operand's if both are 0.
+
+    An operator that does not paint keeps the first operand's colour.
+    """
     p = partials(operator, a[0], b[0], parameter, tape)
     weight_a = wp.abs(p[1]) * a[0]
     weight_b = wp.abs(p[2]) * b[0]
@@ -368,6 +372,8 @@ def color_combine(
         t = 1.0
     if weight_a + weight_b > 0.0:
         t = weight_b / (weight_a + weight_b)
+    if not paints(operator):
+        t = 0.0
     mixed = a * (1.0 - t) + b * t
     return wp.vec4(p[0], mixed[1], mixed[2], mixed[3])
 

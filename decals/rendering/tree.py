@@ -18,6 +18,7 @@ from blobtree.tape.dispatch import (
     direct_bounds,
     direct_value_gradient,
     is_monotone,
+    paints,
     partials,
     slope,
     warp_forward,
@@ -116,7 +117,9 @@ def _library(kinds: Kinds) -> str:
         direction_to_local,
         trace_ray,
     ]
-    return translate_library(functions, provided=[*_choices(kinds), is_monotone, field_bound, field_gradient])
+    return translate_library(
+        functions, provided=[*_choices(kinds), is_monotone, paints, field_bound, field_gradient]
+    )
 
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
@@ -137,12 +140,19 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
 
 def _dispatch(kinds: Kinds) -> str:
     """Those functions, each knowing the kinds in use alone."""
-    monotone = [code for code in kinds.operators if kinds.instruction_set.operators[code].monotone]
-    test = " || ".join(f"operator == {code}" for code in monotone) or "false"
-    if len(monotone) == len(kinds.operators):
-        test = "true"
+    rows = {code: kinds.instruction_set.operators[code] for code in kinds.operators}
+    flags = {
+        "is_monotone": [code for code, row in rows.items() if row.monotone],
+        "paints": [code for code, row in rows.items() if row.paints],
+    }
     choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
-    return "\n".join([*choices, f"bool is_monotone(int operator) {{ return {test}; }}"])
+    return "\n".join([*choices, *(_flag(name, among, len(rows)) for name, among in flags.items())])
+
+
+def _flag(name: str, among: list[int], count: int) -> str:
+    """Return a function that is true for the operators `among` `count` ones in use."""
+    test = " || ".join(f"operator == {code}" for code in among) or "false"
+    return f"bool {name}(int operator) {{ return {'true' if len(among) == count else test}; }}"
 
 
 def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) -> Source:

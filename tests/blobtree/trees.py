@@ -14,6 +14,7 @@ from blobtree import (
     Box,
     Circle,
     Cone,
+    Contact,
     CubicBezier,
     Cylinder,
     Difference,
@@ -26,7 +27,9 @@ from blobtree import (
     Point,
     Polygon,
     Polyline,
+    Press,
     QuadraticBezier,
+    RatedUnion,
     Rectangle,
     Ricci,
     Segment,
@@ -140,6 +143,28 @@ def random_shape(rng: np.random.Generator) -> Node:
 
 
 SHAPES = MoreKinds(random_shape)
+
+
+def random_contact(rng: np.random.Generator, operands: list[Node]) -> Node:
+    """Solids in contact, a solid pressed by another, or obstacles of different stiffness."""
+    width, kind = float(rng.uniform(0.1, 0.5)), rng.integers(0, 4)
+    ratio = float(np.exp2(rng.uniform(-1.5, 1.5)))
+    heights = rng.uniform(0.0, min(0.25 * width, 0.1), len(operands)) * (rng.random() < 0.8)
+    if kind == 0:
+        return RatedUnion(operands[0], operands[1], stiffness_ratio=ratio)
+    if kind == 1:
+        return Press(*operands[:2], stiffness_ratio=ratio, width=width, height=float(heights[0]))
+    several = operands[:3]
+    stiffness = rng.uniform(1.0, 3.0, len(several) ** int(rng.integers(1, 3))) * (rng.random() < 0.7)
+    return Contact(
+        tuple(several),
+        stiffness=tuple(stiffness.tolist()) if stiffness.any() else (),
+        width=width,
+        height=tuple(heights[: len(several)].tolist()),
+    )
+
+
+CONTACTS = MoreKinds(random_leaf, random_contact)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:

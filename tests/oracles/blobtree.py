@@ -16,6 +16,7 @@ from blobtree import (
     Box,
     Circle,
     Cone,
+    Contact,
     CustomCombination,
     CustomPrimitive,
     Difference,
@@ -28,6 +29,8 @@ from blobtree import (
     Point,
     Polygon,
     Polyline,
+    Press,
+    RatedUnion,
     Ricci,
     Segment,
     Stroke,
@@ -109,6 +112,15 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return evaluate(child, np.linalg.solve(linear, (q - offset).T).T)
         case Difference(solid=solid, tool=tool):
             return _difference(evaluate(solid, q), evaluate(tool, q))
+        case Press(solid=solid, obstacle=obstacle):
+            shape = node.stiffness_ratio, node.width, node.height
+            return pressed_field(evaluate(solid, q), evaluate(obstacle, q), *shape)
+        case RatedUnion(first=first, second=second, stiffness_ratio=ratio):
+            a, b = evaluate(first, q), evaluate(second, q)
+            b = replace(b, value=rated(b.value, ratio))
+            return _choose(a, b, a.value >= b.value)
+        case Contact():
+            return evaluate(Union(pressed_solids(node)), q)
         case Sum(operands=operands):
             return reduce(lambda a, b: _ricci(a, b, 1.0), [evaluate(operand, q) for operand in operands])
         case Ricci(operands=operands, exponent=exponent):
@@ -166,11 +178,60 @@ def grown(node: Node, distance: float) -> Node:
             return Transform(grown(child, distance / float(np.cbrt(volume))), matrix)
         case Twist(child=child):
             return replace(node, child=grown(child, distance))
+        case Press(solid=solid, obstacle=obstacle):
+            return replace(node, solid=grown(solid, distance), obstacle=grown(obstacle, -distance))
+        case RatedUnion(first=first, second=second):
+            return replace(node, first=grown(first, distance), second=grown(second, distance))
+        case Contact():
+            return grown(Union(pressed_solids(node)), distance)
         case Difference(solid=solid, tool=tool):
             return Difference(grown(solid, distance), grown(tool, -distance))
         case Sum() | Union() | Intersection() | Ricci():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
     raise TypeError(type(node))
+
+
+def pressed_solids(contact: Contact) -> tuple[Node, ...]:
+    """The solids of a contact, each pressed by all others at once."""
+    solids = contact.operands
+    pressed: list[Node] = []
+    for i, solid in enumerate(solids):
+        others = [(contact.stiffness_ratio(i, j), solids[j]) for j in range(len(solids)) if j != i]
+        if not others:
+            return solids
+        first, obstacle = others[0]
+        for ratio, other in others[1:]:
+            obstacle = RatedUnion(obstacle, other, stiffness_ratio=ratio / first)
+        height = contact.height[i % len(contact.height)]
+        pressed.append(Press(solid, obstacle, stiffness_ratio=first, width=contact.width, height=height))
+    return tuple(pressed)
+
+
+def rated(value: Floats, ratio: float) -> Floats:
+    """Linear above ½; below, x = 2f becomes x / (k + (1 − k) x)."""
+    x = 2.0 * value
+    return np.where(
+        x >= 1.0, 0.5 + ratio * (value - 0.5), 0.5 * x / (ratio + (1.0 - ratio) * np.minimum(x, 1.0))
+    )
+
+
+def pressed_field(a: Field, b: Field, ratio: float, w: float, h: float) -> Field:
+    """a − (m − ½) inside the obstacle; outside, a plus (a parabola, then a cubic) · smoothstep(4a)."""
+    t = 0.5 - rated(b.value, ratio)
+    rising = t - t**2 / (4.0 * h) if h else np.zeros_like(t)
+    v = (t - 2.0 * h) / (w - 2.0 * h)
+    humps = np.select(
+        [t <= 0.0, t <= 2.0 * h, t < w], [0.0, rising, h * (1.0 - 3.0 * v**2 + 2.0 * v**3)], 0.0
+    )
+    x = np.minimum(4.0 * a.value, 1.0)
+    fade = 3.0 * x**2 - 2.0 * x**3
+    value = np.where(t > 0.0, a.value + humps * fade, np.maximum(a.value + t, 0.0))
+    margin = np.minimum(a.margin, b.margin)
+    if h == 0.0:
+        margin = np.minimum(margin, np.abs(t))
+    margin = np.where(x < 1.0, np.minimum(margin, np.abs(t)), margin)
+    margin = np.where(t <= 0.0, np.minimum(margin, np.abs(a.value + t)), margin)
+    return Field(value, a.color, margin)
 
 
 def _turned(q: Floats, angle: Floats) -> Floats:

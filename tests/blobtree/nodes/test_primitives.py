@@ -266,7 +266,7 @@ def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -
         assert f"{name} : " in document
         assert describe(parameter) in document
     operands = {field.name for field in fields(kind)} - set(parameters)  # type: ignore[arg-type]
-    assert operands <= {"operands", "child", "solid", "tool"}
+    assert operands <= {"operands", "child", "solid", "tool", "obstacle", "first", "second"}
     assert ">>> " in document
 
 

@@ -8,7 +8,15 @@ import pytest
 
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
-from blobtree.tape.dispatch import is_monotone, partials, slope, warp_forward, warp_pullback, warp_stretch
+from blobtree.tape.dispatch import (
+    is_monotone,
+    paints,
+    partials,
+    slope,
+    warp_forward,
+    warp_pullback,
+    warp_stretch,
+)
 from blobtree.transpile.glsl import translate_library
 from decals.rendering.context import Context
 from decals.rendering.tree import _dispatch
@@ -31,7 +39,7 @@ MODULES = (
     "decals.record",
     "decals.field.ownership",
 )
-WRITTEN_TWICE = {"closest", "min_influence", "stride", "is_convex", "is_monotone"}
+WRITTEN_TWICE = {"closest", "min_influence", "stride", "is_convex", "is_monotone", "paints"}
 """Switches over the tables, written per backend."""
 
 
@@ -43,7 +51,7 @@ def shared(module: str) -> list[TypedFunction]:
 
 
 FUNCTIONS = {f"{module}.{typed.name}": typed for module in MODULES for typed in shared(module)}
-CHOOSERS: list[Any] = [partials, is_monotone, slope, warp_forward, warp_pullback, warp_stretch]
+CHOOSERS: list[Any] = [partials, is_monotone, paints, slope, warp_forward, warp_pullback, warp_stretch]
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

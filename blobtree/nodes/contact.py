@@ -1,0 +1,472 @@
+"""Contact between solids: compression to shared surfaces and bulges around them (Gascuel 1993).
+
+`Press` deforms one solid at an obstacle. `Contact` lets any number of solids deform each other: each one is
+pressed by all others, and their union is the model.
+"""
+
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Annotated, Any, Self
+
+import numpy as np
+
+from blobtree._typing import Float32Array, Float64Array
+from blobtree.errors import InvalidNode
+from blobtree.formulas.contact import HEIGHT_OVER_WIDTH, LARGEST_HEIGHT, PRESS, RATED_UNION
+from blobtree.lazy import Lazy
+from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
+from blobtree.meshing.mesh import Mesh
+from blobtree.meshing.polygonize import polygonize
+from blobtree.nodes.parameters import Parameter, Quantity
+from blobtree.nodes.tree import Combination, Macro, Node, Union
+
+LARGEST_RATIO = 100.0
+"""Largest ratio of two stiffnesses; beyond it the stiffer solid is rigid for any purpose."""
+
+RESOLUTION = 64
+"""Cells along the longest side of a solid's support where volumes and contact surfaces are measured."""
+
+STEPS = 12
+"""Largest number of secant steps of `Contact.compensated`."""
+
+LARGEST_STEP, LARGEST_GROWTH = 0.1, 0.5
+"""Largest step and offset in `Contact.compensated`, over the side of a cube of the solid's volume."""
+
+Width = Annotated[
+    float,
+    Parameter(
+        Quantity.FACTOR,
+        "width of the bulge, as the fall of the obstacle's field from 0.5 to its end",
+        low=0.01,
+        high=0.5,
+        hint="0.5 reaches to the end of the obstacle's field",
+    ),
+]
+Height = Annotated[
+    float,
+    Parameter(
+        Quantity.FACTOR,
+        "height of the bulge, as a value of the solid's field; 0 for none",
+        low=0.0,
+        high=LARGEST_HEIGHT,
+        hint="a larger bulge would not stay in the support of its solid",
+    ),
+]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Press(Combination):
+    """`solid` as it deforms at `obstacle`; the obstacle itself is not part of the result.
+
+    Inside the obstacle the solid yields until s(f − ½) = s′(g − ½), where f and g are their fields and s′/s
+    is `stiffness_ratio`. Around the contact it bulges by `height`. Press two solids by each other, and their
+    surfaces coincide in the contact (Gascuel 1993; Cani & Desbrun 1997).
+
+    Examples
+    --------
+    >>> from blobtree import Point, Press
+    >>> left, right = Point((-0.7, 0, 0), radius=1.0), Point((0.7, 0, 0), radius=1.0)
+    >>> pressed = Press(left, right)
+    >>> pressed([[0, 0, 0], [0.2, 0, 0]]).round(3).tolist()
+    [0.5, 0.173]
+    """
+
+    file_tag = "press"
+    operator = PRESS
+
+    solid: Node
+    obstacle: Node
+    _: KW_ONLY
+    stiffness_ratio: Annotated[
+        float,
+        Parameter(
+            Quantity.FACTOR,
+            "stiffness of the obstacle over that of the solid",
+            low=1.0 / LARGEST_RATIO,
+            high=LARGEST_RATIO,
+            hint="leave a rigid solid as it is, and press the others",
+        ),
+    ] = 1.0
+    width: Width = 0.3
+    height: Height = 0.05
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_shape(self.width, self.height)
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The solid and the obstacle."""
+        return (self.solid, self.obstacle)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RatedUnion(Combination):
+    """Union of two obstacles of different stiffness, F = max(f, r(g)); for `Press`.
+
+    r keeps the surface of g, and changes its slope there by `stiffness_ratio`.
+
+    Examples
+    --------
+    >>> from blobtree import Point, RatedUnion
+    >>> soft, hard = Point((0, 0, 0), radius=1.0), Point((3, 0, 0), radius=1.0)
+    >>> RatedUnion(soft, hard, stiffness_ratio=2.0)([[1, 0, 0], [2, 0, 0], [3, 0, 0]]).round(3).tolist()
+    [0.5, 0.5, 1.5]
+    """
+
+    file_tag = "rated_union"
+    operator = RATED_UNION
+
+    first: Node
+    second: Node
+    _: KW_ONLY
+    stiffness_ratio: Annotated[
+        float,
+        Parameter(
+            Quantity.FACTOR,
+            "stiffness of the second over that of the first",
+            low=LARGEST_RATIO**-2,
+            high=LARGEST_RATIO**2,
+            hint="take a union, or leave one out",
+        ),
+    ]
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """Both obstacles."""
+        return (self.first, self.second)
+
+
+@dataclass(frozen=True)
+class ContactSurface:
+    """The surface that two solids of a `Contact` share.
+
+    Attributes
+    ----------
+    pair
+        Numbers of the two solids, the smaller first.
+    names
+        Their names, empty if the solids have none.
+    area
+        Area, in squared model units.
+    centroid
+        float64[3]: centroid of the surface.
+    outlines
+        Closed polylines float64[n, 3] around the surface; the last point is the first.
+    vertices, faces
+        float64[n, 3] and int32[m, 3]: its triangles.
+    """
+
+    pair: tuple[int, int]
+    names: tuple[str, ...]
+    area: float
+    centroid: Float64Array
+    outlines: tuple[Float64Array, ...]
+    vertices: Float64Array
+    faces: Any
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Macro):
+    """Solids that deform each other where they touch; the model is the union of the deformed solids.
+
+    No two deformed solids overlap, and no void opens between them: a point inside several solids belongs to
+    the one with the largest s(f − ½), where s is its stiffness. Each solid is pressed by the strongest of the
+    others at a point, see `Press`. An offset above it grows the deformed solids; to let the solids grow
+    before they touch, offset them.
+
+    Examples
+    --------
+    >>> from blobtree import Contact, Point
+    >>> balls = [Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)]
+    >>> model = Contact(balls, stiffness=(1, 4))
+    >>> soft, stiff = model.solids()
+    >>> bool(soft.bounds[1][0] < 0.0)
+    True
+    >>> (surface,) = model.contacts()
+    >>> surface.pair, len(surface.outlines)
+    ((0, 1), 1)
+    """
+
+    file_tag = "contact"
+
+    operands: tuple[Node, ...]
+    _: KW_ONLY
+    stiffness: Annotated[
+        tuple[float, ...],
+        Parameter(
+            Quantity.FACTORS,
+            "stiffness of each solid, or of each (row) against each other (n × n numbers); equal if empty",
+        ),
+    ] = ()
+    width: Width = 0.3
+    height: Annotated[
+        tuple[float, ...],
+        Parameter(Quantity.FACTORS, "height of the bulges: one number, or one for each solid; see `Press`"),
+    ] = (0.05,)
+    growth: Annotated[
+        tuple[float, ...],
+        Parameter(
+            Quantity.DISTANCES, "offset of each solid before it deforms; see `compensated`; none if empty"
+        ),
+    ] = ()
+    names: Annotated[
+        tuple[str, ...], Parameter(Quantity.NAMES, "names of the solids, each different; none if empty")
+    ] = ()
+
+    combines = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count = len(self.operands)
+        _check_count("stiffness", self.stiffness, {0, count, count**2})
+        _check_count("height", self.height, {1, count})
+        _check_count("growth", self.growth, {0, count})
+        _check_count("names", self.names, {0, count})
+        if self.stiffness and not 0.0 < max(self.stiffness) <= LARGEST_RATIO * min(self.stiffness):
+            raise InvalidNode(
+                f"stiffness: expected numbers above 0 whose ratio is at most {LARGEST_RATIO:g}, "
+                f"got {self.stiffness}"
+            )
+        for height in self.height:
+            if not 0.0 <= height <= LARGEST_HEIGHT:
+                raise InvalidNode(f"height: expected 0 to {LARGEST_HEIGHT:g}, got {height!r}")
+            _check_shape(self.width, height)
+        if len(set(self.names)) < len(self.names):
+            raise InvalidNode(f"names: expected a different name for each solid, got {self.names}")
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The solids before they deform."""
+        return self.operands
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return the union of the deformed solids."""
+        return Union(self._deformed) if len(self._deformed) > 1 else self._deformed[0]
+
+    def solids(self) -> tuple[Node, ...]:
+        """Return the deformed solids as trees of their own.
+
+        Each one has a closed surface. Neighbours share the surface of their contact.
+
+        Examples
+        --------
+        >>> from blobtree import Contact, Point, polygonize
+        >>> left, right = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)]).solids()
+        >>> bool(abs(polygonize(left).vertices[:, 0].max()) < 1e-5)
+        True
+        """
+        return self._deformed
+
+    def contacts(self, *, resolution: int = RESOLUTION) -> list[ContactSurface]:
+        """Return the surfaces that solids share.
+
+        Parameters
+        ----------
+        resolution : int
+            Cells along the longest side of a solid's support, in which the surfaces are triangulated.
+
+        Returns
+        -------
+        list[ContactSurface]
+            One for each pair that touches, ordered by pair. Areas miss at most what the triangulation of one
+            solid misses.
+
+        Raises
+        ------
+        InvalidResolution
+            The resolution is not a usable number of cells.
+
+        Examples
+        --------
+        >>> from blobtree import Contact, Point
+        >>> model = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)], names=("left", "right"))
+        >>> (surface,) = model.contacts()
+        >>> surface.names, round(surface.area, 2)  # a disc of radius 0.6
+        (('left', 'right'), 1.13)
+        """
+        surfaces: list[ContactSurface] = []
+        for i, solid in enumerate(self._deformed):
+            later = [j for j in self._neighbors[i] if j > i]
+            if later:
+                mesh = polygonize(solid, resolution=resolution)
+                surfaces += [surface for j in later if (surface := self._shared(mesh, i, j)) is not None]
+        return surfaces
+
+    def compensated(self, *, tolerance: float = 0.002, resolution: int = RESOLUTION) -> "Contact":
+        """Return this contact with offsets of the solids, so that each keeps the volume that it has alone.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest relative error of a volume.
+        resolution : int
+            Cells along the longest side of a solid's support, in which volumes are measured.
+
+        Returns
+        -------
+        Contact
+            The same solids with other `growth`.
+
+        Raises
+        ------
+        InvalidNode
+            A solid has no volume, or no offsets up to half of its size let it keep its volume.
+        InvalidResolution
+            The resolution is not a usable number of cells.
+
+        Examples
+        --------
+        >>> from blobtree import Contact, Point
+        >>> model = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)])
+        >>> [round(distance, 3) for distance in model.compensated(resolution=32).growth]
+        [0.029, 0.029]
+        """
+        cells = [float(np.max(np.subtract(*node.support[::-1]))) / resolution for node in self.operands]
+        free = _volumes(self.operands, cells)
+        if not (free > 0.0).all():
+            raise InvalidNode(f"expected solids with a volume, solid {int(free.argmin())} has none")
+        growth, model = np.array(self.growth or (0.0,) * len(free)), self
+        errors = _volumes(model.solids(), cells) - free
+        sizes = np.cbrt(free)
+        slopes = 4.8 * sizes**2  # area of the ball of each volume
+        for _ in range(STEPS):
+            if (np.abs(errors) <= tolerance * free).all():
+                return model
+            step = np.clip(-errors / slopes, -LARGEST_STEP * sizes, LARGEST_STEP * sizes)
+            growth = growth + step
+            if (np.abs(growth) > LARGEST_GROWTH * sizes).any():
+                break
+            model = replace(model, growth=tuple(growth.tolist()))
+            now = _volumes(model.solids(), cells) - free
+            moved = np.abs(step) > 1e-9 * sizes
+            secants = (now - errors) / np.where(moved, step, 1.0)
+            slopes = np.where(moved & (secants > 0.1 * slopes), secants, slopes)
+            errors = now
+        worst = int(np.abs(errors / free).argmax())
+        raise InvalidNode(
+            f"expected solids that can keep their volumes, solid {worst} still misses "
+            f"{-errors[worst] / free[worst]:.1%}; move the solids apart"
+        )
+
+    def without(self, number: int) -> Self:
+        """Return this contact without one of its solids."""
+        count = len(self.operands)
+        kept = [i for i in range(count) if i != number]
+        table = np.array(self.stiffness)
+        if len(table) == count**2:
+            table = table.reshape(count, count)[np.ix_(kept, kept)].ravel()
+        elif len(table):
+            table = table[kept]
+        return replace(
+            self,
+            operands=tuple(self.operands[i] for i in kept),
+            stiffness=tuple(table.tolist()),
+            height=self.height if len(self.height) == 1 else tuple(self.height[i] for i in kept),
+            growth=tuple(self.growth[i] for i in kept if self.growth),
+            names=tuple(self.names[i] for i in kept if self.names),
+        )
+
+    def stiffness_ratio(self, first: int, second: int) -> float:
+        """Return the stiffness of the second solid over that of the first, where these two touch."""
+        count = len(self.operands)
+        if not self.stiffness:
+            return 1.0
+        if len(self.stiffness) == count:
+            return self.stiffness[second] / self.stiffness[first]
+        return self.stiffness[second * count + first] / self.stiffness[first * count + second]
+
+    @Lazy
+    def _grown(self) -> tuple[Node, ...]:
+        """Return the solids with their offsets, before they deform."""
+        if not any(self.growth):
+            return self.operands
+        return tuple(node.offset(d) for node, d in zip(self.operands, self.growth, strict=True))
+
+    @Lazy
+    def _neighbors(self) -> list[list[int]]:
+        """Return for each solid those whose supports overlap with its own; no other can press it."""
+        boxes = np.array([node.support for node in self._grown])
+        neighbors: list[list[int]] = [[] for _ in boxes]
+        for i, (lower, upper) in enumerate(boxes):
+            meets = ((boxes[:, 0] <= upper) & (boxes[:, 1] >= lower)).all(axis=1)
+            meets[i] = False
+            neighbors[i] = np.flatnonzero(meets).tolist()
+        return neighbors
+
+    @Lazy
+    def _deformed(self) -> tuple[Node, ...]:
+        """Return the deformed solids."""
+        return tuple(self._pressed(i) for i in range(len(self.operands)))
+
+    def _pressed(self, number: int) -> Node:
+        """Return one solid, pressed by all others."""
+        solid, groups = self._grown[number], self._obstacles(number)
+        if not groups:
+            return solid
+        (first, obstacle), *others = groups
+        for ratio, more in others:
+            obstacle = RatedUnion(obstacle, more, stiffness_ratio=ratio / first)
+        height = self.height[number % len(self.height)]
+        return Press(solid, obstacle, stiffness_ratio=first, width=self.width, height=height)
+
+    def _obstacles(self, number: int) -> list[tuple[float, Node]]:
+        """Return the obstacles of one solid and their stiffness ratios, those of equal ratio as one."""
+        groups: dict[float, list[Node]] = {}
+        for other in self._neighbors[number]:
+            groups.setdefault(self.stiffness_ratio(number, other), []).append(self._grown[other])
+        return [
+            (ratio, Union(tuple(nodes)) if len(nodes) > 1 else nodes[0]) for ratio, nodes in groups.items()
+        ]
+
+    def _shared(self, mesh: Mesh, first: int, second: int) -> ContactSurface | None:
+        """Return the surface that two solids share, from a mesh of the first; None if they are apart."""
+        own = self._pressure(mesh.vertices, first, second)
+        if not (own > 0.0).any():
+            return None
+        margin = own
+        for rival in self._neighbors[first]:
+            if rival != second:
+                margin = np.minimum(margin, own - self._pressure(mesh.vertices, first, rival))
+        vertices, faces = clipped(mesh.vertices, mesh.faces, margin)
+        if not len(faces):
+            return None
+        corners = vertices[faces]
+        areas = 0.5 * np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        area = float(areas.sum())
+        if area == 0.0:
+            return None
+        centroid = (areas @ corners.mean(axis=1)) / area
+        names = (self.names[first], self.names[second]) if self.names else ()
+        return ContactSurface(
+            (first, second), names, area, centroid, outlines_of(vertices, faces), vertices, faces
+        )
+
+    def _pressure(self, points: Float32Array, first: int, second: int) -> Float64Array:
+        """Return the second solid's f − ½ (n,) at points inside it, in the scale of the first."""
+        excess = self._grown[second](points).astype(np.float64) - 0.5
+        return excess * np.where(excess > 0.0, self.stiffness_ratio(first, second), 1.0)
+
+
+def _volumes(solids: Iterable[Node], cells: list[float]) -> Float64Array:
+    """Return the volumes (n,) of n solids, each measured in cells of its own size."""
+    meshes = (polygonize(solid, cell_size=cell) for solid, cell in zip(solids, cells, strict=True))
+    return np.array([enclosed_volume(mesh.vertices, mesh.faces) for mesh in meshes])
+
+
+def _check_shape(width: float, height: float) -> None:
+    """Raise `InvalidNode` for a bulge that is too high for its width."""
+    if height > HEIGHT_OVER_WIDTH * width:
+        raise InvalidNode(
+            f"height: expected at most {HEIGHT_OVER_WIDTH:g} of the width {width:g}, got {height:g}"
+        )
+
+
+def _check_count(name: str, values: tuple[Any, ...], counts: set[int]) -> None:
+    """Raise `InvalidNode` if a parameter has not as many values as one of `counts`."""
+    if len(values) not in counts:
+        expected = " or ".join(str(count) for count in sorted(counts))
+        raise InvalidNode(f"{name}: expected {expected} values for these solids, got {len(values)}")
