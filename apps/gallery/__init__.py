@@ -25,6 +25,7 @@ Example = Literal[
     "mapping_modes",
     "custom_nodes",
     "creases",
+    "pressed_solids",
 ]
 """The name of an example."""
 

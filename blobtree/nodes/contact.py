@@ -202,7 +202,10 @@ class Contact(Macro):
     width: Width = 0.3
     height: Annotated[
         tuple[float, ...],
-        Parameter(Quantity.FACTORS, "height of the bulges: one number, or one for each solid; see `Press`"),
+        Parameter(
+            Quantity.FACTORS,
+            "height of the bulges (see `Press`): one for each solid, or that of the softest, and less for stiffer",
+        ),
     ] = (0.05,)
     growth: Annotated[
         tuple[float, ...],
@@ -408,8 +411,19 @@ class Contact(Macro):
         (first, obstacle), *others = groups
         for ratio, more in others:
             obstacle = RatedUnion(obstacle, more, stiffness_ratio=ratio / first)
-        height = self.height[number % len(self.height)]
+        height = self._heights[number]
         return Press(solid, obstacle, stiffness_ratio=first, width=self.width, height=height)
+
+    @Lazy
+    def _heights(self) -> tuple[float, ...]:
+        """Return the height of each solid's bulges."""
+        count = len(self.operands)
+        if len(self.height) == count:
+            return self.height
+        if not self.stiffness:
+            return self.height * count
+        rows = np.reshape(self.stiffness, (count, -1)).mean(axis=1)
+        return tuple((self.height[0] * rows.min() / rows).tolist())
 
     def _obstacles(self, number: int) -> list[tuple[float, Node]]:
         """Return the obstacles of one solid and their stiffness ratios, those of equal ratio as one."""

@@ -160,7 +160,7 @@ def random_contact(rng: np.random.Generator, operands: list[Node]) -> Node:
         tuple(several),
         stiffness=tuple(stiffness.tolist()) if stiffness.any() else (),
         width=width,
-        height=tuple(heights[: len(several)].tolist()),
+        height=tuple(heights[: int(rng.choice([1, len(several)]))].tolist()),
     )
 
 

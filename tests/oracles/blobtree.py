@@ -202,9 +202,21 @@ def pressed_solids(contact: Contact) -> tuple[Node, ...]:
         first, obstacle = others[0]
         for ratio, other in others[1:]:
             obstacle = RatedUnion(obstacle, other, stiffness_ratio=ratio / first)
-        height = contact.height[i % len(contact.height)]
+        height = bulge_height(contact, i)
         pressed.append(Press(solid, obstacle, stiffness_ratio=first, width=contact.width, height=height))
     return tuple(pressed)
+
+
+def bulge_height(contact: Contact, number: int) -> float:
+    """Height as given for a solid; one for all is that of the softest, others times the ratio of stiffness."""
+    count = len(contact.operands)
+    if len(contact.height) == count:
+        return contact.height[number]
+    size = len(contact.stiffness) // count
+    rows = (
+        [sum(contact.stiffness[i * size : (i + 1) * size]) for i in range(count)] if size else [1.0] * count
+    )
+    return contact.height[0] * min(rows) / rows[number]
 
 
 def rated(value: Floats, ratio: float) -> Floats:

@@ -54,7 +54,7 @@ def fields(model: Contact, points: NDArray[Any]) -> NDArray[np.float64]:
         rated = [oracle.rated(f, model.stiffness_ratio(i, j)) for j, f in enumerate(plain) if j != i]
         empty = np.zeros((len(own), 3)), np.full(len(own), np.inf)
         m = oracle.Field(np.max(rated, axis=0), *empty)
-        height = model.height[i % len(model.height)]
+        height = oracle.bulge_height(model, i)
         result.append(oracle.pressed_field(oracle.Field(own, *empty), m, 1.0, model.width, height).value)
     return np.array(result)
 
@@ -66,6 +66,13 @@ def test_the_deformed_fields_are_those_of_the_definition(model: Contact) -> None
     for solid, values in zip(model.solids(), expected, strict=True):
         np.testing.assert_allclose(solid(points), values, atol=1e-5)
     np.testing.assert_allclose(model(points), expected.max(axis=0), atol=1e-5)
+
+
+def test_stiffer_solids_bulge_less() -> None:
+    soft, stiff = Contact(PAIR, stiffness=(1, 4), height=0.08, width=0.4).solids()  # type: ignore[arg-type]
+    assert isinstance(soft, Press)
+    assert isinstance(stiff, Press)
+    assert (soft.height, stiff.height) == (0.08, 0.02)
 
 
 @EVERY_MODEL
