@@ -204,7 +204,7 @@ class Contact(Macro):
         tuple[float, ...],
         Parameter(
             Quantity.FACTORS,
-            "height of the bulges (see `Press`): one for each solid, or that of the softest, and less for stiffer",
+            "height of the bulges (see `Press`), one for each solid or that of the softest; stiffer ones bulge less",
         ),
     ] = (0.05,)
     growth: Annotated[

@@ -208,7 +208,7 @@ def pressed_solids(contact: Contact) -> tuple[Node, ...]:
 
 
 def bulge_height(contact: Contact, number: int) -> float:
-    """Height as given for a solid; one for all is that of the softest, others times the ratio of stiffness."""
+    """Height as given for a solid; a single one is that of the softest, others divide it by stiffness."""
     count = len(contact.operands)
     if len(contact.height) == count:
         return contact.height[number]
