@@ -6,7 +6,7 @@ pressed by all others, and their union is the model.
 
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass, replace
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 
@@ -201,12 +201,12 @@ class Contact(Macro):
     ] = ()
     width: Width = 0.3
     height: Annotated[
-        tuple[float, ...],
+        float | tuple[float, ...],
         Parameter(
             Quantity.FACTORS,
-            "height of the bulges (see `Press`), one for each solid or that of the softest; stiffer ones bulge less",
+            "height of the bulges (see `Press`), one a solid or that of the softest; stiffer ones bulge less",
         ),
-    ] = (0.05,)
+    ] = 0.05
     growth: Annotated[
         tuple[float, ...],
         Parameter(
@@ -223,7 +223,7 @@ class Contact(Macro):
         super().__post_init__()
         count = len(self.operands)
         _check_count("stiffness", self.stiffness, {0, count, count**2})
-        _check_count("height", self.height, {1, count})
+        _check_count("height", self._given_heights, {1, count})
         _check_count("growth", self.growth, {0, count})
         _check_count("names", self.names, {0, count})
         if self.stiffness and not 0.0 < max(self.stiffness) <= LARGEST_RATIO * min(self.stiffness):
@@ -231,7 +231,7 @@ class Contact(Macro):
                 f"stiffness: expected numbers above 0 whose ratio is at most {LARGEST_RATIO:g}, "
                 f"got {self.stiffness}"
             )
-        for height in self.height:
+        for height in self._given_heights:
             if not 0.0 <= height <= LARGEST_HEIGHT:
                 raise InvalidNode(f"height: expected 0 to {LARGEST_HEIGHT:g}, got {height!r}")
             _check_shape(self.width, height)
@@ -357,6 +357,7 @@ class Contact(Macro):
         """Return this contact without one of its solids."""
         count = len(self.operands)
         kept = [i for i in range(count) if i != number]
+        heights = self._given_heights
         table = np.array(self.stiffness)
         if len(table) == count**2:
             table = table.reshape(count, count)[np.ix_(kept, kept)].ravel()
@@ -366,7 +367,7 @@ class Contact(Macro):
             self,
             operands=tuple(self.operands[i] for i in kept),
             stiffness=tuple(table.tolist()),
-            height=self.height if len(self.height) == 1 else tuple(self.height[i] for i in kept),
+            height=self.height if len(heights) == 1 else tuple(heights[i] for i in kept),
             growth=tuple(self.growth[i] for i in kept if self.growth),
             names=tuple(self.names[i] for i in kept if self.names),
         )
@@ -417,13 +418,18 @@ class Contact(Macro):
     @Lazy
     def _heights(self) -> tuple[float, ...]:
         """Return the height of each solid's bulges."""
-        count = len(self.operands)
-        if len(self.height) == count:
-            return self.height
+        count, given = len(self.operands), self._given_heights
+        if len(given) == count:
+            return given
         if not self.stiffness:
-            return self.height * count
+            return given * count
         rows = np.reshape(self.stiffness, (count, -1)).mean(axis=1)
-        return tuple((self.height[0] * rows.min() / rows).tolist())
+        return tuple((given[0] * rows.min() / rows).tolist())
+
+    @property
+    def _given_heights(self) -> tuple[float, ...]:
+        """The checked heights, of all solids or of each one."""
+        return cast("tuple[float, ...]", self.height)
 
     def _obstacles(self, number: int) -> list[tuple[float, Node]]:
         """Return the obstacles of one solid and their stiffness ratios, those of equal ratio as one."""

@@ -210,13 +210,14 @@ def pressed_solids(contact: Contact) -> tuple[Node, ...]:
 def bulge_height(contact: Contact, number: int) -> float:
     """Height as given for a solid; a single one is that of the softest, others divide it by stiffness."""
     count = len(contact.operands)
-    if len(contact.height) == count:
-        return contact.height[number]
+    heights = np.atleast_1d(contact.height).tolist()
+    if len(heights) == count:
+        return float(heights[number])
     size = len(contact.stiffness) // count
     rows = (
         [sum(contact.stiffness[i * size : (i + 1) * size]) for i in range(count)] if size else [1.0] * count
     )
-    return contact.height[0] * min(rows) / rows[number]
+    return float(heights[0] * min(rows) / rows[number])
 
 
 def rated(value: Floats, ratio: float) -> Floats:

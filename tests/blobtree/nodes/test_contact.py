@@ -69,7 +69,7 @@ def test_the_deformed_fields_are_those_of_the_definition(model: Contact) -> None
 
 
 def test_stiffer_solids_bulge_less() -> None:
-    soft, stiff = Contact(PAIR, stiffness=(1, 4), height=0.08, width=0.4).solids()  # type: ignore[arg-type]
+    soft, stiff = Contact(PAIR, stiffness=(1, 4), height=0.08, width=0.4).solids()
     assert isinstance(soft, Press)
     assert isinstance(stiff, Press)
     assert (soft.height, stiff.height) == (0.08, 0.02)
@@ -147,7 +147,7 @@ def test_a_solid_far_from_all_others_stays_as_it_is() -> None:
 @pytest.mark.parametrize("height", [0.02, 0.06])
 def test_normals_are_continuous_where_contact_and_bulge_begin_and_end(height: float) -> None:
     """Points of the surface a little on both sides of m = ½, of the top and of the far edge, along it."""
-    model = Contact(PAIR, height=height, width=0.3)  # type: ignore[arg-type]
+    model = Contact(PAIR, height=height, width=0.3)
     left = model.solids()[0]
     mesh = polygonize(left, resolution=60)
     points = mesh.vertices[np.random.default_rng(0).permutation(len(mesh.vertices))[:4000]]
@@ -268,8 +268,12 @@ def test_wrong_solids_are_refused(operands: Any) -> None:
 
 
 def test_wrong_presses_are_refused() -> None:
-    options: dict[str, Any]
-    for options in ({"stiffness_ratio": 0.0}, {"stiffness_ratio": 1e9}, {"width": 0.04, "height": 0.02}):
+    wrong: tuple[dict[str, Any], ...] = (
+        {"stiffness_ratio": 0.0},
+        {"stiffness_ratio": 1e9},
+        {"width": 0.04, "height": 0.02},
+    )
+    for options in wrong:
         with pytest.raises(InvalidNode):
             Press(*PAIR, **options)
 
