@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from blobtree import Node, Point, Segment, Superquadric
+from blobtree.tape.instruction_set import LIBRARY
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
@@ -13,7 +14,7 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
-from tests.blobtree.trees import FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
 from tests.decals.glsl.functions import ALL_KINDS, ALL_LIBRARY_KINDS, run_program
 from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
@@ -22,6 +23,7 @@ from tests.oracles import blobtree as oracle
 
 TREES = random_trees(seed=31, count=24) + random_trees(seed=33, count=12, more=SOLIDS)
 FIELD_TREES = random_trees(seed=35, count=6, more=FIELDS)
+CONTACT_TREES = random_trees(seed=36, count=6, depth=2, more=CONTACTS)
 LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
 
 
@@ -63,6 +65,13 @@ def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
 
 def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> None:
     assert_same_in_both_languages(context, LIBRARY_TREES, ALL_LIBRARY_KINDS, 0)
+
+
+def test_contacts_are_the_same_in_both_languages(context: Context) -> None:
+    names = {LIBRARY.operators[code].name for tree in CONTACT_TREES for code in tree.tape.operators}
+    assert {"press", "rated_union"} <= names
+    kinds = replace(ALL_KINDS, operators=tuple(range(len(LIBRARY.operators))), instruction_set=LIBRARY)
+    assert_same_in_both_languages(context, CONTACT_TREES, kinds, 0)
 
 
 def assert_same_in_both_languages(context: Context, trees: list[Node], kinds: Kinds, seed: int) -> None:
