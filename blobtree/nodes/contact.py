@@ -66,9 +66,8 @@ class Press(Combination):
     --------
     >>> from blobtree import Point, Press
     >>> left, right = Point((-0.7, 0, 0), radius=1.0), Point((0.7, 0, 0), radius=1.0)
-    >>> pressed = Press(left, right)
-    >>> pressed([[0, 0, 0], [0.2, 0, 0]]).round(3).tolist()
-    [0.5, 0.173]
+    >>> Press(left, right)([[-0.9, 0, 0], [0, 0, 0], [0.9, 0, 0]]).round(1).tolist()
+    [1.0, 0.5, 0.0]
     """
 
     file_tag = "press"
@@ -87,7 +86,7 @@ class Press(Combination):
             hint="leave a rigid solid as it is, and press the others",
         ),
     ] = 1.0
-    width: Width = 0.3
+    width: Width = 0.4
     height: Height = 0.05
 
     def __post_init__(self) -> None:
@@ -181,7 +180,7 @@ class Contact(Macro):
     >>> balls = [Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)]
     >>> model = Contact(balls, stiffness=(1, 4))
     >>> soft, stiff = model.solids()
-    >>> bool(soft.bounds[1][0] < 0.0)
+    >>> bool(soft([0, 0, 0]) < 0.5 < stiff([0, 0, 0]))
     True
     >>> (surface,) = model.contacts()
     >>> surface.pair, len(surface.outlines)
@@ -199,7 +198,7 @@ class Contact(Macro):
             "stiffness of each solid, or of each (row) against each other (n × n numbers); equal if empty",
         ),
     ] = ()
-    width: Width = 0.3
+    width: Width = 0.4
     height: Annotated[
         float | tuple[float, ...],
         Parameter(
@@ -322,9 +321,9 @@ class Contact(Macro):
         Examples
         --------
         >>> from blobtree import Contact, Point
-        >>> model = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)])
+        >>> model = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.7, 0.7)], height=0)
         >>> [round(distance, 3) for distance in model.compensated(resolution=32).growth]
-        [0.029, 0.029]
+        [0.023, 0.023]
         """
         cells = [float(np.max(np.subtract(*node.support[::-1]))) / resolution for node in self.operands]
         free = _volumes(self.operands, cells)
