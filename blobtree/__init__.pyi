@@ -1,4 +1,5 @@
 from ._version import __version__
+from .custom.field import CustomField, define_field
 from .custom.operator import CustomCombination, define_operator
 from .custom.skeleton import CustomPrimitive, define_skeleton
 from .derivatives.curvature import Curvatures
@@ -23,7 +24,7 @@ from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
 from .nodes.contact import Contact, ContactSurface, Press, RatedUnion
 from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
-from .nodes.fields import FieldPrimitive, Superquadric
+from .nodes.fields import FieldPrimitive, Gyroid, Noise, Superquadric
 from .nodes.flats import Polygon, Rectangle, Triangle
 from .nodes.numeric_parameters import (
     NumericParameter,
@@ -53,12 +54,14 @@ __all__ = [
     "CubicBezier",
     "Curvatures",
     "CustomCombination",
+    "CustomField",
     "CustomPrimitive",
     "Cylinder",
     "Difference",
     "Disc",
     "Ellipsoid",
     "FieldPrimitive",
+    "Gyroid",
     "HalfSpace",
     "Hits",
     "ImplicitDecalsError",
@@ -72,6 +75,7 @@ __all__ = [
     "Mesh",
     "MissingPackage",
     "Node",
+    "Noise",
     "NumericParameter",
     "Offset",
     "ParameterGradient",
@@ -100,6 +104,7 @@ __all__ = [
     "UntranslatableFunction",
     "UnusableCache",
     "__version__",
+    "define_field",
     "define_operator",
     "define_skeleton",
     "from_json",

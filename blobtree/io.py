@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast, get_type_hints
 import msgspec
 
 from blobtree.custom.definition import find_kind
+from blobtree.custom.field import CustomField
 from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.errors import ImplicitDecalsError, InvalidFile
@@ -59,6 +60,21 @@ class CustomSkeletonRecord(NodeRecord, frozen=True, tag="custom_skeleton"):
     def make(self, values: dict[str, Any]) -> Node:
         """Return the node; its kind must be defined."""
         return _custom_node(CustomPrimitive, values)
+
+
+class CustomFieldRecord(NodeRecord, frozen=True, tag="custom_field"):
+    """A field in a box by a custom function."""
+
+    kind: str
+    values: dict[str, CustomValue] = msgspec.field(name="parameters")
+    center: Vector
+    size: Vector
+    fade: float
+    color: Vector
+
+    def make(self, values: dict[str, Any]) -> Node:
+        """Return the node; its kind must be defined."""
+        return _custom_node(CustomField, values)
 
 
 class CustomOperatorRecord(NodeRecord, frozen=True, tag="custom_operator"):
@@ -110,7 +126,11 @@ if TYPE_CHECKING:
     AnyRecord = NodeRecord
 else:
     AnyRecord = (
-        CustomSkeletonRecord | CustomOperatorRecord | OldCustomSkeletonRecord | OldCustomOperatorRecord
+        CustomSkeletonRecord
+        | CustomFieldRecord
+        | CustomOperatorRecord
+        | OldCustomSkeletonRecord
+        | OldCustomOperatorRecord
     )
     for _record in RECORD_OF_KIND.values():
         AnyRecord |= _record
@@ -288,6 +308,8 @@ def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
     record_type: type[NodeRecord]
     if isinstance(node, CustomPrimitive):
         record_type = CustomSkeletonRecord
+    elif isinstance(node, CustomField):
+        record_type = CustomFieldRecord
     elif isinstance(node, CustomCombination):
         record_type = CustomOperatorRecord
     else:

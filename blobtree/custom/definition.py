@@ -38,7 +38,7 @@ def custom_parameters(
         A parameter has a type that fits on no tape, the name of an attribute of every node, or limits that
         allow no value.
     """
-    taken = {"_", *dir(base), "radius", "color", "operands"}
+    taken = {"_", *dir(base), *getattr(base, "__dataclass_fields__", ()), "radius", "color", "operands"}
     if not isinstance(limits, Mapping | None):
         raise source.refusal(
             f"limits: expected {{parameter: (smallest or None, largest or None), ...}}, got {limits!r}"
@@ -86,7 +86,7 @@ def _limits(source: CustomSource, name: str, limits: Limits) -> tuple[float, flo
 
 
 class CustomKind(type):
-    """The type of node classes that `define_skeleton` and `define_operator` make."""
+    """The type of node classes that definitions make."""
 
     kind: str
     digest: str
@@ -118,7 +118,8 @@ def find_kind(name: str) -> CustomKind:
         known = ", ".join(sorted(_KINDS)) or "none"
         raise UnknownKind(
             f"custom kind {name!r} is not defined in this process (defined: {known}); import the module that "
-            "calls define_skeleton or define_operator for it (on the command line: --define), then try again"
+            "calls define_skeleton, define_operator or define_field for it "
+            "(on the command line: --define), then try again"
         )
     return _KINDS[name]
 

@@ -88,6 +88,11 @@ def custom_source(function: Any, *, returns: Any) -> CustomSource:
     return CustomSource(python.__name__, {name: hints[name] for name in names}, function_copy, python, digest)
 
 
+def returned_type(function: Any) -> Any:
+    """Return the annotated type of a function's result, None if it has none."""
+    return _hints(_python_function(function)).get("return")
+
+
 def kind_name(source: CustomSource, name: str | None) -> str:
     """Return the name of a kind in files: `name`, or that of its function."""
     kind = source.name if name is None else name

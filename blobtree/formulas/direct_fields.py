@@ -1,15 +1,40 @@
-"""Direct fields of the library: superquadrics."""
+"""Direct fields of the library: superquadrics, gyroids and noise.
+
+A gyroid and noise have no end of their own. They fill a box, with tape[at] = (its middle, fade) and
+tape[at + 1] = (half lengths, the kind's first number), see `formulas.windows`.
+"""
+
+import math
 
 import warp as wp
 
 from blobtree.formulas.falloff import RIM, falloff, falloff_derivative, falloff_steepest
 from blobtree.formulas.fields import FieldKind
+from blobtree.formulas.noise import LARGEST_NOISE, STEEPEST_NOISE, gradient_noise
 from blobtree.formulas.operators import ricci_partials
+from blobtree.formulas.windows import (
+    smooth_step,
+    smooth_step_slope,
+    steepest_smooth_step,
+    window,
+    window_bounds,
+    windowed,
+    windowed_bounds,
+)
 
 wp.set_module_options({"enable_backward": False})
 
 NORM_MARGIN = wp.constant(4e-6)
 """Relative error of powers in float32."""
+
+STEEPEST_GYROID = math.sqrt(3.0)
+"""Largest |∇G| of G = sin x cos y + sin y cos z + sin z cos x."""
+
+GYROID_SLOPE = 1.529
+"""Mean |∇G| on the surface G = 0; it varies there from √2 to √3."""
+
+LARGEST_GYROID = 1.5
+"""Largest |G|."""
 
 
 @wp.func
@@ -67,7 +92,98 @@ def superquadric_bounds(
     )
 
 
+@wp.func
+def gyroid(x: wp.vec3, rate: wp.float32) -> wp.vec4:
+    """Return (G, ∇G) of G = sin X cos Y + sin Y cos Z + sin Z cos X with X = rate · x (Schoen 1970)."""
+    p = x * rate
+    sx = wp.sin(p[0])
+    sy = wp.sin(p[1])
+    sz = wp.sin(p[2])
+    cx = wp.cos(p[0])
+    cy = wp.cos(p[1])
+    cz = wp.cos(p[2])
+    return wp.vec4(
+        sx * cy + sy * cz + sz * cx,
+        rate * (cx * cy - sz * sx),
+        rate * (cy * cz - sx * sy),
+        rate * (cz * cx - sy * sz),
+    )
+
+
+@wp.func
+def gyroid_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (f, ∇f) of f = g(|G| / s) in a window; tape[at + 1][3] = rate, tape[at + 2][0] = 1 / s."""
+    middle = tape[at]
+    half = tape[at + 1]
+    x = q - wp.vec3(middle[0], middle[1], middle[2])
+    w = window(x, wp.vec3(half[0], half[1], half[2]), middle[3])
+    if w[0] <= 0.0:
+        return wp.vec4(0.0, 0.0, 0.0, 0.0)
+    d = gyroid(x, half[3]) * tape[at + 2][0]
+    slope = 2.0 * d[0] * falloff_derivative(d[0] * d[0])
+    return windowed(wp.vec4(falloff(d[0] * d[0]), slope * d[1], slope * d[2], slope * d[3]), w)
+
+
+@wp.func
+def gyroid_bounds(
+    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Bound f over a ball, in which |G| changes by at most √3 · rate · radius."""
+    middle = tape[at]
+    half = tape[at + 1]
+    x = center - wp.vec3(middle[0], middle[1], middle[2])
+    w = window_bounds(x, radius, wp.vec3(half[0], half[1], half[2]), middle[3])
+    if w[1] <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    steepest = STEEPEST_GYROID * half[3] * tape[at + 2][0]
+    d = wp.abs(gyroid(x, half[3])[0]) * tape[at + 2][0]
+    nearest = wp.max(d - steepest * radius, 0.0)
+    farthest = wp.min(d + steepest * radius, LARGEST_GYROID * tape[at + 2][0])
+    slope = steepest * falloff_steepest(nearest, wp.max(farthest, nearest))
+    return windowed_bounds(wp.vec3(falloff(farthest * farthest), falloff(nearest * nearest), slope), w)
+
+
+@wp.func
+def noise_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (f, ∇f) of f = s(½ + (n − level) / 2 softness) in a window, s being `smooth_step`.
+
+    tape[at + 1][3] = 1 / wavelength; tape[at + 2] = (level, 1 / (2 softness), seed, 0).
+    """
+    middle = tape[at]
+    half = tape[at + 1]
+    shape = tape[at + 2]
+    x = q - wp.vec3(middle[0], middle[1], middle[2])
+    w = window(x, wp.vec3(half[0], half[1], half[2]), middle[3])
+    if w[0] <= 0.0:
+        return wp.vec4(0.0, 0.0, 0.0, 0.0)
+    n = gradient_noise(x * half[3], int(shape[2]))
+    t = 0.5 + (n[0] - shape[0]) * shape[1]
+    slope = smooth_step_slope(t) * shape[1] * half[3]
+    return windowed(wp.vec4(smooth_step(t), slope * n[1], slope * n[2], slope * n[3]), w)
+
+
+@wp.func
+def noise_bounds(center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Bound f over a ball, in which the noise changes by at most STEEPEST_NOISE · radius / wavelength."""
+    middle = tape[at]
+    half = tape[at + 1]
+    shape = tape[at + 2]
+    x = center - wp.vec3(middle[0], middle[1], middle[2])
+    w = window_bounds(x, radius, wp.vec3(half[0], half[1], half[2]), middle[3])
+    if w[1] <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    n = gradient_noise(x * half[3], int(shape[2]))[0]
+    change = STEEPEST_NOISE * radius * half[3]
+    low = 0.5 + (wp.max(n - change, -LARGEST_NOISE) - shape[0]) * shape[1]
+    high = 0.5 + (wp.min(n + change, LARGEST_NOISE) - shape[0]) * shape[1]
+    slope = STEEPEST_NOISE * half[3] * shape[1] * steepest_smooth_step(low, high)
+    return windowed_bounds(wp.vec3(smooth_step(low), smooth_step(high), slope), w)
+
+
 SUPERQUADRIC = FieldKind("superquadric", superquadric_value_gradient, superquadric_bounds, parameters=3)
 
-DIRECT_FIELDS = (SUPERQUADRIC,)
+GYROID = FieldKind("gyroid", gyroid_value_gradient, gyroid_bounds, parameters=3)
+NOISE = FieldKind("noise", noise_value_gradient, noise_bounds, parameters=3)
+
+DIRECT_FIELDS = (SUPERQUADRIC, GYROID, NOISE)
 """Every direct field of this file."""

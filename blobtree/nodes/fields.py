@@ -13,9 +13,10 @@ import numpy as np
 
 from blobtree._typing import Box, Float64Array
 from blobtree.errors import InvalidNode
-from blobtree.formulas.direct_fields import SUPERQUADRIC
+from blobtree.formulas.direct_fields import GYROID, GYROID_SLOPE, NOISE, SUPERQUADRIC
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
+from blobtree.formulas.noise import MEAN_NOISE_SLOPE
 from blobtree.nodes.parameters import Color, Parameter, Quantity, columns_of, parameters_of
 from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf
 from blobtree.tape.program import ProgramField
@@ -127,3 +128,120 @@ class Superquadric(FieldPrimitive):
         rest = np.zeros((len(inverses), 3))
         numbers = [columns["center"], powers[:, :1], inverses, powers[:, 1:], slopes, rest]
         return np.concatenate(numbers, axis=1).reshape(-1, 3, 4)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoxedField(FieldPrimitive):
+    """A field that has no end of its own and fills a box: the base of such leaves.
+
+    Its function sees points from the middle of the box. It is multiplied by a window that falls from 1 to 0
+    inside the faces of the box, see `formulas.windows`.
+    """
+
+    center: Annotated[Vector, Parameter(Quantity.POINT, "middle of the box, and origin of the function")]
+    size: Annotated[Vector, Parameter(Quantity.EXTENTS, "lengths of the box along x, y and z, above 0")]
+    _: KW_ONLY
+    fade: Annotated[
+        float,
+        Parameter(Quantity.FACTOR, "share of the way from each face to the middle on which the field fades",
+                  low=0.001, high=1.0, hint="a field needs some way to fade to 0"),
+    ] = 0.2  # fmt: skip
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if min(self.size) <= 0.0:
+            raise InvalidNode(f"size: expected three numbers above 0, got {self.size!r}")
+
+    @classmethod
+    def box(cls, columns: Columns) -> Box:
+        """Return the boxes."""
+        half = 0.5 * columns["size"]
+        return columns["center"] - half, columns["center"] + half
+
+    @classmethod
+    def texels(cls, columns: Columns) -> Float64Array:
+        """Return the middle and `fade`, the half lengths, then the numbers of the kind."""
+        numbers = [columns["center"], columns["fade"], 0.5 * columns["size"], cls.numbers(columns)]
+        return super().texels({str(place): part for place, part in enumerate(numbers)})
+
+    @classmethod
+    def numbers(cls, columns: Columns) -> Float64Array:
+        """Return the numbers (n, ·) of the function; by default its parameters as declared."""
+        own = [columns[name] for name in columns if name not in parameters_of(BoxedField)]
+        return np.concatenate([np.empty((len(columns["fade"]), 0)), *own], axis=1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Gyroid(BoxedField):
+    """A wall along a gyroid, the minimal surface without straight lines (Schoen 1970).
+
+    Its field is g(RIM · G / τ) with G = sin X cos Y + sin Y cos Z + sin Z cos X, X = 2π x / period. τ is half
+    the thickness times the mean slope of G on the gyroid, so the wall is up to 13 % thinner and 8 % thicker.
+
+    Examples
+    --------
+    >>> from blobtree import Gyroid
+    >>> lattice = Gyroid((0, 0, 0), (4, 4, 4), period=2.0, thickness=0.1)
+    >>> lattice([[0, 0, 0], [0, 0, 0.25]]).tolist()
+    [1.0, 0.0]
+    """
+
+    file_tag = "gyroid"
+    field_kind = GYROID
+
+    period: Annotated[float, Parameter(Quantity.LENGTH, "length after which the wall repeats")]
+    thickness: Annotated[float, Parameter(Quantity.LENGTH, "mean thickness of the wall")]
+
+    def grown(self, distance: float) -> "Gyroid":
+        """Return this gyroid with a wall that is thicker by the distance on both sides."""
+        if self.thickness + 2.0 * distance <= 0.0:
+            raise InvalidNode(f"offset: {distance:g} leaves nothing of {self!r}")
+        return replace(self, thickness=self.thickness + 2.0 * distance)
+
+    @classmethod
+    def numbers(cls, columns: Columns) -> Float64Array:
+        """Return 2π / period, and RIM / τ."""
+        rate = 2.0 * np.pi / columns["period"]
+        return np.concatenate([rate, RIM / (0.5 * columns["thickness"] * rate * GYROID_SLOPE)], axis=1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Noise(BoxedField):
+    """Random lumps: where gradient noise n (Perlin 2002) is above a level.
+
+    Its field is t²(3 − 2t) with t = ½ + (n − level) / (2 softness), between 0 and 1. The noise lies between
+    −1.04 and 1.04, mostly between −½ and ½.
+
+    Examples
+    --------
+    >>> from blobtree import Noise
+    >>> rock = Noise((0, 0, 0), (4, 4, 4), wavelength=1.0, level=0.0)
+    >>> rock([[0, 0, 0], [9, 0, 0]]).tolist()
+    [0.5, 0.0]
+    """
+
+    file_tag = "noise"
+    field_kind = NOISE
+
+    wavelength: Annotated[float, Parameter(Quantity.LENGTH, "distance between the noise's lattice points")]
+    level: Annotated[float, Parameter(Quantity.FACTOR, "value of the noise on the surface")] = 0.0
+    softness: Annotated[
+        float,
+        Parameter(Quantity.FACTOR, "difference of the noise over which the field fades", low=0.01, high=10.0,
+                  hint="a smaller one makes the field too steep"),
+    ] = 0.3  # fmt: skip
+    seed: Annotated[
+        int,
+        Parameter(Quantity.NUMBERS, "whole number that chooses the noise", low=0, high=288, whole=True),
+    ] = 0
+
+    def grown(self, distance: float) -> "Noise":
+        """Return this noise at a lower level, so that its surface moves by about the distance."""
+        return replace(self, level=self.level - distance * MEAN_NOISE_SLOPE / self.wavelength)
+
+    @classmethod
+    def numbers(cls, columns: Columns) -> Float64Array:
+        """Return 1 / wavelength, the level, 1 / (2 softness) and the seed."""
+        parts = [1.0 / columns["wavelength"], columns["level"], 0.5 / columns["softness"], columns["seed"]]
+        return np.concatenate(parts, axis=1)

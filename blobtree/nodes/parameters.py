@@ -261,7 +261,9 @@ def mapped(quantity: Quantity, values: Float64Array, matrices: Float64Array | No
 def documented(doc: str, kind: type) -> str:
     """Return the docstring of a node class with a Parameters section of its declarations."""
     lines: list[str] = []
-    for name, hint in inspect.get_annotations(kind).items():
+    annotations_of = inspect.get_annotations
+    hints = {name: hint for base in reversed(kind.__mro__) for name, hint in annotations_of(base).items()}
+    for name, hint in hints.items():
         parameter = _declared(hint)
         if parameter is not None and parameter.doc:
             lines += [f"{name} : {_type_name(hint)}", f"    {describe(parameter)}"]

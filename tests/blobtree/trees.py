@@ -20,9 +20,11 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    Gyroid,
     HalfSpace,
     Intersection,
     Node,
+    Noise,
     Offset,
     Point,
     Polygon,
@@ -97,6 +99,14 @@ SOLIDS = MoreKinds(random_solid)
 def random_field(rng: np.random.Generator) -> Node:
     """A direct field of any kind."""
     center, color = triple(rng.uniform(-1.0, 1.0, 3)), triple(rng.uniform(0.0, 1.0, 3))
+    kind, size = rng.integers(0, 3), triple(rng.uniform(0.6, 1.6, 3))
+    if kind == 1:
+        wavelength, level = rng.uniform(0.4, 1.0), rng.uniform(-0.3, 0.1)
+        seed = int(rng.integers(0, 289))
+        return Noise(center, size, float(wavelength), float(level), 0.4, seed, color=color)
+    if kind == 0:
+        period, thickness = rng.uniform(0.6, 1.5), rng.uniform(0.15, 0.3)
+        return Gyroid(center, size, float(period), float(thickness), fade=0.3, color=color)
     vertical, horizontal = rng.choice([0.2, 0.5, 1.0, 1.5, 2.0], 2).tolist()
     return Superquadric(center, triple(rng.uniform(0.2, 0.8, 3)), vertical, horizontal, color=color)
 

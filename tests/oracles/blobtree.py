@@ -22,9 +22,11 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    Gyroid,
     HalfSpace,
     Intersection,
     Node,
+    Noise,
     Offset,
     Point,
     Polygon,
@@ -44,7 +46,7 @@ from blobtree import (
 )
 from blobtree.formulas.operators import Support
 from blobtree.nodes.primitives import Leaf, Primitive
-from tests.oracles import custom_kinds, shapes
+from tests.oracles import custom_kinds, direct_fields, shapes
 
 Floats = NDArray[np.float64]
 
@@ -94,6 +96,16 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             leaf, next_leaf = (_leaf_at(d * RIM, node.color) for d in (distance, other))
             apart = np.where(next_leaf.value > 0.0, leaf.value - next_leaf.value, np.inf)
             return replace(leaf, margin=apart)
+        case Gyroid(center=center, period=period, thickness=thickness, color=color):
+            x, y, z = 2.0 * np.pi / period * (q - np.array(center)).T
+            level = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+            leaf = _leaf_at(np.abs(level) * RIM / (0.5 * thickness * 2.0 * np.pi / period * 1.529), color)
+            return replace(leaf, value=leaf.value * direct_fields.window(node, q))
+        case Noise(center=center, wavelength=wavelength, color=color):
+            noise = direct_fields.gradient_noise((q - np.array(center)) / wavelength, node.seed)
+            t = np.clip(0.5 + (noise - node.level) / (2.0 * node.softness), 0.0, 1.0)
+            value = t * t * (3.0 - 2.0 * t) * direct_fields.window(node, q)
+            return replace(_leaf_at(np.zeros(len(q)), color), value=value)
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -167,6 +179,10 @@ def grown(node: Node, distance: float) -> Node:
         case HalfSpace(point=point, normal=normal, radius=radius):
             moved = np.array(point) + distance * np.array(normal) / np.linalg.norm(normal)
             return replace(node, point=tuple(moved), radius=radius + distance)
+        case Noise():
+            return replace(node, level=node.level - 1.18 * distance / node.wavelength)
+        case Gyroid():
+            return replace(node, thickness=node.thickness + 2.0 * distance)
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Primitive() | Polyline() | Polygon():

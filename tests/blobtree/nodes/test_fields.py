@@ -11,8 +11,10 @@ from blobtree import (
     ISO,
     RIM,
     FieldPrimitive,
+    Gyroid,
     InvalidNode,
     Node,
+    Noise,
     Point,
     Superquadric,
     from_json,
@@ -30,7 +32,9 @@ from tests.blobtree.trees import points_around
 from tests.oracles import blobtree as oracle
 
 PILLOW = Superquadric((0.1, 0.2, 0.3), (1.0, 0.5, 0.7), 0.4, 1.5, color=(1, 0, 0))
-EACH = pytest.mark.parametrize("node", [PILLOW], ids=["superquadric"])
+SPONGE = Gyroid((0.1, 0.2, 0.3), (2.0, 1.5, 1.8), 1.0, 0.2, fade=0.3, color=(1, 0, 0))
+ROCK = Noise((0.1, 0.2, 0.3), (2.0, 1.5, 1.8), 0.7, -0.1, 0.4, 17, color=(1, 0, 0))
+EACH = pytest.mark.parametrize("node", [PILLOW, SPONGE, ROCK], ids=["superquadric", "gyroid", "noise"])
 
 
 @EACH
@@ -41,9 +45,8 @@ def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, p
     field = oracle.evaluate(placed, points)
     np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
     smooth = field.margin > 1e-3
-    np.testing.assert_allclose(
-        placed.gradient(points[smooth]), oracle.gradient(placed, points[smooth]), atol=5e-4
-    )
+    slopes = oracle.gradient(placed, points[smooth])
+    np.testing.assert_allclose(placed.gradient(points[smooth]), slopes, rtol=1e-4, atol=1e-3)
 
 
 @EACH
@@ -71,6 +74,21 @@ def test_square_exponents_reach_into_the_corners() -> None:
     cube = Superquadric((0, 0, 0), (1, 1, 1), 0.1, 0.1)
     corner = 3.0**-0.05
     np.testing.assert_allclose(cube([[corner] * 3, [1, 0, 0], [0, 0, -1]]), ISO, atol=1e-5)
+
+
+def test_the_wall_of_a_gyroid_has_its_thickness() -> None:
+    sponge = Gyroid((0, 0, 0), (8, 8, 8), 1.0, 0.1, fade=0.01)
+    rng = np.random.default_rng(5)
+    inside = (sponge(rng.uniform(-2.0, 2.0, (20000, 3))) >= ISO).mean()
+    assert inside == pytest.approx(0.1 * 3.0915, rel=0.03)  # area of the gyroid in a unit cube
+
+
+def test_noise_differs_by_seed_and_repeats_after_289_units() -> None:
+    rng = np.random.default_rng(6)
+    points = rng.uniform(-3.0, 3.0, (500, 3))
+    rocks = [Noise((0, 0, 0), (1000, 1000, 1000), 1.0, seed=seed) for seed in (0, 1)]
+    assert np.abs(rocks[0](points) - rocks[1](points)).max() > 0.3
+    np.testing.assert_allclose(rocks[0](points + np.array([289.0, 0.0, 0.0])), rocks[0](points), atol=1e-3)
 
 
 def test_a_field_leaf_is_one_run_behind_its_map() -> None:
@@ -124,6 +142,12 @@ def test_the_support_holds_the_field() -> None:
         (lambda: Superquadric((0, 0, 0), (1, np.nan, 1)), "semi_axes: expected three"),
         (lambda: Superquadric((0, 0, 0), (1, 1, 1), 0.0), "vertical: expected 0.1 to 2, got 0.0"),
         (lambda: Superquadric((0, 0, 0), (1, 1, 1), 1.0, 2.5), "horizontal: expected 0.1 to 2, got 2.5"),
+        (lambda: Gyroid((0, 0, 0), (1, 0, 1), 1.0, 0.1), "size: expected three numbers above 0"),
+        (lambda: Gyroid((0, 0, 0), (1, 1, 1), 0.0, 0.1), "period: expected a number above 0"),
+        (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, fade=0.0), "fade: expected 0.001 to 1, got 0.0"),
+        (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, seed=300), "seed: expected a number from 0 to 288"),
+        (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, seed=1.5), "seed: expected a whole number"),  # type: ignore[arg-type]
+        (lambda: SPONGE.offset(-0.2).tape, "offset: -0.2 leaves nothing of Gyroid"),
         (lambda: PILLOW.offset(-0.5).tape, "offset: -0.5 leaves nothing of Superquadric"),
     ],
 )

@@ -1,0 +1,149 @@
+"""Custom direct fields: values, gradients, bounds, meshes, files, and what a definition is refused for."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import (
+    ISO,
+    CustomField,
+    InvalidDefinition,
+    InvalidFile,
+    InvalidNode,
+    Node,
+    Point,
+    UntranslatableFunction,
+    define_field,
+    from_json,
+    polygonize,
+    to_json,
+)
+from blobtree._typing import Float32Array, Float64Array
+from blobtree.tape.model import bounds_at
+from tests.blobtree.custom import field_kernels as kernels
+from tests.blobtree.meshing.test_polygonize import assert_closed
+from tests.blobtree.trees import points_around
+from tests.oracles import direct_fields
+
+Lump = define_field(kernels.lump, steepest=kernels.lump_slope, limits={"breadth": (0.1, None)})
+Waves = define_field(kernels.waves, steepest=kernels.waves_slope, interval=kernels.waves_interval)
+LUMP = Lump((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), (0.1, 0.2, 0.0), 0.6, color=(1, 0, 0))
+WAVES = Waves((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), 4.0, fade=0.4)
+(LUMP + WAVES).tape  # noqa: B018  (one set of kernels for both)
+EACH = pytest.mark.parametrize("node", [LUMP, WAVES], ids=["lump", "waves"])
+
+
+def value(node: Node, points: Float32Array | Float64Array) -> Float64Array:
+    """The fields of LUMP and WAVES in float64."""
+    assert isinstance(node, CustomField)
+    q = points.astype(np.float64) - np.array(node.center)
+    if node.kind == "lump":
+        field = 1.0 / (
+            1.0 + ((q - np.array(node.values["middle"])) ** 2).sum(axis=1) / node.values["breadth"] ** 2
+        )
+    else:
+        rate = node.values["rate"]
+        field = 0.5 + 0.25 * (np.sin(rate * q[:, 0]) + np.cos(rate * q[:, 1]))
+    result: Float64Array = field * direct_fields.window(node, points.astype(np.float64))
+    return result
+
+
+@EACH
+def test_values_and_gradients_are_those_of_float64(node: Node) -> None:
+    points = points_around(np.random.default_rng(1), node, 400)
+    np.testing.assert_allclose(node(points), value(node, points), atol=2e-6)
+    steps = 1e-5 * np.eye(3)
+    slopes = [value(node, points + step) - value(node, points - step) for step in steps]
+    np.testing.assert_allclose(node.gradient(points), np.stack(slopes, axis=1) / 2e-5, atol=2e-4)
+
+
+@EACH
+def test_bounds_hold(node: Node) -> None:
+    rng = np.random.default_rng(2)
+    centers = points_around(rng, node, 200)
+    reach = (10.0 ** rng.uniform(-3.0, 0.3, 200)).astype(np.float32)
+    bounds = bounds_at(node.tape, centers, reach)[:, 1]
+    for _ in range(10):
+        offsets = rng.normal(size=(200, 3))
+        offsets *= (reach * rng.uniform(0, 1, 200) / np.linalg.norm(offsets, axis=1))[:, None]
+        change = np.abs(value(node, centers + offsets) - value(node, centers))
+        assert (change <= bounds * np.linalg.norm(offsets, axis=1) + 1e-6).all()
+    for center, radius in zip(centers[:40], reach[:40], strict=True):
+        smallest, largest = node.interval(center - radius, center + radius)
+        inside = value(node, rng.uniform(center - radius, center + radius, (100, 3)))
+        assert smallest - 1e-6 <= inside.min() <= inside.max() <= largest + 1e-6
+
+
+@EACH
+def test_a_custom_field_blends_is_meshed_and_traced(node: Node) -> None:
+    tree = node.rotate((1, 0, 0), 20) + Point((1.0, 0, 0), radius=0.4)
+    mesh = polygonize(tree, resolution=30)
+    assert_closed(mesh)
+    np.testing.assert_allclose(tree(mesh.vertices), ISO, atol=1e-5)
+    eye = np.array([6.0, 5.0, 4.0])
+    hits = tree.raycast(np.tile(eye, (100, 1)), mesh.vertices[:100] - eye)
+    assert hits.hit.mean() > 0.9
+    np.testing.assert_allclose(tree(hits.positions[hits.hit]), ISO, atol=1e-3)
+
+
+@EACH
+def test_files_and_pickles_name_the_kind(node: CustomField) -> None:
+    assert from_json(to_json(node)) == node == pickle.loads(pickle.dumps(node))
+    assert eval(repr(node), {"Lump": Lump, "Waves": Waves}) == node
+    with pytest.raises(InvalidFile, match=r"calls .* define_field"):
+        from_json(to_json(node).replace(f'"{node.kind}"'.encode(), b'"nothing"'))
+
+
+def test_the_same_definition_is_the_same_class() -> None:
+    again = define_field(kernels.lump, steepest=kernels.lump_slope, limits={"breadth": (0.1, None)})
+    assert again is Lump
+
+
+def test_parameters_of_a_leaf_are_checked() -> None:
+    with pytest.raises(InvalidNode, match=r"breadth: expected a number from 0\.1"):
+        Lump((0, 0, 0), (1, 1, 1), (0, 0, 0), 0.0)
+    with pytest.raises(InvalidNode, match="offset: expected primitives with a radius, got a Waves"):
+        WAVES.offset(0.1).tape  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("function", "claims", "message"),
+    [
+        (kernels.negative, {"steepest": 1.0}, "negative, and a field is not"),
+        (kernels.jumping, {"steepest": 1.0}, "claim a larger slope"),
+        (kernels.waves, {"steepest": 0.1}, "more than steepest = 0.1 allows"),
+        (kernels.not_finite, {"steepest": 1.0}, "not_finite: for q = .* it (fails|returns)"),
+        (kernels.wrong_gradient, {"steepest": 1.0}, "∂f/∂x at .* by differences, but 1 is returned"),
+        (kernels.returns_a_point, {"steepest": 1.0}, "expected it to return wp.float32"),
+        (kernels.takes_no_point, {"steepest": 1.0}, "expected the point `q: wp.vec3`"),
+        (kernels.takes_a_size, {"steepest": 1.0}, "'size': every node has an attribute of that name"),
+        (kernels.imprecise, {"steepest": 2e6}, "in single precision"),
+        (kernels.waves, {"steepest": -1.0}, "steepest: expected a number from 0"),
+        (kernels.waves, {"steepest": float("nan")}, "steepest: expected a number from 0"),
+        (kernels.waves, {"steepest": "steep"}, "write it with `def`"),
+        (kernels.waves, {"steepest": kernels.of_other_parameters}, "steepest: expected a function of"),
+        (
+            kernels.waves,
+            {"steepest": kernels.waves_slope, "interval": kernels.narrow_interval},
+            "interval: f.* is not between 0.4 and 0.6",
+        ),
+        (kernels.waves, {"steepest": 1.0, "interval": kernels.waves_slope}, "expected it to return wp.vec2"),
+        ("a wave", {"steepest": 1.0}, "write it with `def`"),
+    ],
+)
+def test_wrong_definitions_are_refused(function: Any, claims: dict[str, Any], message: str) -> None:
+    limits = {"rate": (-4.0, 4.0)} if function is kernels.waves else None
+    with pytest.raises(InvalidDefinition, match=message):
+        define_field(function, **claims, limits=limits, name="refused")
+
+
+def test_a_function_outside_the_subset_is_refused() -> None:
+    with pytest.raises(UntranslatableFunction, match="List expression"):
+        define_field(kernels.makes_a_list, steepest=1.0)
+
+
+def test_a_function_that_raises_is_refused() -> None:
+    with pytest.raises(InvalidDefinition, match="divides_by_zero: for q = "):
+        define_field(kernels.divides_by_zero, steepest=1.0)
