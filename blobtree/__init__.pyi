@@ -17,6 +17,7 @@ from .errors import (
     UntranslatableFunction,
     UnusableCache,
 )
+from .fitting import Fit, fit
 from .formulas.falloff import ISO, RIM
 from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
@@ -61,6 +62,7 @@ __all__ = [
     "Disc",
     "Ellipsoid",
     "FieldPrimitive",
+    "Fit",
     "Gyroid",
     "HalfSpace",
     "Hits",
@@ -107,6 +109,7 @@ __all__ = [
     "define_field",
     "define_operator",
     "define_skeleton",
+    "fit",
     "from_json",
     "load",
     "numeric_parameters",

@@ -1,5 +1,7 @@
 """Derivatives of field values where the numbers on a tape change."""
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
@@ -10,9 +12,17 @@ from blobtree.tape.tape import Tape
 
 
 def sensitivities_at(
-    tape: Tape, tangents: NDArray[np.float32], points: Float32Array, rows: IndexArray, columns: IndexArray
+    tape: Tape,
+    tangents: NDArray[np.float32],
+    points: Float32Array,
+    rows: IndexArray,
+    columns: IndexArray,
+    *,
+    gradients: bool = False,
 ) -> Float32Array:
-    """Return the derivatives (k,) at points[rows] where the tape moves along tangents[columns].
+    """Return the derivatives at points[rows] where the tape moves along tangents[columns].
+
+    They are those of the value (k,), or with `gradients` those of value and gradient (k, 4).
 
     Parameters
     ----------
@@ -25,12 +35,11 @@ def sensitivities_at(
     rows, columns
         int[k]: pairs of a point and a parameter.
     """
-    from blobtree.derivatives.sensitivity_kernels import evaluate_sensitivities  # made at the first use
-
+    kernel, dtype = _gradient_kernel() if gradients else _value_kernel()
     uploaded = tape.on()
-    out: wp.array[wp.float32] = wp.empty(len(rows), dtype=wp.float32)
+    out: wp.array[Any] = wp.empty(len(rows), dtype=dtype)
     wp.launch(
-        loaded(tape.instruction_set.kernel_for(evaluate_sensitivities)),
+        loaded(tape.instruction_set.kernel_for(kernel)),
         dim=len(rows),
         inputs=[
             wp.array(points, dtype=wp.vec3),
@@ -44,3 +53,15 @@ def sensitivities_at(
     )
     result: Float32Array = out.numpy()
     return result
+
+
+def _value_kernel() -> tuple[wp.Kernel, Any]:
+    from blobtree.derivatives.sensitivity_kernels import evaluate_sensitivities  # made at the first use
+
+    return evaluate_sensitivities, wp.float32
+
+
+def _gradient_kernel() -> tuple[wp.Kernel, Any]:
+    from blobtree.derivatives.gradient_sensitivity_kernels import evaluate_gradient_sensitivities
+
+    return evaluate_gradient_sensitivities, wp.vec4

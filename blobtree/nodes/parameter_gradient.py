@@ -77,9 +77,23 @@ def parameter_gradient_of(
     model: ImplicitModel, points: Float32Array, parameters: Iterable[NumericParameter] | None = None
 ) -> ParameterGradient:
     """Return the derivatives of a tree's field by its parameters, see `Node.parameter_gradient`."""
+    chosen = tuple(numeric_parameters(model) if parameters is None else parameters)
+    return ParameterGradient(_derivatives(model, points, chosen, gradients=False)[:, :, 0], chosen)
+
+
+def gradient_sensitivities(
+    model: ImplicitModel, points: Float32Array, parameters: Sequence[NumericParameter]
+) -> Float32Array:
+    """Return the derivatives (n, p, 4) of the field and of its gradient at n points by p parameters."""
+    return _derivatives(model, points, tuple(parameters), gradients=True)
+
+
+def _derivatives(
+    model: ImplicitModel, points: Float32Array, chosen: tuple[NumericParameter, ...], *, gradients: bool
+) -> Float32Array:
+    """Return the derivatives (n, p, 4) of value and gradient, or (n, p, 1) of the value alone."""
     tree = without_sharing(model)
-    chosen = tuple(numeric_parameters(tree) if parameters is None else parameters)
-    values = np.zeros((len(points), len(chosen)), np.float32)
+    values = np.zeros((len(points), len(chosen), 4 if gradients else 1), np.float32)
     touched = _touched_points(tree, chosen, points)
     for tangents in _batches(_tangents(tree, chosen)):
         tape = tangents[0].tape
@@ -90,8 +104,9 @@ def parameter_gradient_of(
         counts = [len(touched[chosen[tangent.column].path]) for tangent in tangents]
         places = np.repeat(np.arange(len(tangents)), counts)
         columns = np.array([tangent.column for tangent in tangents])
-        values[rows, columns[places]] = sensitivities_at(tape, dense, points, rows, places)
-    return ParameterGradient(values, chosen)
+        changes = sensitivities_at(tape, dense, points, rows, places, gradients=gradients)
+        values[rows, columns[places]] = changes.reshape(len(rows), -1)
+    return values
 
 
 def _batches(tangents: Iterable[_Tangent]) -> Iterator[list[_Tangent]]:
