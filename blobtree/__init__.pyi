@@ -25,6 +25,7 @@ from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
 from .nodes.contact import Contact, ContactSurface, Press, RatedUnion
 from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
+from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
 from .nodes.fields import FieldPrimitive, Gyroid, Noise, Superquadric
 from .nodes.flats import Polygon, Rectangle, Triangle
 from .nodes.numeric_parameters import (
@@ -45,6 +46,7 @@ __all__ = [
     "ISO",
     "RIM",
     "Arc",
+    "Bend",
     "Box",
     "Cancel",
     "Cancelled",
@@ -54,6 +56,7 @@ __all__ = [
     "ContactSurface",
     "CubicBezier",
     "Curvatures",
+    "CurveWarp",
     "CustomCombination",
     "CustomField",
     "CustomPrimitive",
@@ -74,10 +77,12 @@ __all__ = [
     "InvalidNode",
     "InvalidPoints",
     "InvalidResolution",
+    "LimitedTwist",
     "Mesh",
     "MissingPackage",
     "Node",
     "Noise",
+    "NoiseWarp",
     "NumericParameter",
     "Offset",
     "ParameterGradient",
@@ -92,10 +97,13 @@ __all__ = [
     "Rectangle",
     "Ricci",
     "Segment",
+    "Shear",
+    "Stretch",
     "Stroke",
     "Sum",
     "Superquadric",
     "Tape",
+    "Taper",
     "TaperedBezier",
     "Torus",
     "Transform",

@@ -307,36 +307,37 @@ def prune(
             accumulator_start = end
             run_at = -1
         elif code == WARP:
-            p = tape[at + 3]
             local = to_local(point, tape, at)
-            reach = ball * p[0]
+            reach = ball * tape[at + 3][0]
+            size = PREFIX + int(header[3])
             points[count] = point
             balls[count] = ball
             outer_starts[count] = accumulator_start
-            point = warp_forward(operator, local, p)
-            ball = reach * warp_stretch(operator, local, reach, p)
+            point = warp_forward(operator, local, tape, at + 3)
+            ball = reach * warp_stretch(operator, local, reach, tape, at + 3)
             warped += 1
             if write:
-                copy_texels(tape, at - 1, PREFIX + 1, out, start + end)
-            end += PREFIX + 1
+                copy_texels(tape, at - 1, size + 1, out, start + end)
+            end += size + 1
             peak = wp.max(peak, end)
             accumulator_start = end
             run_at = -1
-            at += PREFIX
+            at += size
         elif code == UNWARP:
             point = points[count]
             ball = balls[count]
             warped -= 1
+            size = PREFIX + int(header[3])
             accumulator_start = outer_starts[count]
             if accumulator[1] <= 0.0:
                 end = accumulator_start
             else:
                 if write:
-                    copy_texels(tape, at - 1, PREFIX + 1, out, start + end)
-                end += PREFIX + 1
+                    copy_texels(tape, at - 1, size + 1, out, start + end)
+                end += size + 1
                 peak = wp.max(peak, end)
             run_at = -1
-            at += PREFIX
+            at += size
         else:
             accumulator, end = pop_range(
                 header,

@@ -7,6 +7,7 @@ ends in a tuple of rows, and one name here.
 
 from blobtree.formulas.contact import CONTACT_OPERATORS
 from blobtree.formulas.curve_skeletons import CURVE_SKELETONS
+from blobtree.formulas.deformations import DEFORMATIONS
 from blobtree.formulas.direct_fields import DIRECT_FIELDS
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.flat_skeletons import FLAT_SKELETONS
@@ -19,3 +20,4 @@ LIBRARY_SKELETONS: tuple[Skeleton, ...] = (*CURVE_SKELETONS, *FLAT_SKELETONS, *S
 LIBRARY_OPERATORS: tuple[Operator, ...] = (*CONTACT_OPERATORS,)
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = ()
 LIBRARY_FIELDS: tuple[FieldKind, ...] = DIRECT_FIELDS
+LIBRARY_WARPS: tuple[SpaceWarp, ...] = DEFORMATIONS

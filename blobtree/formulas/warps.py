@@ -1,13 +1,13 @@
 """Warps: non-affine maps of space around a subtree (Barr 1984).
 
 A warp T maps a point of the outer space to the subtree's space: F(q) = f(T(q)). It consists of three typed
-functions, with parameters p = (·, p₁, p₂, p₃):
+functions that read the parameters from tape[at] = (·, p₁, p₂, p₃), tape[at + 1] = (p₄, …) and so on:
 
-* `forward(q, p) -> T(q)`;
-* `pullback(q, g, p) -> Jᵀ g`, which takes the subtree's gradient to the outer space;
-* `stretch(q, reach, p)`: a bound on ‖J‖ over the ball of radius `reach` about q;
+* `forward(q, tape, at) -> T(q)`;
+* `pullback(q, g, tape, at) -> Jᵀ g`, which takes the subtree's gradient to the outer space;
+* `stretch(q, reach, tape, at)`: a bound on ‖J‖ over the ball of radius `reach` about q;
 
-and `box(lower, upper, p)`, the outer space's box around what the inner box holds.
+and `box(lower, upper, (p₁, p₂, …))`, the outer space's box around what the inner box holds.
 """
 
 from collections.abc import Callable
@@ -22,16 +22,18 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def twist_forward(q: wp.vec3, p: wp.vec4) -> wp.vec3:
+def twist_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """Rotate about z by −p₁·z."""
+    p = tape[at]
     c = wp.cos(p[1] * q[2])
     s = wp.sin(p[1] * q[2])
     return wp.vec3(c * q[0] + s * q[1], c * q[1] - s * q[0], q[2])
 
 
 @wp.func
-def twist_pullback(q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
+def twist_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """Rotate back, and add the change of the rotation along z."""
+    p = tape[at]
     c = wp.cos(p[1] * q[2])
     s = wp.sin(p[1] * q[2])
     x = c * q[0] + s * q[1]
@@ -40,9 +42,9 @@ def twist_pullback(q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
 
 
 @wp.func
-def twist_stretch(q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
+def twist_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
     """Return ‖J‖ = (k + √(k² + 4)) / 2: a rotation and a shear by k = |p₁| · distance from the axis."""
-    k = wp.abs(p[1]) * (wp.sqrt(q[0] * q[0] + q[1] * q[1]) + reach)
+    k = wp.abs(tape[at][1]) * (wp.sqrt(q[0] * q[0] + q[1] * q[1]) + reach)
     return 0.5 * (k + wp.sqrt(k * k + 4.0))
 
 

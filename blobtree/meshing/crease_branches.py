@@ -255,21 +255,19 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.ve
         elif code == POP_SWAPPED:
             accumulator = branch_combine(operator, accumulator, registers[count], parameter, tape)
         elif code == WARP:
-            p = tape[at + 3]
             points[count] = point
             references[count] = reference
-            point = warp_forward(operator, to_local(point, tape, at), p)
-            reference = warp_forward(operator, to_local(reference, tape, at), p)
-            at += PREFIX
+            point = warp_forward(operator, to_local(point, tape, at), tape, at + 3)
+            reference = warp_forward(operator, to_local(reference, tape, at), tape, at + 3)
+            at += PREFIX + int(header[3])
         elif code == UNWARP:
-            p = tape[at + 3]
             point = points[count]
             reference = references[count]
             inner = wp.vec3(accumulator[3], accumulator[4], accumulator[5])
-            g = warp_pullback(operator, to_local(point, tape, at), inner, p)
+            g = warp_pullback(operator, to_local(point, tape, at), inner, tape, at + 3)
             f = gradient_pullback_affine(wp.vec4(accumulator[2], g[0], g[1], g[2]), tape, at)
             accumulator = make_branch(accumulator[0], int(accumulator[1]), f)
-            at += PREFIX
+            at += PREFIX + int(header[3])
     return accumulator
 
 
@@ -293,7 +291,7 @@ def has_choice(tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.bool:
             at += int(header[2]) * stride(code)
             kinked = chooses(operator)
         elif code <= WARP:
-            at += PREFIX
+            at += PREFIX + int(header[3])
         elif code != PUSH:
             kinked = chooses(operator)
     return kinked

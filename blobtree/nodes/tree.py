@@ -9,6 +9,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
+from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
 import numpy as np
@@ -240,18 +241,20 @@ class Node(ImplicitModel):
             raise InvalidNode(f"factor: expected a scale other than 0, got {factor!r}")
         return self.transform(np.column_stack([np.diag(factors), np.zeros(3)]))
 
-    def twist(self, degrees: float) -> "Twist":
+    def twist(self, degrees: float, *, limits: tuple[float, float] | None = None) -> "Node":
         """Return this node turned about the z axis by an angle that grows with the height.
 
         Parameters
         ----------
         degrees : float
             Angle per model unit of height, counter-clockwise seen from above.
+        limits : tuple[float, float], optional
+            Heights between which the angle grows, from 0. By default it grows everywhere, and is 0 at z = 0.
 
         Raises
         ------
         InvalidNode
-            The angle is not a finite number.
+            The angle is not a finite number, or the limits are not two ascending heights.
 
         Examples
         --------
@@ -259,7 +262,154 @@ class Node(ImplicitModel):
         >>> Point((1, 0, 1), radius=0.5).twist(90)([[0, 1, 1]]).round(3).tolist()
         [1.0]
         """
-        return Twist(self, degrees)
+        if limits is None:
+            return Twist(self, degrees)
+        return _deformed("limited_twist", self, degrees, *_limits(limits))
+
+    def taper(self, factor: float, limits: tuple[float, float]) -> "Node":
+        """Return this node with cross-sections that grow with the height, see `Taper`.
+
+        Parameters
+        ----------
+        factor : float
+            Scale across z at the upper limit and above; it is 1 at the lower limit and below.
+        limits : tuple[float, float]
+            Heights between which the scale changes.
+
+        Raises
+        ------
+        InvalidNode
+            The factor is not from 0.001 to 1000, or the limits are not two ascending heights.
+
+        Examples
+        --------
+        >>> from blobtree import Segment
+        >>> Segment((0, 0, 0), (0, 0, 2), radius=0.5).taper(0.5, (0, 2))([[0.25, 0, 2]]).round(3).tolist()
+        [0.5]
+        """
+        return _deformed("taper", self, factor, *_limits(limits))
+
+    def bend(self, degrees: float, limits: tuple[float, float]) -> "Node":
+        """Return this node bent about an axis parallel to y, see `Bend`.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle per model unit of height, from z toward x.
+        limits : tuple[float, float]
+            Heights between which the model bends; below and above it stays rigid.
+
+        Raises
+        ------
+        InvalidNode
+            The angle is 360° or more in all, or the limits are not two ascending heights. `support` of the
+            result raises it too, if the field of this node reaches the axis of the bend.
+
+        Examples
+        --------
+        >>> from blobtree import Segment
+        >>> arc = Segment((0, 0, 0), (0, 0, 3), radius=0.2).bend(30, (0, 3))
+        >>> arc([[6 / 3.14159265, 0, 6 / 3.14159265]]).round(3).tolist()
+        [1.0]
+        """
+        return _deformed("bend", self, degrees, *_limits(limits))
+
+    def shear(self, slope_x: float, slope_y: float, limits: tuple[float, float]) -> "Node":
+        """Return this node with cross-sections that move sideways, see `Shear`.
+
+        Parameters
+        ----------
+        slope_x, slope_y : float
+            Motion along x and y per unit of height.
+        limits : tuple[float, float]
+            Heights between which the motion grows.
+
+        Raises
+        ------
+        InvalidNode
+            A slope is not a finite number, or the limits are not two ascending heights.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 1), radius=0.5).shear(0.5, 0, (0, 2))([[0.5, 0, 1]]).round(3).tolist()
+        [1.0]
+        """
+        return _deformed("shear", self, slope_x, slope_y, *_limits(limits))
+
+    def stretch(self, factor: float, limits: tuple[float, float]) -> "Node":
+        """Return this node with the part between two heights longer by a factor, see `Stretch`.
+
+        Parameters
+        ----------
+        factor : float
+            New length of the part over its old length.
+        limits : tuple[float, float]
+            Heights of the part, before the stretch. What is above moves with its upper end.
+
+        Raises
+        ------
+        InvalidNode
+            The factor is not from 0.001 to 1000, or the limits are not two ascending heights.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 2), radius=0.5).stretch(3, (0, 1))([[0, 0, 4]]).round(3).tolist()
+        [1.0]
+        """
+        return _deformed("stretch", self, factor, *_limits(limits))
+
+    def noise_warp(self, amplitude: float, wavelength: float, *, seed: int = 0) -> "Node":
+        """Return this node displaced by smooth noise, see `NoiseWarp`.
+
+        Parameters
+        ----------
+        amplitude : float
+            Bound on the displacement, in model units; typical displacements are a third of it.
+        wavelength : float
+            Mean length of the waves, in model units, at least the amplitude.
+        seed : int
+            Number of the noise.
+
+        Raises
+        ------
+        InvalidNode
+            A length is not above 0, or the amplitude exceeds the wavelength.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> rough = Point((0, 0, 0), radius=1.0).noise_warp(0.2, 1.0, seed=3)
+        >>> bool(rough([[9, 0, 0]])[0] == 0.0)
+        True
+        """
+        return _deformed("noise_warp", self, amplitude, wavelength, seed)
+
+    def curve_warp(self, source: ArrayLike, target: ArrayLike, reach: float) -> "Node":
+        """Return this node deformed so that points of a curve move to others, see `CurveWarp`.
+
+        Parameters
+        ----------
+        source, target : array-like (n, 3)
+            Points before and after the deformation, one for one; 256 at most.
+        reach : float
+            Distance from the target up to which space moves, in model units.
+
+        Raises
+        ------
+        InvalidNode
+            The points differ in number, lie too close together, or their motion folds space.
+
+        Examples
+        --------
+        >>> from blobtree import Segment
+        >>> rod = Segment((-1, 0, 0), (1, 0, 0), radius=0.2)
+        >>> arched = rod.curve_warp([(0, 0, 0)], [(0, 0, 0.3)], reach=1.5)
+        >>> arched([[0, 0, 0.3]]).round(3).tolist()
+        [1.0]
+        """
+        return _deformed("curve_warp", self, source, target, reach)
 
     def offset(self, distance: float) -> "Offset":
         """Return this node with every visible radius larger by a distance, see `Offset`.
@@ -951,6 +1101,21 @@ def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
         if not isinstance(node, Node):
             raise InvalidNode(f"operands: expected BlobTree nodes, got {node!r}")
     return nodes
+
+
+def _deformed(tag: str, *arguments: Any) -> Node:
+    """Return a node of `nodes.deformations`, whose classes derive from those of this file."""
+    import_module("blobtree.nodes.kinds")
+    return NODE_KINDS[tag](*arguments)
+
+
+def _limits(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return limits as two numbers; raise `InvalidNode` otherwise."""
+    try:
+        low, high = limits
+    except (TypeError, ValueError):
+        raise InvalidNode(f"limits: expected two heights (low, high), got {limits!r}") from None
+    return finite_number("limits[0]", low), finite_number("limits[1]", high)
 
 
 def _folded(kind: type[Sum] | type[Union] | type[Intersection], first: Node, second: Node) -> Node:

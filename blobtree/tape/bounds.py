@@ -29,7 +29,7 @@ def support_box(program: list[Instruction]) -> tuple[Float32Array, Float32Array]
     """Return lower and upper corner (3,) of the support of a tree, rounded outward.
 
     The program runs over boxes in place of numbers. A tree that is empty everywhere has the box of its first
-    primitive, so that views always have a box to frame.
+    primitive, without the warps around it, so that views always have a box to frame.
     """
     box = EMPTY
     registers: dict[int, Box] = {}
@@ -48,7 +48,6 @@ def support_box(program: list[Instruction]) -> tuple[Float32Array, Float32Array]
                 box = _combine_all(operator, box, boxes)
             case LeaveWarp(entry):
                 box = _warped(box, entry)
-                fallback = fallback and _warped(fallback, entry)
     if np.any(box[0] > box[1]) and fallback is not None:
         box = fallback
     lower, upper = (corner.astype(np.float32) for corner in box)

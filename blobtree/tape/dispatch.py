@@ -140,30 +140,34 @@ def slope(
 
 
 @unrolled
-def warp_forward(kind: wp.int32, q: wp.vec3, p: wp.vec4) -> wp.vec3:
-    """Return T(q) of a warp."""
+def warp_forward(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Return T(q) of a warp, whose parameters begin at tape[at]."""
     result = wp.vec3()
     for code in range(wp.static(len(WARPS))):
         if kind == code:
-            result = wp.static(WARPS[code].forward)(q, p)
+            result = wp.static(WARPS[code].forward)(q, tape, at)
     return result
 
 
 @unrolled
-def warp_pullback(kind: wp.int32, q: wp.vec3, g: wp.vec3, p: wp.vec4) -> wp.vec3:
+def warp_pullback(
+    kind: wp.int32, q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
     """Return Jᵀ g of a warp."""
     result = wp.vec3()
     for code in range(wp.static(len(WARPS))):
         if kind == code:
-            result = wp.static(WARPS[code].pullback)(q, g, p)
+            result = wp.static(WARPS[code].pullback)(q, g, tape, at)
     return result
 
 
 @unrolled
-def warp_stretch(kind: wp.int32, q: wp.vec3, reach: wp.float32, p: wp.vec4) -> wp.float32:
+def warp_stretch(
+    kind: wp.int32, q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.float32:
     """Return a bound on ‖J‖ of a warp over a ball."""
     result = float(1.0)
     for code in range(wp.static(len(WARPS))):
         if kind == code:
-            result = wp.static(WARPS[code].stretch)(q, reach, p)
+            result = wp.static(WARPS[code].stretch)(q, reach, tape, at)
     return result

@@ -9,8 +9,8 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
 * `pullback_affine(f, tape, at)`: a result behind the map at tape[at], seen in front of it;
 * `pullback_warp(kind, f, q, tape, at)`: a subtree's result behind a warp and the map at tape[at], seen in
   front;
-* `scale_speed(kind, q, speed, reach, p)`: a bound on the speed behind a warp of a point that moves at most at
-  `speed` in front of it;
+* `scale_speed(kind, q, speed, reach, tape, at)`: a bound on the speed behind the warp with parameters at
+  tape[at] of a point that moves at most at `speed` in front of it;
 * `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field.
 
 Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): along q + u ·
@@ -73,7 +73,12 @@ def squared_distance(q: wp.vec3, c: wp.vec4) -> wp.float32:
 
 @wp.func
 def constant_speed(
-    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, p: wp.vec4
+    kind: wp.int32,
+    q: wp.vec3,
+    speed: wp.float32,
+    reach: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
 ) -> wp.float32:
     """Return `speed`: results at a point alone do not depend on it."""
     return speed
@@ -215,10 +220,15 @@ def bound_pullback_warp(
 
 @wp.func
 def bound_scale_speed(
-    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, p: wp.vec4
+    kind: wp.int32,
+    q: wp.vec3,
+    speed: wp.float32,
+    reach: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
 ) -> wp.float32:
     """Return `speed` times the warp's largest stretch in the ball within reach."""
-    return speed * warp_stretch(kind, q, reach * speed, p)
+    return speed * warp_stretch(kind, q, reach * speed, tape, at)
 
 
 @wp.func
@@ -291,8 +301,7 @@ def gradient_pullback_warp(
     kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec4:
     """Return (value, ∇f) pulled back by the warp's transposed Jacobian, then by the transposed map."""
-    p = tape[at + 3]
-    g = warp_pullback(kind, to_local(q, tape, at), wp.vec3(f[1], f[2], f[3]), p)
+    g = warp_pullback(kind, to_local(q, tape, at), wp.vec3(f[1], f[2], f[3]), tape, at + 3)
     return gradient_pullback_affine(wp.vec4(f[0], g[0], g[1], g[2]), tape, at)
 
 

@@ -170,19 +170,18 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             elif code == WARP:
                 points[count] = point
                 speeds[count] = speed
-                p = tape[at + 3]
                 local = to_local(point, tape, at)
-                speed = scale_speed(operator, local, speed * p[0], reach, p)
+                speed = scale_speed(operator, local, speed * tape[at + 3][0], reach, tape, at + 3)
                 local_direction = wp.vec3()
-                point = warp_forward(operator, local, p)
-                at += PREFIX
+                point = warp_forward(operator, local, tape, at + 3)
+                at += PREFIX + int(header[3])
             elif code == UNWARP:
                 point = points[count]
                 speed = speeds[count]
                 if count == 0:
                     local_direction = direction  # between two warps it stays 0
                 accumulator = pullback_warp(operator, accumulator, point, tape, at)
-                at += PREFIX
+                at += PREFIX + int(header[3])
         return accumulator
 
     @wp.func

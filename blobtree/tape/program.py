@@ -95,7 +95,7 @@ class ProgramNode:
 
     @property
     def warp_parameters(self) -> tuple[float, ...]:
-        """The numbers that the warp takes, at most three."""
+        """The numbers that the warp takes."""
         return ()
 
     def child_placement(self, placement: Placement) -> Placement:

@@ -14,7 +14,8 @@ instruction after the other:
       POP          accumulator = operator(register[count], accumulator)
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
       WARP         before PREFIX texels: the rows of a world → local map, then (its largest stretch, and the
-                   warp's parameters); `operator` is the warp's code, `count` the register for the point
+                   warp's first three parameters); `operator` is the warp's code, `count` the register for the
+                   point, `parameter` the number of texels with further parameters, which follow
       UNWARP       the same; ends what WARP began
 
 `parameter` is the number that the operator takes. An operator with several parameters has them in the data
@@ -221,11 +222,13 @@ def _parameter(parameters: tuple[float, ...], region: DataRegion) -> float:
 
 def _warp_texels(code: int, entry: EnterWarp, instruction_set: InstructionSet) -> NDArray[np.float64]:
     """Return header, map and parameters of a warp."""
-    parameters = (*entry.parameters, 0.0, 0.0, 0.0)[:3]
-    header = [code, instruction_set.warps.index(entry.warp), entry.register, 0.0]
     prefix = _map_texels(entry.placement.matrix)
-    prefix[-1, 1:] = parameters
-    return np.vstack([header, prefix])
+    first, more = entry.parameters[:3], entry.parameters[3:]
+    prefix[-1, 1 : 1 + len(first)] = first
+    texels = np.zeros((-(-len(more) // 4), 4))
+    texels.ravel()[: len(more)] = more
+    header = [code, instruction_set.warps.index(entry.warp), entry.register, len(texels)]
+    return np.vstack([header, prefix, texels])
 
 
 def _map_texels(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -281,12 +281,12 @@ def _warp_cases(registers: int) -> str:
     return f"""\
 case {WARP}: {{
     switch (count) {{ {store} }}
-    vec4 p = tape_texel(tape, at + {PREFIX} - 1);
     vec3 local = to_local(point, tape, at);
-    speed *= p.x * warp_stretch(operator_, local, reach * speed * p.x, p);
+    speed *= tape_texel(tape, at + 3).x;
+    speed *= warp_stretch(operator_, local, reach * speed, tape, at + 3);
     local_direction = vec3(0.0);
-    point = warp_forward(operator_, local, p);
-    at += {PREFIX};
+    point = warp_forward(operator_, local, tape, at + 3);
+    at += {PREFIX} + int(header.w);
     break;
 }}
 case {UNWARP}: {{
@@ -296,7 +296,7 @@ case {UNWARP}: {{
     speed = kept.w;
     local_direction = count == 0 ? direction : vec3(0.0);
     accumulator = PULLBACK_WARP(operator_, accumulator, point, tape, at);
-    at += {PREFIX};
+    at += {PREFIX} + int(header.w);
     break;
 }}
 """

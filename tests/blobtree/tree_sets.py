@@ -8,12 +8,13 @@ import pytest
 from blobtree import Node
 from blobtree._typing import Float32Array
 from tests.blobtree.custom_kinds import CUSTOM_TREES
-from tests.blobtree.trees import CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, points_around, random_trees
 
 BATCH = 40
 POINTS = 150
 
 BUILT_IN_TREES = random_trees(seed=1, count=240)
+DEFORMED_TREES = random_trees(seed=51, count=80, depth=3, more=DEFORMED)
 SOLID_TREES = random_trees(seed=21, count=80, more=SOLIDS)
 FIELD_TREES = random_trees(seed=33, count=40, more=FIELDS)
 SHAPE_TREES = random_trees(seed=41, count=80, more=SHAPES)
@@ -46,6 +47,7 @@ _SETS = {
     "fields": _batches(FIELD_TREES, 2e-5, 3e-4),
     "shapes": _batches(SHAPE_TREES, 2e-5, 3e-4),
     "contacts": _batches(CONTACT_TREES, 2e-5, 3e-4),
+    "deformed": _batches(DEFORMED_TREES, 2e-5, 3e-4),
     "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),
 }
 ORDINARY = 1

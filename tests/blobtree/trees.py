@@ -23,6 +23,7 @@ from blobtree import (
     Gyroid,
     HalfSpace,
     Intersection,
+    InvalidNode,
     Node,
     Noise,
     Offset,
@@ -175,6 +176,50 @@ def random_contact(rng: np.random.Generator, operands: list[Node]) -> Node:
 
 
 CONTACTS = MoreKinds(random_leaf, random_contact)
+
+
+def random_deformation(rng: np.random.Generator, node: Node) -> Node:
+    """A node under one of the library's warps, whose parameters suit its size."""
+    lower, upper = (corner.astype(np.float64) for corner in node.support)
+    low, high = (float(z) for z in np.sort(rng.uniform(lower[2], upper[2], 2)))
+    high = max(high, low + 0.05)
+    kind = rng.integers(0, 7)
+    if kind == 0:
+        return node.taper(float(rng.uniform(0.4, 2.0)), (low, high))
+    if kind == 1:
+        slope_x, slope_y = rng.uniform(-1.0, 1.0, 2)
+        return node.shear(float(slope_x), float(slope_y), (low, high))
+    if kind == 2:
+        return node.stretch(float(rng.uniform(0.5, 2.0)), (low, high))
+    if kind == 3:
+        return node.twist(float(rng.uniform(-90.0, 90.0)), limits=(low, high))
+    if kind == 4:
+        seed = int(rng.integers(100))
+        return node.noise_warp(float(rng.uniform(0.05, 0.2)), float(rng.uniform(0.5, 1.5)), seed=seed)
+    degrees = float(rng.uniform(0.3, 0.95) * rng.choice([-1.0, 1.0])) * 57.0
+    degrees /= max(*upper, *-lower) + 0.4  # an offset above may enlarge the node
+    source = rng.uniform(lower, upper, (4, 3))
+    moves = rng.uniform(-0.3, 0.3, (4, 3))
+    for _ in range(20):
+        try:
+            deformed = (
+                node.bend(degrees, (low, high))
+                if kind == 5
+                else node.curve_warp(source, source + moves, float(rng.uniform(0.5, 1.5)))
+            )
+            assert deformed.support
+        except InvalidNode:
+            degrees, moves = 0.7 * degrees, 0.7 * moves
+        else:
+            return deformed
+    return node
+
+
+def _deformed_blend(rng: np.random.Generator, operands: list[Node]) -> Node:
+    return random_deformation(rng, reduce(add, operands[:2]))
+
+
+DEFORMED = MoreKinds(random_leaf, _deformed_blend)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:

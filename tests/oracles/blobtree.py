@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import (
+    Bend,
     Box,
     Circle,
     Cone,
     Contact,
+    CurveWarp,
     CustomCombination,
     CustomPrimitive,
     Difference,
@@ -25,8 +27,10 @@ from blobtree import (
     Gyroid,
     HalfSpace,
     Intersection,
+    LimitedTwist,
     Node,
     Noise,
+    NoiseWarp,
     Offset,
     Point,
     Polygon,
@@ -35,9 +39,12 @@ from blobtree import (
     RatedUnion,
     Ricci,
     Segment,
+    Shear,
+    Stretch,
     Stroke,
     Sum,
     Superquadric,
+    Taper,
     TaperedBezier,
     Torus,
     Transform,
@@ -45,8 +52,9 @@ from blobtree import (
     Union,
 )
 from blobtree.formulas.operators import Support
+from blobtree.nodes.deformations import Deformation
 from blobtree.nodes.primitives import Leaf, Primitive
-from tests.oracles import custom_kinds, direct_fields, shapes
+from tests.oracles import custom_kinds, deformations, direct_fields, shapes
 
 Floats = NDArray[np.float64]
 
@@ -117,6 +125,10 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return _leaf_at(_least_ratio(q, node), color)
         case Twist(child=child, degrees=degrees):
             return evaluate(child, _turned(q, -np.radians(degrees) * q[:, 2]))
+        case Taper() | Shear() | Stretch() | LimitedTwist() | Bend() | NoiseWarp() | CurveWarp():
+            unwarped, kink = deformations.unwarped(node, q)
+            inner = evaluate(node.child, unwarped)
+            return replace(inner, margin=np.minimum(inner.margin, kink))
         case Offset(child=child, distance=distance):
             return evaluate(grown(child, distance), q)
         case Transform(child=child, matrix=matrix):
@@ -192,7 +204,7 @@ def grown(node: Node, distance: float) -> Node:
         case Transform(child=child, matrix=matrix):
             volume = abs(np.linalg.det(np.array(matrix)[:, :3]))
             return Transform(grown(child, distance / float(np.cbrt(volume))), matrix)
-        case Twist(child=child):
+        case Twist(child=child) | Deformation(child=child) | NoiseWarp(child=child) | CurveWarp(child=child):
             return replace(node, child=grown(child, distance))
         case Press(solid=solid, obstacle=obstacle):
             return replace(node, solid=grown(solid, distance), obstacle=grown(obstacle, -distance))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blobtree import Node, Point, Segment, Superquadric
+from blobtree import Box, Node, Point, Segment, Superquadric
 from blobtree.tape.instruction_set import LIBRARY
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
@@ -110,6 +110,14 @@ MODELS = {
     .twist(400)
     .rotate((1, 0, 0), 90)
     .twist(400),
+    "every warp": Box((0, 0, 0), (0.5, 0.3, 3), radius=0.2)
+    .twist(60, limits=(-1, 1))
+    .taper(0.4, (-1, 1))
+    .stretch(1.2, (0, 1))
+    .bend(20, (-1, 1))
+    .shear(0.3, 0.3, (-1, 1))
+    .noise_warp(0.1, 1.0)
+    .curve_warp([(0, 0, 0)], [(0.1, 0.2, 0)], reach=1.0),
     "random trees side by side": random_trees(seed=5, count=1)[0]
     | random_trees(seed=6, count=1)[0].translate((2, 0, 0)),
 }
