@@ -18,6 +18,5 @@ from blobtree.formulas.warps import SpaceWarp
 
 LIBRARY_SKELETONS: tuple[Skeleton, ...] = (*CURVE_SKELETONS, *FLAT_SKELETONS, *SOLID_SKELETONS)
 LIBRARY_OPERATORS: tuple[Operator, ...] = (*CONTACT_OPERATORS,)
-LIBRARY_WARPS: tuple[SpaceWarp, ...] = ()
 LIBRARY_FIELDS: tuple[FieldKind, ...] = DIRECT_FIELDS
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = DEFORMATIONS

@@ -18,11 +18,14 @@ from blobtree.transpile.glsl import uniform_struct
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-MAX_STEPS = 4096
-"""More steps of a tolerance than a block has along its diagonal, so every ray leaves its block.
+MAX_STEPS = 512
+"""More steps than cross any block, so that every ray leaves its block.
 
-Blocks are 64 along the longest side of a box, and a tolerance is 1e-5 of its diagonal: 2,707 steps at most.
-"""
+Blocks are 64 along the longest side of a box, and a tolerance is 1e-5 of its diagonal, so a block is at most
+2,707 tolerances long. Steps grow as STEPS_PER_TOLERANCE states, and 416 of the shortest cross a block."""
+
+STEPS_PER_TOLERANCE = 32.0
+"""Steps in a block after which the shortest step is longer by a tolerance, 13 tolerances at most."""
 
 MISS = -1.0
 
@@ -76,19 +79,23 @@ def first_hit(
 
     A point is a hit if it lies inside, or if a Newton step along the gradient takes it to the surface within
     a tolerance: ISO − f ≤ tolerance · |∇f|. A slope bound alone is no hit, because behind warps it may be far
-    above the slope. A ray that starts inside hits at t_min. No step is shorter than a tolerance. So rays miss
-    only parts in which they stay inside for less than a tolerance.
+    above the slope. A ray that starts inside hits at t_min.
+
+    No step is shorter than a tolerance, or than several after many steps. So rays miss only parts in which
+    they stay inside for less than such a step. A step that ends inside is cut by linear interpolation.
     """
     t = t_min
     reach = wp.max(t_max - t_min, 4.0 * tolerance)
-    for _step in range(MAX_STEPS):
+    last_gap = float(1.0)
+    last_step = float(0.0)
+    for step in range(MAX_STEPS):
         if t > t_max:
             return MISS
         bound = field_bound(origin + direction * t, direction, reach, tape, span)
         gap = ISO - bound[0]
         free = reach
         if gap <= 0.0:
-            return t
+            return t + last_step * gap / (last_gap - gap)
         if bound[1] * reach > gap:
             free = gap / bound[1]
             if free <= tolerance:
@@ -96,8 +103,10 @@ def first_hit(
                 slope = wp.vec3(f[1], f[2], f[3])
                 if gap <= tolerance * wp.length(slope):
                     return t + newton_step(gap, wp.dot(slope, direction), tolerance)
-                free = tolerance
+            free = wp.max(free, tolerance * wp.max(1.0, float(step) / STEPS_PER_TOLERANCE))
         t += free
+        last_gap = gap
+        last_step = free
         reach = 2.0 * free
     return MISS
 

@@ -37,9 +37,9 @@ def padded(points: Array) -> Array:
     return np.pad(points, ((0, 0), (0, 4 - points.shape[1]))).astype(np.float32)
 
 
-def assert_close(seen: Array, expected: Array) -> None:
+def assert_close(seen: Array, expected: Array, agreement: float = TAPE_AGREEMENT) -> None:
     error = np.abs(seen - expected) / np.maximum(1.0, np.abs(expected))
-    assert error.max(initial=0.0) <= TAPE_AGREEMENT, f"largest error: {error.max()}"
+    assert error.max(initial=0.0) <= agreement, f"largest error: {error.max()}"
 
 
 @dataclass(frozen=True, eq=False)

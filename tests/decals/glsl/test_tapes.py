@@ -14,10 +14,20 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
+from tests.blobtree.nodes.test_deformations import STRONG
 from tests.blobtree.trees import CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
 from tests.decals.glsl.functions import ALL_KINDS, ALL_LIBRARY_KINDS, run_program
-from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded
+from tests.decals.glsl.tapes import (
+    BOUND_AND_VALUE,
+    COLOR,
+    GRADIENT,
+    MAIN,
+    TAPE_AGREEMENT,
+    Model,
+    assert_close,
+    padded,
+)
 from tests.decals.shapes import View
 from tests.oracles import blobtree as oracle
 
@@ -74,32 +84,46 @@ def test_contacts_are_the_same_in_both_languages(context: Context) -> None:
     assert_same_in_both_languages(context, CONTACT_TREES, kinds, 0)
 
 
-def assert_same_in_both_languages(context: Context, trees: list[Node], kinds: Kinds, seed: int) -> None:
+def test_deformations_are_the_same_in_both_languages(context: Context) -> None:
+    trees = list(STRONG.values())
+    used = trees[0].tape.instruction_set
+    kinds = replace(ALL_KINDS, warps=tuple(range(len(used.warps))), warp_registers=5, instruction_set=used)
+    assert {code for tree in trees for code in tree.tape.warps} == set(range(1, len(used.warps)))
+    assert_same_in_both_languages(context, trees, kinds, 0, agreement=1e-4)  # strong warps magnify rounding
+
+
+def assert_same_in_both_languages(
+    context: Context, trees: list[Node], kinds: Kinds, seed: int, agreement: float = TAPE_AGREEMENT
+) -> None:
     rng = np.random.default_rng(seed)
     compared = 0
     for tree in trees:
         points = points_around(rng, tree, 500)
         reach = (10.0 ** rng.uniform(-3.0, 0.5, 500)).astype(np.float32)
         seen = read_tape(context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), kinds=kinds)
-        assert_close(seen[:, :2], bounds_at(tree.tape, points, reach))
+        assert_close(seen[:, :2], bounds_at(tree.tape, points, reach), agreement)
         heading = units(rng, 4)[3]
         seen = read_tape(
             context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist()), kinds
         )
-        assert_close(seen[:, :3], bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach))
+        assert_close(
+            seen[:, :3], bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach), agreement
+        )
         field = oracle.evaluate(tree, points)
         smooth = field.margin > 1e-5
         assert_close(
             read_tape(context, tree, GRADIENT, points, kinds=kinds)[smooth],
             gradients_at(tree.tape, points)[smooth],
+            agreement,
         )
         strong = smooth & (field.value > 1e-3)
         seen = read_tape(context, tree, COLOR, points, kinds=kinds)[:, 1:]
-        assert_close(seen[strong], colors_at(tree.tape, points)[strong])
+        assert_close(seen[strong], colors_at(tree.tape, points)[strong], agreement)
         compared += int(strong.sum())
     assert compared > 0.3 * 6 * 500
 
 
+BAR = Box((0, 0, 0), (0.5, 0.3, 3), radius=0.2)
 MODELS = {
     "a superquadric": Superquadric((0, 0, 0), (1, 0.6, 0.8), 0.4, 0.6).rotate((1, 2, 3), 30)
     + Point((1, 0, 0), radius=0.5),
@@ -110,14 +134,10 @@ MODELS = {
     .twist(400)
     .rotate((1, 0, 0), 90)
     .twist(400),
-    "every warp": Box((0, 0, 0), (0.5, 0.3, 3), radius=0.2)
-    .twist(60, limits=(-1, 1))
-    .taper(0.4, (-1, 1))
-    .stretch(1.2, (0, 1))
-    .bend(20, (-1, 1))
-    .shear(0.3, 0.3, (-1, 1))
-    .noise_warp(0.1, 1.0)
-    .curve_warp([(0, 0, 0)], [(0.1, 0.2, 0)], reach=1.0),
+    "a bent horn": BAR.taper(0.4, (-1, 1)).bend(20, (-1, 1)),
+    "a twisted and sheared bar": BAR.twist(60, limits=(-1, 1)).stretch(1.2, (0, 1)).shear(0.3, 0.3, (-1, 1)),
+    "a bar under noise": BAR.noise_warp(0.1, 1.0),
+    "a bar along a curve": BAR.curve_warp([(0, 0, 0)], [(0.1, 0.2, 0)], reach=1.0),
     "random trees side by side": random_trees(seed=5, count=1)[0]
     | random_trees(seed=6, count=1)[0].translate((2, 0, 0)),
 }
