@@ -141,9 +141,13 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        if not isinstance(self.objects, Iterable) or isinstance(self.objects, str | Mapping):
+        try:
+            items = None if isinstance(self.objects, str | Mapping) else list(self.objects)
+        except TypeError:  # not iterable; arrays without dimensions say so only here
+            items = None
+        if items is None:
             raise InvalidScene(f"objects: expected a list of models, got {describe(self.objects)}")
-        objects = tuple(as_object(item, f"model {number}") for number, item in enumerate(self.objects, 1))
+        objects = tuple(as_object(item, f"model {number}") for number, item in enumerate(items, 1))
         object.__setattr__(self, "objects", objects)
         object.__setattr__(self, "images", as_images(self.images))
         instance("camera", self.camera, Camera, InvalidScene, "Camera.framing makes one")

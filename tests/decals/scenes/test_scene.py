@@ -285,6 +285,9 @@ def test_objects_are_checked() -> None:
         MeshObject("m", CORNERS.astype(np.float64) * 1e300, FACES)
     with pytest.raises(InvalidMesh, match="area"):
         MeshObject("m", CORNERS * 0, FACES)
+    for objects in ("model.ply", {"a": 1}, 3.5, np.array("x")):
+        with pytest.raises(InvalidScene, match="a list of models"):
+            Scene(objects=objects, camera=Camera((0, 0, 1)))  # type: ignore[arg-type]
     with pytest.raises(InvalidScene, match="BlobTree"):
         TreeObject("t", "no tree")  # type: ignore[arg-type]
     with pytest.raises(InvalidScene, match="uint8"):
