@@ -24,6 +24,12 @@ from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
 from .nodes.contact import Contact, ContactSurface, Press, RatedUnion
+from .nodes.convolution import (
+    ConvolutionArc,
+    ConvolutionSegment,
+    ConvolutionStroke,
+    ConvolutionTriangle,
+)
 from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
 from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
 from .nodes.fields import FieldPrimitive, Gyroid, Noise, Superquadric
@@ -54,6 +60,10 @@ __all__ = [
     "Cone",
     "Contact",
     "ContactSurface",
+    "ConvolutionArc",
+    "ConvolutionSegment",
+    "ConvolutionStroke",
+    "ConvolutionTriangle",
     "CubicBezier",
     "Curvatures",
     "CurveWarp",

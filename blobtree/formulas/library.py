@@ -6,6 +6,7 @@ ends in a tuple of rows, and one name here.
 """
 
 from blobtree.formulas.contact import CONTACT_OPERATORS
+from blobtree.formulas.convolution import CONVOLUTION_FIELDS
 from blobtree.formulas.curve_skeletons import CURVE_SKELETONS
 from blobtree.formulas.deformations import DEFORMATIONS
 from blobtree.formulas.direct_fields import DIRECT_FIELDS
@@ -18,5 +19,5 @@ from blobtree.formulas.warps import SpaceWarp
 
 LIBRARY_SKELETONS: tuple[Skeleton, ...] = (*CURVE_SKELETONS, *FLAT_SKELETONS, *SOLID_SKELETONS)
 LIBRARY_OPERATORS: tuple[Operator, ...] = (*CONTACT_OPERATORS,)
-LIBRARY_FIELDS: tuple[FieldKind, ...] = DIRECT_FIELDS
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = DEFORMATIONS
+LIBRARY_FIELDS: tuple[FieldKind, ...] = (*DIRECT_FIELDS, *CONVOLUTION_FIELDS)

@@ -15,6 +15,9 @@ from blobtree import (
     Circle,
     Cone,
     Contact,
+    ConvolutionArc,
+    ConvolutionSegment,
+    ConvolutionTriangle,
     CubicBezier,
     Cylinder,
     Difference,
@@ -100,7 +103,7 @@ SOLIDS = MoreKinds(random_solid)
 def random_field(rng: np.random.Generator) -> Node:
     """A direct field of any kind."""
     center, color = triple(rng.uniform(-1.0, 1.0, 3)), triple(rng.uniform(0.0, 1.0, 3))
-    kind, size = rng.integers(0, 3), triple(rng.uniform(0.6, 1.6, 3))
+    kind, size = rng.integers(0, 6), triple(rng.uniform(0.6, 1.6, 3))
     if kind == 1:
         wavelength, level = rng.uniform(0.4, 1.0), rng.uniform(-0.3, 0.1)
         seed = int(rng.integers(0, 289))
@@ -108,6 +111,14 @@ def random_field(rng: np.random.Generator) -> Node:
     if kind == 0:
         period, thickness = rng.uniform(0.6, 1.5), rng.uniform(0.15, 0.3)
         return Gyroid(center, size, float(period), float(thickness), fade=0.3, color=color)
+    a, b, c = (triple(corner) for corner in rng.uniform(-1.0, 1.0, (3, 3)))
+    radius, end_radius = rng.uniform(0.15, 0.4, 2).tolist()
+    if kind == 3:
+        return ConvolutionSegment(a, b, radius=radius, end_radius=end_radius, color=color)
+    if kind == 4:
+        return ConvolutionArc(a, b, c, radius=radius, color=color)
+    if kind == 5:
+        return ConvolutionTriangle(a, b, c, radius=radius, color=color)
     vertical, horizontal = rng.choice([0.2, 0.5, 1.0, 1.5, 2.0], 2).tolist()
     return Superquadric(center, triple(rng.uniform(0.2, 0.8, 3)), vertical, horizontal, color=color)
 

@@ -18,6 +18,9 @@ from blobtree import (
     Circle,
     Cone,
     Contact,
+    ConvolutionArc,
+    ConvolutionSegment,
+    ConvolutionTriangle,
     CurveWarp,
     CustomCombination,
     CustomPrimitive,
@@ -54,7 +57,7 @@ from blobtree import (
 from blobtree.formulas.operators import Support
 from blobtree.nodes.deformations import Deformation
 from blobtree.nodes.primitives import Leaf, Primitive
-from tests.oracles import custom_kinds, deformations, direct_fields, shapes
+from tests.oracles import convolution, custom_kinds, deformations, direct_fields, shapes
 
 Floats = NDArray[np.float64]
 
@@ -114,6 +117,9 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             t = np.clip(0.5 + (noise - node.level) / (2.0 * node.softness), 0.0, 1.0)
             value = t * t * (3.0 - 2.0 * t) * direct_fields.window(node, q)
             return replace(_leaf_at(np.zeros(len(q)), color), value=value)
+        case ConvolutionSegment() | ConvolutionArc() | ConvolutionTriangle():
+            value = convolution.evaluate(node, q)[:, 0]
+            return Field(value, np.tile(np.array(node.color), (len(q), 1)), np.full(len(q), np.inf))
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -177,6 +183,10 @@ def grown(node: Node, distance: float) -> Node:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
         case CustomCombination():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
+        case ConvolutionArc() | ConvolutionTriangle():
+            return replace(node, radius=node.radius + distance)
+        case ConvolutionSegment():
+            return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Ellipsoid():  # an offset of the unit ball that is scaled
             larger = 1.0 + distance / float(np.cbrt(np.prod(node.semi_axes)))
             return replace(node, semi_axes=tuple(larger * np.array(node.semi_axes)))

@@ -10,6 +10,9 @@ import pytest
 from blobtree import (
     ISO,
     RIM,
+    ConvolutionArc,
+    ConvolutionSegment,
+    ConvolutionTriangle,
     FieldPrimitive,
     Gyroid,
     InvalidNode,
@@ -34,7 +37,14 @@ from tests.oracles import blobtree as oracle
 PILLOW = Superquadric((0.1, 0.2, 0.3), (1.0, 0.5, 0.7), 0.4, 1.5, color=(1, 0, 0))
 SPONGE = Gyroid((0.1, 0.2, 0.3), (2.0, 1.5, 1.8), 1.0, 0.2, fade=0.3, color=(1, 0, 0))
 ROCK = Noise((0.1, 0.2, 0.3), (2.0, 1.5, 1.8), 0.7, -0.1, 0.4, 17, color=(1, 0, 0))
-EACH = pytest.mark.parametrize("node", [PILLOW, SPONGE, ROCK], ids=["superquadric", "gyroid", "noise"])
+LIMB = ConvolutionSegment((0.1, 0.2, 0.3), (1.2, -0.3, 0.5), radius=0.4, end_radius=0.2, color=(1, 0, 0))
+HOOK = ConvolutionArc((1, 0, 0), (0.2, 0.9, 0.3), (-0.9, -0.2, 0), radius=0.3, color=(1, 0, 0))
+SAIL = ConvolutionTriangle((0, 0, 0), (1.5, 0.2, 0.1), (0.3, 1.1, -0.4), radius=0.3, color=(1, 0, 0))
+EACH = pytest.mark.parametrize(
+    "node",
+    [PILLOW, SPONGE, ROCK, LIMB, HOOK, SAIL],
+    ids=["superquadric", "gyroid", "noise", "convolution segment", "convolution arc", "convolution triangle"],
+)
 
 
 @EACH
