@@ -245,7 +245,7 @@ def _ear(points: Float64Array, left: list[int]) -> tuple[int, bool]:
     flat = np.abs(roundness) <= 2.0 * SMALLEST_SINE
     if flat.any():
         return int(flat.argmax()), True
-    for place in np.argsort(-roundness):
+    for place in np.argsort(-roundness.round(3), kind="stable"):  # rounding chooses no ear among equal ones
         a, b, c = before[place], corners[place], after[place]
         inside = (_cross(b - a, corners - a) >= 0.0) & (_cross(c - b, corners - b) >= 0.0)
         inside &= _cross(a - c, corners - c) >= 0.0

@@ -105,7 +105,7 @@ def _derivatives(
         places = np.repeat(np.arange(len(tangents)), counts)
         columns = np.array([tangent.column for tangent in tangents])
         changes = sensitivities_at(tape, dense, points, rows, places, gradients=gradients)
-        values[rows, columns[places]] = changes.reshape(len(rows), -1)
+        values[rows, columns[places]] = changes.reshape(len(rows), values.shape[2])
     return values
 
 
@@ -271,19 +271,39 @@ def _with_leaves(run: Run, copies: dict[int, ProgramNode]) -> Run:
 def _of_one(
     tree: ImplicitModel, parameter: NumericParameter, column: int, base: Tape, *, stretched: bool
 ) -> _Tangent:
-    """Return the tangent of any parameter: the difference of two tapes of the whole tree."""
+    """Return the tangent of any parameter: the difference of two tapes of the whole tree.
+
+    Where a macro changes its tree at the parameter's value, such as a polygon its triangles, tapes on the two
+    sides differ by more than a small step. Then the difference is taken on the side where it is smallest.
+    """
     value, step = _steps(tree, parameter)
+    best: tuple[float, _Tangent] | None = None
     for low, high in SIDES:
         try:
             ends = [with_numeric_values(tree, [parameter], [value + side * step]) for side in (low, high)]
             first, second = (compile_tape(_program(end, stretched=stretched), np.float64) for end in ends)
         except InvalidNode:
             continue
-        if _alike(first, second):
-            texels = (second.data - first.data) / ((high - low) * step)
-            beside = base if _alike(base, first) else replace(first, data=0.5 * (first.data + second.data))
-            return _Tangent(column, beside, 0, texels)
-    raise InvalidNode(f"{parameter}: expected a parameter that can change a little, got {value:g}")
+        if not _alike(first, second):
+            continue
+        texels = (second.data - first.data) / ((high - low) * step)
+        beside = base if _near(base, first, step) else replace(first, data=0.5 * (first.data + second.data))
+        steepest = float(np.abs(texels).max())
+        if best is None or steepest < best[0]:
+            best = steepest, _Tangent(column, beside, 0, texels)
+        if _near(first, second, step):
+            break
+    if best is None:
+        raise InvalidNode(f"{parameter}: expected a parameter that can change a little, got {value:g}")
+    return best[1]
+
+
+def _near(first: Tape, second: Tape, step: float) -> bool:
+    """Return True if tapes are alike, and no number of one is far from that of the other."""
+    if not _alike(first, second):
+        return False
+    change = np.abs(second.data - first.data)
+    return not (change > np.maximum(1e-3 * np.abs(first.data), 100.0 * step)).any()
 
 
 def _alike(first: Tape, second: Tape) -> bool:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from blobtree import Box, InvalidPoints, Node, Point, Torus
 from tests.blobtree.custom_kinds import CUSTOM_TREES
-from tests.blobtree.trees import SOLIDS, points_around, random_trees
+from tests.blobtree.trees import CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
 from tests.oracles import blobtree as oracle
 
 Numbers = NDArray[np.float64]
@@ -26,9 +26,18 @@ def second_differences(node: Node, points: Numbers, step: float) -> Numbers:
     return np.stack(rows, axis=1)
 
 
-@pytest.mark.parametrize("kind", ["built-in", "custom"])
+TREES = {
+    "solids": random_trees(seed=8, count=8, more=SOLIDS),
+    "custom": CUSTOM_TREES[:2],
+    "shapes": random_trees(seed=6, count=5, depth=2, more=SHAPES),
+    "fields": random_trees(seed=6, count=6, depth=2, more=FIELDS),
+    "contacts": random_trees(seed=6, count=4, depth=2, more=CONTACTS),
+}
+
+
+@pytest.mark.parametrize("kind", TREES)
 def test_hessians_match_differences(kind: str) -> None:
-    trees = random_trees(seed=8, count=10, more=SOLIDS) if kind == "built-in" else CUSTOM_TREES[:3]
+    trees = TREES[kind]
     rng = np.random.default_rng(2)
     compared = 0
     for tree in trees:
