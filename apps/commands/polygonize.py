@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.pyvista_views import MESH_SUFFIXES, write_polydata
 from decals import MeshObject, Scene
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust
@@ -25,6 +26,7 @@ def polygonize(
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     cell_size: OptionalLength = None,
     chord_error: OptionalLength = None,
+    max_triangles: int = MAX_TRIANGLES,
     creases: bool = False,
     split_normals: bool = False,
     define: Definitions = None,
@@ -44,6 +46,9 @@ def polygonize(
         Side of a cell in the model's units, instead of --resolution.
     chord_error
         Largest distance of triangles from the surface in the model's units, instead of a cell size.
+    max_triangles
+        Triangles that a mesh by --chord-error may have in each object; more are refused before they are
+        computed.
     creases
         Put vertices on the edges and corners that unions, intersections and differences leave.
     split_normals
@@ -69,6 +74,7 @@ def polygonize(
                 resolution=resolution,
                 cell_size=cell_size,
                 chord_error=chord_error,
+                max_triangles=max_triangles,
                 creases=creases,
                 split_normals=split_normals,
                 progress=progress,

@@ -10,6 +10,7 @@ Between samples the error is not bounded: a surface that bends within a third of
 away. Parts of a model that fall between all cells are not measured.
 """
 
+import logging
 import math
 from functools import partial
 from typing import Any, cast
@@ -53,6 +54,14 @@ MAX_PASSES = 8
 MIN_RELATIVE_ERROR = 2.0**-20
 """Smallest error that float32 can resolve, over the largest coordinate."""
 
+MAX_TRIANGLES = 10_000_000
+"""Triangles that a mesh by chord error may have unless the caller allows more; they take about 2 GB."""
+
+MANY_TRIANGLES = 2_000_000
+"""Triangles from which on a mesh by chord error is announced by a warning."""
+
+_logger = logging.getLogger(__name__)
+
 _STAGES = (
     "finding the surface",
     "sampling the field",
@@ -70,6 +79,7 @@ def polygonize(
     resolution: int | None = None,
     cell_size: float | None = None,
     chord_error: float | None = None,
+    max_triangles: int = MAX_TRIANGLES,
     creases: bool = False,
     device: str | None = None,
     progress: Progress | None = None,
@@ -90,7 +100,10 @@ def polygonize(
     chord_error : float, optional
         Largest distance of the triangles to the surface, in the model's units. Passes with smaller and
         smaller cells are measured at seven samples in every triangle, until no sample lies farther. Features
-        thinner than a 32nd of the box may be lost.
+        thinner than a 32nd of the box may be lost. A warning is logged if two million triangles are needed.
+    max_triangles : int, optional
+        Triangles that a mesh by chord error may have. Each pass is estimated by the one before it, and is
+        refused before it starts.
     creases : bool, optional
         Move vertices onto the edges and corners that unions, intersections and differences leave.
     device : str, optional
@@ -112,7 +125,8 @@ def polygonize(
     InvalidDevice
         `device` is not a Warp device.
     InvalidResolution
-        Several sizes are given, or one that is not positive, too small for float32, or too small for memory.
+        Several sizes are given, or one that is not positive, too small for float32, or too small for memory;
+        or the chord error takes more triangles than allowed.
     Cancelled
         `cancel` returned True.
 
@@ -148,11 +162,19 @@ def polygonize(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"
         )
     chord_error = _chord_error(tree, chord_error)
-    return _within_chord_error(tree, chord_error, creases, device, watched(progress, cancel))
+    if not isinstance(max_triangles, int | np.integer) or max_triangles < 1:
+        raise InvalidResolution(f"max_triangles: expected a whole number from 1, got {shown(max_triangles)}")
+    report = watched(progress, cancel)
+    return _within_chord_error(tree, chord_error, int(max_triangles), creases, device, report)
 
 
 def _within_chord_error(
-    tree: ImplicitModel, chord_error: float, creases: bool, device: str | None, report: Progress
+    tree: ImplicitModel,
+    chord_error: float,
+    max_triangles: int,
+    creases: bool,
+    device: str | None,
+    report: Progress,
 ) -> Mesh:
     """Return the mesh of the first pass whose triangles lie within `chord_error` of the surface."""
     passes: list[tuple[float, float]] = []
@@ -164,7 +186,12 @@ def _within_chord_error(
         if error <= chord_error:
             return polygonizer.mesh
         passes.append((size, error))
+        density = len(polygonizer.device_mesh.faces) * size**2  # triangles per squared cell size
+        if number == 1:
+            first = (passes[0][0], min(error, passes[0][0]))  # errors of parts that cells miss are larger
+            _announce_count(density / _final_cell_size([first], chord_error) ** 2, chord_error)
         size = _next_cell_size(passes, chord_error)
+        _check_count(density / size**2, max_triangles, f"chord_error: {chord_error:g}")
     raise InvalidResolution(
         f"chord_error: {chord_error:g} was not reached in {MAX_PASSES} passes, the last with cells of "
         f"{passes[-1][0]:g} came to {passes[-1][1]:g}; allow more, or ask for creases where CSG cuts edges"
@@ -187,6 +214,14 @@ def _largest_chord_error(mesh: DeviceMesh, report: Progress) -> float:
 def _next_cell_size(passes: list[tuple[float, float]], allowed: float) -> float:
     """Return the cell size to try after `passes`, pairs of a cell size and its error.
 
+    Estimates hold no farther than MIN_SIZE_RATIO.
+    """
+    return max(_final_cell_size(passes, allowed), MIN_SIZE_RATIO * passes[-1][0])
+
+
+def _final_cell_size(passes: list[tuple[float, float]], allowed: float) -> float:
+    """Return the cell size at which the error is expected to be the allowed one.
+
     The error of a smooth surface falls with the square of the cell size, that of a crease with the size
     itself. The last two passes show the exponent.
     """
@@ -197,7 +232,26 @@ def _next_cell_size(passes: list[tuple[float, float]], allowed: float) -> float:
         power = math.log(error_before / error) / math.log(size_before / size)
     power = min(max(power, 1.0), 2.0)
     ratio: float = (ERROR_MARGIN * allowed / error) ** (1.0 / power)
-    return size * max(ratio, MIN_SIZE_RATIO)
+    return size * ratio
+
+
+def _check_count(triangles: float, allowed: int, wish: str) -> None:
+    """Raise `InvalidResolution` if the next pass would give more triangles than allowed."""
+    if triangles > allowed:
+        raise InvalidResolution(
+            f"{wish} takes about {triangles:,.0f} triangles or more, and max_triangles = {allowed:,}; "
+            "allow a larger error, or more triangles"
+        )
+
+
+def _announce_count(triangles: float, chord_error: float) -> None:
+    """Log a warning if a mesh will have many triangles; creases in CSG take more than this estimate."""
+    if triangles >= MANY_TRIANGLES:
+        _logger.warning(
+            "chord_error %g takes about %s million triangles; a larger error takes fewer",
+            chord_error,
+            f"{triangles / 1e6:,.0f}",
+        )
 
 
 def _numbered(report: Progress, number: int) -> Progress:

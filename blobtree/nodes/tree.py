@@ -25,7 +25,7 @@ from blobtree.formulas.warps import TWIST, SpaceWarp
 from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
-from blobtree.meshing.polygonize import polygonize
+from blobtree.meshing.polygonize import MAX_TRIANGLES, polygonize
 from blobtree.nodes.numeric_parameters import NumericParameter
 from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradient_of
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
@@ -711,6 +711,7 @@ class Node(ImplicitModel):
         resolution: int | None = None,
         cell_size: float | None = None,
         chord_error: float | None = None,
+        max_triangles: int = MAX_TRIANGLES,
         creases: bool = False,
         split_normals: bool = False,
         device: str | None = None,
@@ -721,7 +722,7 @@ class Node(ImplicitModel):
 
         Parameters
         ----------
-        resolution, cell_size, chord_error, creases, device, progress, cancel
+        resolution, cell_size, chord_error, max_triangles, creases, device, progress, cancel
             As for `polygonize`.
         split_normals : bool
             Give each side of a crease its own vertices and normals; implies `creases`. Creases then look
@@ -751,6 +752,7 @@ class Node(ImplicitModel):
             resolution=resolution,
             cell_size=cell_size,
             chord_error=chord_error,
+            max_triangles=max_triangles,
             creases=creases or split_normals,
             device=device,
             progress=progress,

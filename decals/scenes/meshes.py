@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blobtree.meshing.mesh import Mesh
+from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.progress import Progress
 from blobtree.pyvista_views import to_polydata, write_polydata
 from decals.errors import InvalidMesh, InvalidScene
@@ -23,6 +24,7 @@ def as_polydata(
     resolution: int | None = None,
     cell_size: float | None = None,
     chord_error: float | None = None,
+    max_triangles: int = MAX_TRIANGLES,
     creases: bool = False,
     split_normals: bool = False,
     progress: Progress | None = None,
@@ -33,7 +35,7 @@ def as_polydata(
     ----------
     objects
         Objects of a scene.
-    resolution, cell_size, chord_error, creases, split_normals
+    resolution, cell_size, chord_error, max_triangles, creases, split_normals
         See `blobtree.polygonize`.
     progress
         Called with a stage and the fraction done.
@@ -54,6 +56,7 @@ def as_polydata(
             resolution=resolution,
             cell_size=cell_size,
             chord_error=chord_error,
+            max_triangles=max_triangles,
             creases=creases,
             split_normals=split_normals,
             progress=progress,

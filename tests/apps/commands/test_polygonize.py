@@ -47,6 +47,23 @@ def test_polygonize_by_chord_error_with_creases(folder: Path) -> None:
     assert pv.read(folder / "cells.stl").n_cells > 100
 
 
+def test_a_chord_error_that_takes_too_many_triangles_is_one_line(folder: Path, capfd: Capture) -> None:
+    blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
+    command = [
+        "polygonize",
+        "ball.json",
+        "--chord-error",
+        "1e-5",
+        "--max-triangles",
+        "50000",
+        "-o",
+        "ball.ply",
+    ]
+    assert run(command) != 0
+    assert "max_triangles = 50,000" in capfd.readouterr().err
+    assert not (folder / "ball.ply").exists()
+
+
 @pytest.mark.parametrize("stage", ["placing vertices", "writing"])
 def test_an_interrupted_polygonize_leaves_no_file(
     folder: Path, stage: str, monkeypatch: pytest.MonkeyPatch, capfd: Capture

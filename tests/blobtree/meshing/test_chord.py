@@ -90,3 +90,24 @@ def test_progress_names_the_passes_and_never_decreases() -> None:
         fractions = [part for name, part in told if name == stage]
         assert fractions == sorted(fractions)
         assert (fractions[0], fractions[-1]) == (0.0, 1.0)
+
+
+def test_a_mesh_of_too_many_triangles_is_refused_before_its_pass() -> None:
+    with pytest.raises(InvalidResolution, match=r"chord_error: 1e-05 takes about .* max_triangles = 50,000"):
+        polygonize(BALL, chord_error=1e-5, max_triangles=50_000)
+    allowed = polygonize(BALL, chord_error=2e-3, max_triangles=20_000)
+    assert len(allowed.faces) <= 20_000
+    for wrong in (0, 1.5, "many"):
+        with pytest.raises(InvalidResolution, match="max_triangles: expected a whole number from 1"):
+            polygonize(BALL, chord_error=0.1, max_triangles=wrong)  # type: ignore[arg-type]
+
+
+def test_many_triangles_are_announced_after_the_first_pass(caplog: pytest.LogCaptureFixture) -> None:
+    with pytest.raises(InvalidResolution):
+        polygonize(BALL, chord_error=3e-6, max_triangles=50_000)
+    (message,) = [record.getMessage() for record in caplog.records if "chord_error" in record.getMessage()]
+    millions = int(message.split("about ")[1].split(" million")[0])
+    assert 3 <= millions <= 7  # 140,652 triangles at 1e-4
+    caplog.clear()
+    polygonize(BALL, chord_error=0.01)
+    assert not any("chord_error" in record.getMessage() for record in caplog.records)
