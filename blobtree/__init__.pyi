@@ -23,7 +23,7 @@ from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
-from .nodes.contact import Contact, ContactSurface, Press, RatedUnion
+from .nodes.contact import Bulge, Contact, ContactSurface, Press, RatedUnion
 from .nodes.convolution import (
     ConvolutionArc,
     ConvolutionSegment,
@@ -54,6 +54,7 @@ __all__ = [
     "Arc",
     "Bend",
     "Box",
+    "Bulge",
     "Cancel",
     "Cancelled",
     "Circle",

@@ -47,7 +47,7 @@ def rated_field(b: wp.float32, ratio: wp.float32) -> wp.vec2:
 
 
 @wp.func
-def bulge(t: wp.float32, width: wp.float32, height: wp.float32) -> wp.vec2:
+def hump(t: wp.float32, width: wp.float32, height: wp.float32) -> wp.vec2:
     """Return B(t) and B′(t): up to `height` at t = 2 · height, then down to 0 at t = `width`."""
     top = 2.0 * height
     if t <= 0.0 or t >= width or height <= 0.0:
@@ -66,7 +66,7 @@ def pressed_value(a: wp.float32, m: wp.float32, width: wp.float32, height: wp.fl
     if m >= 0.5:
         return wp.max(a - (m - 0.5), 0.0)
     x = wp.clamp(a / FADE, 0.0, 1.0)
-    return a + bulge(0.5 - m, width, height)[0] * x * x * (3.0 - 2.0 * x)
+    return a + hump(0.5 - m, width, height)[0] * x * x * (3.0 - 2.0 * x)
 
 
 @wp.func
@@ -83,7 +83,7 @@ def press_partials(
         if value <= 0.0:
             return wp.vec3(0.0, 0.0, 0.0)
         return wp.vec3(value, 1.0, -m[1])
-    h = bulge(0.5 - m[0], p[1], p[2])
+    h = hump(0.5 - m[0], p[1], p[2])
     x = wp.clamp(a / FADE, 0.0, 1.0)
     fade = x * x * (3.0 - 2.0 * x)
     return wp.vec3(a + h[0] * fade, 1.0 + h[0] * 6.0 * x * (1.0 - x) / FADE, -h[1] * fade * m[1])
@@ -138,6 +138,46 @@ def press_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(d
 
 
 @wp.func
+def bulged_value(a: wp.float32, m: wp.float32, width: wp.float32, height: wp.float32) -> wp.float32:
+    """Return F(a, m) without compression."""
+    if m >= 0.5:
+        return a
+    return pressed_value(a, m, width, height)
+
+
+@wp.func
+def bulge_partials(
+    a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
+) -> wp.vec3:
+    """Return F, ∂F/∂a and ∂F/∂b of a solid that bulges, but is not compressed."""
+    if rated_field(b, tape[int(parameter)][0])[0] >= 0.5:
+        return wp.vec3(a, 1.0, 0.0)
+    return press_partials(a, b, parameter, tape)
+
+
+@wp.func
+def bulge_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec2:
+    """F rises with a; over b it rises up to the top of the bulge and falls behind."""
+    p = tape[int(parameter)]
+    low = rated_field(b[0], p[0])[0]
+    high = rated_field(b[1], p[0])[0]
+    top = wp.clamp(0.5 - 2.0 * p[2], low, high)
+    smallest = wp.min(bulged_value(a[0], low, p[1], p[2]), bulged_value(a[0], high, p[1], p[2]))
+    return wp.vec2(smallest, bulged_value(a[1], top, p[1], p[2]))
+
+
+@wp.func
+def bulge_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.int32:
+    """Return the dependence of a bulge: on the solid alone inside the obstacle and beyond its region."""
+    p = tape[int(parameter)]
+    if a[1] <= 0.0:
+        return KEEP_NONE
+    if b[1] <= 0.0 or rated_field(b[1], p[0])[0] <= 0.5 - p[1] or rated_field(b[0], p[0])[0] >= 0.5:
+        return KEEP_LEFT
+    return KEEP_BOTH
+
+
+@wp.func
 def rated_union_partials(a: wp.float32, b: wp.float32, ratio: wp.float32) -> wp.vec3:
     """F = max(a, r(b))."""
     m = rated_field(b, ratio)
@@ -182,6 +222,17 @@ PRESS = Operator(
     support=Support.LEFT,
     paints=False,
 )
+BULGE = Operator(
+    "bulge",
+    bulge_partials,
+    press_slope,
+    bulge_range,
+    bulge_choice,
+    commutes=False,
+    starts_from_zero=False,
+    support=Support.LEFT,
+    paints=False,
+)
 RATED_UNION = Operator(
     "rated_union",
     rated_union_partials,
@@ -193,5 +244,5 @@ RATED_UNION = Operator(
     monotone=True,
 )
 
-CONTACT_OPERATORS = (PRESS, RATED_UNION)
+CONTACT_OPERATORS = (PRESS, BULGE, RATED_UNION)
 """Operators of contact between solids."""

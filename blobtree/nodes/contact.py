@@ -12,7 +12,13 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidNode
-from blobtree.formulas.contact import HEIGHT_OVER_WIDTH, LARGEST_HEIGHT, PRESS, RATED_UNION
+from blobtree.formulas.contact import (
+    BULGE,
+    HEIGHT_OVER_WIDTH,
+    LARGEST_HEIGHT,
+    PRESS,
+    RATED_UNION,
+)
 from blobtree.lazy import Lazy
 from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.meshing.mesh import Mesh
@@ -100,6 +106,25 @@ class Press(Combination):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Bulge(Press):
+    """`solid` with the bulge that it gets at `obstacle`, but not compressed by it.
+
+    The union of two solids that bulge at each other is the outside of two that press each other; inside, its
+    field has no surface where they meet.
+
+    Examples
+    --------
+    >>> from blobtree import Bulge, Point
+    >>> left, right = Point((-0.7, 0, 0), radius=1.0), Point((0.7, 0, 0), radius=1.0)
+    >>> bool(Bulge(left, right)([0, 0, 0]) == left([0, 0, 0]))
+    True
+    """
+
+    file_tag = "bulge"
+    operator = BULGE
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class RatedUnion(Combination):
     """Union of two obstacles of different stiffness, F = max(f, r(g)); for `Press`.
 
@@ -171,7 +196,8 @@ class Contact(Macro):
 
     No two deformed solids overlap, and no void opens between them: a point inside several solids belongs to
     the one with the largest s(f − ½), where s is its stiffness. Each solid is pressed by the strongest of the
-    others at a point, see `Press`. An offset above it grows the deformed solids; to let the solids grow
+    others at a point, see `Press`. The node itself is the outside of all deformed solids: its field has no
+    surface where they meet. An offset above it grows the deformed solids; to let the solids grow
     before they touch, offset them.
 
     Examples
@@ -244,8 +270,9 @@ class Contact(Macro):
 
     @Lazy
     def expanded(self) -> Node:
-        """Return the union of the deformed solids."""
-        return Union(self._deformed) if len(self._deformed) > 1 else self._deformed[0]
+        """Return the union of the deformed solids, without the surfaces between them."""
+        solids = tuple(self._deformed_by(Bulge, i) for i in range(len(self.operands)))
+        return Union(solids) if len(solids) > 1 else solids[0]
 
     def solids(self) -> tuple[Node, ...]:
         """Return the deformed solids as trees of their own.
@@ -401,10 +428,10 @@ class Contact(Macro):
     @Lazy
     def _deformed(self) -> tuple[Node, ...]:
         """Return the deformed solids."""
-        return tuple(self._pressed(i) for i in range(len(self.operands)))
+        return tuple(self._deformed_by(Press, i) for i in range(len(self.operands)))
 
-    def _pressed(self, number: int) -> Node:
-        """Return one solid, pressed by all others."""
+    def _deformed_by(self, kind: type[Press], number: int) -> Node:
+        """Return one solid under a deformation at all others."""
         solid, groups = self._grown[number], self._obstacles(number)
         if not groups:
             return solid
@@ -412,7 +439,7 @@ class Contact(Macro):
         for ratio, more in others:
             obstacle = RatedUnion(obstacle, more, stiffness_ratio=ratio / first)
         height = self._heights[number]
-        return Press(solid, obstacle, stiffness_ratio=first, width=self.width, height=height)
+        return kind(solid, obstacle, stiffness_ratio=first, width=self.width, height=height)
 
     @Lazy
     def _heights(self) -> tuple[float, ...]:

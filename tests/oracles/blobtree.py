@@ -5,7 +5,7 @@ these are aⁿ and bⁿ over a common divisor, and union and intersection choose
 fold does not matter, save on exact ties of a union or an intersection. A difference has an order of its own.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import reduce
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree import (
     Bend,
     Box,
+    Bulge,
     Circle,
     Cone,
     Contact,
@@ -142,6 +143,13 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return evaluate(child, np.linalg.solve(linear, (q - offset).T).T)
         case Difference(solid=solid, tool=tool):
             return _difference(evaluate(solid, q), evaluate(tool, q))
+        case Bulge(solid=solid, obstacle=obstacle):
+            a, b = evaluate(solid, q), evaluate(obstacle, q)
+            pressed = pressed_field(a, b, node.stiffness_ratio, node.width, node.height)
+            beyond = 0.5 - rated(b.value, node.stiffness_ratio)
+            value = np.where(beyond > 0.0, pressed.value, a.value)
+            margin = np.where(beyond > 0.0, pressed.margin, a.margin)
+            return Field(value, a.color, np.minimum(margin, np.abs(beyond)))
         case Press(solid=solid, obstacle=obstacle):
             shape = node.stiffness_ratio, node.width, node.height
             return pressed_field(evaluate(solid, q), evaluate(obstacle, q), *shape)
@@ -150,7 +158,7 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             b = replace(b, value=rated(b.value, ratio))
             return _choose(a, b, a.value >= b.value)
         case Contact():
-            return evaluate(Union(pressed_solids(node)), q)
+            return evaluate(outside_of(node), q)
         case Sum(operands=operands):
             return reduce(lambda a, b: _ricci(a, b, 1.0), [evaluate(operand, q) for operand in operands])
         case Ricci(operands=operands, exponent=exponent):
@@ -221,7 +229,7 @@ def grown(node: Node, distance: float) -> Node:
         case RatedUnion(first=first, second=second):
             return replace(node, first=grown(first, distance), second=grown(second, distance))
         case Contact():
-            return grown(Union(pressed_solids(node)), distance)
+            return grown(outside_of(node), distance)
         case Difference(solid=solid, tool=tool):
             return Difference(grown(solid, distance), grown(tool, -distance))
         case Sum() | Union() | Intersection() | Ricci():
@@ -243,6 +251,18 @@ def pressed_solids(contact: Contact) -> tuple[Node, ...]:
         height = bulge_height(contact, i)
         pressed.append(Press(solid, obstacle, stiffness_ratio=first, width=contact.width, height=height))
     return tuple(pressed)
+
+
+def outside_of(contact: Contact) -> Union:
+    """The union of the solids of a contact, each with its bulges, but not compressed."""
+    return Union(
+        tuple(
+            Bulge(**{item.name: getattr(solid, item.name) for item in fields(Press)})
+            if isinstance(solid, Press)
+            else solid
+            for solid in pressed_solids(contact)
+        )
+    )
 
 
 def bulge_height(contact: Contact, number: int) -> float:

@@ -7,6 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree.formulas.contact import (
+    bulge_choice,
+    bulge_partials,
+    bulge_range,
     press_choice,
     press_partials,
     press_range,
@@ -136,6 +139,27 @@ def test_slopes_ranges_and_choices_hold(shape: tuple[float, float, float]) -> No
     assert {KEEP_NONE, KEEP_LEFT, KEEP_BOTH} == set(choice.tolist())
     exact = at_tape(press_range, shape, a=boxes[0][:, [0, 0]], b=boxes[1][:, [0, 0]])
     np.testing.assert_array_equal(exact[:, 0], exact[:, 1])
+
+
+@EVERY_SHAPE
+def test_a_bulge_is_a_pressed_solid_outside_and_the_solid_inside(shape: tuple[float, float, float]) -> None:
+    rng = np.random.default_rng(4)
+    a, b = operands()
+    inside = rated(b.astype(np.float32).astype(np.float64), shape[0]) > 0.5 + 1e-6
+    seen, outside = at_tape(bulge_partials, shape, a=a, b=b), at_tape(press_partials, shape, a=a, b=b)
+    np.testing.assert_array_equal(seen[inside, 0], a.astype(np.float32)[inside])
+    np.testing.assert_array_equal(seen[inside, 1:], np.tile([1.0, 0.0], (inside.sum(), 1)))
+    clear = rated(b, shape[0]) < 0.5 - 1e-6
+    np.testing.assert_array_equal(seen[clear], outside[clear])
+    both = np.sort(rng.uniform(0.0, 1.2, (2, 2, 3000)) ** 1.5, axis=1).astype(np.float32)
+    bounds = at_tape(bulge_range, shape, a=both[0].T, b=both[1].T)
+    choice = at_tape(bulge_choice, shape, a=both[0].T, b=both[1].T)
+    for _ in range(30):
+        x, y = (both[:, 0] + (both[:, 1] - both[:, 0]) * rng.random((2, 3000))).astype(np.float64)
+        f = at_tape(bulge_partials, shape, a=x, b=y)[:, 0]
+        assert (bounds[:, 0] - 1e-6 <= f).all()
+        assert (f <= bounds[:, 1] + 1e-6).all()
+        np.testing.assert_array_equal(f[choice == KEEP_LEFT], x.astype(np.float32)[choice == KEEP_LEFT])
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.5, 1.0, 3.0, 100.0])
