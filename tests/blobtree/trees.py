@@ -176,8 +176,8 @@ def random_contact(rng: np.random.Generator, operands: list[Node]) -> Node:
     if kind == 0:
         return RatedUnion(operands[0], operands[1], stiffness_ratio=ratio)
     if kind == 1:
-        kind = Press if rng.random() < 0.5 else Bulge
-        return kind(*operands[:2], stiffness_ratio=ratio, width=width, height=float(heights[0]))
+        deformation = Press if rng.random() < 0.5 else Bulge
+        return deformation(*operands[:2], stiffness_ratio=ratio, width=width, height=float(heights[0]))
     several = operands[:3]
     stiffness = rng.uniform(1.0, 3.0, len(several) ** int(rng.integers(1, 3))) * (rng.random() < 0.7)
     return Contact(
