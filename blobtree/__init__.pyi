@@ -2,6 +2,7 @@ from ._version import __version__
 from .custom.field import CustomField, define_field
 from .custom.operator import CustomCombination, define_operator
 from .custom.skeleton import CustomPrimitive, define_skeleton
+from .custom.warp import CustomWarp, define_warp
 from .derivatives.curvature import Curvatures
 from .errors import (
     Cancelled,
@@ -71,6 +72,7 @@ __all__ = [
     "CustomCombination",
     "CustomField",
     "CustomPrimitive",
+    "CustomWarp",
     "Cylinder",
     "Difference",
     "Disc",
@@ -128,6 +130,7 @@ __all__ = [
     "define_field",
     "define_operator",
     "define_skeleton",
+    "define_warp",
     "fit",
     "from_json",
     "load",

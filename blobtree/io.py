@@ -24,6 +24,7 @@ from blobtree.custom.definition import find_kind
 from blobtree.custom.field import CustomField
 from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
+from blobtree.custom.warp import CustomWarp
 from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.files import write_atomically
 from blobtree.nodes.kinds import NODE_KINDS
@@ -90,6 +91,19 @@ class CustomOperatorRecord(NodeRecord, frozen=True, tag="custom_operator"):
         return _custom_node(CustomCombination, values)
 
 
+class CustomWarpRecord(NodeRecord, frozen=True, tag="custom_warp"):
+    """A node under a custom warp."""
+
+    references = ("child",)
+    kind: str
+    values: dict[str, CustomValue] = msgspec.field(name="parameters")
+    child: int
+
+    def make(self, values: dict[str, Any]) -> Node:
+        """Return the node; its kind must be defined."""
+        return _custom_node(CustomWarp, values)
+
+
 class OldCustomSkeletonRecord(CustomSkeletonRecord, frozen=True, tag="own skeleton"):
     """The same as older files write it."""
 
@@ -129,6 +143,7 @@ else:
         CustomSkeletonRecord
         | CustomFieldRecord
         | CustomOperatorRecord
+        | CustomWarpRecord
         | OldCustomSkeletonRecord
         | OldCustomOperatorRecord
     )
@@ -312,6 +327,8 @@ def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
         record_type = CustomFieldRecord
     elif isinstance(node, CustomCombination):
         record_type = CustomOperatorRecord
+    elif isinstance(node, CustomWarp):
+        record_type = CustomWarpRecord
     else:
         record_type = RECORD_OF_KIND[type(node)]
     values = {name: getattr(node, name) for name in record_type.__struct_fields__}

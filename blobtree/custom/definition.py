@@ -118,7 +118,7 @@ def find_kind(name: str) -> CustomKind:
         known = ", ".join(sorted(_KINDS)) or "none"
         raise UnknownKind(
             f"custom kind {name!r} is not defined in this process (defined: {known}); import the module that "
-            "calls define_skeleton, define_operator or define_field for it "
+            "calls define_skeleton, define_operator, define_field or define_warp for it "
             "(on the command line: --define), then try again"
         )
     return _KINDS[name]

@@ -1,0 +1,300 @@
+"""Custom warps: a deformation from one typed function that says where a point of space comes from.
+
+    @wp.func
+    def wave(q: wp.vec3, height: wp.float32) -> wp.vec3:
+        return q - wp.vec3(0.0, 0.0, height * wp.sin(q[0]))
+
+    Wave = define_warp(wave, stretch=wave_stretch, box=wave_height)
+    model = Wave(Point((0, 0, 0), radius=1.0), 0.2)
+
+The function maps a point of the deformed space to the space of the child, as `formulas.warps` describes. Its
+transposed Jacobian is derived from the source, unless a function for it is given.
+"""
+
+import inspect
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import Box, Float64Array
+from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.custom.warp_checks import WarpClaims, check_warp
+from blobtree.errors import InvalidNode
+from blobtree.formulas.warps import SpaceWarp
+from blobtree.nodes.parameters import Parameter
+from blobtree.nodes.tree import Node, Placed
+from blobtree.transpile.derivative import directional_derivative
+from blobtree.validation import positive_number
+
+FIRST_NUMBER = 1
+"""Place of the first parameter on the tape, in floats: behind the stretch of the map."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CustomWarp(Placed, metaclass=CustomKind):
+    """A node under a user's warp: the base of the classes that `define_warp` returns.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import CustomWarp, define_warp
+    >>> @wp.func
+    ... def lean(q: wp.vec3) -> wp.vec3:
+    ...     return wp.vec3(q[0] - 0.2 * wp.sin(q[2]), q[1], q[2])
+    >>> Lean = define_warp(lean, stretch=1.11, box=0.2)
+    >>> issubclass(Lean, CustomWarp)
+    True
+    """
+
+    kind: ClassVar[str]
+    digest: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, child: Node, *parameters: Any, **named: Any) -> None: ...
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The function's parameters by name."""
+        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
+
+    @property
+    def warp_parameters(self) -> tuple[float, ...]:
+        """The numbers of the parameters, one after the other."""
+        numbers = (item.components(getattr(self, item.name)) for item in self.parameters)
+        return tuple(itertools.chain.from_iterable(numbers))
+
+
+def define_warp(
+    forward: Any,
+    *,
+    stretch: Any,
+    box: Any,
+    pullback: Any = None,
+    extent: float = 4.0,
+    name: str | None = None,
+    limits: Mapping[str, Limits] | None = None,
+) -> type[CustomWarp]:
+    """Return a class of nodes that deform their child.
+
+    Parameters
+    ----------
+    forward
+        ``(q: wp.vec3, parameters...) -> wp.vec3``: the point of the child's space that the deformation takes
+        to q. It must be continuous. Parameters are wp.float32, wp.int32, wp.vec2, wp.vec3 or wp.vec4.
+    stretch
+        Upper bound of the norm of the Jacobian of `forward`: a number, or a typed function ``(parameters...)
+        -> wp.float32``, or ``(q: wp.vec3, reach: wp.float32, parameters...) -> wp.float32`` for the ball of
+        radius `reach` around q.
+    box
+        Largest distance by which `forward` moves a point, as a number; or a plain function ``(lower, upper,
+        **parameters) -> (lower, upper)`` that returns a box outside of which `forward` takes no point into
+        the box lower, upper.
+    pullback
+        ``(q: wp.vec3, g: wp.vec3, parameters...) -> wp.vec3``: the transposed Jacobian at q times g. By
+        default it is derived from `forward`.
+    extent
+        Half side of the cube around the origin in which samples try the claims.
+    name
+        Name of the kind in files; by default the function's name. The class has the same name in CamelCase.
+    limits
+        By parameter (smallest or None, largest or None): of a number, or of the length of a vector.
+
+    Returns
+    -------
+    type[CustomWarp]
+        A node class: `child`, then the function's parameters in order.
+
+    Raises
+    ------
+    InvalidDefinition
+        A function has no types or no source; or samples contradict a claim, or show a singular Jacobian.
+        Nothing has been compiled by then.
+    UntranslatableFunction
+        A function leaves the shared subset; the message names file and line.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import Point, define_warp
+    >>> @wp.func
+    ... def sway(q: wp.vec3, width: wp.float32) -> wp.vec3:
+    ...     return wp.vec3(q[0] - width * wp.sin(q[2]), q[1], q[2])
+    >>> @wp.func
+    ... def sway_stretch(width: wp.float32) -> wp.float32:
+    ...     return 1.0 + wp.abs(width)
+    >>> Sway = define_warp(sway, stretch=sway_stretch, box=0.5, limits={"width": (-0.5, 0.5)})
+    >>> Sway(Point((0, 0, 0), radius=1.0), 0.3).values
+    {'width': 0.3}
+    """
+    source = custom_source(forward, returns=wp.vec3)
+    first, *names = list(source.parameters) or [""]
+    if source.parameters.get(first) is not wp.vec3:
+        raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
+    parameters = custom_parameters(source, names, limits, CustomWarp)
+    kind = kind_name(source, name)
+    claims = WarpClaims(
+        _stretch(source, parameters, stretch),
+        _box(source, parameters, box),
+        None if pullback is None else _pullback(source, parameters, pullback),
+        positive_number("extent", extent),
+    )
+    digest = source.digest_with(kind, parameters, claims.digest, _box_text(box))
+    known = registered(kind)
+    if known is not None and issubclass(known, CustomWarp) and known.digest == digest:
+        return known
+    check_warp(source, parameters, claims)
+    node: type[CustomWarp] = node_class(
+        kind,
+        source,
+        [(parameter.name, Annotated[Any, parameter]) for parameter in parameters],
+        CustomWarp,
+        {
+            "__doc__": source.python.__doc__ or f"A node under the warp {kind!r}.",
+            "kind": kind,
+            "digest": digest,
+            "parameters": parameters,
+            "warp": _row(kind, digest, source, parameters, claims),
+        },
+    )
+    register(node)
+    return node
+
+
+def _types(source: CustomSource, parameters: tuple[Parameter, ...]) -> list[Any]:
+    return [source.parameters[parameter.name] for parameter in parameters]
+
+
+def _stretch(source: CustomSource, parameters: tuple[Parameter, ...], claim: Any) -> float | CustomSource:
+    """Return the claimed bound as a number or a function."""
+    if isinstance(claim, int | float | np.number) and not isinstance(claim, bool):
+        if not 0.0 < claim < np.inf:
+            raise source.refusal(f"stretch: expected a number above 0 or a typed function, got {claim!r}")
+        return float(claim)
+    bound = custom_source(claim, returns=wp.float32)
+    types, expected = list(bound.parameters.values()), _types(source, parameters)
+    if types == expected or (
+        types[2:] == expected and types[:2] in ([wp.vec3, wp.float32], [wp.vec3, float])
+    ):
+        return bound
+    wanted = ", ".join(["q: wp.vec3", "reach: wp.float32", *(item.name for item in parameters)])
+    got = ", ".join(bound.parameters)
+    raise source.refusal(f"stretch: expected a function of ({wanted}), got one of ({got})")
+
+
+def _pullback(source: CustomSource, parameters: tuple[Parameter, ...], function: Any) -> CustomSource:
+    claim = custom_source(function, returns=wp.vec3)
+    if list(claim.parameters.values()) != [wp.vec3, wp.vec3, *_types(source, parameters)]:
+        wanted = ", ".join(["q: wp.vec3", "g: wp.vec3", *(item.name for item in parameters)])
+        got = ", ".join(claim.parameters)
+        raise source.refusal(f"pullback: expected a function of ({wanted}), got one of ({got})")
+    return claim
+
+
+def _box(
+    source: CustomSource, parameters: tuple[Parameter, ...], box: Any
+) -> Callable[[Float64Array, Float64Array, tuple[float, ...]], Box]:
+    """Return the function (lower, upper, numbers of the parameters) of the claim."""
+    if isinstance(box, int | float | np.number) and not isinstance(box, bool):
+        if not 0.0 <= box < np.inf:
+            raise source.refusal(f"box: expected a distance from 0 or a function, got {box!r}")
+        distance = float(box)
+        return lambda lower, upper, _numbers: (lower - distance, upper + distance)
+    if not callable(box):
+        raise source.refusal(f"box: expected a distance or a function (lower, upper, ...), got {box!r}")
+
+    def outer(lower: Float64Array, upper: Float64Array, numbers: tuple[float, ...]) -> Box:
+        values: dict[str, Any] = {}
+        remaining = list(numbers)
+        for item in parameters:
+            taken, remaining = remaining[: item.size], remaining[item.size :]
+            values[item.name] = tuple(taken) if item.size > 1 else int(taken[0]) if item.whole else taken[0]
+        try:
+            low, high = box(lower.copy(), upper.copy(), **values)
+            corners = np.asarray(low, np.float64), np.asarray(high, np.float64)
+        except Exception as error:  # the function is the user's own
+            raise InvalidNode(f"{source.name}: its box fails: {type(error).__name__}: {error}") from error
+        if not all(corner.shape == (3,) and np.isfinite(corner).all() for corner in corners):
+            raise InvalidNode(
+                f"{source.name}: expected its box to be two corners (3,), got {low!r}, {high!r}"
+            )
+        return corners
+
+    return outer
+
+
+def _box_text(box: Any) -> str:
+    """Return a text that differs between boxes."""
+    try:
+        return inspect.getsource(box) if callable(box) else repr(float(box))
+    except (OSError, TypeError):
+        return repr(box)
+
+
+def _row(
+    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], claims: WarpClaims
+) -> SpaceWarp:
+    """Return the row of the table, with functions generated around the user's."""
+    readings, place = [], FIRST_NUMBER
+    for item in parameters:
+        numbers = [f"t{k // 4}[{k % 4}]" for k in range(place, place + item.size)]
+        place += item.size
+        whole = f"int({numbers[0]})" if item.whole else numbers[0]
+        readings.append(f"wp.vec{item.size}({', '.join(numbers)})" if item.size > 1 else whole)
+    texels = "".join(f"    t{i} = tape[at + {i}]\n" for i in range(-(-place // 4) if parameters else 0))
+
+    def made(part: str, template: str, functions: list[wp.Function], **parts: str) -> wp.Function:
+        name = f"custom_{kind}_{part}_{digest}"
+        text = template.format(name=name, texels=texels, **parts)
+        return generated(name, text, {function.key: function for function in functions})
+
+    rest = "".join(f", {reading}" for reading in readings)
+    forward = made("forward", _FORWARD, [source.function], call=f"{source.function.key}(q{rest})")
+    if claims.pullback is None:
+        derivative = directional_derivative(source.function, [next(iter(source.parameters))])
+        pullback = made("pullback", _DERIVED, [derivative], derivative=derivative.key, rest=rest)
+    else:
+        function = claims.pullback.function
+        pullback = made("pullback", _GIVEN, [function], call=f"{function.key}(q, g{rest})")
+    if isinstance(claims.stretch, float):
+        stretch = made("stretch", _STRETCH, [], call=repr(claims.stretch))
+    else:
+        bound = claims.stretch.function
+        leading = ["q", "reach"] if len(claims.stretch.parameters) > len(parameters) else []
+        call = f"{bound.key}({', '.join([*leading, *readings])})"
+        stretch = made("stretch", _STRETCH, [bound], call=call)
+    return SpaceWarp(kind, forward, pullback, stretch, claims.box, digest)
+
+
+_FORWARD = '''\
+def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """The user's warp."""
+{texels}    return {call}
+'''
+
+_GIVEN = '''\
+def {name}(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """The user's transposed Jacobian times g."""
+{texels}    return {call}
+'''
+
+_DERIVED = '''\
+def {name}(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """The transposed Jacobian times g, from derivatives along the axes."""
+{texels}    moved, along_x = {derivative}(q, wp.vec3(1.0, 0.0, 0.0){rest})
+    same, along_y = {derivative}(q, wp.vec3(0.0, 1.0, 0.0){rest})
+    again, along_z = {derivative}(q, wp.vec3(0.0, 0.0, 1.0){rest})
+    return wp.vec3(wp.dot(along_x, g), wp.dot(along_y, g), wp.dot(along_z, g))
+'''
+
+_STRETCH = '''\
+def {name}(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """The claimed bound on the norm of the Jacobian."""
+{texels}    return {call}
+'''

@@ -1,0 +1,140 @@
+"""Custom warps: fields against float64, bounds, meshes, rays, files, and refused definitions."""
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import (
+    InvalidDefinition,
+    InvalidNode,
+    Point,
+    Segment,
+    define_warp,
+    from_json,
+    polygonize,
+    to_json,
+)
+from blobtree._typing import Float64Array
+from blobtree.tape.model import bounds_along
+from blobtree.tracing.trace import trace
+from tests.blobtree.custom.warp_kernels import (
+    broken,
+    flat,
+    folded,
+    sway,
+    sway_pullback,
+    sway_stretch,
+    swirl,
+    swirl_stretch,
+    torn,
+    wrong_pullback,
+)
+from tests.oracles import blobtree as oracle
+
+
+def swirl_box(lower: Float64Array, upper: Float64Array, **_parameters: Any) -> tuple[Any, Any]:
+    radius = np.hypot(*np.maximum(np.abs(lower[:2]), np.abs(upper[:2])))
+    return (-radius, -radius, lower[2]), (radius, radius, upper[2])
+
+
+LIMITS = {"width": (-0.5, 0.5), "rate": (0.0, 3.0)}
+Sway = define_warp(sway, stretch=sway_stretch, box=0.5, limits=LIMITS)
+GivenSway = define_warp(
+    sway, stretch=sway_stretch, box=0.5, pullback=sway_pullback, limits=LIMITS, name="given_sway"
+)
+Swirl = define_warp(
+    swirl, stretch=swirl_stretch, box=swirl_box, limits={"axis": (0.0, 2.0), "turns": (-5, 5)}
+)
+ROD = Segment((0.2, 0, -2), (0.2, 0, 2), radius=0.3)
+TREES = {
+    "sway": Sway(ROD, 0.4, 2.0),
+    "nested": Swirl(Sway(ROD, 0.4, 2.0) + Point((0.5, 0, 0), radius=0.4), (0.1, 0, 0.5), 3).bend(10, (-1, 1)),
+}
+
+
+def swayed(q: Float64Array) -> Float64Array:
+    return q - 0.4 * np.stack([np.sin(2.0 * q[:, 2]), 0 * q[:, 0], 0 * q[:, 0]], axis=1)
+
+
+def test_values_and_gradients_match_float64_with_derived_and_given_jacobians() -> None:
+    points = np.random.default_rng(0).uniform((-1, -1, -2.5), (1, 1, 2.5), (300, 3))
+    expected = oracle.value(ROD, swayed(points))
+    step = 1e-6 * np.eye(3)
+    slopes = [(oracle.value(ROD, swayed(points + h)) - oracle.value(ROD, swayed(points - h))) for h in step]
+    for node in (Sway(ROD, 0.4, 2.0), GivenSway(ROD, 0.4, 2.0)):
+        np.testing.assert_allclose(node(points), expected, atol=1e-5)
+        np.testing.assert_allclose(node.gradient(points), np.stack(slopes, axis=1) / 2e-6, atol=2e-3)
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_bounds_boxes_meshes_and_rays_agree_with_the_field(name: str) -> None:
+    tree, rng = TREES[name], np.random.default_rng(1)
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
+    outside = rng.uniform(lower - 0.5, upper + 0.5, (2000, 3))
+    assert (tree(outside[((outside < lower) | (outside > upper)).any(axis=1)]) == 0.0).all()
+    points = rng.uniform(lower, upper, (200, 3)).astype(np.float32)
+    headings = rng.normal(size=(200, 3))
+    headings = (headings / np.linalg.norm(headings, axis=1, keepdims=True)).astype(np.float32)
+    reach = (10.0 ** rng.uniform(-3.0, 0.5, 200)).astype(np.float32)
+    value, rise, fall = bounds_along(tree.tape, points, headings, reach).T
+    for share in (0.1, 0.5, 1.0):
+        change = tree(points + share * reach[:, None] * headings) - value
+        assert (-fall * share * reach - 1e-5 <= change).all()
+        assert (change <= rise * share * reach + 1e-5).all()
+    mesh = polygonize(tree, resolution=32)
+    assert np.abs(tree(mesh.vertices) - 0.5).max() < 1e-5
+    starts = mesh.vertices[::50] + 5.0 * mesh.normals[::50]
+    distances = trace(tree, starts, -mesh.normals[::50])
+    assert (distances <= 5.0 + 1e-3).all()
+    assert np.abs(tree(starts - distances[:, None] * mesh.normals[::50]) - 0.5).max() < 1e-3
+
+
+def test_custom_warps_survive_files_and_pickles() -> None:
+    for tree in TREES.values():
+        assert from_json(to_json(tree)) == tree
+        assert pickle.loads(pickle.dumps(tree)) == tree
+    assert "Sway(width=0.4, rate=2.0)" in str(TREES["sway"])
+    assert define_warp(sway, stretch=sway_stretch, box=0.5, limits=LIMITS) is Sway
+
+
+def test_parameters_are_checked() -> None:
+    with pytest.raises(InvalidNode, match=r"width: expected a number from -0\.5 to 0\.5"):
+        Sway(ROD, 0.6, 1.0)
+    with pytest.raises(InvalidNode, match="expected BlobTree nodes"):
+        Sway(3, 0.1, 1.0)  # type: ignore[arg-type]
+
+
+REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
+    "flat": (lambda: define_warp(flat, stretch=1.0, box=9.0), "its Jacobian is singular"),
+    "folded": (lambda: define_warp(folded, stretch=9.0, box=99.0), "its Jacobian is singular"),
+    "torn": (lambda: define_warp(torn, stretch=1.0, box=1.0), "stretch: .* it may jump between them"),
+    "broken": (lambda: define_warp(broken, stretch=1.0, box=1.0), "broken: for "),
+    "steep": (lambda: define_warp(sway, stretch=1.01, box=0.5, limits=LIMITS, name="s"), "stretch: the norm"),
+    "small box": (
+        lambda: define_warp(sway, stretch=sway_stretch, box=0.1, limits=LIMITS, name="s"),
+        "box: .* does not hold it",
+    ),
+    "wrong pullback": (
+        lambda: define_warp(
+            sway, stretch=sway_stretch, box=0.5, pullback=wrong_pullback, limits=LIMITS, name="s"
+        ),
+        "pullback: for q",
+    ),
+    "no stretch": (lambda: define_warp(sway, stretch=0.0, box=0.5), "stretch: expected a number above 0"),
+    "no box": (lambda: define_warp(sway, stretch=9.0, box="big"), "box: expected a distance or a function"),
+    "other parameters": (
+        lambda: define_warp(sway, stretch=swirl_stretch, box=0.5),
+        "stretch: expected a function of",
+    ),
+    "no point": (lambda: define_warp(sway_stretch, stretch=1.0, box=0.5), "expected it to return wp.vec3"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_wrong_definitions_are_refused(name: str) -> None:
+    define, message = REFUSED[name]
+    with pytest.raises(InvalidDefinition, match=message):
+        define()
