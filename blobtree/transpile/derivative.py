@@ -18,6 +18,8 @@ that varies is followed by its tangent::
         out[i] = slope
 
 The gradient of a function of a point is three such calls, with tangents (1, 0, 0), (0, 1, 0) and (0, 0, 1).
+Three calls of the derivative of a gradient are the Hessian. An operator that reads the gradients of its
+operands (Gourmel et al. 2013) needs it for its own gradient: the chain rule takes ∂F/∂(∇a) to H_a.
 
 * Each float, vector or matrix that depends on what varies has a tangent. Integers, bools and structs have
   none. Branches and loops are those of the function itself.

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from blobtree import Box, InvalidPoints, Node, Point, Torus
 from tests.blobtree.custom_kinds import CUSTOM_TREES
-from tests.blobtree.trees import CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, points_around, random_trees
 from tests.oracles import blobtree as oracle
 
 Numbers = NDArray[np.float64]
@@ -27,10 +27,11 @@ def second_differences(node: Node, points: Numbers, step: float) -> Numbers:
 
 
 TREES = {
-    "solids": random_trees(seed=8, count=8, more=SOLIDS),
-    "custom": CUSTOM_TREES[:2],
+    "solids": random_trees(seed=8, count=5, more=SOLIDS),
+    "custom": CUSTOM_TREES[:1],
     "shapes": random_trees(seed=6, count=5, depth=2, more=SHAPES),
     "fields": random_trees(seed=6, count=6, depth=2, more=FIELDS),
+    "deformed": random_trees(seed=6, count=4, depth=2, more=DEFORMED),
     "contacts": random_trees(seed=6, count=4, depth=2, more=CONTACTS),
 }
 
