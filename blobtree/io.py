@@ -14,7 +14,6 @@ to equal trees.
 """
 
 import os
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast, get_type_hints
 
@@ -27,9 +26,11 @@ from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
 from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.files import write_atomically
+from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.tree import Node
+from blobtree.nodes.values import OPTIONAL, fields_of
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
 from blobtree.validation import Vector
@@ -39,7 +40,9 @@ VERSION: Literal[1] = 1
 CustomValue = float | tuple[float, ...]
 
 
-class NodeRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+class NodeRecord(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", omit_defaults=True
+):
     """One node in a file; fields that hold other nodes hold their indices instead."""
 
     node_kind: ClassVar[type[Node]]
@@ -57,6 +60,7 @@ class CustomSkeletonRecord(NodeRecord, frozen=True, tag="custom_skeleton"):
     values: dict[str, CustomValue] = msgspec.field(name="parameters")
     radius: float
     color: Vector
+    attributes: dict[str, AttributeValue] = {}
 
     def make(self, values: dict[str, Any]) -> Node:
         """Return the node; its kind must be defined."""
@@ -72,6 +76,7 @@ class CustomFieldRecord(NodeRecord, frozen=True, tag="custom_field"):
     size: Vector
     fade: float
     color: Vector
+    attributes: dict[str, AttributeValue] = {}
 
     def make(self, values: dict[str, Any]) -> Node:
         """Return the node; its kind must be defined."""
@@ -115,12 +120,17 @@ class OldCustomOperatorRecord(CustomOperatorRecord, frozen=True, tag="own operat
 def _record_type(kind: type[Node]) -> type[NodeRecord]:
     """Return the record of a built-in class of nodes."""
     hints = get_type_hints(kind)
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # every node is a dataclass
+    names = [field.name for field in fields_of(kind)]
     references = tuple(name for name in names if name not in parameters_of(kind))
-    types = [
+    types: list[Any] = [
         (name, (int if hints[name] is Node else tuple[int, ...]) if name in references else hints[name])
         for name in names
     ]
+    for place, field in enumerate(fields_of(kind)):
+        if isinstance(field.default, Attributes):
+            types[place] = (field.name, dict[str, AttributeValue], {})
+        elif OPTIONAL in field.metadata:
+            types[place] = (*types[place], field.default)
     record: Any = msgspec.defstruct(
         f"{kind.__name__}Record",
         types,
@@ -332,6 +342,7 @@ def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
     else:
         record_type = RECORD_OF_KIND[type(node)]
     values = {name: getattr(node, name) for name in record_type.__struct_fields__}
+    values |= {name: dict(value) for name, value in values.items() if isinstance(value, Attributes)}
     for name in record_type.references:
         operand = values[name]
         values[name] = (

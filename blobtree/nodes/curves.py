@@ -273,7 +273,12 @@ class Polyline(Macro, Leaf):
     def expanded(self) -> Node:
         """Return the union of segments between different neighbours."""
         ends = [pair for pair in pairwise(self.points) if pair[0] != pair[1]]
-        return Union(tuple(Segment(*pair, radius=self.radius, color=self.color) for pair in ends))
+        return Union(
+            tuple(
+                Segment(*pair, radius=self.radius, color=self.color, attributes=self.attributes)
+                for pair in ends
+            )
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -335,7 +340,7 @@ class Stroke(Macro, Leaf):
         first = np.stack([balls[:-1], after, middles], axis=1)
         second = np.stack([middles, before, balls[1:]], axis=1)
         pieces = np.stack([first, second], axis=1).reshape(-1, 3, 4).tolist()
-        return Union(tuple(_piece(*controls, color=self.color) for controls in pieces))
+        return Union(tuple(_piece(self, *controls) for controls in pieces))
 
 
 def _chordal_slopes(balls: Float64Array, lengths: Float64Array) -> Float64Array:
@@ -346,7 +351,7 @@ def _chordal_slopes(balls: Float64Array, lengths: Float64Array) -> Float64Array:
     return slopes
 
 
-def _piece(start: list[float], control: list[float], end: list[float], *, color: Vector) -> TaperedBezier:
+def _piece(stroke: Stroke, start: list[float], control: list[float], end: list[float]) -> TaperedBezier:
     a, b, c = (tuple(ball[:3]) for ball in (start, control, end))
     radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
-    return TaperedBezier(a, b, c, **radii, color=color)  # type: ignore[arg-type]  # lists of four
+    return TaperedBezier(a, b, c, **radii, color=stroke.color, attributes=stroke.attributes)  # type: ignore[arg-type]  # lists of four

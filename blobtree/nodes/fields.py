@@ -67,7 +67,7 @@ class FieldPrimitive(ProgramField, Leaf):
         return {
             name: columns_of(leaves, parameter)
             for name, parameter in parameters_of(cls).items()
-            if parameter.quantity is not Quantity.COLOR
+            if parameter.quantity not in (Quantity.COLOR, Quantity.ATTRIBUTES)
         }
 
 

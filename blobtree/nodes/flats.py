@@ -175,7 +175,12 @@ class Polygon(Macro, Leaf):
         """Return the union of ears."""
         ears = _ears(_in_plane(np.array(self.points)))
         corners = [[self.points[place] for place in ear] for ear in ears]
-        return Union(tuple(Triangle(*ear, radius=self.radius, color=self.color) for ear in corners))
+        return Union(
+            tuple(
+                Triangle(*ear, radius=self.radius, color=self.color, attributes=self.attributes)
+                for ear in corners
+            )
+        )
 
 
 def _in_plane(points: Float64Array) -> Float64Array:

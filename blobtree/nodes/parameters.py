@@ -11,7 +11,7 @@ follow from this declaration. Fields without one hold operands.
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass, fields, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -23,6 +23,8 @@ import numpy as np
 from blobtree._typing import Float64Array
 from blobtree.colors import color_rgb
 from blobtree.errors import InvalidNode
+from blobtree.nodes.attributes import AttributeMapping, checked_attributes
+from blobtree.nodes.values import fields_of
 from blobtree.validation import (
     Vector,
     affine_matrix,
@@ -75,6 +77,8 @@ class Quantity(Enum):
     """Texts that are not empty, any number of them."""
     COLOR = "color"
     """Red, green and blue (3,) from 0 to 1."""
+    ATTRIBUTES = "attributes"
+    """Numbers, vectors and labels of the user by name; no edit changes them."""
     MATRIX = "matrix"
     """An invertible affine map, three rows of four numbers."""
     NUMBERS = "numbers"
@@ -196,6 +200,7 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.DISTANCES: finite_numbers,
     Quantity.NAMES: texts,
     Quantity.COLOR: color_rgb,
+    Quantity.ATTRIBUTES: checked_attributes,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }
 """Functions (name, value) that return the checked value of each quantity."""
@@ -213,7 +218,7 @@ def parameters_of(kind: type) -> dict[str, Parameter]:
     """Return the parameters that a node class declares, by name and in order; operands are left out."""
     if kind not in _PARAMETERS:
         hints = get_type_hints(kind, include_extras=True)
-        declared = {field.name: _declared(hints[field.name]) for field in fields(kind)}
+        declared = {field.name: _declared(hints[field.name]) for field in fields_of(kind)}
         _PARAMETERS[kind] = {name: replace(p, name=name) for name, p in declared.items() if p is not None}
     return _PARAMETERS[kind]
 
@@ -287,4 +292,9 @@ def describe(parameter: Parameter) -> str:
 
 def _type_name(hint: Any) -> str:
     inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-    return {float: "float", Vector: "(x, y, z)"}.get(inner, "array-like")
+    names = {
+        float: "float",
+        Vector: "(x, y, z)",
+        AttributeMapping: "dict",
+    }
+    return names.get(inner, "array-like")

@@ -3,6 +3,7 @@
 import reprlib
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -162,9 +163,9 @@ def resized(primitive: Leaf, factor: float) -> Leaf:
     parameters = parameters_of(type(primitive)).items()
     radii = [name for name, parameter in parameters if parameter.quantity in _RADII]
     lengths = [name for name, parameter in parameters if parameter.quantity in _LENGTHS]
-    sizes: dict[str, float | tuple[float, ...]] = {}
+    sizes: dict[str, Any] = {}
     for name in radii or lengths:
         value = getattr(primitive, name)
         vector = isinstance(value, tuple)
         sizes[name] = tuple(factor * component for component in value) if vector else factor * value
-    return replace(primitive, **sizes)  # type: ignore[type-var]  # every node is a dataclass
+    return replace(primitive, **sizes)

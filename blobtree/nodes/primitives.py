@@ -6,7 +6,7 @@ the order of declaration, `texels` need not be written.
 """
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from itertools import product
 from typing import Annotated, ClassVar
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
+from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.parameters import (
     Color,
     Parameter,
@@ -25,6 +26,7 @@ from blobtree.nodes.parameters import (
     unit_vectors,
 )
 from blobtree.nodes.tree import Node
+from blobtree.nodes.values import OPTIONAL
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
 
@@ -45,7 +47,17 @@ Columns = dict[str, Float64Array]
 """Values (n, size) of n primitives by the names of their parameters."""
 
 
-class Leaf(Node):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Attributed:
+    """The keyword that every leaf has."""
+
+    attributes: Annotated[
+        AttributeMapping,
+        Parameter(Quantity.ATTRIBUTES, "numbers, vectors and labels by name"),
+    ] = field(default=NO_ATTRIBUTES, metadata={OPTIONAL: True})
+
+
+class Leaf(Attributed, Node):
     """A node without operands: a shape of one colour."""
 
     color: Vector
@@ -67,7 +79,7 @@ class Primitive(ProgramPrimitive, Leaf):
     @classmethod
     def _skeleton_parameters(cls) -> list[Parameter]:
         """Return the parameters of the skeleton, without radii and colour."""
-        surface = (Quantity.RADIUS, Quantity.COLOR)
+        surface = (Quantity.RADIUS, Quantity.COLOR, Quantity.ATTRIBUTES)
         return [p for p in parameters_of(cls).values() if p.quantity not in surface]
 
     @classmethod

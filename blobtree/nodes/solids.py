@@ -51,7 +51,7 @@ class Ellipsoid(Macro, Leaf):
     @Lazy
     def expanded(self) -> Node:
         """Return a ball of radius 1 under a scale and a translation."""
-        ball = Point((0.0, 0.0, 0.0), radius=1.0, color=self.color)
+        ball = Point((0.0, 0.0, 0.0), radius=1.0, color=self.color, attributes=self.attributes)
         return ball.transform(np.column_stack([np.diag(self.semi_axes), self.center]))
 
 
@@ -135,4 +135,6 @@ class HalfSpace(Macro, Leaf):
         (normal,) = unit_vectors(np.array([self.normal]))
         top = np.array(self.point) - self.radius * normal
         start, end = tuple(top.tolist()), tuple((top - self.extent * normal).tolist())
-        return Cylinder(start, end, self.extent, radius=self.radius, color=self.color)
+        return Cylinder(
+            start, end, self.extent, radius=self.radius, color=self.color, attributes=self.attributes
+        )

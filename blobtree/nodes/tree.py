@@ -8,13 +8,13 @@
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
 from blobtree.cells.prune_kernels import measure_range
@@ -29,11 +29,20 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES, polygonize
 from blobtree.nodes.numeric_parameters import NumericParameter
 from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradient_of
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
-from blobtree.nodes.values import equal, from_records, hash_of, outline, text_of, to_records
+from blobtree.nodes.values import equal, fields_of, from_records, hash_of, outline, text_of, to_records
 from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import LEVELS, SLICE_RESOLUTION, slice_tree, to_polydata
+from blobtree.tape.attributes import (
+    attribute_names,
+    attribute_values,
+    labels_at,
+    numbers_at,
+    rest_coordinates_at,
+    rest_tape,
+)
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.program import Placement
+from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import Hits, raycast
 from blobtree.validation import (
     Matrix,
@@ -91,8 +100,10 @@ class Node(ImplicitModel):
             NODE_KINDS[cls.file_tag] = cls
 
     def __post_init__(self) -> None:
-        for name, check in _checks(type(self)):
-            object.__setattr__(self, name, check(getattr(self, name)))
+        values = vars(self)
+        for name, check, default in _checks(type(self)):
+            if values[name] is not default:
+                object.__setattr__(self, name, check(values[name]))
 
     @property
     def children(self) -> tuple["Node", ...]:
@@ -631,6 +642,98 @@ class Node(ImplicitModel):
         """
         return super().colors(points)
 
+    @property
+    def attribute_names(self) -> list[str]:
+        """Names of the attributes of all leaves, sorted."""
+        return attribute_names(self._program)
+
+    def attribute(
+        self, name: str, points: ArrayLike, *, default: float | ArrayLike | str | None = None
+    ) -> NDArray[Any]:
+        """Return an attribute of the leaves at points, blended with the weights of their colours.
+
+        Numbers and vectors are averaged. Of labels, the one with the largest weight is chosen.
+
+        Parameters
+        ----------
+        name : str
+            Name of the attribute.
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
+        default : float, array-like or str, optional
+            Value of leaves without the attribute, and outside every influence; 0 or "" if it is left out.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n], float32[n, k] for vectors of k numbers, or str[n]; without n at one point.
+
+        Raises
+        ------
+        InvalidNode
+            No leaf has the attribute, its values differ in type, or the default has another type.
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> old = Point((0, 0, 0), radius=1.0, attributes={"age": 10, "bone": "arm"})
+        >>> pair = old + Point((1, 0, 0), radius=1.0, attributes={"age": 20, "bone": "hand"})
+        >>> pair.attribute("age", [[0.5, 0, 0], [-1, 0, 0]]).round(1).tolist()
+        [15.0, 10.3]
+        >>> pair.attribute("bone", [[0.2, 0, 0], [0.9, 0, 0]]).tolist()
+        ['arm', 'hand']
+        """
+        values = attribute_values(self._program, name)
+        array, single = points_or_point(points)
+        given = next(value for value in values if value is not None)
+        rows: NDArray[Any]
+        if isinstance(given, str):
+            if default is not None and not isinstance(default, str):
+                raise InvalidNode(f"default: expected a label for {name!r}, got {default!r}")
+            rows = labels_at(self.tape, self._program, values, array, default or "")
+        else:
+            size = len(given) if isinstance(given, tuple) else 1
+            base = np.broadcast_to(_numbers(default, size), size)
+            rows = numbers_at(self.tape, self._program, values, array, base)
+        return rows[0] if single else rows
+
+    @Lazy
+    def _rest_tape(self) -> Tape:
+        return rest_tape(self._program)
+
+    def rest_coordinates(self, points: ArrayLike) -> Float32Array:
+        """Return where points lie in the leaves' own spaces, behind all maps and warps above them.
+
+        Where leaves blend, their rest coordinates are averaged with the weights of their colours. Textures
+        and noise in rest coordinates move and bend with the model.
+
+        Parameters
+        ----------
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n, 3], or float32[3] at one point; NaN where the field is 0.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((1, 0, 0), radius=1.0).rotate((0, 0, 1), 90).rest_coordinates([0, 1, 0]).round(3).tolist()
+        [1.0, 0.0, 0.0]
+        """
+        array, single = points_or_point(points)
+        rows = rest_coordinates_at(self._rest_tape, array)
+        return rows[0] if single else rows
+
     def interval(self, lower: ArrayLike, upper: ArrayLike) -> tuple[float, float]:
         """Return bounds on the field over a box, by interval arithmetic.
 
@@ -714,6 +817,8 @@ class Node(ImplicitModel):
         max_triangles: int = MAX_TRIANGLES,
         creases: bool = False,
         split_normals: bool = False,
+        attributes: Iterable[str] = (),
+        rest_coordinates: bool = False,
         device: str | None = None,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
@@ -727,6 +832,10 @@ class Node(ImplicitModel):
         split_normals : bool
             Give each side of a crease its own vertices and normals; implies `creases`. Creases then look
             sharp, and the mesh is not closed there.
+        attributes : iterable of str
+            Names of attributes to add as point data, see `attribute`.
+        rest_coordinates : bool
+            Add point data "rest_coordinates".
 
         Returns
         -------
@@ -758,7 +867,13 @@ class Node(ImplicitModel):
             progress=progress,
             cancel=cancel,
         )
-        return to_polydata(split_creases(self, mesh) if split_normals else mesh)
+        surface = to_polydata(split_creases(self, mesh) if split_normals else mesh)
+        if surface.n_points:
+            for name in attributes:
+                surface.point_data[name] = self.attribute(name, surface.points)
+            if rest_coordinates:
+                surface.point_data["rest_coordinates"] = self.rest_coordinates(surface.points)
+        return surface
 
     def plot(self, *, resolution: int | None = None, **options: Any) -> Any:
         """Show the surface in a window, or in a notebook.
@@ -1069,21 +1184,33 @@ class Twist(Placed):
         return (math.radians(self.degrees),)
 
 
-_CHECKS: dict[type[Node], list[tuple[str, Callable[[Any], Any]]]] = {}
+_CHECKS: dict[type[Node], list[tuple[str, Callable[[Any], Any], Any]]] = {}
 
 
-def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any]]]:
-    """Return the names of a class's fields, and the functions that return their checked values."""
+def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any], Any]]:
+    """Return the names of a class's fields, the functions that return checked values, and the defaults."""
     if kind in _CHECKS:
         return _CHECKS[kind]
     parameters, hints = parameters_of(kind), get_type_hints(kind)
-    checks: list[tuple[str, Callable[[Any], Any]]] = []
-    for item in fields(kind):  # type: ignore[arg-type]  # every node is a dataclass
+    checks: list[tuple[str, Callable[[Any], Any], Any]] = []
+    for item in fields_of(kind):
         if item.name in parameters:
-            checks.append((item.name, parameters[item.name].check))
+            check = parameters[item.name].check
         else:
-            checks.append((item.name, _node if hints[item.name] is Node else _nodes))
+            check = _node if hints[item.name] is Node else _nodes
+        checks.append((item.name, check, item.default))
     return _CHECKS.setdefault(kind, checks)
+
+
+def _numbers(default: Any, size: int) -> NDArray[np.float64]:
+    """Return the default of an attribute as one number or `size` numbers."""
+    try:
+        numbers = np.asarray(0.0 if default is None else default, np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty((0, 0))
+    if numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
+        raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}")
+    return numbers
 
 
 def _node(operand: Any) -> Node:

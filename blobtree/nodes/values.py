@@ -4,7 +4,7 @@ The methods that dataclasses generate recurse once per level, so they fail some 
 functions walk the tree with a list. A shared subtree is compared, hashed and pickled once.
 """
 
-from dataclasses import fields
+from dataclasses import Field, fields
 from typing import Any
 
 from blobtree.tape.program import ProgramNode, postorder
@@ -12,9 +12,27 @@ from blobtree.tape.program import ProgramNode, postorder
 HASH = "_hash"
 """Attribute that caches a node's hash; it is not part of the value."""
 
+OPTIONAL = "optional"
+"""Key in the metadata of a field that comes last, and that texts and files leave out at its default."""
+
 References = dict[str, int | tuple[int, ...]]
 Record = tuple[type[ProgramNode], dict[str, Any], References]
 """A node's type, its parameters, and the indices of the records of its operands."""
+
+
+_FIELDS: dict[type, tuple["Field[Any]", ...]] = {}
+
+
+def fields_of(kind: type) -> tuple["Field[Any]", ...]:
+    """Return the fields of a class of nodes; those that texts may leave out come last."""
+    if kind not in _FIELDS:
+        _FIELDS[kind] = tuple(sorted(fields(kind), key=lambda field: OPTIONAL in field.metadata))
+    return _FIELDS[kind]
+
+
+def left_out(field: "Field[Any]", value: Any) -> bool:
+    """Return True if texts and files leave out a field with this value."""
+    return OPTIONAL in field.metadata and bool(value == field.default)
 
 
 def parameter_values(node: ProgramNode) -> dict[str, Any]:
@@ -98,7 +116,13 @@ def from_records(records: list[Record]) -> ProgramNode:
 
 
 def _fields(node: ProgramNode) -> dict[str, Any]:
-    return {field.name: getattr(node, field.name) for field in fields(node)}  # type: ignore[arg-type]  # every kind of node is a dataclass
+    return {field.name: getattr(node, field.name) for field in fields_of(type(node))}
+
+
+def _shown_fields(node: ProgramNode) -> dict[str, Any]:
+    """Return the fields of a node that texts show."""
+    values = _fields(node)
+    return {f.name: values[f.name] for f in fields_of(type(node)) if not left_out(f, values[f.name])}
 
 
 def _holds_nodes(value: Any, children: set[int]) -> bool:
@@ -109,7 +133,7 @@ def _tokens(node: ProgramNode) -> list[ProgramNode | str]:
     """Return the text of one node in order, with its operands in place of their texts."""
     values = parameter_values(node)
     tokens: list[ProgramNode | str] = [f"{type(node).__qualname__}("]
-    for number, (name, value) in enumerate(_fields(node).items()):
+    for number, (name, value) in enumerate(_shown_fields(node).items()):
         tokens.append(f"{', ' if number else ''}{name}=")
         if name in values:
             tokens.append(repr(value))
@@ -145,5 +169,6 @@ def _indent(depth: int) -> str:
 
 def _line(node: ProgramNode) -> str:
     """Return the node's name and its parameters, without its operands."""
-    parts = [f"{name}={value!r}" for name, value in parameter_values(node).items()]
+    own = parameter_values(node)
+    parts = [f"{name}={value!r}" for name, value in _shown_fields(node).items() if name in own]
     return f"{type(node).__name__}({', '.join(parts)})"

@@ -129,6 +129,11 @@ def project(tape: Tape, points: ArrayLike, longest_step: float) -> tuple[Float32
     return positions.numpy(), normals.numpy()
 
 
+def evaluate(kernel: wp.Kernel, tape: Tape, points: ArrayLike) -> Float32Array:
+    """Return the vectors (n, 4) that a kernel computes at `points` (n, 3)."""
+    return _evaluate(kernel, tape, point_array(points), [], wp.vec4)
+
+
 def _evaluate(
     kernel: wp.Kernel, tape: Tape, points: Float32Array, extra: list[Any], dtype: Any
 ) -> Float32Array:

@@ -1,0 +1,127 @@
+"""Attributes of leaves at points, blended with the weights of colours; and rest coordinates.
+
+Both read a copy of the tape. For an attribute, the texels of colours hold its values, so that the evaluation
+of colours blends them. For rest coordinates, each primitive under a map carries the map, so that evaluation
+knows the point in the primitive's own space.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blobtree._typing import Float32Array, Float64Array
+from blobtree.errors import InvalidNode
+from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.model import colors_at, evaluate
+from blobtree.tape.program import WORLD, Instruction, Run, distinct_placements
+from blobtree.tape.rest_kernels import evaluate_rest_coordinates
+from blobtree.tape.tape import Tape, compile_tape
+
+CHANNELS = 3
+"""Numbers that a texel of colour holds."""
+
+AttributeValues = Sequence[float | tuple[float, ...] | str | None]
+
+
+def attribute_values(program: list[Instruction], name: str) -> list[float | tuple[float, ...] | str | None]:
+    """Return the value of an attribute for each leaf of a program, None for leaves without it.
+
+    Raises
+    ------
+    InvalidNode
+        No leaf has the attribute, or its values differ in type or length.
+    """
+    values = [own.get(name) for own in _attributes(program)]
+    sizes = {_type_name(value) for value in values if value is not None}
+    if not sizes:
+        known = ", ".join(attribute_names(program)) or "none"
+        raise InvalidNode(f"name: expected an attribute of a primitive in the tree ({known}), got {name!r}")
+    if len(sizes) > 1:
+        raise InvalidNode(
+            f"attribute {name!r}: expected values of one type, got {' and '.join(sorted(sizes))}; "
+            "use another name for one of them"
+        )
+    return values
+
+
+def attribute_names(program: list[Instruction]) -> list[str]:
+    """Return the names of all attributes of the leaves of a program, sorted."""
+    return sorted({name for own in _attributes(program) for name in own})
+
+
+def numbers_at(
+    tape: Tape, program: list[Instruction], values: AttributeValues, points: ArrayLike, default: ArrayLike
+) -> Float32Array:
+    """Return blended numbers (n,) or vectors (n, k) at `points` (n, 3); `default` outside all influences."""
+    given = next(value for value in values if value is not None)
+    size = len(given) if isinstance(given, tuple) else 1
+    base = np.broadcast_to(np.asarray(default, np.float64), size)
+    channels = np.zeros((len(values), CHANNELS))
+    for row, value in zip(channels, values, strict=True):
+        row[:size] = 0.0 if value is None else np.subtract(value, base)
+    blended = colors_at(_with_channels(tape, program, channels), points)[:, :size] + base.astype(np.float32)
+    result: Float32Array = blended if isinstance(given, tuple) else blended[:, 0]
+    return result
+
+
+def labels_at(
+    tape: Tape, program: list[Instruction], values: AttributeValues, points: ArrayLike, default: str
+) -> NDArray[np.str_]:
+    """Return the label (n,) with the largest weight at `points` (n, 3); `default` outside all influences."""
+    own = [default if value is None else str(value) for value in values]
+    labels = sorted(set(own))
+    places = np.array([labels.index(label) for label in own])
+    shares: list[Float32Array] = []
+    for first in range(0, len(labels), CHANNELS):
+        channels = (places[:, None] == first + np.arange(CHANNELS)).astype(np.float64)
+        shares.append(colors_at(_with_channels(tape, program, channels), points))
+    weights = np.concatenate(shares, axis=1)[:, : len(labels)]
+    chosen = np.array(labels)[weights.argmax(axis=1)]
+    return np.where(weights.max(axis=1) > 0.0, chosen, default)
+
+
+def rest_tape(program: list[Instruction]) -> Tape:
+    """Return the tape on which each primitive under a map carries the map."""
+    return compile_tape([_carrying_maps(step) for step in program])
+
+
+def rest_coordinates_at(tape: Tape, points: ArrayLike) -> Float32Array:
+    """Return blended rest coordinates (n, 3) at `points` (n, 3), NaN where the field is 0."""
+    rest = evaluate(evaluate_rest_coordinates, tape, points)
+    return np.where(rest[:, :1] != 0.0, rest[:, 1:], np.float32(np.nan))
+
+
+def _carrying_maps(step: Instruction) -> Instruction:
+    if not isinstance(step, Run) or not isinstance(step.kind, Skeleton):
+        return step
+    placements, _ = distinct_placements(step.primitives)
+    at_home = all(np.array_equal(placement.matrix, WORLD.matrix) for placement in placements)
+    return step if at_home else replace(step, stretched=True)
+
+
+def _with_channels(tape: Tape, program: list[Instruction], channels: Float64Array) -> Tape:
+    """Return a tape whose texels of colour hold other numbers (leaves, 3), the last texel of each leaf."""
+    data = tape.data.copy()
+    ends = [*tape.headers[1:].tolist(), len(data)]
+    first = 0
+    for step, header, end in zip(program, tape.headers.tolist(), ends, strict=True):
+        if isinstance(step, Run):
+            count = len(step.primitives)
+            stride = (end - header - 1) // count
+            data[header + stride * np.arange(1, count + 1), :CHANNELS] = channels[first : first + count]
+            first += count
+    return replace(tape, data=data)
+
+
+def _attributes(program: list[Instruction]) -> list[Mapping[str, float | tuple[float, ...] | str]]:
+    """Return the attributes of each leaf of a program; a leaf need not have any."""
+    runs = [step for step in program if isinstance(step, Run)]
+    return [getattr(placed.primitive, "attributes", {}) for run in runs for placed in run.primitives]
+
+
+def _type_name(value: float | tuple[float, ...] | str) -> str:
+    if isinstance(value, str):
+        return "labels"
+    return f"vectors of {len(value)}" if isinstance(value, tuple) else "numbers"
