@@ -36,12 +36,13 @@ def closest_on_arc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> w
     u = wp.vec3(first[0], first[1], first[2])
     v = wp.vec3(second[0], second[1], second[2])
     w = q - wp.vec3(center[0], center[1], center[2])
-    x = wp.dot(w, u)
-    y = wp.dot(w, v)
+    radius = wp.length(u)
+    x = wp.dot(w, u) / radius
+    y = wp.dot(w, v) / radius
     across = wp.sqrt(x * x + y * y)
     cosine = float(1.0)
     sine = float(0.0)
-    if across > 1.0e-6 * wp.length(w) * wp.length(u):
+    if across > 1.0e-6 * wp.length(w):
         cosine = x / across
         sine = y / across
     if cosine < first[3]:
@@ -161,15 +162,17 @@ def curve_ratio(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
     """Return t after a Newton step for N(t) = ½ (|c − q|²)' s − |c − q|² s'.
 
-    Its vectors cancel less than the coefficients of N.
+    Its vectors cancel less than the coefficients of N. Lengths are in units of s(0), for squares overflow.
     """
+    unit = 1.0 / tape[at][3]
     c = curve_point(t, tape, at)
-    slope = tape[at + 1] + (tape[at + 2] * 2.0 + tape[at + 3] * (3.0 * t)) * t
-    bend = tape[at + 2] * 2.0 + tape[at + 3] * (6.0 * t)
-    w = wp.vec3(c[0], c[1], c[2]) - q
+    slope = (tape[at + 1] + (tape[at + 2] * 2.0 + tape[at + 3] * (3.0 * t)) * t) * unit
+    bend = (tape[at + 2] * 2.0 + tape[at + 3] * (6.0 * t)) * unit
+    w = (wp.vec3(c[0], c[1], c[2]) - q) * unit
+    s = c[3] * unit
     d = wp.vec3(slope[0], slope[1], slope[2])
-    n = wp.dot(w, d) * c[3] - wp.dot(w, w) * slope[3]
-    rate = (wp.dot(d, d) + wp.dot(w, wp.vec3(bend[0], bend[1], bend[2]))) * c[3]
+    n = wp.dot(w, d) * s - wp.dot(w, w) * slope[3]
+    rate = (wp.dot(d, d) + wp.dot(w, wp.vec3(bend[0], bend[1], bend[2]))) * s
     rate -= wp.dot(w, d) * slope[3] + wp.dot(w, w) * bend[3]
     if rate * 1.0e-3 <= wp.abs(n):
         return t  # N is flat here, or t is an end
@@ -180,13 +183,15 @@ def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
 def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """tape[at + k] = coefficient of tᵏ in (c(t), s(t)), k from 0 to 3; s is constant if that of t³ is not 0.
 
-    With c − q = w + b t + a t² + g t³ and s = s₀ + s₁ t + s₂ t², N = ½ (|c − q|²)' s − |c − q|² s'.
+    With c − q = w + b t + a t² + g t³ and s = 1 + s₁ t + s₂ t² in units of s(0), to which N is proportional,
+    N = ½ (|c − q|²)' s − |c − q|² s'.
     """
-    k0 = tape[at]
-    k1 = tape[at + 1]
-    k2 = tape[at + 2]
-    k3 = tape[at + 3]
-    w = wp.vec3(k0[0], k0[1], k0[2]) - q
+    start = tape[at]
+    unit = 1.0 / start[3]
+    k1 = tape[at + 1] * unit
+    k2 = tape[at + 2] * unit
+    k3 = tape[at + 3] * unit
+    w = (wp.vec3(start[0], start[1], start[2]) - q) * unit
     b = wp.vec3(k1[0], k1[1], k1[2])
     a = wp.vec3(k2[0], k2[1], k2[2])
     g = wp.vec3(k3[0], k3[1], k3[2])
@@ -195,12 +200,12 @@ def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) ->
     h2 = 3.0 * wp.dot(a, b)
     h3 = 2.0 * wp.dot(a, a)
     e0 = wp.dot(w, w)
-    n0 = h0 * k0[3] - e0 * k1[3]
-    n1 = h1 * k0[3] - h0 * k1[3] - 2.0 * e0 * k2[3]
-    n2 = (h2 + 3.0 * wp.dot(w, g)) * k0[3] - 3.0 * h0 * k2[3]
-    n3 = (h3 + 4.0 * wp.dot(b, g)) * k0[3] + h2 * k1[3] / 3.0 - h1 * k2[3]
-    n4 = 5.0 * wp.dot(a, g) * k0[3] + 0.5 * h3 * k1[3] - h2 * k2[3] / 3.0
-    n5 = 3.0 * wp.dot(g, g) * k0[3]
+    n0 = h0 - e0 * k1[3]
+    n1 = h1 - h0 * k1[3] - 2.0 * e0 * k2[3]
+    n2 = h2 + 3.0 * wp.dot(w, g) - 3.0 * h0 * k2[3]
+    n3 = h3 + 4.0 * wp.dot(b, g) + h2 * k1[3] / 3.0 - h1 * k2[3]
+    n4 = 5.0 * wp.dot(a, g) + 0.5 * h3 * k1[3] - h2 * k2[3] / 3.0
+    n5 = 3.0 * wp.dot(g, g)
     largest = wp.max(wp.max(wp.abs(n0), wp.abs(n1)), wp.max(wp.abs(n2), wp.abs(n3)))
     largest = wp.max(largest, wp.max(wp.abs(n4), wp.abs(n5)))
     scale = 1.0 / wp.max(largest, 1.0e-30)

@@ -188,7 +188,8 @@ class PaintPrimitive(PrimitiveCommand):
         """Return the edit."""
         tree = self.tree(document)
         path = primitive_path(tree, self.path)
-        primitive = replace(primitive_at(tree, path), color=self.color)  # type: ignore[type-var]
+        leaf: Any = primitive_at(tree, path)
+        primitive = replace(leaf, color=self.color)
         item = TreeObject(document.objects[self.object].name, with_node(tree, path, primitive))
         objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
         return document.compute_parts(objects=objects)

@@ -216,9 +216,9 @@ def grown(node: Node, distance: float) -> Node:
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Primitive() | Polyline() | Polygon():
-            leaf: Any = node
-            larger: Node = replace(leaf, radius=node.radius + distance)
-            return larger
+            thick: Any = node
+            thicker: Node = replace(thick, radius=node.radius + distance)
+            return thicker
         case Offset(child=child, distance=more):
             return grown(child, distance + more)
         case Transform(child=child, matrix=matrix):

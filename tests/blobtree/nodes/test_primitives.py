@@ -154,6 +154,13 @@ def test_ears_fill_a_polygon(steps: list[tuple[float, float]]) -> None:
     assert sum(covered) == pytest.approx(area, rel=1e-5)
 
 
+@pytest.mark.parametrize("size", [1e-12, 1e12])
+def test_shapes_are_the_same_at_any_size(size: float) -> None:
+    for node in (*SHAPES, WORM, GROUND):
+        points = points_around(np.random.default_rng(4), node, 100)
+        np.testing.assert_allclose(node.scale(size)(points * size), node(points), atol=2e-5)
+
+
 def test_known_points_of_each_surface() -> None:
     on_torus = [[1.25, 0, 0], [0, 0.75, 0], [1, 0, 0.25]]
     np.testing.assert_allclose(Torus((0, 0, 0), (0, 0, 9), 1.0, radius=0.25)(on_torus), ISO, atol=1e-6)
@@ -200,7 +207,7 @@ def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
     if node is not ELLIPSOID:
         names = [name for name, p in parameters_of(type(node)).items() if p.quantity is Quantity.RADIUS]
         larger = {name: 2.0 * getattr(node, name) for name in names}
-    assert thick == replace(node, **larger)  # type: ignore[type-var]
+    assert thick == replace(node, **larger)
 
 
 @pytest.mark.parametrize(
