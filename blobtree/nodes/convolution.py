@@ -6,7 +6,7 @@ the end, without the round cap of a `Segment`. Pieces much shorter than their ra
 
 from dataclasses import KW_ONLY, dataclass, replace
 from itertools import pairwise
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class ConvolutionPrimitive(FieldPrimitive):
         }
         if min(radii.values()) <= 0.0:
             raise InvalidNode(f"offset: {distance:g} leaves nothing of {self!r}")
-        return replace(self, **radii)  # type: ignore[type-var]  # every node is a dataclass
+        return replace(self, **radii)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -278,9 +278,10 @@ class ConvolutionStroke(Macro, Leaf):
     def expanded(self) -> Node:
         """Return the sum of segments between neighbours."""
         ends = zip(pairwise(self.points), pairwise(self.radii), strict=True)
+        same: dict[str, Any] = {"color": self.color, "attributes": self.attributes}
         return Sum(
             tuple(
-                ConvolutionSegment(*points, radius=radii[0], end_radius=radii[1], color=self.color)
+                ConvolutionSegment(*points, radius=radii[0], end_radius=radii[1], **same)
                 for points, radii in ends
             )
         )
