@@ -116,3 +116,8 @@ def figures() -> dict[str, float]:
         "convolution_gradient_error": gradient_error,
         "convolution_scale_error": scale_error(),
     }
+
+
+if __name__ == "__main__":
+    for name, figure in figures().items():
+        print(f"{name:32} {figure:.3g}")

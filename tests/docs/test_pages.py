@@ -16,7 +16,7 @@ import pyvista as pv
 from cyclopts import CycloptsError
 from PIL import Image
 
-from blobtree import Point, polygonize
+from blobtree import Point, load, polygonize
 from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.apps.cli import app
@@ -53,6 +53,12 @@ def check_modelling(session: Session) -> None:
     assert len(session["mesh"].faces) > 1000
     assert session["surface"].n_points > 1000
     assert session["low"][0] < session["high"][0]
+
+
+def check_character(session: Session) -> None:
+    edges = np.sort(session["mesh"].faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    assert load("newt.json") == session["walking"] != session["resting"]
 
 
 def check_custom_nodes(session: Session) -> None:
@@ -160,6 +166,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "README": check_readme,
     "tour": check_tour,
     "modelling": check_modelling,
+    "character": check_character,
     "custom-nodes": check_custom_nodes,
     "meshing": check_meshing,
     "decals": check_decals,

@@ -70,7 +70,8 @@ def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     used = FIELD_TREES[0].tape.instruction_set
     kinds = replace(ALL_KINDS, fields=tuple(range(len(used.fields))), instruction_set=used)
     assert {code for tree in FIELD_TREES for code in tree.tape.fields} == set(kinds.fields)
-    assert_same_in_both_languages(context, FIELD_TREES, kinds, 0)
+    # Arcs through random points have centres far away, so their coordinates round more.
+    assert_same_in_both_languages(context, FIELD_TREES, kinds, 0, agreement=6e-5)
 
 
 def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> None:
