@@ -28,7 +28,7 @@ def second_differences(node: Node, points: Numbers, step: float) -> Numbers:
 
 TREES = {
     "solids": random_trees(seed=8, count=5, more=SOLIDS),
-    "custom": CUSTOM_TREES[:1],
+    "custom": CUSTOM_TREES[:2],
     "shapes": random_trees(seed=6, count=5, depth=2, more=SHAPES),
     "fields": random_trees(seed=6, count=6, depth=2, more=FIELDS),
     "deformed": random_trees(seed=6, count=4, depth=2, more=DEFORMED),
