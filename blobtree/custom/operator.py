@@ -14,14 +14,13 @@ A missing claim costs speed only: fewer cells are pruned.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast, get_args
+from typing import Annotated, Any, ClassVar, Literal, cast, get_args
 
 import warp as wp
 
 from blobtree.custom.checks import Claims, check_operator
 from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
-from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import (
     Operator,
     Support,
@@ -32,7 +31,7 @@ from blobtree.formulas.operators import (
     widened_range,
 )
 from blobtree.nodes.parameters import Parameter
-from blobtree.nodes.tree import AssociativeCombination, Node
+from blobtree.nodes.tree import AssociativeCombination
 from blobtree.tape.data_region import TEXEL
 from blobtree.validation import finite_number
 
@@ -59,18 +58,6 @@ class CustomCombination(AssociativeCombination, metaclass=CustomKind):
     kind: ClassVar[str]
     digest: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, operands: tuple[Node, ...], *parameter: float, **named: float) -> None: ...
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.operator.commutes and len(self.operands) != 2:
-            raise InvalidNode(
-                f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
-                "claim that operands may come in any order (order_free=True), so nest it"
-            )
 
     @property
     def values(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 
 from blobtree.errors import InvalidDefinition
-from blobtree.nodes.tree import Node
+from blobtree.nodes.tree import AssociativeCombination, Node
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import Precision, find_changed_constants, plain_python
 from blobtree.transpile.specialize import rebind, referenced_values, warp_function
@@ -110,7 +110,8 @@ def node_class(
     kind: str, source: CustomSource, fields: list[Any], base: type[Node], namespace: dict[str, Any]
 ) -> Any:
     """Return a node class with these fields, in the module of the function."""
-    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False}
+    inherits_init = issubclass(base, AssociativeCombination)
+    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False, "init": not inherits_init}
     node_type = make_dataclass(class_name(kind), fields, bases=(base,), namespace=namespace, **options)
     node_type.__module__ = source.python.__module__
     return node_type

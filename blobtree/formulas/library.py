@@ -5,6 +5,7 @@ and the library together (`tape.instruction_set.LIBRARY`). A new family of kinds
 ends in a tuple of rows, and one name here.
 """
 
+from blobtree.formulas.blends import BLENDS
 from blobtree.formulas.contact import CONTACT_OPERATORS
 from blobtree.formulas.convolution import CONVOLUTION_FIELDS
 from blobtree.formulas.curve_skeletons import CURVE_SKELETONS
@@ -18,6 +19,9 @@ from blobtree.formulas.solid_skeletons import SOLID_SKELETONS
 from blobtree.formulas.warps import SpaceWarp
 
 LIBRARY_SKELETONS: tuple[Skeleton, ...] = (*CURVE_SKELETONS, *FLAT_SKELETONS, *SOLID_SKELETONS)
-LIBRARY_OPERATORS: tuple[Operator, ...] = (*CONTACT_OPERATORS,)
+LIBRARY_OPERATORS: tuple[Operator, ...] = (
+    *BLENDS,
+    *CONTACT_OPERATORS,
+)
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = DEFORMATIONS
 LIBRARY_FIELDS: tuple[FieldKind, ...] = (*DIRECT_FIELDS, *CONVOLUTION_FIELDS)

@@ -28,10 +28,12 @@ from blobtree.nodes.values import fields_of
 from blobtree.validation import (
     Vector,
     affine_matrix,
+    different_names,
     finite_number,
     finite_numbers,
     finite_points,
     finite_vector,
+    name_pairs,
     non_negative_vector,
     nonzero_vector,
     positive_number,
@@ -81,6 +83,10 @@ class Quantity(Enum):
     """Numbers, vectors and labels of the user by name; no edit changes them."""
     MATRIX = "matrix"
     """An invertible affine map, three rows of four numbers."""
+    NAMES = "names"
+    """Several different names."""
+    NAME_PAIRS = "name_pairs"
+    """Pairs of names."""
     NUMBERS = "numbers"
     """One to four numbers of a custom kind, whose meaning is unknown; no edit changes them."""
 
@@ -201,6 +207,8 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.NAMES: texts,
     Quantity.COLOR: color_rgb,
     Quantity.ATTRIBUTES: checked_attributes,
+    Quantity.NAMES: different_names,
+    Quantity.NAME_PAIRS: name_pairs,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }
 """Functions (name, value) that return the checked value of each quantity."""

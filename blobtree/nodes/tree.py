@@ -8,7 +8,7 @@
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
@@ -989,11 +989,27 @@ class Combination(Node):
         return tuple(number for p, value in values for number in p.components(value))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class AssociativeCombination(Combination):
-    """A combination of any number of `operands`, at least one."""
+    """A combination of `operands`: any number of them, or two if their order matters to the operator.
+
+    Operands come one by one or as one iterable. The operator's parameters follow, best by name.
+    """
 
     operands: tuple[Node, ...]
+
+    def __init__(self, *arguments: "Node | Iterable[Node] | float", **named: Any) -> None:
+        for name, value in _bound(type(self), arguments, named).items():
+            object.__setattr__(self, name, value)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.operator.commutes and len(self.operands) != 2:
+            raise InvalidNode(
+                f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
+                "claim that operands may come in any order, so nest it"
+            )
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -1001,7 +1017,7 @@ class AssociativeCombination(Combination):
         return self.operands
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Sum(AssociativeCombination):
     """Smooth blend F = Σ fᵢ (Blinn 1982; Wyvill et al. 1986).
 
@@ -1009,7 +1025,7 @@ class Sum(AssociativeCombination):
     --------
     >>> from blobtree import Point, Sum
     >>> parts = [Point((x, 0, 0), radius=1.0) for x in (0, 1)]
-    >>> Sum(tuple(parts)) == parts[0] + parts[1]
+    >>> Sum(parts) == Sum(parts[0], parts[1]) == parts[0] + parts[1]
     True
     """
 
@@ -1017,7 +1033,7 @@ class Sum(AssociativeCombination):
     operator = SUM
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Union(AssociativeCombination):
     """Sharp union F = max fᵢ (Ricci 1973).
 
@@ -1033,7 +1049,7 @@ class Union(AssociativeCombination):
     operator = UNION
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Intersection(AssociativeCombination):
     """Sharp intersection F = min fᵢ (Ricci 1973).
 
@@ -1049,7 +1065,7 @@ class Intersection(AssociativeCombination):
     operator = INTERSECTION
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Ricci(AssociativeCombination):
     """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): exponent 1 is the sum, a large one nears the union.
 
@@ -1211,6 +1227,24 @@ def _numbers(default: Any, size: int) -> NDArray[np.float64]:
     if numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
         raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}")
     return numbers
+
+
+def _bound(kind: type[Node], arguments: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a combination's fields; nodes in front of all other arguments are its operands."""
+    names = [item.name for item in fields(kind)]  # type: ignore[arg-type]  # every kind is a dataclass
+    values = {item.name: item.default for item in fields(kind) if item.default is not MISSING}  # type: ignore[arg-type]
+    count = next((i for i, item in enumerate(arguments) if not isinstance(item, Node)), len(arguments))
+    positional = (arguments[:count], *arguments[count:]) if count else arguments
+    given = dict(zip(names, positional, strict=False)) | named
+    missing = [name for name in names if name not in values | given]
+    unknown = [name for name in named if name not in names]
+    if missing or unknown or len(positional) > len(names) or len(given) < len(positional) + len(named):
+        expected = ", ".join(names[1:]) or "nothing else"
+        raise TypeError(
+            f"{kind.__name__}: expected operands and {expected}, got {len(positional)} arguments by position "
+            f"and {', '.join(named) or 'none'} by name"
+        )
+    return values | given
 
 
 def _node(operand: Any) -> Node:
