@@ -70,31 +70,15 @@ def positive_numbers(name: str, value: object) -> tuple[float, ...]:
     return tuple(positive_number(f"{name}[{place}]", number) for place, number in enumerate(numbers))
 
 
-def different_names(name: str, value: object) -> tuple[str, ...]:
-    """Return `value` as a tuple of different texts; raise `InvalidNode` if it holds anything else."""
-    names = _texts(value)
-    if names is None:
-        raise InvalidNode(f"{name}: expected several names, got {shown(value)}")
-    for text in names:
-        if names.count(text) > 1:
-            raise InvalidNode(f"{name}: expected different names, got {text!r} twice")
-    return names
-
-
 def name_pairs(name: str, value: object) -> tuple[tuple[str, ...], ...]:
     """Return `value` as a tuple of pairs of different texts; raise `InvalidNode` otherwise."""
-    pairs = None if isinstance(value, str) or not isinstance(value, Iterable) else [*map(_texts, value)]
-    if pairs is None or any(pair is None or len({*pair}) != 2 or len(pair) != 2 for pair in pairs):
+    try:
+        pairs = tuple(texts(name, pair) for pair in cast(Iterable[Any], value))
+    except (TypeError, InvalidNode):
+        pairs = (("",),)
+    if isinstance(value, str) or any(len(pair) != 2 or pair[0] == pair[1] for pair in pairs):
         raise InvalidNode(f"{name}: expected pairs of two different names, got {shown(value)}")
-    return tuple(pair for pair in pairs if pair is not None)
-
-
-def _texts(value: object) -> tuple[str, ...] | None:
-    """Return an iterable of texts as a tuple, None for anything else."""
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        return None
-    texts = tuple(value)
-    return texts if all(isinstance(text, str) for text in texts) else None
+    return pairs
 
 
 def nonzero_vector(name: str, value: object) -> Vector:

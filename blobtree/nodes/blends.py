@@ -361,6 +361,8 @@ class BlendGraph(Macro):
             raise InvalidNode(
                 f"names: expected one for each of {len(self.operands)} operands, got {len(self.names)}"
             )
+        if len(set(self.names)) < len(self.names):
+            raise InvalidNode(f"names: expected a different name for each operand, got {self.names}")
         for pair in self.pairs:
             for name in pair:
                 if name not in self.names:

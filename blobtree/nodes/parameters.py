@@ -28,7 +28,6 @@ from blobtree.nodes.values import fields_of
 from blobtree.validation import (
     Vector,
     affine_matrix,
-    different_names,
     finite_number,
     finite_numbers,
     finite_points,
@@ -83,8 +82,6 @@ class Quantity(Enum):
     """Numbers, vectors and labels of the user by name; no edit changes them."""
     MATRIX = "matrix"
     """An invertible affine map, three rows of four numbers."""
-    NAMES = "names"
-    """Several different names."""
     NAME_PAIRS = "name_pairs"
     """Pairs of names."""
     NUMBERS = "numbers"
@@ -207,7 +204,6 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.NAMES: texts,
     Quantity.COLOR: color_rgb,
     Quantity.ATTRIBUTES: checked_attributes,
-    Quantity.NAMES: different_names,
     Quantity.NAME_PAIRS: name_pairs,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }

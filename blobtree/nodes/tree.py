@@ -8,7 +8,7 @@
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
@@ -1231,8 +1231,8 @@ def _numbers(default: Any, size: int) -> NDArray[np.float64]:
 
 def _bound(kind: type[Node], arguments: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a combination's fields; nodes in front of all other arguments are its operands."""
-    names = [item.name for item in fields(kind)]  # type: ignore[arg-type]  # every kind is a dataclass
-    values = {item.name: item.default for item in fields(kind) if item.default is not MISSING}  # type: ignore[arg-type]
+    names = [item.name for item in fields_of(kind)]
+    values = {item.name: item.default for item in fields_of(kind) if item.default is not MISSING}
     count = next((i for i, item in enumerate(arguments) if not isinstance(item, Node)), len(arguments))
     positional = (arguments[:count], *arguments[count:]) if count else arguments
     given = dict(zip(names, positional, strict=False)) | named

@@ -8,7 +8,16 @@ import pytest
 from blobtree import Node
 from blobtree._typing import Float32Array
 from tests.blobtree.custom_kinds import CUSTOM_TREES
-from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import (
+    BLENDED,
+    CONTACTS,
+    DEFORMED,
+    FIELDS,
+    SHAPES,
+    SOLIDS,
+    points_around,
+    random_trees,
+)
 
 BATCH = 40
 POINTS = 150
@@ -18,6 +27,7 @@ DEFORMED_TREES = random_trees(seed=51, count=80, depth=3, more=DEFORMED)
 SOLID_TREES = random_trees(seed=21, count=80, more=SOLIDS)
 FIELD_TREES = random_trees(seed=33, count=40, more=FIELDS)
 SHAPE_TREES = random_trees(seed=41, count=80, more=SHAPES)
+BLEND_TREES = random_trees(seed=51, count=80, depth=3, more=BLENDED)
 CONTACT_TREES = random_trees(seed=31, count=40, depth=2, more=CONTACTS)
 
 
@@ -46,6 +56,7 @@ _SETS = {
     "solids": _batches(SOLID_TREES, 2e-5, 3e-4),
     "fields": _batches(FIELD_TREES, 2e-5, 3e-4),
     "shapes": _batches(SHAPE_TREES, 2e-5, 3e-4),
+    "blends": _batches(BLEND_TREES, 2e-5, 3e-4),
     "contacts": _batches(CONTACT_TREES, 2e-5, 3e-4),
     "deformed": _batches(DEFORMED_TREES, 2e-5, 3e-4),
     "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),

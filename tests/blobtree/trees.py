@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
+from itertools import combinations
 from operator import add, and_, or_
 
 import numpy as np
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 
 from blobtree import (
     Arc,
+    BlendGraph,
     Box,
     Bulge,
     Circle,
+    CleanUnion,
     Cone,
     Contact,
+    ControllableBlend,
     ConvolutionArc,
     ConvolutionSegment,
     ConvolutionTriangle,
@@ -28,6 +32,7 @@ from blobtree import (
     HalfSpace,
     Intersection,
     InvalidNode,
+    LocalBlend,
     Node,
     Noise,
     Offset,
@@ -37,12 +42,20 @@ from blobtree import (
     Press,
     QuadraticBezier,
     RatedUnion,
+    RDifference,
     Rectangle,
     Ricci,
+    RIntersection,
+    RUnion,
     Segment,
+    Shell,
+    SmoothDifference,
+    SmoothIntersection,
     Stroke,
     Sum,
+    SuperellipticBlend,
     Superquadric,
+    SymmetricDifference,
     TaperedBezier,
     Torus,
     Transform,
@@ -233,6 +246,36 @@ def _deformed_blend(rng: np.random.Generator, operands: list[Node]) -> Node:
 
 
 DEFORMED = MoreKinds(random_leaf, _deformed_blend)
+
+
+def random_blend(rng: np.random.Generator, operands: list[Node]) -> Node:
+    """A combination by an operator of the library, or a macro of such."""
+    first, second = operands[:2]
+    width = float(rng.choice([0.02, 0.2, 0.5]))
+    match rng.integers(0, 12):
+        case 0:
+            return SuperellipticBlend(operands, width=width, exponent=float(rng.choice([1.5, 2.0, 20.0])))
+        case 1:
+            return SmoothIntersection(first, second, width=width)
+        case 2:
+            return SmoothDifference(first, second, width=width)
+        case 3:
+            left, right = rng.choice([0.0, 10.0, 30.0, 44.0], 2).tolist()
+            return ControllableBlend(first, second, left_angle=left, right_angle=right)
+        case 4:
+            return LocalBlend(first, second, operands[-1])
+        case 5:
+            names = tuple("abcd"[: len(operands)])
+            pairs = [pair for pair in combinations(names, 2) if rng.random() < 0.6]
+            return BlendGraph(tuple(operands), names=names, pairs=tuple(pairs))
+        case 6:
+            return Shell(random_leaf(rng), 0.1)
+        case kind:
+            kinds = (RUnion, RIntersection, RDifference, CleanUnion, SymmetricDifference)
+            return kinds[int(kind) - 7](first, second)
+
+
+BLENDED = MoreKinds(random_leaf, random_blend)
 
 
 def random_transform(rng: np.random.Generator, node: Node) -> Node:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree import (
     Bend,
+    BlendGraph,
     Box,
     Bulge,
     Circle,
@@ -32,6 +33,8 @@ from blobtree import (
     HalfSpace,
     Intersection,
     LimitedTwist,
+    LocalBlend,
+    Masked,
     Node,
     Noise,
     NoiseWarp,
@@ -44,10 +47,12 @@ from blobtree import (
     Ricci,
     Segment,
     Shear,
+    Shell,
     Stretch,
     Stroke,
     Sum,
     Superquadric,
+    SymmetricDifference,
     Taper,
     TaperedBezier,
     Torus,
@@ -58,7 +63,9 @@ from blobtree import (
 from blobtree.formulas.operators import Support
 from blobtree.nodes.deformations import Deformation
 from blobtree.nodes.primitives import Leaf, Primitive
-from tests.oracles import convolution, custom_kinds, deformations, direct_fields, shapes
+from blobtree.nodes.tree import AssociativeCombination, Macro
+from blobtree.nodes.values import parameter_values
+from tests.oracles import blends, convolution, custom_kinds, deformations, direct_fields, shapes
 
 Floats = NDArray[np.float64]
 
@@ -167,6 +174,10 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
             return reduce(lambda a, b: _choose(a, b, a.value >= b.value), [evaluate(x, q) for x in operands])
         case Intersection(operands=operands):
             return reduce(lambda a, b: _choose(a, b, a.value <= b.value), [evaluate(x, q) for x in operands])
+        case AssociativeCombination() if node.operator.name in blends.VALUES:
+            return reduce(lambda a, b: _blended(a, b, node), [evaluate(x, q) for x in node.operands])
+        case Macro():
+            return evaluate(written_out(node), q)
     raise TypeError(type(node))
 
 
@@ -187,9 +198,9 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
 def grown(node: Node, distance: float) -> Node:
     """`node` with every radius larger by `distance`, those of tools smaller."""
     match node:
-        case CustomCombination(operands=(solid, tool)) if node.operator.support is Support.LEFT:
+        case AssociativeCombination(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
-        case CustomCombination():
+        case AssociativeCombination():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
         case ConvolutionArc() | ConvolutionTriangle():
             return replace(node, radius=node.radius + distance)
@@ -234,8 +245,22 @@ def grown(node: Node, distance: float) -> Node:
             return grown(outside_of(node), distance)
         case Difference(solid=solid, tool=tool):
             return Difference(grown(solid, distance), grown(tool, -distance))
-        case Sum() | Union() | Intersection() | Ricci():
-            return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
+        case Macro():
+            return grown(written_out(node), distance)
+    raise TypeError(type(node))
+
+
+def written_out(node: Node) -> Node:
+    """The nodes that a macro of blends stands for."""
+    match node:
+        case Shell(child=child, thickness=thickness):
+            return Difference(child, grown(child, -thickness))
+        case SymmetricDifference(first=a, second=b):
+            return Union(Difference(a, b), Difference(b, a))
+        case LocalBlend(first=a, second=b, region=region):
+            return Sum(Union(a, b), Masked(Intersection(a, b), region))
+        case BlendGraph(operands=operands, names=names, pairs=pairs):
+            return Union([Sum([operands[i] for i in group]) for group in blends.cliques(names, pairs)])
     raise TypeError(type(node))
 
 
@@ -362,6 +387,19 @@ def _custom(a: Field, b: Field, node: CustomCombination) -> Field:
     share = np.where(total > 0.0, weights[1] / np.where(total > 0.0, total, 1.0), b.value > a.value)
     margin = np.minimum(np.minimum(a.margin, b.margin), kink)
     return Field(value, _mixed(a, b, 1.0 - share, share), margin)
+
+
+def _blended(a: Field, b: Field, node: AssociativeCombination) -> Field:
+    """A blend of the library; its partial derivatives are differences."""
+    values = parameter_values(node)
+    name = node.operator.name
+    value = blends.VALUES[name](a.value, b.value, **values)
+    by_a, by_b, _ = blends.partials(name, a.value, b.value, **values)
+    weights = np.abs(by_a) * a.value, np.abs(by_b) * b.value
+    total = weights[0] + weights[1]
+    share = np.where(total > 0.0, weights[1] / np.where(total > 0.0, total, 1.0), b.value > a.value)
+    kink = blends.kink(name, a.value, b.value, **values)
+    return Field(value, _mixed(a, b, 1.0 - share, share), np.minimum(np.minimum(a.margin, b.margin), kink))
 
 
 def _ricci(a: Field, b: Field, exponent: float) -> Field:

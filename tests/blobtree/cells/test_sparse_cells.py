@@ -12,7 +12,7 @@ from blobtree.tape.model import bounds_at, values_at
 from tests.blobtree.custom_kinds import CUSTOM
 from tests.blobtree.meshing.edits import edited
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
-from tests.blobtree.trees import SHAPES, SOLIDS, random_leaf, random_trees
+from tests.blobtree.trees import BLENDED, SHAPES, SOLIDS, random_leaf, random_trees
 from tests.oracles.dense_polygonize import polygonize as dense_polygonize
 
 CELLS_ALONG = 28
@@ -45,9 +45,12 @@ def assert_same_surface(tree: Node) -> None:
         assert quads(sparse, label) == quads(dense, np.arange(len(label)))
 
 
-MORE = {"built_in": None, "solids": SOLIDS, "shapes": SHAPES, "custom": CUSTOM}
+MORE = {"built_in": None, "solids": SOLIDS, "shapes": SHAPES, "blends": BLENDED, "custom": CUSTOM}
 SEEDS = [("built_in", seed) for seed in range(6)]
-SEEDS += [(kinds, seed) for kinds in ("solids", "custom") for seed in range(2)] + [("shapes", 0)]
+SEEDS += [(kinds, seed) for kinds in ("solids", "custom") for seed in range(2)] + [
+    ("shapes", 0),
+    ("blends", 0),
+]
 
 
 @pytest.mark.parametrize(("kinds", "seed"), SEEDS)

@@ -13,7 +13,7 @@ from blobtree.tape.program import postorder
 from blobtree.tracing.trace import trace
 from tests.blobtree.custom_kinds import CUSTOM, CUSTOM_TREES, EVERYTHING, KINDS, Brick, Mean, Path, Ring, Soft
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
-from tests.blobtree.trees import SHAPES, SOLIDS, MoreKinds, points_around, random_trees
+from tests.blobtree.trees import BLENDED, SHAPES, SOLIDS, MoreKinds, points_around, random_trees
 from tests.oracles import blobtree as oracle
 
 POINTS = 120
@@ -29,7 +29,9 @@ def test_the_random_trees_hold_every_custom_kind_and_maps_among_them() -> None:
     assert sum(tree.tape.stretched for tree in CUSTOM_TREES) > 30
 
 
-@pytest.mark.parametrize("kinds", [CUSTOM, SOLIDS, SHAPES], ids=["custom", "solids", "shapes"])
+@pytest.mark.parametrize(
+    "kinds", [CUSTOM, SOLIDS, SHAPES, BLENDED], ids=["custom", "solids", "shapes", "blends"]
+)
 @pytest.mark.parametrize("seed", range(2))
 def test_no_ray_passes_through_unseen(seed: int, kinds: MoreKinds) -> None:
     """Against dense marching: never later than the first sample inside, and on the surface."""

@@ -127,7 +127,7 @@ def test_combinations_hold_nodes_at_least_one(kind: Callable[[Any], Node]) -> No
     with pytest.raises(InvalidNode, match="operands: expected BlobTree nodes, got 1"):
         kind((A, 1))
     with pytest.raises(InvalidNode, match="operands: expected "):
-        kind(A)
+        kind(5)
     with pytest.raises(InvalidNode, match="operands: expected "):
         kind(None)
     assert kind((A,))([(0, 0, 0)]) == A([(0, 0, 0)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point, Segment, Superquadric
+from blobtree.formulas.blends import BLENDS
 from blobtree.tape.instruction_set import LIBRARY
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
@@ -14,8 +15,9 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
+from tests.blobtree.nodes.test_blends import NODES as BLEND_NODES
 from tests.blobtree.nodes.test_deformations import STRONG
-from tests.blobtree.trees import CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import BLENDED, CONTACTS, FIELDS, SHAPES, SOLIDS, points_around, random_trees
 from tests.decals.glsl.arguments import Array, units
 from tests.decals.glsl.functions import ALL_KINDS, ALL_LIBRARY_KINDS, run_program
 from tests.decals.glsl.tapes import (
@@ -34,6 +36,7 @@ from tests.oracles import blobtree as oracle
 TREES = random_trees(seed=31, count=24) + random_trees(seed=33, count=12, more=SOLIDS)
 FIELD_TREES = random_trees(seed=35, count=6, more=FIELDS)
 CONTACT_TREES = random_trees(seed=36, count=6, depth=2, more=CONTACTS)
+BLEND_TREES = [*BLEND_NODES, *random_trees(seed=37, count=4, depth=2, more=BLENDED)]
 LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
 
 
@@ -83,6 +86,13 @@ def test_contacts_are_the_same_in_both_languages(context: Context) -> None:
     assert {"press", "rated_union"} <= names
     kinds = replace(ALL_KINDS, operators=tuple(range(len(LIBRARY.operators))), instruction_set=LIBRARY)
     assert_same_in_both_languages(context, CONTACT_TREES, kinds, 0)
+
+
+def test_blends_are_the_same_in_both_languages(context: Context) -> None:
+    used = {LIBRARY.operators[code] for tree in BLEND_TREES for code in tree.tape.operators}
+    assert set(BLENDS) <= used
+    kinds = replace(ALL_KINDS, operators=tuple(range(len(LIBRARY.operators))), instruction_set=LIBRARY)
+    assert_same_in_both_languages(context, BLEND_TREES, kinds, 0)
 
 
 def test_deformations_are_the_same_in_both_languages(context: Context) -> None:

@@ -1,0 +1,191 @@
+"""Blends and their macros as nodes: operands, files, text, and what they refuse."""
+
+import pickle
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blobtree
+from blobtree import (
+    BlendGraph,
+    CleanUnion,
+    ControllableBlend,
+    Intersection,
+    InvalidNode,
+    LocalBlend,
+    Masked,
+    Node,
+    Point,
+    RDifference,
+    Ricci,
+    RIntersection,
+    RUnion,
+    Shell,
+    SmoothDifference,
+    SmoothIntersection,
+    Sum,
+    SuperellipticBlend,
+    SymmetricDifference,
+    Union,
+    from_json,
+    polygonize,
+    to_json,
+)
+from tests.blobtree.custom_kinds import Soft, Stew, Swell
+
+A, B, C, D = (Point((0.8 * x, 0.1 * x, 0.0), radius=0.7) for x in range(4))
+PAIRS = (("a", "b"), ("b", "c"))
+NODES: list[Node] = [
+    SuperellipticBlend(A, B, C, width=0.2, exponent=2.0),
+    RUnion(A, B),
+    RIntersection(A, B),
+    RDifference(A, B),
+    SmoothIntersection(A, B, width=0.2),
+    SmoothDifference(A, B, width=0.2),
+    CleanUnion(A, B),
+    ControllableBlend(A, B, left_angle=0.0, right_angle=30.0),
+    Masked(A, B),
+    Shell(A, 0.2),
+    SymmetricDifference(A, B),
+    LocalBlend(A, B, C),
+    BlendGraph((A, B, C), names=("a", "b", "c"), pairs=PAIRS),
+]
+EVERY_NODE = pytest.mark.parametrize("node", NODES, ids=lambda node: type(node).__name__)
+
+
+@pytest.mark.parametrize("kind", [Sum, Union, Intersection, Swell])
+def test_operands_come_one_by_one_or_as_an_iterable(kind: Any) -> None:
+    expected = kind((A, B, C))
+    for same in (kind(A, B, C), kind([A, B, C]), kind(iter([A, B, C])), kind(operands=(A, B, C))):
+        assert same == expected
+        assert same.operands == (A, B, C)
+    assert kind(A).operands == (A,)
+
+
+def test_parameters_follow_the_operands() -> None:
+    assert Ricci(A, B, exponent=2.0) == Ricci((A, B), exponent=2.0)
+    assert Soft(A, B, 0.5) == Soft((A, B), 0.5) == Soft((A, B), hardness=0.5)
+    assert Stew(A, B, 0.1, 0.2, 0.3, 0.4, less_right=0.5).operator_parameters == (0.1, 0.2, 0.3, 0.4, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "error"),
+    [
+        (lambda: Sum(), TypeError),
+        (lambda: Ricci(A, B), TypeError),
+        (lambda: Sum(A, B, exponent=2.0), TypeError),
+        (lambda: Sum([A], [B]), TypeError),
+        (lambda: Sum(A, operands=(B,)), TypeError),
+        (lambda: Soft((A, B), 0.5, 0.6), TypeError),
+        (lambda: Sum([]), InvalidNode),
+        (lambda: Sum(5), InvalidNode),
+        (lambda: Sum([A, 5]), InvalidNode),
+    ],
+)
+def test_wrong_arguments_are_refused(make: Any, error: type[Exception]) -> None:
+    with pytest.raises(error, match="operands"):
+        make()
+
+
+@EVERY_NODE
+def test_files_text_and_copies(node: Node) -> None:
+    names: dict[str, Any] = {name: getattr(blobtree, name) for name in blobtree.__all__}
+    for same in (from_json(to_json(node)), pickle.loads(pickle.dumps(node)), eval(repr(node), names)):
+        assert same == node
+        assert hash(same) == hash(node)
+        np.testing.assert_array_equal(same.tape.data, node.tape.data)
+
+
+@EVERY_NODE
+def test_meshes_lie_on_the_surface_and_in_the_support(node: Node) -> None:
+    mesh = polygonize(node, resolution=32)
+    assert len(mesh.faces) > 100
+    assert np.abs(node(mesh.vertices) - 0.5).max() < 2e-3
+    lower, upper = node.support
+    assert (mesh.vertices >= lower).all()
+    assert (mesh.vertices <= upper).all()
+
+
+@pytest.mark.parametrize("kind", [CleanUnion, RUnion, RIntersection, RDifference, SymmetricDifference])
+def test_operators_with_an_order_take_two_operands(kind: Any) -> None:
+    with pytest.raises((InvalidNode, TypeError)):
+        kind(A, B, C)
+    with pytest.raises((InvalidNode, TypeError)):
+        kind(A)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: SuperellipticBlend(A, B, width=0.0, exponent=2.0),
+        lambda: SuperellipticBlend(A, B, width=0.6, exponent=2.0),
+        lambda: SuperellipticBlend(A, B, width=0.2, exponent=0.5),
+        lambda: SmoothIntersection(A, B, width=float("nan")),
+        lambda: SmoothDifference(A, B, width=-1.0),
+        lambda: ControllableBlend(A, B, left_angle=45.0, right_angle=0.0),
+        lambda: ControllableBlend(A, B, left_angle=0.0, right_angle=-1.0),
+        lambda: Shell(A, 0.0),
+        lambda: Shell(A, 1.0).tape,
+    ],
+)
+def test_parameters_out_of_range_are_refused(make: Any) -> None:
+    with pytest.raises(InvalidNode):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("names", "pairs", "reason"),
+    [
+        (("a", "b"), (), "one for each of 3"),
+        (("a", "b", "a"), (), "different name"),
+        (("a", "b", "c"), (("a", "x"),), "no operand is named 'x'; the names are 'a', 'b', 'c'"),
+        (("a", "b", "c"), (("a", "a"),), "two different names"),
+        (("a", "b", "c"), (("a", "b", "c"),), "two different names"),
+        (("a", "b", "c"), "ab", "two different names"),
+        (("a", "b", "c"), 5, "two different names"),
+        ("abc", (), "names"),
+        ((1, 2, 3), (), "names"),
+    ],
+)
+def test_blend_graphs_refuse_wrong_names(names: Any, pairs: Any, reason: str) -> None:
+    with pytest.raises(InvalidNode, match=reason):
+        BlendGraph((A, B, C), names=names, pairs=pairs)
+
+
+def test_operands_of_a_graph_blend_where_an_edge_joins_them() -> None:
+    names = ("a", "b", "c", "d")
+    points = np.random.default_rng(0).uniform((-1, -1, -1), (3.5, 1, 1), (2000, 3))
+    every = tuple(combinations(names, 2))
+    graph = BlendGraph((A, B, C, D), names=names, pairs=every)
+    np.testing.assert_allclose(graph(points), Sum(A, B, C, D)(points), atol=1e-6)
+    none = BlendGraph((A, B, C, D), names=names, pairs=())
+    np.testing.assert_allclose(none(points), Union(A, B, C, D)(points), atol=1e-6)
+    chain = BlendGraph((A, B, C, D), names=names, pairs=(*PAIRS, ("c", "d")))
+    np.testing.assert_allclose(chain(points), Union(A + B, B + C, C + D)(points), atol=1e-6)
+
+
+def test_a_graph_with_too_many_groups_is_refused() -> None:
+    """Moon and Moser (1965): pairs of all but one of three at a time give 3^(n/3) groups."""
+    names = tuple(map(str, range(24)))
+    pairs = [pair for pair in combinations(names, 2) if int(pair[0]) // 3 != int(pair[1]) // 3]
+    with pytest.raises(InvalidNode, match="groups"):
+        _ = BlendGraph([A] * 24, names=names, pairs=pairs).tape  # type: ignore[arg-type]
+
+
+def test_a_local_blend_is_a_sum_inside_its_region_and_a_union_where_that_ends() -> None:
+    region = Point((0.4, 0.0, 0.8), radius=0.4)
+    local = LocalBlend(A, B, region)
+    points = np.random.default_rng(1).uniform(-1, 2, (4000, 3))
+    inside, outside = region(points) >= 0.5, region(points) == 0.0
+    assert inside.sum() > 20
+    np.testing.assert_allclose(local(points[inside]), (A + B)(points[inside]), atol=1e-6)
+    np.testing.assert_allclose(local(points[outside]), (A | B)(points[outside]), atol=1e-6)
+
+
+def test_a_shell_is_hollow() -> None:
+    shell = Shell(Point((0, 0, 0), radius=1.0), 0.2)
+    radii = np.array([0.0, 0.5, 0.79, 0.81, 0.99, 1.01])
+    inside = shell(radii[:, None] * [[0.6, 0.0, 0.8]]) >= 0.5
+    assert inside.tolist() == [False, False, False, True, True, False]
