@@ -208,9 +208,8 @@ def r_intersection_slope(
     slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32, parameter: wp.float32
 ) -> wp.float32:
     """No partial derivative exceeds 2, for F ≤ a, b; their sum does not exceed 2 + √2."""
-    rise_a = wp.max(slope_a, 0.0)
-    rise_b = wp.max(slope_b, 0.0)
-    return wp.min(2.0 * (rise_a + rise_b), 3.4143 * wp.max(rise_a, rise_b))
+    total = wp.max(slope_a, 0.0) + wp.max(slope_b, 0.0)
+    return wp.min(2.0 * total, 3.4143 * wp.max(wp.max(slope_a, slope_b), 0.0))
 
 
 @wp.func

@@ -138,7 +138,7 @@ def kink(name: str, a: Floats, b: Floats, reach: float = 2e-3, **parameters: flo
     for da in (-reach, 0.0, reach):
         for db in (-reach, 0.0, reach):
             near = np.maximum(a + da, 0.5 * a), np.maximum(b + db, 0.5 * b)
-            by_a, by_b, _ = partials(name, *near, **parameters)
+            by_a, by_b, _ = partials(name, near[0], near[1], **parameters)
             change = np.maximum(np.abs(by_a - middle[0]) * (a > 0.0), np.abs(by_b - middle[1]) * (b > 0.0))
             margin[change > 0.2] = 0.0
     return margin

@@ -85,7 +85,7 @@ def test_the_same_definition_twice_is_one_kind_and_another_one_takes_its_name() 
         lambda: Soft((BALL, BALL), "hard"),  # type: ignore[arg-type]
         lambda: Soft((BALL,), 1.0),
         lambda: Soft((BALL, BALL, BALL), 1.0),
-        lambda: Soft(BALL, 1.0),  # type: ignore[arg-type]
+        lambda: Soft(BALL, 1.0),
         lambda: Mean((BALL, 3)),  # type: ignore[arg-type]
         lambda: Swell(()),
     ],

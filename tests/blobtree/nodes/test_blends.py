@@ -81,7 +81,7 @@ def test_parameters_follow_the_operands() -> None:
         (lambda: Soft((A, B), 0.5, 0.6), TypeError),
         (lambda: Sum([]), InvalidNode),
         (lambda: Sum(5), InvalidNode),
-        (lambda: Sum([A, 5]), InvalidNode),
+        (lambda: Sum([A, 5]), InvalidNode),  # type: ignore[list-item]
     ],
 )
 def test_wrong_arguments_are_refused(make: Any, error: type[Exception]) -> None:

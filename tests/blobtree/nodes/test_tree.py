@@ -62,7 +62,7 @@ def test_operators_flatten_from_the_right_too_but_not_one_kind_into_another() ->
 
 
 def test_operands_may_come_from_any_iterable() -> None:
-    assert Sum(iter([A, B])) == Sum([A, B]) == Sum((A, B))  # type: ignore[arg-type]
+    assert Sum(iter([A, B])) == Sum([A, B]) == Sum((A, B))
 
 
 @given(trees())
