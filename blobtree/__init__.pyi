@@ -60,7 +60,9 @@ from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
+from .nodes.volumes import Volume, from_mesh, from_sdf
 from .progress import Cancel, Progress
+from .sampling.tree_distances import SignedDistances, to_sdf
 from .tape.tape import Tape
 from .tracing.trace import Hits
 
@@ -135,6 +137,7 @@ __all__ = [
     "Segment",
     "Shear",
     "Shell",
+    "SignedDistances",
     "SmoothDifference",
     "SmoothIntersection",
     "Stretch",
@@ -154,6 +157,7 @@ __all__ = [
     "UnknownKind",
     "UntranslatableFunction",
     "UnusableCache",
+    "Volume",
     "__version__",
     "define_field",
     "define_operator",
@@ -161,6 +165,8 @@ __all__ = [
     "define_warp",
     "fit",
     "from_json",
+    "from_mesh",
+    "from_sdf",
     "load",
     "numeric_parameters",
     "numeric_values",
@@ -168,5 +174,6 @@ __all__ = [
     "save",
     "split_creases",
     "to_json",
+    "to_sdf",
     "with_numeric_values",
 ]

@@ -16,6 +16,7 @@ from blobtree.formulas.flat_skeletons import FLAT_SKELETONS
 from blobtree.formulas.operators import Operator
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.solid_skeletons import SOLID_SKELETONS
+from blobtree.formulas.volumes import VOLUME_FIELDS
 from blobtree.formulas.warps import SpaceWarp
 
 LIBRARY_SKELETONS: tuple[Skeleton, ...] = (*CURVE_SKELETONS, *FLAT_SKELETONS, *SOLID_SKELETONS)
@@ -24,4 +25,4 @@ LIBRARY_OPERATORS: tuple[Operator, ...] = (
     *CONTACT_OPERATORS,
 )
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = DEFORMATIONS
-LIBRARY_FIELDS: tuple[FieldKind, ...] = (*DIRECT_FIELDS, *CONVOLUTION_FIELDS)
+LIBRARY_FIELDS: tuple[FieldKind, ...] = (*DIRECT_FIELDS, *CONVOLUTION_FIELDS, *VOLUME_FIELDS)

@@ -10,6 +10,7 @@ from blobtree.nodes import (
     flats,
     primitives,
     solids,
+    volumes,
 )
 from blobtree.nodes.tree import NODE_KINDS
 
@@ -24,4 +25,5 @@ __all__ = [
     "flats",
     "primitives",
     "solids",
+    "volumes",
 ]

@@ -24,6 +24,7 @@ from blobtree._typing import Float64Array
 from blobtree.colors import color_rgb
 from blobtree.errors import InvalidNode
 from blobtree.nodes.attributes import AttributeMapping, checked_attributes
+from blobtree.nodes.samples import checked_samples
 from blobtree.nodes.values import fields_of
 from blobtree.validation import (
     Vector,
@@ -76,6 +77,8 @@ class Quantity(Enum):
     """Signed lengths, any number of them."""
     NAMES = "names"
     """Texts that are not empty, any number of them."""
+    SAMPLES = "samples"
+    """Numbers at the points of a grid."""
     COLOR = "color"
     """Red, green and blue (3,) from 0 to 1."""
     ATTRIBUTES = "attributes"
@@ -202,6 +205,7 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.FACTORS: finite_numbers,
     Quantity.DISTANCES: finite_numbers,
     Quantity.NAMES: texts,
+    Quantity.SAMPLES: checked_samples,
     Quantity.COLOR: color_rgb,
     Quantity.ATTRIBUTES: checked_attributes,
     Quantity.NAME_PAIRS: name_pairs,

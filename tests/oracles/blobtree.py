@@ -59,13 +59,14 @@ from blobtree import (
     Transform,
     Twist,
     Union,
+    Volume,
 )
 from blobtree.formulas.operators import Support
 from blobtree.nodes.deformations import Deformation
 from blobtree.nodes.primitives import Leaf, Primitive
 from blobtree.nodes.tree import AssociativeCombination, Macro
 from blobtree.nodes.values import parameter_values
-from tests.oracles import blends, convolution, custom_kinds, deformations, direct_fields, shapes
+from tests.oracles import blends, convolution, custom_kinds, deformations, direct_fields, shapes, volumes
 
 Floats = NDArray[np.float64]
 
@@ -128,6 +129,9 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
         case ConvolutionSegment() | ConvolutionArc() | ConvolutionTriangle():
             value = convolution.evaluate(node, q)[:, 0]
             return Field(value, np.tile(np.array(node.color), (len(q), 1)), np.full(len(q), np.inf))
+        case Volume(color=color):
+            leaf = _leaf_at(np.zeros(len(q)), color)
+            return replace(leaf, value=volumes.value(node, q), margin=volumes.clearance(node, q))
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -222,6 +226,8 @@ def grown(node: Node, distance: float) -> Node:
             return replace(node, point=tuple(moved), radius=radius + distance)
         case Noise():
             return replace(node, level=node.level - 1.18 * distance / node.wavelength)
+        case Volume():
+            return replace(node, growth=node.growth + distance)
         case Gyroid():
             return replace(node, thickness=node.thickness + 2.0 * distance)
         case Cone():

@@ -1,0 +1,106 @@
+"""Grids of numbers as values: immutable, comparable, and small in files."""
+
+import math
+import zlib
+from functools import lru_cache
+from typing import Any, Self
+
+import msgspec
+import numpy as np
+
+from blobtree._typing import Float32Array
+from blobtree.errors import InvalidNode
+
+FAST_COMPRESSION = 1
+
+MAX_NUMBERS = 1 << 24
+"""Largest number of samples: a float32 cannot count more texels on a tape."""
+
+
+class Samples(msgspec.Struct, frozen=True):
+    """A grid of float32 numbers.
+
+    In files it is its shape and a text: little-endian float32 numbers, compressed by zlib, in base64.
+
+    Attributes
+    ----------
+    shape
+        Numbers of grid points along x, y and z.
+    data
+        The compressed numbers, the last axis fastest.
+    """
+
+    shape: tuple[int, int, int]
+    data: bytes
+
+    @classmethod
+    def of(cls, numbers: Any) -> Self:
+        """Return the samples of an array (nx, ny, nz).
+
+        Raises
+        ------
+        InvalidNode
+            The array does not have three axes of at least two finite numbers, or too many.
+        """
+        try:
+            array = np.asarray(numbers, np.float32)
+        except (TypeError, ValueError):
+            raise InvalidNode(
+                f"samples: expected an array of numbers, got {type(numbers).__name__}"
+            ) from None
+        _check_shape(array.shape)
+        if not np.isfinite(array).all():
+            raise InvalidNode(
+                f"samples: expected finite numbers, got {int((~np.isfinite(array)).sum())} others"
+            )
+        little_endian = np.ascontiguousarray(array, "<f4").tobytes()
+        nx, ny, nz = array.shape
+        return cls((nx, ny, nz), zlib.compress(little_endian, FAST_COMPRESSION))
+
+    @property
+    def array(self) -> Float32Array:
+        """The numbers, float32[nx, ny, nz], read-only.
+
+        Raises
+        ------
+        InvalidNode
+            The data are damaged.
+        """
+        return _decoded(self)
+
+    def __repr__(self) -> str:
+        return f"Samples(shape={self.shape}, data=<{len(self.data)} bytes>)"
+
+
+@lru_cache(maxsize=32)
+def _decoded(samples: Samples) -> Float32Array:
+    _check_shape(samples.shape)
+    size = 4 * math.prod(samples.shape)
+    decoder = zlib.decompressobj()
+    try:
+        content = decoder.decompress(samples.data, size + 1)  # damaged data might expand without end
+    except zlib.error as error:
+        raise InvalidNode(
+            f"samples: expected numbers compressed by zlib, got damaged data ({error})"
+        ) from None
+    if len(content) != size:
+        raise InvalidNode(f"samples: expected {size} bytes for the shape {samples.shape}, got {len(content)}")
+    array = np.frombuffer(content, "<f4").reshape(samples.shape).astype(np.float32)
+    if not np.isfinite(array).all():
+        raise InvalidNode("samples: expected finite numbers, got damaged data")
+    array.setflags(write=False)
+    return array
+
+
+def checked_samples(name: str, value: Any) -> Samples:
+    """Return `value` as samples; raise `InvalidNode` unless it is an array of finite numbers."""
+    samples = value if isinstance(value, Samples) else Samples.of(value)
+    samples.array  # noqa: B018  (raises for damaged data)
+    return samples
+
+
+def _check_shape(shape: tuple[int, ...]) -> None:
+    if len(shape) != 3 or min(shape) < 2:
+        raise InvalidNode(f"samples: expected a grid of at least 2 × 2 × 2 numbers, got the shape {shape}")
+    if math.prod(shape) > MAX_NUMBERS:
+        raise InvalidNode(f"samples: expected at most {MAX_NUMBERS:,} numbers, got {math.prod(shape):,}")

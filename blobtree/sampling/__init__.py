@@ -1,0 +1,1 @@
+"""Triangle meshes and fields as grids of signed distances."""
