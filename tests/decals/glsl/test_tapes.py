@@ -122,11 +122,10 @@ def assert_same_in_both_languages(
         seen = read_tape(
             context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist()), kinds
         )
-        assert_close(
-            seen[:, :3], bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach), agreement
-        )
         field = oracle.evaluate(tree, points)
-        smooth = field.margin > 1e-5
+        smooth = field.margin > 1e-5  # on a tie of two operands, rounding may choose either bound
+        expected = bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach)
+        assert_close(seen[smooth, :3], expected[smooth], agreement)
         assert_close(
             read_tape(context, tree, GRADIENT, points, kinds=kinds)[smooth],
             gradients_at(tree.tape, points)[smooth],
