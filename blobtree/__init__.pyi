@@ -1,4 +1,5 @@
 from ._version import __version__
+from .custom.falloff import define_falloff
 from .custom.field import CustomField, define_field
 from .custom.operator import CustomCombination, define_operator
 from .custom.skeleton import CustomPrimitive, define_skeleton
@@ -19,7 +20,8 @@ from .errors import (
     UnusableCache,
 )
 from .fitting import Fit, fit
-from .formulas.falloff import ISO, RIM
+from .formulas.falloff import ISO, RIM, Falloff
+from .formulas.falloffs import FALLOFF_NAMES
 from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
@@ -67,6 +69,7 @@ from .tape.tape import Tape
 from .tracing.trace import Hits
 
 __all__ = [
+    "FALLOFF_NAMES",
     "ISO",
     "RIM",
     "Arc",
@@ -97,6 +100,7 @@ __all__ = [
     "Difference",
     "Disc",
     "Ellipsoid",
+    "Falloff",
     "FieldPrimitive",
     "Fit",
     "Gyroid",
@@ -159,6 +163,7 @@ __all__ = [
     "UnusableCache",
     "Volume",
     "__version__",
+    "define_falloff",
     "define_field",
     "define_operator",
     "define_skeleton",

@@ -26,6 +26,7 @@ from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
 from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.files import write_atomically
+from blobtree.formulas.falloff import WYVILL, Falloff
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import parameters_of
@@ -61,6 +62,9 @@ class CustomSkeletonRecord(NodeRecord, frozen=True, tag="custom_skeleton"):
     radius: float
     color: Vector
     attributes: dict[str, AttributeValue] = {}
+    falloff: str = WYVILL.name
+    width: float | None = None
+    weight: float = 1.0
 
     def make(self, values: dict[str, Any]) -> Node:
         """Return the node; its kind must be defined."""
@@ -129,6 +133,8 @@ def _record_type(kind: type[Node]) -> type[NodeRecord]:
     for place, field in enumerate(fields_of(kind)):
         if isinstance(field.default, Attributes):
             types[place] = (field.name, dict[str, AttributeValue], {})
+        elif isinstance(field.default, Falloff):
+            types[place] = (field.name, str, field.default.name)
         elif OPTIONAL in field.metadata:
             types[place] = (*types[place], field.default)
     record: Any = msgspec.defstruct(
@@ -343,6 +349,7 @@ def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
         record_type = RECORD_OF_KIND[type(node)]
     values = {name: getattr(node, name) for name in record_type.__struct_fields__}
     values |= {name: dict(value) for name, value in values.items() if isinstance(value, Attributes)}
+    values |= {name: value.name for name, value in values.items() if isinstance(value, Falloff)}
     for name in record_type.references:
         operand = values[name]
         values[name] = (

@@ -1,5 +1,6 @@
 // The tape's interpreter, blobtree/tape/interpreter.py in GLSL: one composition per evaluator. Defines:
-// INTERPRET, FIELD (its type), LEAF, DIRECT, PULLBACK_AFFINE, PULLBACK_WARP, COMBINE, PRIMITIVE_COLOR (LEAF's colour).
+// INTERPRET, FIELD (its type), LEAF, PROFILED_LEAF, DIRECT, PULLBACK_AFFINE, PULLBACK_WARP, COMBINE,
+// PRIMITIVE_COLOR (LEAF's colour).
 // Slots: the registers, and a case per instruction that occurs (decals/rendering/tree.py).
 FIELD INTERPRET(vec3 q, vec3 direction, float reach, sampler2D tape, ivec2 span) {
     FIELD accumulator = FIELD(0.0);
@@ -25,6 +26,7 @@ FIELD INTERPRET(vec3 q, vec3 direction, float reach, sampler2D tape, ivec2 span)
 #undef FIELD
 #undef LEAF
 #undef DIRECT
+#undef PROFILED_LEAF
 #undef PULLBACK_AFFINE
 #undef PULLBACK_WARP
 #undef COMBINE

@@ -9,12 +9,11 @@ returns its first operand if the second is 0. The next level is pruned as usual.
 import warp as wp
 
 from blobtree.cells.block_kernels import ChildGrid, LevelBlocks, block_center, child_offset
-from blobtree.cells.prune_kernels import direct_range, primitive_range, range_in_ball
+from blobtree.cells.prune_kernels import absent, direct_range, primitive_range, stretched_range
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE, write_block
 from blobtree.formulas.skeletons import HALF_DIAGONAL
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.evaluators import to_local
-from blobtree.tape.tape import FIELD, PREFIX, STRETCHED
+from blobtree.tape.tape import FIELD, STRETCHED
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -28,11 +27,10 @@ def reaches(
     if code >= FIELD:
         r = direct_range(code - FIELD, center, half * HALF_DIAGONAL, tape, at)
     elif code >= STRETCHED:
-        ball = half * HALF_DIAGONAL * tape[at + 3][0]
-        r = range_in_ball(code - STRETCHED, to_local(center, tape, at), ball, tape, at + PREFIX)
+        r = stretched_range(code - STRETCHED, center, half * HALF_DIAGONAL, tape, at)
     else:
         r = primitive_range(code, center, half, tape, at)
-    return r[1] > 0.0
+    return not absent(r)
 
 
 @wp.kernel

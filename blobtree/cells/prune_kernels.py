@@ -21,7 +21,7 @@ from blobtree.tape.dispatch import (
     warp_forward,
     warp_stretch,
 )
-from blobtree.tape.evaluators import to_local
+from blobtree.tape.evaluators import profile_value, to_local
 from blobtree.tape.tape import (
     FIELD,
     POP_SWAPPED,
@@ -89,6 +89,35 @@ def direct_range(
     return widened(wp.vec2(bounds[0], bounds[1]))
 
 
+@wp.func
+def absent(r: wp.vec2) -> wp.bool:
+    """Return True if a field of this range is 0 everywhere."""
+    return r[1] <= 0.0 and r[0] >= 0.0
+
+
+@wp.func
+def stretched_range(
+    kind: wp.int32, point: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Return the range over a ball of a primitive with a map, and maybe a profile, at tape[at]."""
+    profile = tape[at + 3]
+    center = to_local(point, tape, at)
+    ball = radius * profile[0]
+    if profile[2] == 0.0:
+        return range_in_ball(kind, center, ball, tape, at + PREFIX)
+    c = closest(kind, center, tape, at + PREFIX)
+    distances = squared_distances_to_ball(center, ball, c, min_influence(kind, tape, at + PREFIX))
+    largest = profile_value(wp.sqrt(distances[0]), profile)
+    if largest <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    margin = RANGE_MARGIN * (1.0 + profile[2])
+    smallest = wp.max(profile_value(wp.sqrt(distances[1]), profile) - margin, 0.0)
+    largest += margin
+    if profile[3] < 0.0:
+        return wp.vec2(largest, smallest) * profile[3]
+    return wp.vec2(smallest, largest) * profile[3]
+
+
 @unrolled
 def operator_range(
     operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
@@ -139,7 +168,7 @@ def range_anywhere(
     A map or a warp takes the cube to a shape that only the ball around it bounds.
     """
     if stretched:
-        return range_in_ball(kind, to_local(point, tape, at), ball * tape[at + 3][0], tape, at + PREFIX)
+        return stretched_range(kind, point, ball, tape, at)
     if warped:
         return range_in_ball(kind, point, ball, tape, at)
     return primitive_range(kind, point, half, tape, at)
@@ -329,7 +358,7 @@ def prune(
             warped -= 1
             size = PREFIX + int(header[3])
             accumulator_start = outer_starts[count]
-            if accumulator[1] <= 0.0:
+            if absent(accumulator):
                 end = accumulator_start
             else:
                 if write:

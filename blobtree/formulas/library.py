@@ -11,6 +11,8 @@ from blobtree.formulas.convolution import CONVOLUTION_FIELDS
 from blobtree.formulas.curve_skeletons import CURVE_SKELETONS
 from blobtree.formulas.deformations import DEFORMATIONS
 from blobtree.formulas.direct_fields import DIRECT_FIELDS
+from blobtree.formulas.falloff import Falloff
+from blobtree.formulas.falloffs import MORE_FALLOFFS
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.flat_skeletons import FLAT_SKELETONS
 from blobtree.formulas.operators import Operator
@@ -26,3 +28,4 @@ LIBRARY_OPERATORS: tuple[Operator, ...] = (
 )
 LIBRARY_WARPS: tuple[SpaceWarp, ...] = DEFORMATIONS
 LIBRARY_FIELDS: tuple[FieldKind, ...] = (*DIRECT_FIELDS, *CONVOLUTION_FIELDS, *VOLUME_FIELDS)
+LIBRARY_FALLOFFS: tuple[Falloff, ...] = MORE_FALLOFFS

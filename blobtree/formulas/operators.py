@@ -15,6 +15,10 @@ Two more prune the operands of a cell; a = (smallest, largest) value of the oper
 Colours are averaged with the weights |∂F/∂a|·a and |∂F/∂b|·b: a sum mixes by strength, a union takes the
 colour of the larger field, a difference paints the cut in the colour of its tool. Where the second operand is
 exactly 0, every operator here returns the first, except the intersection, which is 0.
+
+Operands are 0 or more, except those of a sum: only there do fields below 0, of primitives with a negative
+weight, act. Programs raise the operands of other operators to 0 (`tape.program`), so that other formulas need
+not know of them.
 """
 
 from dataclasses import dataclass
@@ -150,9 +154,9 @@ def ricci_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
 @wp.func
 def blend_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     """Return the dependence of a blend: on every operand that is not 0 everywhere."""
-    if b[1] <= 0.0:
+    if b[1] <= 0.0 and b[0] >= 0.0:
         return KEEP_LEFT
-    if a[1] <= 0.0:
+    if a[1] <= 0.0 and a[0] >= 0.0:
         return KEEP_RIGHT
     return KEEP_BOTH
 
@@ -166,9 +170,9 @@ def union_range(a: wp.vec2, b: wp.vec2, exponent: wp.float32) -> wp.vec2:
 @wp.func
 def union_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     """Return the dependence of a union: on one operand where that one is always the larger."""
-    if b[1] <= a[0] or b[1] <= 0.0:
+    if b[1] <= a[0]:
         return KEEP_LEFT
-    if a[1] <= b[0] or a[1] <= 0.0:
+    if a[1] <= b[0]:
         return KEEP_RIGHT
     return KEEP_BOTH
 
@@ -286,11 +290,13 @@ class Operator:
     support: Support = Support.EITHER
     paints: bool = True
     """True if the second operand's colour shows where F depends on it; else F has the first one's."""
+    signed: bool = False
+    """Operands below 0 act as they are; those of other operators are raised to 0."""
     digest: str = ""
     """Digest of the sources of a custom operator."""
 
 
-SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice, monotone=True)
+SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice, monotone=True, signed=True)
 RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice, monotone=True)
 UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice, monotone=True)
 INTERSECTION = Operator(

@@ -45,9 +45,9 @@ class Rectangle(Primitive):
     center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the rectangle")]
     axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the rectangle's plane, of any length")]
     side: Annotated[
-        Vector, Parameter(Quantity.DIRECTION, "direction of the width; its part along the axis is left out")
+        Vector, Parameter(Quantity.DIRECTION, "direction of the length; its part along the axis is left out")
     ]
-    width: Annotated[float, Parameter(Quantity.LENGTH, "length along `side`, without the radius")]
+    length: Annotated[float, Parameter(Quantity.LENGTH, "length along `side`, without the radius")]
     height: Annotated[float, Parameter(Quantity.LENGTH, "length across `side`, without the radius")]
     _: KW_ONLY
     radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
@@ -67,7 +67,7 @@ class Rectangle(Primitive):
         """Return the corners of the rectangle."""
         u, v = _sides(columns)
         signs = np.array(list(product((-0.5, 0.5), repeat=2)))
-        across, along = (columns["width"] * u)[:, None], (columns["height"] * v)[:, None]
+        across, along = (columns["length"] * u)[:, None], (columns["height"] * v)[:, None]
         corners: Float64Array = columns["center"][:, None] + signs[:, :1] * across + signs[:, 1:] * along
         return corners
 
@@ -75,7 +75,7 @@ class Rectangle(Primitive):
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
         """Return centre and influence radius; unit vectors along the sides with half their lengths."""
         u, v = _sides(columns)
-        sides = [beside(u, 0.5 * columns["width"]), beside(v, 0.5 * columns["height"])]
+        sides = [beside(u, 0.5 * columns["length"]), beside(v, 0.5 * columns["height"])]
         return np.stack([beside(columns["center"], influences[:, 0]), *sides], axis=1)
 
 

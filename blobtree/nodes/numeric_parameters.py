@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
-from blobtree.nodes.values import parameter_values
+from blobtree.nodes.values import fields_of, left_out, parameter_values
 from blobtree.tape.program import ProgramNode
 
 AnyNode = TypeVar("AnyNode", bound=ProgramNode)
@@ -47,7 +47,10 @@ class NumericParameter:
 
 
 def numeric_parameters(tree: ProgramNode) -> list[NumericParameter]:
-    """Return all numbers of a tree on which its field depends, node by node from the root, left to right."""
+    """Return all numbers of a tree on which its field depends, node by node from the root, left to right.
+
+    Widths and weights that texts leave out are left out too.
+    """
     return [parameter for path, node in nodes_with_paths(tree) for parameter in _numbers_of(path, node)]
 
 
@@ -122,10 +125,13 @@ def with_number(value: Any, index: tuple[int, ...], number: float) -> Any:
 
 
 def _numbers_of(path: Path, node: ProgramNode) -> Iterator[NumericParameter]:
-    for name, declaration in parameters_of(type(node)).items():
-        if declaration.quantity is not Quantity.COLOR:
-            for index in _places(getattr(node, name)):
-                yield NumericParameter(path, name, index, declaration)
+    declared = parameters_of(type(node))
+    for field in fields_of(type(node)):
+        value = getattr(node, field.name)
+        declaration = declared.get(field.name)
+        if declaration and declaration.quantity is not Quantity.COLOR and not left_out(field, value):
+            for index in _places(value):
+                yield NumericParameter(path, field.name, index, declaration)
 
 
 def _places(value: Any) -> Iterator[tuple[int, ...]]:

@@ -217,7 +217,7 @@ def _of_leaves(
 ) -> list[_Tangent] | None:
     """Return the tangents of one parameter of several primitives, None if they need tapes of their own."""
     name, index = parameters[columns[0]].name, parameters[columns[0]].index
-    nodes = [node_along(tree, parameters[column].path) for column in columns]
+    nodes = [cast(ProgramLeaf, node_along(tree, parameters[column].path)) for column in columns]
     steps = [_steps(tree, parameters[column]) for column in columns]
     owners = {id(node): place for place, node in enumerate(nodes)}
     starts: list[int] = []
@@ -234,6 +234,8 @@ def _of_leaves(
                 for node, (value, step) in zip(nodes, steps, strict=True)
             }
         except InvalidNode:
+            return None
+        if any(cast(ProgramLeaf, copies[id(node)]).profiled is not node.profiled for node in nodes):
             return None
         tapes.append(compile_tape([_with_leaves(run, copies) for run in runs], np.float64))
     difference = tapes[1].data - tapes[0].data

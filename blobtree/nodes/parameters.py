@@ -23,6 +23,8 @@ import numpy as np
 from blobtree._typing import Float64Array
 from blobtree.colors import color_rgb
 from blobtree.errors import InvalidNode
+from blobtree.formulas.falloff import Falloff
+from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.attributes import AttributeMapping, checked_attributes
 from blobtree.nodes.samples import checked_samples
 from blobtree.nodes.values import fields_of
@@ -39,6 +41,7 @@ from blobtree.validation import (
     positive_number,
     positive_numbers,
     positive_vector,
+    shown,
     texts,
 )
 
@@ -87,6 +90,10 @@ class Quantity(Enum):
     """An invertible affine map, three rows of four numbers."""
     NAME_PAIRS = "name_pairs"
     """Pairs of names."""
+    FALLOFF = "falloff"
+    """A `Falloff`, or the name of one."""
+    WIDTH = "width"
+    """A length above 0, or None for the one that follows from other parameters."""
     NUMBERS = "numbers"
     """One to four numbers of a custom kind, whose meaning is unknown; no edit changes them."""
 
@@ -101,6 +108,7 @@ UNITS = {
     Quantity.RADII: "model units",
     Quantity.DISTANCE: "model units",
     Quantity.DISTANCES: "model units",
+    Quantity.WIDTH: "model units",
 }
 """Units of quantities that have one."""
 
@@ -190,6 +198,23 @@ class Parameter:
         return result
 
 
+def _falloff(name: str, value: Any) -> Falloff:
+    """Return a falloff, or the one of this name; raise `InvalidNode` otherwise."""
+    if isinstance(value, Falloff):
+        return value
+    if isinstance(value, str) and value in FALLOFF_NAMES:
+        return FALLOFF_NAMES[value]
+    raise InvalidNode(
+        f"{name}: expected a falloff or one of {', '.join(FALLOFF_NAMES)}, got {shown(value)}; "
+        "define_falloff makes others"
+    )
+
+
+def _width(name: str, value: Any) -> float | None:
+    """Return None or a number above 0; raise `InvalidNode` otherwise."""
+    return None if value is None else positive_number(name, value)
+
+
 CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.POINT: finite_vector,
     Quantity.POINTS: finite_points,
@@ -209,6 +234,8 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.COLOR: color_rgb,
     Quantity.ATTRIBUTES: checked_attributes,
     Quantity.NAME_PAIRS: name_pairs,
+    Quantity.FALLOFF: _falloff,
+    Quantity.WIDTH: _width,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }
 """Functions (name, value) that return the checked value of each quantity."""
@@ -274,8 +301,9 @@ def mapped(quantity: Quantity, values: Float64Array, matrices: Float64Array | No
 def documented(doc: str, kind: type) -> str:
     """Return the docstring of a node class with a Parameters section of its declarations."""
     lines: list[str] = []
-    annotations_of = inspect.get_annotations
-    hints = {name: hint for base in reversed(kind.__mro__) for name, hint in annotations_of(base).items()}
+    hints: dict[str, Any] = {}
+    for base in kind.__mro__:
+        hints |= {n: hint for n, hint in inspect.get_annotations(base).items() if n not in hints}
     for name, hint in hints.items():
         parameter = _declared(hint)
         if parameter is not None and parameter.doc:
@@ -304,5 +332,7 @@ def _type_name(hint: Any) -> str:
         float: "float",
         Vector: "(x, y, z)",
         AttributeMapping: "dict",
+        float | None: "float or None",
+        Falloff | str: "Falloff or str",
     }
     return names.get(inner, "array-like")

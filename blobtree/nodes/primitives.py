@@ -2,17 +2,20 @@
 
 A new primitive is a row of `formulas.skeletons` and a class here. The class names that row, declares its
 parameters, and returns points whose convex hull holds the skeleton. If the formula reads its parameters in
-the order of declaration, `texels` need not be written.
+the order of declaration, `texels` need not be written. Falloff, width and weight are those of every primitive
+(`Profile`).
 """
 
+import inspect
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import product
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.formulas.falloff import WYVILL, Falloff
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.parameters import (
@@ -47,6 +50,43 @@ Columns = dict[str, Float64Array]
 """Values (n, size) of n primitives by the names of their parameters."""
 
 
+LARGEST_WEIGHT = 1000.0
+
+_OPTIONAL = {OPTIONAL: True}
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Profile:
+    """How the field of a primitive falls with the distance: keywords of every primitive.
+
+    With weight 1 an isolated primitive shows its `radius`, whatever falloff and width it has.
+    """
+
+    falloff: Annotated[
+        Falloff | str, Parameter(Quantity.FALLOFF, "how the field falls off with the distance, or its name")
+    ] = field(default=WYVILL, metadata=_OPTIONAL)
+    width: Annotated[
+        float | None,
+        Parameter(
+            Quantity.WIDTH, "distance beyond the surface over which it blends; None grows with the radius"
+        ),
+    ] = field(default=None, metadata=_OPTIONAL)
+    weight: Annotated[
+        float,
+        Parameter(
+            Quantity.FACTOR,
+            "factor of the field; below 0 it carves in a sum and does nothing elsewhere",
+            low=-LARGEST_WEIGHT,
+            high=LARGEST_WEIGHT,
+            hint="for more take a larger radius",
+        ),
+    ] = field(default=1.0, metadata=_OPTIONAL)
+
+
+PROFILE = tuple(Profile.__dataclass_fields__)
+"""Names of the keywords that every primitive has."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Attributed:
     """The keyword that every leaf has."""
@@ -54,7 +94,7 @@ class Attributed:
     attributes: Annotated[
         AttributeMapping,
         Parameter(Quantity.ATTRIBUTES, "numbers, vectors and labels by name"),
-    ] = field(default=NO_ATTRIBUTES, metadata={OPTIONAL: True})
+    ] = field(default=NO_ATTRIBUTES, metadata=_OPTIONAL)
 
 
 class Leaf(Attributed, Node):
@@ -63,11 +103,28 @@ class Leaf(Attributed, Node):
     color: Vector
 
 
-class Primitive(ProgramPrimitive, Leaf):
-    """A skeleton with a visible radius and a colour: a leaf of the tree."""
+class Primitive(ProgramPrimitive, Profile, Leaf):
+    """A skeleton with a visible radius, a colour and a `Profile`: a leaf of the tree."""
 
     skeleton: ClassVar[Skeleton]
     radius: float
+
+    def __init_subclass__(cls) -> None:
+        declared = [name for name in PROFILE if name in inspect.get_annotations(cls)]
+        if declared:
+            raise TypeError(f"{cls.__name__}: every primitive has a parameter {declared[0]!r} already")
+        super().__init_subclass__()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.falloff is not WYVILL or self.width is not None or self.weight != 1.0:
+            object.__setattr__(self, "profiled", True)
+            object.__setattr__(self, "signed", self.weight < 0.0)
+
+    @property
+    def profile(self) -> tuple[Falloff, float | None, float]:
+        """Falloff, width (None in proportion to the radius) and weight."""
+        return cast(Falloff, self.falloff), self.width, self.weight
 
     @classmethod
     def radii(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:
@@ -78,9 +135,9 @@ class Primitive(ProgramPrimitive, Leaf):
 
     @classmethod
     def _skeleton_parameters(cls) -> list[Parameter]:
-        """Return the parameters of the skeleton, without radii and colour."""
-        surface = (Quantity.RADIUS, Quantity.COLOR, Quantity.ATTRIBUTES)
-        return [p for p in parameters_of(cls).values() if p.quantity not in surface]
+        """Return the parameters of the skeleton, without those that every primitive has."""
+        shared = (Quantity.RADIUS, Quantity.COLOR, Quantity.ATTRIBUTES)
+        return [p for p in parameters_of(cls).values() if p.quantity not in shared and p.name not in PROFILE]
 
     @classmethod
     def hulls(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:

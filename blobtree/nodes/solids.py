@@ -1,7 +1,7 @@
 """Solid shapes: the cylinder, the half-space, and the ellipsoid as a ball under a map."""
 
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -10,7 +10,16 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Point, Primitive, beside, octagons
+from blobtree.nodes.primitives import (
+    DEFAULT_COLOR,
+    Columns,
+    Leaf,
+    Point,
+    Primitive,
+    Profile,
+    beside,
+    octagons,
+)
 from blobtree.nodes.tree import Macro, Node
 from blobtree.validation import Vector
 
@@ -19,10 +28,11 @@ LARGEST_RATIO = 1e5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ellipsoid(Macro, Leaf):
+class Ellipsoid(Macro, Profile, Leaf):
     """An ellipsoid, its axes parallel to those of its space: a ball of radius 1 under a scale.
 
-    Its field is g(r · RIM) with r = |(x/a, y/b, z/c)|, so its level sets are ellipsoids too.
+    Its field is g(r · RIM) with r = |(x/a, y/b, z/c)|, so its level sets are ellipsoids too. Along an axis of
+    length a, a `width` w is w · a / ∛(abc).
 
     Examples
     --------
@@ -51,7 +61,9 @@ class Ellipsoid(Macro, Leaf):
     @Lazy
     def expanded(self) -> Node:
         """Return a ball of radius 1 under a scale and a translation."""
-        ball = Point((0.0, 0.0, 0.0), radius=1.0, color=self.color, attributes=self.attributes)
+        width = None if self.width is None else self.width / float(np.cbrt(np.prod(self.semi_axes)))
+        profile: dict[str, Any] = {"falloff": self.falloff, "width": width, "weight": self.weight}
+        ball = Point((0.0, 0.0, 0.0), radius=1.0, color=self.color, attributes=self.attributes, **profile)
         return ball.transform(np.column_stack([np.diag(self.semi_axes), self.center]))
 
 

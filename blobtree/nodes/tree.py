@@ -29,7 +29,16 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES, polygonize
 from blobtree.nodes.numeric_parameters import NumericParameter
 from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradient_of
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
-from blobtree.nodes.values import equal, fields_of, from_records, hash_of, outline, text_of, to_records
+from blobtree.nodes.values import (
+    OPTIONAL,
+    equal,
+    fields_of,
+    from_records,
+    hash_of,
+    outline,
+    text_of,
+    to_records,
+)
 from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import LEVELS, SLICE_RESOLUTION, slice_tree, to_polydata
 from blobtree.tape.attributes import (
@@ -1204,7 +1213,7 @@ _CHECKS: dict[type[Node], list[tuple[str, Callable[[Any], Any], Any]]] = {}
 
 
 def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any], Any]]:
-    """Return the names of a class's fields, the functions that return checked values, and the defaults."""
+    """Return a class's fields: names, functions that return checked values, values that need no check."""
     if kind in _CHECKS:
         return _CHECKS[kind]
     parameters, hints = parameters_of(kind), get_type_hints(kind)
@@ -1214,7 +1223,7 @@ def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any], Any]]:
             check = parameters[item.name].check
         else:
             check = _node if hints[item.name] is Node else _nodes
-        checks.append((item.name, check, item.default))
+        checks.append((item.name, check, item.default if OPTIONAL in item.metadata else MISSING))
     return _CHECKS.setdefault(kind, checks)
 
 

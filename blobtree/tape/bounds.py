@@ -19,7 +19,7 @@ from blobtree.tape.program import (
     Run,
     distinct_placements,
     grown_fields,
-    influence_radii,
+    support_radii,
 )
 
 EMPTY: Box = (np.full(3, np.inf), np.full(3, -np.inf))
@@ -60,15 +60,15 @@ def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:
     Raises
     ------
     InvalidNode
-        An offset leaves nothing of a primitive.
+        An offset leaves nothing of a primitive, or a width is too small.
     """
     leaves = cast("list[ProgramPrimitive]", [placed.primitive for placed in primitives])
     points = leaves[0].hulls(leaves)
     placements, placed_by = distinct_placements(primitives)
     matrices = np.array([placement.matrix for placement in placements])[placed_by]
-    influences = influence_radii(primitives).max(axis=1)
+    reaches = support_radii(primitives).max(axis=1)
     placed_points = np.einsum("nij,nkj->nki", matrices[:, :3, :3], points) + matrices[:, None, :3, 3]
-    margins = influences[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)
+    margins = reaches[:, None] * np.linalg.norm(matrices[:, :3, :3], axis=2)
     return placed_points.min(axis=1) - margins, placed_points.max(axis=1) + margins
 
 

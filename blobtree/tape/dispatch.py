@@ -7,6 +7,7 @@ kinds in use alone.
 
 import warp as wp
 
+from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.fields import FIELDS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
@@ -170,4 +171,38 @@ def warp_stretch(
     for code in range(wp.static(len(WARPS))):
         if kind == code:
             result = wp.static(WARPS[code].stretch)(q, reach, tape, at)
+    return result
+
+
+@unrolled
+def falloff_value(kind: wp.int32, distance: wp.float32) -> wp.float32:
+    """Return g(d) of a falloff, 0 ≤ d ≤ 1."""
+    result = float(0.0)
+    for code in range(wp.static(len(FALLOFFS))):
+        if kind == code:
+            result = wp.static(FALLOFFS[code].value)(distance)
+    return result
+
+
+@unrolled
+def falloff_slope(kind: wp.int32, distance: wp.float32) -> wp.float32:
+    """Return g'(d) of a falloff, 0 ≤ d ≤ 1."""
+    result = float(0.0)
+    for code in range(wp.static(len(FALLOFFS))):
+        if kind == code:
+            result = wp.static(FALLOFFS[code].slope)(distance)
+    return result
+
+
+@unrolled
+def falloff_numbers(kind: wp.int32) -> wp.vec3:
+    """Return `Falloff.rim`, `Falloff.steepest_distance` and `Falloff.steepest_slope`."""
+    result = wp.vec3()
+    for code in range(wp.static(len(FALLOFFS))):
+        if kind == code:
+            result = wp.vec3(
+                wp.static(FALLOFFS[code].rim),
+                wp.static(FALLOFFS[code].steepest_distance),
+                wp.static(FALLOFFS[code].steepest_slope),
+            )
     return result

@@ -6,6 +6,7 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
   and the influence there; `rate` bounds how fast |q − c| / influence changes;
 * `direct(kind, q, tape, at, color, direction, reach, speed)`: the contribution of a direct field at q, whose
   parameters are at tape[at]; q moves at most at `speed`;
+* `profiled_leaf(..., profile)`: the same with a profile = (·, code of its falloff, k, weight);
 * `pullback_affine(f, tape, at)`: a result behind the map at tape[at], seen in front of it;
 * `pullback_warp(kind, f, q, tape, at)`: a subtree's result behind a warp and the map at tape[at], seen in
   front;
@@ -26,6 +27,7 @@ from typing import Any
 import warp as wp
 
 from blobtree.formulas.falloff import (
+    RIM,
     falloff,
     falloff_derivative,
     falloff_shallowest,
@@ -36,6 +38,9 @@ from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import (
     direct_bounds,
     direct_value_gradient,
+    falloff_numbers,
+    falloff_slope,
+    falloff_value,
     is_monotone,
     paints,
     partials,
@@ -69,6 +74,50 @@ def squared_distance(q: wp.vec3, c: wp.vec4) -> wp.float32:
     """Return (|q − c| / influence)² for c = (closest point, influence)."""
     w = q - wp.vec3(c[0], c[1], c[2])
     return wp.dot(w, w) / (c[3] * c[3])
+
+
+@wp.func
+def profile_distance(u: wp.float32, profile: wp.vec4) -> wp.float32:
+    """Return the argument of a falloff, 0 ≤ d ≤ 1, from u = |q − c| / influence.
+
+    d = ρ (1 + k (u / RIM − 1)): where the primitive alone has its surface, u = RIM, the falloff is at its own
+    rim ρ, so that it is half. k is 1 for a falloff in proportion to the radius, and otherwise the width that
+    this one has over the wanted width.
+    """
+    rim = falloff_numbers(int(profile[1]))[0]
+    return wp.clamp(rim * (1.0 + profile[2] * (u / RIM - 1.0)), 0.0, 1.0)
+
+
+@wp.func
+def profile_value(u: wp.float32, profile: wp.vec4) -> wp.float32:
+    """Return g, before its weight."""
+    d = profile_distance(u, profile)
+    if d >= 1.0:
+        return 0.0
+    return wp.max(falloff_value(int(profile[1]), d), 0.0)
+
+
+@wp.func
+def profile_slope(u: wp.float32, profile: wp.vec4) -> wp.float32:
+    """Return ∂g/∂u, before its weight."""
+    code = int(profile[1])
+    d = profile_distance(u, profile)
+    if d <= 0.0 or d >= 1.0:
+        return 0.0
+    return falloff_slope(code, d) * profile[2] * falloff_numbers(code)[0] / RIM
+
+
+@wp.func
+def profile_steepest(nearest: wp.float32, farthest: wp.float32, profile: wp.vec4) -> wp.float32:
+    """Return a bound on |∂g/∂u| over [nearest, farthest]."""
+    code = int(profile[1])
+    numbers = falloff_numbers(code)
+    largest = numbers[2]
+    if numbers[1] >= 0.0:
+        near = profile_distance(nearest, profile)
+        far = profile_distance(farthest, profile)
+        largest = -falloff_slope(code, wp.clamp(numbers[1], near, far))
+    return largest * profile[2] * numbers[0] / RIM
 
 
 @wp.func
@@ -114,6 +163,20 @@ def value_direct(
 ) -> wp.float32:
     """Return the value of a direct field."""
     return direct_value_gradient(kind, q, tape, at)[0]
+
+
+@wp.func
+def profiled_value_leaf(
+    q: wp.vec3,
+    c: wp.vec4,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    rate: wp.float32,
+    profile: wp.vec4,
+) -> wp.float32:
+    """Return the field of one primitive with a profile."""
+    return profile[3] * profile_value(wp.sqrt(squared_distance(q, c)), profile)
 
 
 @wp.func
@@ -205,6 +268,37 @@ def bound_direct(
 
 
 @wp.func
+def profiled_bound_leaf(
+    q: wp.vec3,
+    c: wp.vec4,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    rate: wp.float32,
+    profile: wp.vec4,
+) -> wp.vec3:
+    """Do the same as `bound_leaf` with a profile; a negative weight exchanges the bounds."""
+    u = wp.sqrt(squared_distance(q, c))
+    weight = profile[3]
+    value = weight * profile_value(u, profile)
+    size = wp.abs(weight)
+    if wp.dot(direction, direction) == 0.0:
+        nearest_u = wp.max(u - reach * rate, 0.0)
+        either = size * rate * profile_steepest(nearest_u, u + reach * rate, profile)
+        return wp.vec3(value, either, either)
+    growth = rate
+    if u > 0.0:
+        w = q - wp.vec3(c[0], c[1], c[2])
+        growth = wp.dot(w, direction) / (u * c[3] * c[3])
+    nearest = wp.max(u + wp.min(growth, 0.0) * reach, 0.0)
+    rise = size * wp.max(-growth, 0.0) * profile_steepest(nearest, u, profile)
+    fall = size * rate * profile_steepest(nearest, u + rate * reach, profile)
+    if weight < 0.0:
+        return wp.vec3(value, fall, rise)
+    return wp.vec3(value, rise, fall)
+
+
+@wp.func
 def bound_pullback_affine(f: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """Return `f`: slopes along the ray are the same in every space."""
     return f
@@ -290,6 +384,26 @@ def gradient_direct(
 
 
 @wp.func
+def profiled_gradient_leaf(
+    q: wp.vec3,
+    c: wp.vec4,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    rate: wp.float32,
+    profile: wp.vec4,
+) -> wp.vec4:
+    """Return (value, ∇f) of one primitive with a profile; on the skeleton the gradient is 0."""
+    u = wp.sqrt(squared_distance(q, c))
+    weight = profile[3]
+    g = wp.vec3()
+    if u > 0.0:
+        slope_u = weight * profile_slope(u, profile)
+        g = (q - wp.vec3(c[0], c[1], c[2])) * (slope_u / (u * c[3] * c[3]))
+    return wp.vec4(weight * profile_value(u, profile), g[0], g[1], g[2])
+
+
+@wp.func
 def gradient_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """Return (value, ∇f) pulled back by the transposed map."""
     g = tape[at] * f[1] + tape[at + 1] * f[2] + tape[at + 2] * f[3]
@@ -347,6 +461,21 @@ def color_direct(
 
 
 @wp.func
+def profiled_color_leaf(
+    q: wp.vec3,
+    c: wp.vec4,
+    color: wp.vec4,
+    direction: wp.vec3,
+    reach: wp.float32,
+    rate: wp.float32,
+    profile: wp.vec4,
+) -> wp.vec4:
+    """Return (value, red, green, blue) of one primitive with a profile."""
+    value = profile[3] * profile_value(wp.sqrt(squared_distance(q, c)), profile)
+    return wp.vec4(value, color[0], color[1], color[2])
+
+
+@wp.func
 def color_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """Return `f`: colours are the same in every space."""
     return f
@@ -371,11 +500,11 @@ def color_combine(
 ) -> wp.vec4:
     """Return F and the colours weighted by |∂F/∂a|·a and |∂F/∂b|·b; the stronger operand's if both are 0.
 
-    An operator that does not paint keeps the first operand's colour.
+    An operator that does not paint keeps the first operand's colour. An operand below 0 gives no colour.
     """
     p = partials(operator, a[0], b[0], parameter, tape)
-    weight_a = wp.abs(p[1]) * a[0]
-    weight_b = wp.abs(p[2]) * b[0]
+    weight_a = wp.abs(p[1]) * wp.max(a[0], 0.0)
+    weight_b = wp.abs(p[2]) * wp.max(b[0], 0.0)
     t = float(0.0)
     if b[0] > a[0]:
         t = 1.0
@@ -393,6 +522,7 @@ class Evaluator:
 
     leaf: wp.Function
     direct: wp.Function
+    profiled_leaf: wp.Function
     pullback_affine: wp.Function
     pullback_warp: wp.Function
     scale_speed: wp.Function
@@ -404,6 +534,7 @@ class Evaluator:
 VALUE = Evaluator(
     value_leaf,
     value_direct,
+    profiled_value_leaf,
     value_pullback_affine,
     value_pullback_warp,
     constant_speed,
@@ -414,6 +545,7 @@ VALUE = Evaluator(
 BOUND = Evaluator(
     bound_leaf,
     bound_direct,
+    profiled_bound_leaf,
     bound_pullback_affine,
     bound_pullback_warp,
     bound_scale_speed,
@@ -424,6 +556,7 @@ BOUND = Evaluator(
 GRADIENT = Evaluator(
     gradient_leaf,
     gradient_direct,
+    profiled_gradient_leaf,
     gradient_pullback_affine,
     gradient_pullback_warp,
     constant_speed,
@@ -434,6 +567,7 @@ GRADIENT = Evaluator(
 COLOR = Evaluator(
     color_leaf,
     color_direct,
+    profiled_color_leaf,
     color_pullback_affine,
     color_pullback_warp,
     constant_speed,

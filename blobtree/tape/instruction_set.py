@@ -1,4 +1,4 @@
-"""Instruction sets: the skeletons, operators and warps that the codes on a tape stand for.
+"""Instruction sets: the skeletons, operators, warps and falloffs that the codes on a tape stand for.
 
 Kernels are written against the tables of core kinds; a tree of core kinds has BUILT_IN, whose kernels are
 those in the files. For any other set of kinds the same kernels are instantiated (`transpile.specialize`). A
@@ -18,8 +18,15 @@ from typing import Any, TypeVar
 
 import warp as wp
 
+from blobtree.formulas.falloff import FALLOFFS, Falloff
 from blobtree.formulas.fields import FIELDS, FieldKind
-from blobtree.formulas.library import LIBRARY_FIELDS, LIBRARY_OPERATORS, LIBRARY_SKELETONS, LIBRARY_WARPS
+from blobtree.formulas.library import (
+    LIBRARY_FALLOFFS,
+    LIBRARY_FIELDS,
+    LIBRARY_OPERATORS,
+    LIBRARY_SKELETONS,
+    LIBRARY_WARPS,
+)
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
@@ -34,10 +41,16 @@ from blobtree.transpile.specialize import (
     warp_function,
 )
 
-_TABLES = {"SKELETONS": SKELETONS, "OPERATORS": OPERATORS, "WARPS": WARPS, "FIELDS": FIELDS}
+_TABLES = {
+    "SKELETONS": SKELETONS,
+    "OPERATORS": OPERATORS,
+    "WARPS": WARPS,
+    "FIELDS": FIELDS,
+    "FALLOFFS": FALLOFFS,
+}
 """The core tables by the names under which functions read them: all empty tables are the same object."""
 
-Row = Skeleton | Operator | SpaceWarp | FieldKind
+Row = Skeleton | Operator | SpaceWarp | FieldKind | Falloff
 AnyRow = TypeVar("AnyRow", bound=Row)
 
 _LOCK = RLock()
@@ -55,13 +68,14 @@ class InstructionSet:
     operators: tuple[Operator, ...]
     warps: tuple[SpaceWarp, ...]
     fields: tuple[FieldKind, ...]
+    falloffs: tuple[Falloff, ...] = FALLOFFS
     _kernels: dict[wp.Kernel, wp.Kernel] = field(default_factory=dict, compare=False, repr=False)
     _functions: dict[wp.Function, wp.Function] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def rows(self) -> tuple[Row, ...]:
         """All rows."""
-        return (*self.skeletons, *self.operators, *self.warps, *self.fields)
+        return (*self.skeletons, *self.operators, *self.warps, *self.fields, *self.falloffs)
 
     @Lazy
     def digest(self) -> str:
@@ -142,6 +156,7 @@ LIBRARY = InstructionSet(
     (*OPERATORS, *LIBRARY_OPERATORS),
     (*WARPS, *LIBRARY_WARPS),
     (*FIELDS, *LIBRARY_FIELDS),
+    (*FALLOFFS, *LIBRARY_FALLOFFS),
 )
 """The instruction set of trees with library kinds."""
 
@@ -153,13 +168,14 @@ def instruction_set_for(
     operators: Iterable[Operator],
     warps: Iterable[SpaceWarp],
     fields: Iterable[FieldKind],
+    falloffs: Iterable[Falloff] = (),
 ) -> InstructionSet:
     """Return an instruction set that has these rows.
 
     That is the smallest existing one, so that a tree with fewer kinds than an earlier tree compiles nothing.
     If none fits, a new one has the rows of BUILT_IN or LIBRARY, and then the custom rows in a fixed order.
     """
-    needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps), tuple(fields))
+    needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps), tuple(fields), tuple(falloffs))
     rows = set(needed.rows)
     with _LOCK:
         fitting = [existing for existing in _INSTRUCTION_SETS if rows.issubset(existing.rows)]
@@ -172,6 +188,7 @@ def instruction_set_for(
             _extended(base.operators, needed.operators),
             _extended(base.warps, needed.warps),
             _extended(base.fields, needed.fields),
+            _extended(base.falloffs, needed.falloffs),
         )
         _INSTRUCTION_SETS.append(created)
         return created

@@ -44,6 +44,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
     read from texel span[0] up to span[1].
     """
     leaf, direct, combine, empty = evaluator.leaf, evaluator.direct, evaluator.combine, evaluator.empty
+    profiled_leaf = evaluator.profiled_leaf
     pullback_affine, pullback_warp = evaluator.pullback_affine, evaluator.pullback_warp
     scale_speed = evaluator.scale_speed
     result_type = evaluator.type
@@ -87,7 +88,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
         tape: wp.array(dtype=wp.vec4),
         first: wp.int32,
     ) -> result_type:
-        """Do the same for a run of primitives that carry their own maps."""
+        """Do the same for a run of primitives that carry their own maps, and profiles."""
         accumulator = before
         kind = int(header[0]) - STRETCHED
         operator = int(header[1])
@@ -98,9 +99,14 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             if not is_convex(kind):
                 v = wp.vec3()
             c = closest(kind, local, tape, at + PREFIX)
-            rate = speed * tape[at + 3][0] / min_influence(kind, tape, at + PREFIX)
+            profile = tape[at + 3]
+            rate = speed * profile[0] / min_influence(kind, tape, at + PREFIX)
             end = at + PREFIX + stride(kind)
-            f = leaf(local, c, tape[end - 1], v, reach, rate)
+            f = empty()
+            if profile[2] == 0.0:
+                f = leaf(local, c, tape[end - 1], v, reach, rate)
+            else:
+                f = profiled_leaf(local, c, tape[end - 1], v, reach, rate, profile)
             accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator

@@ -5,6 +5,9 @@ accumulator of its own (push) and is combined afterwards (pop). The subtree that
 first (Sethi & Ullman 1970): a tree of n leaves needs at most log₂ n registers, a spine of any length none.
 Affine maps and offsets fold into the primitives below them. The tree that a macro stands for replaces it.
 
+A primitive with a negative weight has a field below 0. That field acts in sums. The operands of all other
+operators are raised to 0: a program combines such an operand with the empty field by max.
+
 The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state what it reads of a node.
 """
 
@@ -18,9 +21,9 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Box, Float64Array, IndexArray
 from blobtree.errors import InvalidNode
-from blobtree.formulas.falloff import RIM
+from blobtree.formulas.falloff import RIM, Falloff
 from blobtree.formulas.fields import FieldKind
-from blobtree.formulas.operators import RICCI, SUM, Operator, Support
+from blobtree.formulas.operators import RICCI, SUM, UNION, Operator, Support
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.lazy import Lazy
@@ -31,6 +34,12 @@ MAX_PRIMITIVES = 1 << 24
 
 SIMILARITY_TOLERANCE = 1e-6
 """Relative deviation from rotation × scale below which a map counts as a similarity."""
+
+NARROWEST_WIDTH = 1e-4
+"""Smallest width over the visible radius: float32 resolves no narrower edge."""
+
+EXTENT_MARGIN = 1e-6
+"""Relative widening of the extent of a profile, so that rounding leaves nothing outside."""
 
 SIMPLE = -1
 """Weight of a node that folds into the accumulator without one of its own."""
@@ -77,6 +86,8 @@ class ProgramNode:
     skeleton: ClassVar[Skeleton | None] = None
     operator: ClassVar[Operator | None] = None
     warp: ClassVar[SpaceWarp | None] = None
+    signed = False
+    """True for a primitive with a negative weight, whose field is below 0."""
 
     @property
     def children(self) -> tuple["ProgramNode", ...]:
@@ -141,6 +152,13 @@ class ProgramLeaf(ProgramNode):
     """A leaf of a tree, as the compiler of programs reads it."""
 
     color: Vector
+    profiled = False
+    """True if falloff, width or weight are not the default ones."""
+
+    @property
+    def profile(self) -> tuple[Falloff, float | None, float]:
+        """Falloff, width (None in proportion to the radius) and weight."""
+        raise NotImplementedError
 
     @property
     def program_children(self) -> tuple[ProgramNode, ...]:
@@ -241,6 +259,8 @@ def distinct_placements(primitives: list[PlacedPrimitive]) -> tuple[list[Placeme
 def influence_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
     """Return the influence radii (n, k) of n primitives of a kind: radius / RIM, offsets included.
 
+    Offsets change the radii of primitives with a negative weight the other way.
+
     Raises
     ------
     InvalidNode
@@ -250,6 +270,8 @@ def influence_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
     radii = leaves[0].radii(leaves)
     placements, placed_by = distinct_placements(primitives)
     growth = np.array([placement.growth for placement in placements])[placed_by]
+    if growth.any():
+        growth = np.where([placed.primitive.signed for placed in primitives], -growth, growth)
     influences: Float64Array = radii / RIM + (growth / RIM)[:, None]
     if (influences <= 0.0).any():
         vanished = primitives[int(np.argmin(influences.min(axis=1)))]
@@ -265,13 +287,55 @@ def grown_fields(leaves: list[PlacedPrimitive]) -> list[ProgramField]:
     ]
 
 
+def profile_factors(primitives: list[PlacedPrimitive], influences: Float64Array) -> Float64Array:
+    """Return the factors k (n,) of n primitives with influence radii (n, ·); 0 for those without a profile.
+
+    k is the width that the falloff would have in proportion to the radius, over the wanted width.
+
+    Raises
+    ------
+    InvalidNode
+        A width is too small for its radius.
+    """
+    factors = np.zeros(len(primitives))
+    for number, (primitive, _) in enumerate(primitives):
+        if primitive.profiled:
+            falloff, width, _ = primitive.profile
+            radius = float(influences[number, 0]) * RIM
+            if width is not None and width < NARROWEST_WIDTH * radius:
+                raise InvalidNode(
+                    f"width: expected at least {NARROWEST_WIDTH:g} of the radius {radius:g}, got {width:g}"
+                )
+            factors[number] = 1.0 if width is None else radius * (1.0 / falloff.rim - 1.0) / width
+    return factors
+
+
+def support_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
+    """Return the distances (n, k) from n skeletons at which fields end; influence radii by default.
+
+    Raises
+    ------
+    InvalidNode
+        An offset leaves nothing of a primitive, or a width is too small.
+    """
+    influences = influence_radii(primitives)
+    if not any(placed.primitive.profiled for placed in primitives):
+        return influences
+    factors = profile_factors(primitives, influences)
+    rims = np.array([p.profile[0].rim if p.profiled else RIM for p, _ in primitives])
+    extents = RIM * (1.0 + (1.0 / rims - 1.0) / np.where(factors == 0.0, 1.0, factors))
+    extents *= np.where(factors == 0.0, 1.0, 1.0 + EXTENT_MARGIN)
+    radii: Float64Array = influences * extents[:, None]
+    return radii
+
+
 @dataclass(frozen=True)
 class Run:
     """Instruction: fold `primitives`, one after the other, into the accumulator."""
 
     kind: LeafKind
     stretched: bool
-    """True if maps do not fold into the parameters, so that each primitive carries its inverse map."""
+    """True if each primitive carries its inverse map and its profile: maps do not fold into parameters."""
     operator: Operator
     parameters: tuple[float, ...]
     primitives: list[PlacedPrimitive] = field(default_factory=list)
@@ -346,13 +410,13 @@ def compile_program(root: ProgramNode) -> list[Instruction]:
     InvalidNode
         Shared subtrees, counted as often as they are used, hold too many primitives.
     """
-    weights = _weights(root)
+    weights, signed = _weights(root), _signed_nodes(root)
     program: list[Instruction] = []
     pending: list[_Emit | Instruction] = [_Emit(root, WORLD)]
     while pending:
         step = pending.pop()
         if isinstance(step, _Emit):
-            pending.extend(reversed(list(_expand(step, weights))))
+            pending.extend(reversed(list(_expand(step, weights, signed))))
         elif isinstance(step, Run) and program and isinstance(program[-1], Run) and program[-1].accepts(step):
             program[-1].primitives.extend(step.primitives)
         else:
@@ -395,7 +459,20 @@ def _weight(node: ProgramNode, child_weights: list[int]) -> int:
     return max([0, heaviest, *(weight + 1 for weight in others)])
 
 
-def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
+def _signed_nodes(root: ProgramNode) -> frozenset[int]:
+    """Return the ids of the nodes with children whose fields may be below 0."""
+    signed: set[int] = set()
+    for node in postorder(root, leaves=False, below=PROGRAM_CHILDREN):
+        keeps_sign = node.operator is None or _operation(node)[0].signed
+        children = node.program_children
+        if keeps_sign and (
+            any(map(attrgetter("signed"), children)) or not signed.isdisjoint(map(id, children))
+        ):
+            signed.add(id(node))
+    return frozenset(signed)
+
+
+def _expand(step: _Emit, weights: dict[int, int], signed: frozenset[int]) -> Iterator[_Emit | Instruction]:
     """Yield smaller steps for a step that starts from an empty accumulator."""
     node, placement = _strip(step.node, step.placement)
     if isinstance(node, ProgramLeaf):
@@ -404,7 +481,7 @@ def _expand(step: _Emit, weights: dict[int, int]) -> Iterator[_Emit | Instructio
         yield from _expand_warp(replace(step, node=node, placement=placement), node, node.warp)
     elif node.operator is not None:
         expand = _expand_commutative if node.operator.commutes else _expand_ordered
-        yield from expand(replace(step, node=node, placement=placement), node, weights)
+        yield from expand(replace(step, node=node, placement=placement), node, weights, signed)
 
 
 def _expand_warp(step: _Emit, node: ProgramNode, warp: SpaceWarp) -> Iterator[_Emit | Instruction]:
@@ -416,8 +493,23 @@ def _expand_warp(step: _Emit, node: ProgramNode, warp: SpaceWarp) -> Iterator[_E
     yield from (entry, inner, LeaveWarp(entry))
 
 
+def _raised(step: _Emit, operator: Operator, signed: frozenset[int]) -> Iterator[_Emit | Instruction]:
+    """Yield the steps of an operand, raised to 0 where it is below, if the operator asks for it."""
+    yield step
+    if not operator.signed and (step.node.signed or id(step.node) in signed):
+        yield Push(step.register)
+        yield Pop(step.register, UNION, ())
+
+
+def _raised_primitive(placed: PlacedPrimitive) -> PlacedPrimitive:
+    """Return a primitive as an operand of an operator other than the sum: without its field below 0."""
+    if not placed.primitive.signed:
+        return placed
+    return PlacedPrimitive(replace(cast(Any, placed.primitive), weight=0.0), placed.placement)
+
+
 def _expand_commutative(
-    step: _Emit, node: ProgramNode, weights: dict[int, int]
+    step: _Emit, node: ProgramNode, weights: dict[int, int], signed: frozenset[int]
 ) -> Iterator[_Emit | Instruction]:
     """Yield the heaviest operand first; primitives fold in at the end, kind by kind."""
     operator, parameters = _operation(node)
@@ -425,16 +517,16 @@ def _expand_commutative(
     primitives: list[PlacedPrimitive] = []
     for placed in _flatten(node, step.placement):
         if isinstance(placed, PlacedPrimitive):
-            primitives.append(placed)
+            primitives.append(placed if operator.signed else _raised_primitive(placed))
         else:
             subtrees.append(placed)
     subtrees.sort(key=lambda subtree: -weights[id(subtree[0])])
     for number, (operand, placement) in enumerate(subtrees):
         if number == 0:
-            yield step.into(operand, placement)
+            yield from _raised(step.into(operand, placement), operator, signed)
         else:
             yield Push(step.register)
-            yield step.into(operand, placement, deeper=1)
+            yield from _raised(step.into(operand, placement, deeper=1), operator, signed)
             yield Pop(step.register, operator, parameters)
     if not subtrees and not operator.starts_from_zero:
         first, *primitives = primitives
@@ -442,7 +534,9 @@ def _expand_commutative(
     yield from _runs(primitives, operator, parameters)
 
 
-def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> Iterator[_Emit | Instruction]:
+def _expand_ordered(
+    step: _Emit, node: ProgramNode, weights: dict[int, int], signed: frozenset[int]
+) -> Iterator[_Emit | Instruction]:
     """Yield the left operand first, unless the right one needs more registers."""
     operator, parameters = _operation(node)
     left, right = node.program_children
@@ -452,15 +546,15 @@ def _expand_ordered(step: _Emit, node: ProgramNode, weights: dict[int, int]) -> 
     if weights.get(id(right), SIMPLE) == SIMPLE:
         leaf, placement = _strip(right, right_placement)
         assert isinstance(leaf, ProgramLeaf)
-        yield step.into(left, left_placement)
-        yield from _runs([PlacedPrimitive(leaf, placement)], operator, parameters)
+        yield from _raised(step.into(left, left_placement), operator, signed)
+        yield from _runs([_raised_primitive(PlacedPrimitive(leaf, placement))], operator, parameters)
         return
     swapped = weights[id(right)] > weights.get(id(left), SIMPLE)
     operands = [(left, left_placement), (right, right_placement)]
     first, second = reversed(operands) if swapped else operands
-    yield step.into(*first)
+    yield from _raised(step.into(*first), operator, signed)
     yield Push(step.register)
-    yield step.into(*second, deeper=1)
+    yield from _raised(step.into(*second, deeper=1), operator, signed)
     yield Pop(step.register, operator, parameters, swapped)
 
 
@@ -472,11 +566,18 @@ def _runs(
     run: Run | None = None
     packer: type[ProgramLeaf] | None = None
     placement: Placement | None = None
+    profiled = False
     for placed in primitives:
-        if run is None or placed.placement is not placement or type(placed.primitive) is not packer:
-            packer, placement = type(placed.primitive), placed.placement
-            kind = leaf_kind(placed.primitive)
-            stretched = not placement.folds_into(kind)
+        primitive = placed.primitive
+        if (
+            run is None
+            or placed.placement is not placement
+            or type(primitive) is not packer
+            or primitive.profiled is not profiled
+        ):
+            packer, placement, profiled = type(primitive), placed.placement, primitive.profiled
+            kind = leaf_kind(primitive)
+            stretched = profiled or not placement.folds_into(kind)
             run = runs.setdefault((packer, stretched), Run(kind, stretched, operator, parameters))
         run.primitives.append(placed)
     yield from runs.values()

@@ -7,9 +7,10 @@ instruction after the other:
       code ≥ 0     a run of `count` primitives of the instruction set's skeletons[code], behind the header:
                    parameters, then a texel of colour
       code ≥ STRETCHED  the same for skeletons[code − STRETCHED], each behind PREFIX texels: the rows of its
-                   world → local map, then (largest stretch of that map, 0, 0, 0)
-      code ≥ FIELD  a run of `count` direct fields of fields[code − FIELD], each behind PREFIX texels of the
-                   same meaning: parameters, then a texel of colour
+                   world → local map, then (largest stretch of that map, its profile), where the profile is
+                   (0, 0, 0) or (code of a falloff, k > 0, weight), see `evaluators.profile_distance`
+      code ≥ FIELD  a run of `count` direct fields of fields[code − FIELD], each behind PREFIX texels as those
+                   of a warp: parameters, then a texel of colour
       PUSH         register[count] = accumulator; accumulator = 0
       POP          accumulator = operator(register[count], accumulator)
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
@@ -62,6 +63,7 @@ from blobtree.tape.program import (
     distinct_placements,
     grown_fields,
     influence_radii,
+    profile_factors,
     registers_needed,
     warp_registers_needed,
 )
@@ -105,6 +107,8 @@ class Tape:
         Codes of the kinds in use, to which shaders are specialised.
     stretched
         True if a primitive around a skeleton carries its own map.
+    falloffs
+        Codes of the falloffs of primitives with a profile.
     instruction_set
         The kinds that the codes stand for.
     headers
@@ -132,6 +136,7 @@ class Tape:
     headers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     fields: tuple[int, ...] = ()
     start: int = 0
+    falloffs: tuple[int, ...] = ()
 
     def on(self, device: str | None = None) -> DeviceTape:
         """Return this tape on a Warp device, by default the current one."""
@@ -166,7 +171,9 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     fields = {run.kind for run in runs if isinstance(run.kind, FieldKind)}
     warps = {step.warp for step in program if isinstance(step, EnterWarp)}
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
-    instruction_set = instruction_set_for(skeletons, operators, warps, fields)
+    carrying = [placed.primitive for run in runs if run.stretched for placed in run.primitives]
+    falloffs = {primitive.profile[0] for primitive in carrying if primitive.profiled}
+    instruction_set = instruction_set_for(skeletons, operators, warps, fields, falloffs)
     region = DataRegion(precision)
     texels = [np.concatenate(list(_texels(step, instruction_set, region))) for step in program]
     start = len(region.texels)
@@ -183,6 +190,7 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
         instruction_set=instruction_set,
         headers=np.concatenate([[start], ends[:-1]]).astype(np.int64),
         start=start,
+        falloffs=tuple(sorted(map(instruction_set.falloffs.index, falloffs))),
     )
 
 
@@ -210,7 +218,7 @@ def _texels(
             code = instruction_set.skeletons.index(kind) + (STRETCHED if stretched else 0)
             parameter = _parameter(parameters, region)
             yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
-            yield _primitive_texels(primitives, region, stretched=stretched)
+            yield _primitive_texels(primitives, instruction_set, region, stretched=stretched)
 
 
 def _parameter(parameters: tuple[float, ...], region: DataRegion) -> float:
@@ -239,7 +247,11 @@ def _map_texels(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _primitive_texels(
-    primitives: list[PlacedPrimitive], region: DataRegion, *, stretched: bool
+    primitives: list[PlacedPrimitive],
+    instruction_set: InstructionSet,
+    region: DataRegion,
+    *,
+    stretched: bool,
 ) -> NDArray[np.float64]:
     """Return parameters and colours of a run's primitives, all at once, for there may be a million.
 
@@ -257,7 +269,12 @@ def _primitive_texels(
     parameters = _with_data(nodes[0].packed(nodes, grown, matrices), nodes, region)
     parts = [parameters, _color_texels(nodes)]
     if stretched:
-        parts.insert(0, _prefixes(placements)[placed_by])
+        prefixes = _prefixes(placements)[placed_by]
+        factors = profile_factors(primitives, grown)
+        for number in np.flatnonzero(factors):
+            falloff, _, weight = nodes[number].profile
+            prefixes[number, -1, 1:] = (instruction_set.falloffs.index(falloff), factors[number], weight)
+        parts.insert(0, prefixes)
     return np.concatenate(parts, axis=1).reshape(-1, 4)
 
 

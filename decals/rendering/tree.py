@@ -17,6 +17,9 @@ from blobtree._typing import Float64Array
 from blobtree.tape.dispatch import (
     direct_bounds,
     direct_value_gradient,
+    falloff_numbers,
+    falloff_slope,
+    falloff_value,
     is_monotone,
     paints,
     partials,
@@ -66,6 +69,8 @@ class Kinds:
     warp_registers: int
     fields: tuple[int, ...] = ()
     instruction_set: InstructionSet = BUILT_IN
+    falloffs: tuple[int, ...] = ()
+    """Codes of the falloffs of primitives with a profile."""
 
     @classmethod
     def of(cls, tape: Tape) -> "Kinds":
@@ -79,6 +84,7 @@ class Kinds:
             tape.warp_registers,
             tape.fields,
             tape.instruction_set,
+            tape.falloffs,
         )
 
 
@@ -113,19 +119,20 @@ def _library(kinds: Kinds) -> str:
         ),
         *(evaluator.pullback_warp for evaluator in evaluators if kinds.warps),
         *(evaluator.direct for evaluator in evaluators if kinds.fields),
+        *(evaluator.profiled_leaf for evaluator in evaluators if kinds.falloffs),
         to_local,
         direction_to_local,
         trace_ray,
     ]
-    return translate_library(
-        functions, provided=[*_choices(kinds), is_monotone, paints, field_bound, field_gradient]
-    )
+    provided = [*_choices(kinds), is_monotone, paints, falloff_numbers, field_bound, field_gradient]
+    return translate_library(functions, provided=provided)
 
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
     """Return the functions that choose by a code on the tape, and their alternatives."""
     operators, warps = kinds.instruction_set.operators, kinds.instruction_set.warps
     fields = kinds.instruction_set.fields
+    falloffs = kinds.instruction_set.falloffs
     choices: dict[Any, dict[int, Any]] = {
         partials: {code: operators[code].partials for code in kinds.operators},
         slope: {code: operators[code].slope for code in kinds.operators},
@@ -134,6 +141,8 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
         warp_stretch: {code: warps[code].stretch for code in kinds.warps},
         direct_value_gradient: {code: fields[code].value_gradient for code in kinds.fields},
         direct_bounds: {code: fields[code].bounds for code in kinds.fields},
+        falloff_value: {code: falloffs[code].value for code in kinds.falloffs},
+        falloff_slope: {code: falloffs[code].slope for code in kinds.falloffs},
     }
     return {chooser: among for chooser, among in choices.items() if among}
 
@@ -146,13 +155,25 @@ def _dispatch(kinds: Kinds) -> str:
         "paints": [code for code, row in rows.items() if row.paints],
     }
     choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
-    return "\n".join([*choices, *(_flag(name, among, len(rows)) for name, among in flags.items())])
+    return "\n".join(
+        [*choices, *(_flag(name, among, len(rows)) for name, among in flags.items()), _falloff_numbers(kinds)]
+    )
 
 
 def _flag(name: str, among: list[int], count: int) -> str:
     """Return a function that is true for the operators `among` `count` ones in use."""
     test = " || ".join(f"operator == {code}" for code in among) or "false"
     return f"bool {name}(int operator) {{ return {'true' if len(among) == count else test}; }}"
+
+
+def _falloff_numbers(kinds: Kinds) -> str:
+    """`falloff_numbers` for the falloffs in use."""
+    cases = []
+    for code in kinds.falloffs:
+        row = kinds.instruction_set.falloffs[code]
+        numbers = f"vec3({row.rim!r}, {row.steepest_distance!r}, {row.steepest_slope!r})"
+        cases.append(f"if (kind == {code}) {{ return {numbers}; }}")
+    return f"vec3 falloff_numbers(int kind) {{ {' '.join(cases)} return vec3(0.0); }}"
 
 
 def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) -> Source:
@@ -165,6 +186,7 @@ def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) 
             "FIELD": glsl_type,
             "LEAF": evaluator.leaf.key,
             "DIRECT": evaluator.direct.key,
+            "PROFILED_LEAF": evaluator.profiled_leaf.key,
             "PULLBACK_AFFINE": evaluator.pullback_affine.key,
             "PULLBACK_WARP": evaluator.pullback_warp.key,
             "COMBINE": evaluator.combine.key,
@@ -201,6 +223,7 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
                 **names,
                 stride=skeleton.parameters + PREFIX + 1,
                 prefix=PREFIX,
+                field=(_PROFILED_FIELD if kinds.falloffs else _MAPPED_FIELD).format(**names),
             )
     for code in kinds.fields:
         stride = kinds.instruction_set.fields[code].parameters + PREFIX + 1
@@ -225,15 +248,22 @@ case {code}:
         int map = at;
         vec3 local = to_local(point, tape, map);
         vec4 c = {closest}(local, tape, map + {prefix});
-        float local_speed = speed * tape_texel(tape, map + {prefix} - 1).x;
-        float rate = local_speed / {min_influence}(tape, map + {prefix});
+        vec4 profile = tape_texel(tape, map + {prefix} - 1);
+        float rate = speed * profile.x / {min_influence}(tape, map + {prefix});
         at += {stride};
-        FIELD field = LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate);
+        FIELD field = {field};
         field = PULLBACK_AFFINE(field, tape, map);
         accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}
     break;
 """
+
+_MAPPED_FIELD = "LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate)"
+
+_PROFILED_FIELD = (
+    f"profile.z == 0.0 ? {_MAPPED_FIELD}"
+    " : PROFILED_LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate, profile)"
+)
 
 
 _DIRECT_RUN = """\

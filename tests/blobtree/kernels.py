@@ -1,4 +1,4 @@
-"""Warp functions of the custom kinds in `custom_kinds.py`: skeletons and operators."""
+"""Warp functions of custom kinds: skeletons, operators and falloffs."""
 
 import warp as wp
 
@@ -140,3 +140,45 @@ def stew_steepest(
 ) -> wp.vec2:
     """Bounds on the partial derivatives, whose fractions are at most the other operand."""
     return wp.vec2(left + both * max_b, right + both * max_a)
+
+
+@wp.func
+def staircase(d: wp.float32) -> wp.float32:
+    """A falloff with three steep parts."""
+    return 1.0 - d + wp.sin(18.849556 * d) / 18.849556
+
+
+@wp.func
+def staircase_slope(d: wp.float32) -> wp.float32:
+    """Its derivative."""
+    return wp.cos(18.849556 * d) - 1.0
+
+
+@wp.func
+def tent(d: wp.float32) -> wp.float32:
+    """A straight line."""
+    return 1.0 - d
+
+
+@wp.func
+def tent_slope(d: wp.float32) -> wp.float32:
+    """Its derivative."""
+    return -1.0
+
+
+@wp.func
+def rising(d: wp.float32) -> wp.float32:
+    """Not a falloff: it rises."""
+    return 1.0 - d + 0.5 * wp.sin(12.566371 * d)
+
+
+@wp.func
+def short(d: wp.float32) -> wp.float32:
+    """Not a falloff: it ends at a half."""
+    return 1.0 - 0.5 * d
+
+
+@wp.func
+def vector(d: wp.vec3) -> wp.float32:
+    """Not a function of a distance."""
+    return d[0]

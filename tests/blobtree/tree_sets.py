@@ -13,7 +13,9 @@ from tests.blobtree.trees import (
     CONTACTS,
     DEFORMED,
     FIELDS,
+    PROFILED,
     SHAPES,
+    SIGNED,
     SOLIDS,
     points_around,
     random_trees,
@@ -29,6 +31,10 @@ FIELD_TREES = random_trees(seed=33, count=40, more=FIELDS)
 SHAPE_TREES = random_trees(seed=41, count=80, more=SHAPES)
 BLEND_TREES = random_trees(seed=51, count=80, depth=3, more=BLENDED)
 CONTACT_TREES = random_trees(seed=31, count=40, depth=2, more=CONTACTS)
+PROFILED_TREES = random_trees(seed=22, count=80, more=PROFILED)
+SIGNED_TREES = random_trees(seed=23, count=80, more=SIGNED)
+ANY_COLOR = 1.0
+"""Colours of sums with fields below 0 depend on the order of their operands."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,8 @@ _SETS = {
     "blends": _batches(BLEND_TREES, 2e-5, 3e-4),
     "contacts": _batches(CONTACT_TREES, 2e-5, 3e-4),
     "deformed": _batches(DEFORMED_TREES, 2e-5, 3e-4),
+    "profiled": _batches(PROFILED_TREES, 2e-5, 3e-4),
+    "signed": _batches(SIGNED_TREES, 2e-5, ANY_COLOR),
     "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),
 }
 ORDINARY = 1

@@ -1,10 +1,11 @@
 """Random trees: a seeded generator for numbers, a Hypothesis strategy for structure."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import combinations
 from operator import add, and_, or_
+from typing import Any, cast
 
 import numpy as np
 from hypothesis import strategies as st
@@ -63,7 +64,12 @@ from blobtree import (
     Twist,
     Union,
 )
+from blobtree.formulas.falloff import FALLOFFS
+from blobtree.formulas.falloffs import MORE_FALLOFFS
+from blobtree.nodes.primitives import Profile
 from blobtree.validation import Vector
+
+BUILT_IN_FALLOFFS = [row.name for row in (*FALLOFFS, *MORE_FALLOFFS)]
 
 KINDS = (Point, Segment, Cone, Sum, Ricci, Union, Intersection, Difference, Transform, Offset, Twist)
 
@@ -179,6 +185,32 @@ def random_shape(rng: np.random.Generator) -> Node:
 
 
 SHAPES = MoreKinds(random_shape)
+PROFILE_SOURCES = (random_leaf, random_solid, random_shape)
+
+
+def random_profile(rng: np.random.Generator, leaf: Any, weights: Sequence[float]) -> Node:
+    """A primitive with another falloff, width and weight; the leaf itself if it has none."""
+    if not isinstance(leaf, Profile):
+        return cast(Node, leaf)
+    size = float(getattr(leaf, "radius", 0.5))
+    width = None if rng.random() < 0.4 else float(size * rng.uniform(0.4, 2.0))
+    falloff, weight = str(rng.choice(BUILT_IN_FALLOFFS)), float(rng.choice(weights))
+    profiled: Any = replace(leaf, falloff=falloff, width=width, weight=weight)
+    return cast(Node, profiled)
+
+
+def random_profiled_leaf(rng: np.random.Generator) -> Node:
+    leaf = PROFILE_SOURCES[int(rng.integers(0, 3))](rng)
+    return random_profile(rng, leaf, (1.0, 1.0, 1.0, 0.6, 1.5))
+
+
+def random_signed_leaf(rng: np.random.Generator) -> Node:
+    leaf = PROFILE_SOURCES[int(rng.integers(0, 3))](rng)
+    return random_profile(rng, leaf, (1.0, 1.0, 1.0, 1.0, -0.5, -1.5))
+
+
+PROFILED = MoreKinds(random_profiled_leaf)
+SIGNED = MoreKinds(random_signed_leaf)
 
 
 def random_contact(rng: np.random.Generator, operands: list[Node]) -> Node:

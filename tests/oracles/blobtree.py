@@ -63,12 +63,25 @@ from blobtree import (
 )
 from blobtree.formulas.operators import Support
 from blobtree.nodes.deformations import Deformation
-from blobtree.nodes.primitives import Leaf, Primitive
+from blobtree.nodes.parameters import Quantity, parameters_of
+from blobtree.nodes.primitives import Leaf, Primitive, Profile
 from blobtree.nodes.tree import AssociativeCombination, Macro
 from blobtree.nodes.values import parameter_values
-from tests.oracles import blends, convolution, custom_kinds, deformations, direct_fields, shapes, volumes
+from tests.oracles import (
+    blends,
+    convolution,
+    custom_kinds,
+    deformations,
+    direct_fields,
+    falloffs,
+    shapes,
+    volumes,
+)
 
 Floats = NDArray[np.float64]
+
+HUGE = 64.0
+"""Factor of radii that takes every point of a test into a primitive's influence."""
 
 RIM = np.sqrt(1.0 - 0.5 ** (1.0 / 3.0))
 
@@ -83,9 +96,24 @@ class Field:
 
 
 def evaluate(node: Node, points: ArrayLike) -> Field:
-    """The field of `node` at `points` (n, 3)."""
+    """The field of `node` at `points` (n, 3), raised to 0 as operators other than the sum read it."""
+    field = signed(node, points)
+    if (field.value >= 0.0).all():
+        return field
+    margin = np.where(field.value == 0.0, field.margin, np.minimum(field.margin, np.abs(field.value)))
+    return replace(field, value=np.maximum(field.value, 0.0), margin=margin)
+
+
+def signed(node: Node, points: ArrayLike) -> Field:
+    """The field of `node` at `points` (n, 3), below 0 where negative weights outweigh the rest."""
     q = np.asarray(points, np.float64)
     match node:
+        case Primitive() if node.profiled:
+            return _profiled(node, q)
+        case Ellipsoid(semi_axes=axes, width=width):
+            ratio = np.linalg.norm((q - np.array(node.center)) / np.array(axes), axis=1)
+            relative = None if width is None else width / float(np.cbrt(np.prod(axes)))
+            return _falling(ratio, 1.0, relative, node, np.full(len(q), np.inf))
         case Point(center=center, radius=radius, color=color):
             return _leaf(q - np.array(center), radius, color)
         case Segment(start=start, end=end, radius=radius, color=color):
@@ -103,8 +131,6 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
         case Box(center=center, size=size, radius=radius, color=color):
             beyond = np.maximum(np.abs(q - np.array(center)) - 0.5 * np.array(size), 0.0)
             return _leaf(beyond, radius, color)
-        case Ellipsoid(center=center, semi_axes=semi_axes, color=color):
-            return _leaf((q - np.array(center)) / np.array(semi_axes), 1.0, color)
         case Superquadric(center=center, semi_axes=semi_axes, color=color):
             x, y, z = (np.abs(q - np.array(center)) / np.array(semi_axes)).T
             vertical, horizontal = node.vertical, node.horizontal
@@ -142,16 +168,16 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
         case Cone(color=color):
             return _leaf_at(_least_ratio(q, node), color)
         case Twist(child=child, degrees=degrees):
-            return evaluate(child, _turned(q, -np.radians(degrees) * q[:, 2]))
+            return signed(child, _turned(q, -np.radians(degrees) * q[:, 2]))
         case Taper() | Shear() | Stretch() | LimitedTwist() | Bend() | NoiseWarp() | CurveWarp():
             unwarped, kink = deformations.unwarped(node, q)
-            inner = evaluate(node.child, unwarped)
+            inner = signed(node.child, unwarped)
             return replace(inner, margin=np.minimum(inner.margin, kink))
         case Offset(child=child, distance=distance):
-            return evaluate(grown(child, distance), q)
+            return signed(grown(child, distance), q)
         case Transform(child=child, matrix=matrix):
             linear, offset = np.array(matrix)[:, :3], np.array(matrix)[:, 3]
-            return evaluate(child, np.linalg.solve(linear, (q - offset).T).T)
+            return signed(child, np.linalg.solve(linear, (q - offset).T).T)
         case Difference(solid=solid, tool=tool):
             return _difference(evaluate(solid, q), evaluate(tool, q))
         case Bulge(solid=solid, obstacle=obstacle):
@@ -171,7 +197,9 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
         case Contact():
             return evaluate(outside_of(node), q)
         case Sum(operands=operands):
-            return reduce(lambda a, b: _ricci(a, b, 1.0), [evaluate(operand, q) for operand in operands])
+            return reduce(_sum, [signed(operand, q) for operand in operands])
+        case Ricci(operands=operands, exponent=1.0):
+            return reduce(_sum, [signed(operand, q) for operand in operands])
         case Ricci(operands=operands, exponent=exponent):
             return reduce(lambda a, b: _ricci(a, b, exponent), [evaluate(operand, q) for operand in operands])
         case Union(operands=operands):
@@ -187,7 +215,7 @@ def evaluate(node: Node, points: ArrayLike) -> Field:
 
 def value(node: Node, points: ArrayLike) -> Floats:
     """The field's values (n,)."""
-    return evaluate(node, points).value
+    return signed(node, points).value
 
 
 def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
@@ -200,7 +228,9 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
 
 
 def grown(node: Node, distance: float) -> Node:
-    """`node` with every radius larger by `distance`, those of tools smaller."""
+    """`node` with every radius larger by `distance`, those of tools and of negative weights smaller."""
+    if isinstance(node, Profile) and node.weight < 0.0:
+        distance = -distance
     match node:
         case AssociativeCombination(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
@@ -233,9 +263,7 @@ def grown(node: Node, distance: float) -> Node:
         case Cone():
             return replace(node, radius=node.radius + distance, end_radius=node.end_radius + distance)
         case Primitive() | Polyline() | Polygon():
-            thick: Any = node
-            thicker: Node = replace(thick, radius=node.radius + distance)
-            return thicker
+            return _with_radius(node, node.radius + distance)
         case Offset(child=child, distance=more):
             return grown(child, distance + more)
         case Transform(child=child, matrix=matrix):
@@ -336,6 +364,43 @@ def pressed_field(a: Field, b: Field, ratio: float, w: float, h: float) -> Field
     margin = np.where(x < 1.0, np.minimum(margin, np.abs(t)), margin)
     margin = np.where(t <= 0.0, np.minimum(margin, np.abs(a.value + t)), margin)
     return Field(value, a.color, margin)
+
+
+def _with_radius(node: Any, radius: float) -> Node:
+    changed: Node = replace(node, radius=radius)
+    return changed
+
+
+def _profiled(node: Primitive, q: Floats) -> Field:
+    """A primitive with a profile; its ratio |q − c| / radius comes from a huge one without a profile."""
+    radii = [name for name, p in parameters_of(type(node)).items() if p.quantity is Quantity.RADIUS]
+    plain: Any = {"falloff": "wyvill", "width": None, "weight": 1.0}
+    huge = replace(node, **plain, **{name: HUGE * getattr(node, name) for name in radii})
+    base = evaluate(huge, q)
+    ratio = HUGE * np.sqrt(np.maximum(1.0 - np.cbrt(base.value), 0.0)) / RIM
+    return _falling(ratio, float(getattr(node, radii[0])), node.width, node, base.margin)
+
+
+def _falling(
+    ratio: Floats, radius: float, width: float | None, node: Primitive | Ellipsoid, margin: Floats
+) -> Field:
+    """The field at distances (n,) over the radius, by the falloff of a node."""
+    name = str(getattr(node.falloff, "name", node.falloff))
+    rim = falloffs.rim(name)
+    d = rim * ratio if width is None else rim + (ratio - 1.0) * radius * (1.0 - rim) / width
+    value = node.weight * falloffs.value(name, np.clip(d, 0.0, 1.0))
+    if width is not None and width * rim > radius * (1.0 - rim):  # the field has a kink on the skeleton
+        margin = np.minimum(margin, ratio)
+    return Field(value, np.tile(np.array(node.color), (len(ratio), 1)), margin)
+
+
+def _sum(a: Field, b: Field) -> Field:
+    if (a.value >= 0.0).all() and (b.value >= 0.0).all():
+        return _ricci(a, b, 1.0)
+    weights = np.maximum(a.value, 0.0), np.maximum(b.value, 0.0)
+    total = weights[0] + weights[1]
+    share = np.where(total > 0.0, weights[1] / np.where(total > 0.0, total, 1.0), b.value > a.value)
+    return Field(a.value + b.value, _mixed(a, b, 1.0 - share, share), np.minimum(a.margin, b.margin))
 
 
 def _turned(q: Floats, angle: Floats) -> Floats:

@@ -180,7 +180,7 @@ def _from_rectangle(q: Floats, node: Rectangle) -> Floats:
     first /= np.linalg.norm(first)
     second = np.cross(axis, first)
     w = q - np.array(node.center)
-    beyond = [np.maximum(np.abs(w @ first) - 0.5 * node.width, 0.0)]
+    beyond = [np.maximum(np.abs(w @ first) - 0.5 * node.length, 0.0)]
     beyond += [np.maximum(np.abs(w @ second) - 0.5 * node.height, 0.0), w @ axis]
     distance: Floats = np.linalg.norm(beyond, axis=0)
     return distance

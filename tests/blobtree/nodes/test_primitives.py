@@ -42,7 +42,7 @@ from blobtree.formulas.library import LIBRARY_SKELETONS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
-from blobtree.nodes.primitives import Leaf, Primitive
+from blobtree.nodes.primitives import PROFILE, Leaf, Primitive
 from blobtree.nodes.tree import NODE_KINDS
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
@@ -291,7 +291,8 @@ def test_every_skeleton_has_a_primitive_with_a_radius_and_a_color() -> None:
 def test_files_hold_the_declared_parameters(node: Node) -> None:
     (record,) = json.loads(to_json(node))["nodes"]
     assert NODE_KINDS[record.pop("type")] is type(node)
-    assert list(record) == [name for name in parameters_of(type(node)) if name != "attributes"]
+    shared = {"attributes", *PROFILE}
+    assert list(record) == [name for name in parameters_of(type(node)) if name not in shared]
     assert from_json(to_json(node)) == node == eval(repr(node), KINDS)
 
 
@@ -303,7 +304,7 @@ def test_the_guide_lists_every_primitive_with_its_parameters() -> None:
     guide = (Path(__file__).parents[3] / "docs" / "modelling.md").read_text()
     for kind in NODE_KINDS.values():
         if issubclass(kind, Leaf):
-            shared = ("color", "attributes")
+            shared = {"color", "attributes", *PROFILE}
             declared = [p for name, p in parameters_of(kind).items() if name not in shared]
             arguments = [p.name + "=…" * (p.quantity is Quantity.RADIUS) for p in declared]
             assert f"`{kind.__name__}({', '.join(arguments)})`" in guide

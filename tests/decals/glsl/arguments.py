@@ -93,7 +93,8 @@ BY_NAME: dict[str, Draw] = {
     "offset": beside(powers(-9, 9), powers(-9, 9)),
     "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
     "operator": whole(0, len(OPERATORS)), "origin": place,
-    "phi": share, "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
+    "profile": beside(among(1), among(0), uniform(0.3, 3.0), uniform(-2.0, 2.0)), "phi": share,
+    "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
     "rim": share,
     "speed": uniform(0.1, 3.0),
     "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3),
@@ -105,7 +106,13 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "gradient_combine": {"a": beside(field, uniform(-3, 3, 3)), "b": beside(field, uniform(-3, 3, 3))},
     "color_combine": {"a": beside(field, uniform(0, 1, 3)), "b": beside(field, uniform(0, 1, 3))},
     "direction_to_local": {"v": place},
+    "falloff_value": {"kind": among(0), "distance": share},
+    "falloff_slope": {"kind": among(0), "distance": share},
+    **{
+        f"profile_{name}": {"u": uniform(0.0, 1.5)} for name in ("distance", "value", "slope", "steepest")
+    },
     "bound_leaf": {"direction": units_or_none},
+    "profiled_bound_leaf": {"direction": units_or_none},
     "unroll_step": {"step": place},
     "bound_pullback_affine": {"f": uniform(0, 3, 3)},
     "gradient_pullback_affine": {"f": four},

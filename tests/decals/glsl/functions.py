@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
@@ -28,6 +29,7 @@ ALL_KINDS = Kinds(
     stretched=True,
     warps=tuple(range(len(WARPS))),
     warp_registers=4,
+    falloffs=tuple(range(len(FALLOFFS))),
 )
 """All that a tape of core kinds can hold, in one program."""
 ALL_LIBRARY_KINDS = Kinds(

@@ -6,9 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
 from blobtree.tape.dispatch import (
+    falloff_numbers,
+    falloff_slope,
+    falloff_value,
     is_monotone,
     paints,
     partials,
@@ -26,6 +30,7 @@ from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, through_glsl
 
 MODULES = (
     "blobtree.formulas.falloff",
+    "blobtree.formulas.falloffs",
     "blobtree.formulas.skeletons",
     "blobtree.formulas.operators",
     "blobtree.tape.dispatch",
@@ -39,7 +44,15 @@ MODULES = (
     "decals.record",
     "decals.field.ownership",
 )
-WRITTEN_TWICE = {"closest", "min_influence", "stride", "is_convex", "is_monotone", "paints"}
+WRITTEN_TWICE = {
+    "closest",
+    "min_influence",
+    "stride",
+    "is_convex",
+    "is_monotone",
+    "paints",
+    "falloff_numbers",
+}
 """Switches over the tables, written per backend."""
 
 
@@ -51,7 +64,18 @@ def shared(module: str) -> list[TypedFunction]:
 
 
 FUNCTIONS = {f"{module}.{typed.name}": typed for module in MODULES for typed in shared(module)}
-CHOOSERS: list[Any] = [partials, is_monotone, paints, slope, warp_forward, warp_pullback, warp_stretch]
+CHOOSERS: list[Any] = [
+    partials,
+    is_monotone,
+    paints,
+    slope,
+    warp_forward,
+    warp_pullback,
+    warp_stretch,
+    falloff_value,
+    falloff_slope,
+    falloff_numbers,
+]
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -61,7 +85,8 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
     library = _dispatch(ALL_KINDS)
     rows_of_operators = [f for operator in OPERATORS for f in (operator.partials, operator.slope)]
     rows_of_warps = [f for warp in WARPS for f in (warp.forward, warp.pullback, warp.stretch)]
-    chosen = [*rows_of_operators, *rows_of_warps]
+    rows_of_falloffs = [f for row in FALLOFFS for f in (row.value, row.slope)]
+    chosen = [*rows_of_operators, *rows_of_warps, *rows_of_falloffs]
     if typed.function in CHOOSERS:
         library = translate_library(chosen) + library
     else:

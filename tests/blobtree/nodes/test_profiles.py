@@ -1,0 +1,256 @@
+"""Falloff, width and weight of primitives: values, visible radii, supports, meshes, files and bad input."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import (
+    FALLOFF_NAMES,
+    ISO,
+    Box,
+    Cone,
+    Difference,
+    Disc,
+    InvalidDefinition,
+    InvalidNode,
+    Node,
+    NumericParameter,
+    Point,
+    Segment,
+    Sum,
+    Torus,
+    Union,
+    define_falloff,
+    from_json,
+    numeric_parameters,
+    numeric_values,
+    polygonize,
+    to_json,
+    with_numeric_values,
+)
+from blobtree.nodes.parameters import parameters_of
+from blobtree.nodes.paths import moved, resized
+from blobtree.nodes.primitives import PROFILE, Primitive
+from blobtree.tape.instruction_set import BUILT_IN
+from tests.blobtree.custom_kinds import Ring
+from tests.blobtree.kernels import rising, short, staircase, staircase_slope, tent, tent_slope, vector
+from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
+from tests.blobtree.transpile.warp_functions import call
+from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around
+from tests.oracles import blobtree as oracle
+from tests.oracles import falloffs as exact
+
+EACH_FALLOFF = pytest.mark.parametrize("name", BUILT_IN_FALLOFFS)
+
+PRIMITIVES: dict[str, tuple[Any, tuple[float, float, float]]] = {
+    "point": (lambda **p: Point((0, 0, 0), radius=0.4, **p), (0.4, 0, 0)),
+    "segment": (lambda **p: Segment((0, 0, 0), (1, 0, 0), radius=0.4, **p), (0.5, 0.4, 0)),
+    "cone": (lambda **p: Cone((0, 0, 0), (1, 0, 0), radius=0.4, end_radius=0.2, **p), (-0.4, 0, 0)),
+    "torus": (lambda **p: Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
+    "disc": (lambda **p: Disc((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
+    "box": (lambda **p: Box((0, 0, 0), (1, 1, 1), radius=0.4, **p), (0.9, 0, 0)),
+    "ring": (lambda **p: Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
+}
+"""Makers of primitives, and a point on the surface of each, of which x is the direction outwards."""
+
+
+Staircase = define_falloff(staircase, staircase_slope)
+Tent = define_falloff(tent, tent_slope)
+
+
+@EACH_FALLOFF
+def test_a_falloff_is_that_of_its_source(name: str) -> None:
+    row = FALLOFF_NAMES[name]
+    d = np.linspace(0.0, 1.0, 2001)
+    np.testing.assert_allclose(call(row.value, distance=d), exact.value(name, d), atol=5e-7)
+    step = 1e-6
+    inner = d[1:-1]
+    slopes = (exact.value(name, inner + step) - exact.value(name, inner - step)) / (2.0 * step)
+    np.testing.assert_allclose(call(row.slope, distance=inner), slopes, atol=2e-5)
+    assert row.rim == pytest.approx(exact.rim(name), abs=1e-12)
+    dense = np.linspace(0.0, 1.0, 400_001)
+    steepness = -np.gradient(exact.value(name, dense), dense)
+    assert row.steepest_slope == pytest.approx(steepness.max(), rel=1e-4)
+    assert row.steepest_distance == pytest.approx(dense[steepness.argmax()], abs=1e-4)
+    assert call(row.value, distance=[0.0, 1.0]) == pytest.approx([1.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", PRIMITIVES)
+@pytest.mark.parametrize("name", [*BUILT_IN_FALLOFFS, "staircase"])
+def test_an_isolated_primitive_shows_its_radius_and_ends_at_its_width(kind: str, name: str) -> None:
+    make, surface = PRIMITIVES[kind]
+    sign = np.sign(surface[0]) if kind != "segment" else 0.0
+    outward = np.array([sign, 0.0 if sign else 1.0, 0.0])
+    for width in (None, 0.1, 1.0):
+        node = make(falloff=name, width=width)
+        assert float(node(surface)) == pytest.approx(ISO, abs=2e-6)
+        end = 0.4 * (1.0 / exact.rim(name) - 1.0) if width is None else width
+        inside, outside = np.array(surface) + np.multiply.outer([0.98 * end, 1.001 * end], outward)
+        assert float(node(inside)) > 0.0
+        assert float(node(outside)) == 0.0
+        reach = float(np.abs(surface) @ np.abs(outward)) + end
+        corner = node.support[0] if sign < 0 else node.support[1]
+        assert reach <= abs(float(corner @ outward)) <= 1.1 * reach
+
+
+@pytest.mark.parametrize("falloff", [Staircase, Tent], ids=repr)
+def test_a_custom_falloff_is_evaluated_and_bounded(falloff: Any) -> None:
+    tree = Point((0, 0, 0), radius=1.0, falloff=falloff) + Point((1, 0, 0), radius=0.5, width=0.7)
+    points = points_around(np.random.default_rng(1), tree, 400)
+    np.testing.assert_allclose(tree(points), oracle.value(tree, points), atol=1e-5)
+    mesh = polygonize(tree, resolution=24)
+    assert_closed(mesh)
+    hits = tree.raycast(np.tile([3.0, 0, 0], (50, 1)), np.random.default_rng(2).normal(-1, 0.2, (50, 3)))
+    np.testing.assert_allclose(tree(hits.positions[hits.hit]), ISO, atol=1e-3)
+    assert pickle.loads(pickle.dumps(tree)) == tree == from_json(to_json(tree))
+    assert (falloff.steepest_distance >= 0.0) is (falloff is Tent)
+
+
+def test_a_falloff_outside_the_core_uses_the_library_and_a_width_does_not() -> None:
+    ball: dict[str, Any] = {"center": (0, 0, 0), "radius": 1.0}
+    assert Point(**ball, width=0.5, weight=2.0).tape.instruction_set is BUILT_IN
+    assert Point(**ball, falloff="gaussian").tape.instruction_set is not BUILT_IN
+    assert Point(**ball, falloff="gaussian").tape.falloffs != ()
+    assert Point(**ball).tape.falloffs == ()
+
+
+# -- weights --------------------------------------------------------------------------------------------
+
+
+def test_a_negative_weight_carves_in_a_sum_and_does_nothing_elsewhere() -> None:
+    solid, carver = Point((0, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=0.6, weight=-1.0)
+    tool = Point((0.8, 0, 0), radius=0.6)
+    points = points_around(np.random.default_rng(3), solid, 500)
+    np.testing.assert_allclose((solid + carver)(points), solid(points) - tool(points), atol=1e-6)
+    assert (solid + carver)(points).min() < -0.1
+    np.testing.assert_array_equal((solid | carver)(points), solid(points))
+    np.testing.assert_array_equal((solid & carver)(points), np.zeros(500))
+    np.testing.assert_array_equal((solid - carver)(points), solid(points))
+    np.testing.assert_array_equal((carver - solid)(points), np.zeros(500))
+    np.testing.assert_array_equal(((solid + carver) | (carver + carver))(points),
+                                  np.maximum((solid + carver)(points), 0.0))  # fmt: skip
+
+
+def test_a_carved_solid_has_a_closed_mesh_without_what_is_carved() -> None:
+    tree = Sum((Point((0, 0, 0), radius=1.0), Point((0.9, 0, 0), radius=0.5, weight=-2.0)))
+    carved = polygonize(Union((tree, Point((-1.2, 0, 0), radius=0.3))), resolution=48)
+    assert_closed(carved)
+    assert_valid(carved)
+    assert carved.vertices[:, 0].max() < 0.8
+    np.testing.assert_allclose(oracle.value(tree, carved.vertices[carved.vertices[:, 0] > 0]), ISO, atol=1e-4)
+
+
+def test_an_offset_shrinks_what_carves() -> None:
+    tree = Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=0.5, weight=-1.0)
+    grown = Point((0, 0, 0), radius=1.1) + Point((1, 0, 0), radius=0.4, weight=-1.0)
+    points = points_around(np.random.default_rng(4), grown, 200)
+    np.testing.assert_allclose(tree.offset(0.1)(points), grown(points), atol=2e-6)
+    with pytest.raises(InvalidNode, match=r"offset: 0\.6 leaves nothing"):
+        tree.offset(0.6).tape  # noqa: B018
+
+
+def test_colours_of_a_carved_sum_stay_in_range() -> None:
+    rng = np.random.default_rng(5)
+    parts = [
+        Point(tuple(rng.uniform(-1, 1, 3)), radius=0.7, weight=float(w), color=tuple(rng.uniform(0, 1, 3)))
+        for w in (1, 1, -1, 2, -0.5, 1)
+    ]
+    colors = Sum(tuple(parts)).colors(rng.uniform(-2, 2, (2000, 3)))
+    assert 0.0 <= colors.min() <= colors.max() <= 1.0
+
+
+# -- declarations ---------------------------------------------------------------------------------------
+
+
+def test_texts_and_files_leave_out_defaults() -> None:
+    plain, other = Point((0, 0, 0), radius=1.0), Point((0, 0, 0), radius=1.0, falloff="metaball", weight=2)
+    for text in (repr(plain), str(plain), to_json(plain).decode()):
+        assert "falloff" not in text
+        assert "w" not in text.replace("blobtree", "")
+    assert repr(other).endswith("falloff='metaball', weight=2.0)")
+    assert '"falloff": "metaball"' in to_json(other).decode()
+    assert "width" not in to_json(other).decode()
+    for node in (plain, other, Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, width=0.3)):
+        assert from_json(to_json(node)) == node == pickle.loads(pickle.dumps(node))
+    assert eval(repr(other), {"Point": Point}) == other
+    assert hash(plain) != hash(other)
+
+
+def test_edits_keep_the_profile() -> None:
+    node: Primitive = Segment((0, 0, 0), (1, 0, 0), radius=0.5, falloff="cauchy", width=0.3, weight=2.0)
+    assert moved(node, (1, 0, 0)) == Segment((1, 0, 0), (2, 0, 0), radius=0.5, falloff="cauchy", width=0.3,
+                                             weight=2.0)  # fmt: skip
+    assert resized(node, 2.0) == Segment((0, 0, 0), (1, 0, 0), radius=1.0, falloff="cauchy", width=0.3,
+                                         weight=2.0)  # fmt: skip
+
+
+def test_fields_are_differentiated_by_width_and_weight() -> None:
+    ball = Point((0, 0, 0), radius=1.0, width=0.7, falloff="gaussian")
+    tree = ball + Point((1, 0, 0), radius=0.8, weight=-0.5) + Point((0, 1, 0), radius=0.5)
+    points = points_around(np.random.default_rng(8), tree, 60)
+    named = [str(parameter) for parameter in numeric_parameters(tree) if parameter.name in PROFILE]
+    assert named == ["0: width", "1: weight"]
+    (default,) = [NumericParameter((2,), "weight", (), parameters_of(Point)["weight"])]
+    parameters = [*(p for p in numeric_parameters(tree) if p.name in PROFILE), default]
+    seen = tree.parameter_gradient(points, parameters).values
+    for parameter, column in zip(parameters, seen.T, strict=True):
+        (value,) = numeric_values(tree, [parameter])
+        ends = [with_numeric_values(tree, [parameter], [value + d]) for d in (1e-5, -1e-5)]
+        change = oracle.value(ends[0], points) - oracle.value(ends[1], points)
+        np.testing.assert_allclose(column, change / 2e-5, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("profile", "message"),
+    [
+        ({"falloff": "gauss"}, "falloff: expected a falloff or one of wyvill, soft_object, .*, got 'gauss'"),
+        ({"falloff": None}, "falloff: expected a falloff or one of"),
+        ({"width": 0.0}, "width: expected a number above 0"),
+        ({"width": -1.0}, "width: expected a number above 0"),
+        ({"width": float("nan")}, "width: expected a finite number"),
+        ({"weight": float("inf")}, "weight: expected a finite number"),
+        ({"weight": 1e4}, "weight: expected -1000 to 1000"),
+        ({"weight": "2 kg"}, "weight: expected a finite number"),
+    ],
+)
+def test_wrong_profiles_are_refused(profile: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidNode, match=message):
+        Point((0, 0, 0), radius=1.0, **profile)
+
+
+def test_a_width_that_no_float_resolves_is_refused() -> None:
+    with pytest.raises(InvalidNode, match=r"width: expected at least 0\.0001 of the radius 1, got 1e-05"):
+        Point((0, 0, 0), radius=1.0, width=1e-5).tape  # noqa: B018
+
+
+def test_a_kind_cannot_declare_what_every_primitive_has() -> None:
+    with pytest.raises(TypeError, match="Plank: every primitive has a parameter 'width' already"):
+        type("Plank", (Primitive,), {"__annotations__": {"width": float}})
+
+
+@pytest.mark.parametrize(
+    ("value", "slope", "message"),
+    [
+        (rising, tent_slope, "g rises from"),
+        (short, tent_slope, r"g\(1\) = 0.5, expected 0"),
+        (vector, tent_slope, "expected the distance `d: wp.float32` as its only parameter"),
+        (tent, staircase_slope, r"g'\(.*\) is -1 by differences, but"),
+        (abs, tent_slope, "expected a typed function"),
+    ],
+)
+def test_wrong_falloffs_are_refused(value: Any, slope: Any, message: str) -> None:
+    with pytest.raises(InvalidDefinition, match=message):
+        define_falloff(value, slope, name="wrong")
+    with pytest.raises(InvalidDefinition, match="'wyvill' is a built-in falloff"):
+        define_falloff(tent, tent_slope, name="wyvill")
+
+
+def test_a_negative_sum_below_any_operator_is_raised_to_zero() -> None:
+    deep: Node = Point((0, 0, 0), radius=1.0, weight=-1.0) + Point((0.5, 0, 0), radius=0.5, weight=-1.0)
+    other = Point((0, 0.5, 0), radius=0.8)
+    for tree in (deep | other, other | deep, Difference(other, deep), Difference(deep, other),
+                 (deep.twist(30) & other), (deep.scale((1, 2, 1)) | other) + deep):  # fmt: skip
+        points = points_around(np.random.default_rng(6), other, 200)
+        np.testing.assert_allclose(tree(points), oracle.value(tree, points), atol=2e-6)
