@@ -69,6 +69,16 @@ class Fit:
         Why it ended.
     evaluations
         Number of trees that were evaluated.
+
+    Examples
+    --------
+    >>> from blobtree import Fit, Point, fit
+    >>> samples = [[2, 0, 0], [0, 2, 0], [0, 0, 2], [-2, 0, 0]]
+    >>> found = fit(Point((0, 0, 0), radius=1.8), samples, fixed=["center"])
+    >>> isinstance(found, Fit), found.converged, round(found.tree.radius, 3)
+    (True, True, 2.0)
+    >>> [str(parameter) for parameter in found.parameters]
+    ['root: radius']
     """
 
     tree: Node

@@ -79,7 +79,7 @@ def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Fallof
     ... def linear_slope(d: wp.float32) -> wp.float32:
     ...     return -1.0
     >>> falloff = define_falloff(linear, linear_slope)
-    >>> falloff.rim
+    >>> round(falloff.rim, 6)
     0.5
     >>> Point((0, 0, 0), radius=1.0, falloff=falloff)
     Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8), falloff='linear')

@@ -28,6 +28,17 @@ class Curvatures:
     directions
         float64[n, 2, 3]: unit tangents along which the curvature is k₁ and k₂. Where both are equal they are
         any two perpendicular tangents.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from blobtree import Curvatures, Segment
+    >>> limb = Segment((0, 0, -2), (0, 0, 2), radius=0.5)
+    >>> curvatures = limb.curvatures([[0.5, 0, 0]])
+    >>> isinstance(curvatures, Curvatures), curvatures.mean.round(3).tolist()
+    (True, [1.0])
+    >>> np.allclose(curvatures.principal, [[2.0, 0.0]], atol=1e-3)
+    True
     """
 
     mean: Float64Array

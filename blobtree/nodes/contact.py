@@ -179,6 +179,14 @@ class ContactSurface:
         Closed polylines float64[n, 3] around the surface; the last point is the first.
     vertices, faces
         float64[n, 3] and int32[m, 3]: its triangles.
+
+    Examples
+    --------
+    >>> from blobtree import Contact, ContactSurface, Point
+    >>> left, right = Point((-0.8, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=1.0)
+    >>> (surface,) = Contact((left, right), names=("left", "right")).contacts(resolution=32)
+    >>> isinstance(surface, ContactSurface), surface.names, round(surface.area, 1)
+    (True, ('left', 'right'), 1.1)
     """
 
     pair: tuple[int, int]

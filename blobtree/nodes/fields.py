@@ -27,7 +27,16 @@ BOX_MARGIN = 2e-6
 
 
 class FieldPrimitive(ProgramField, Leaf):
-    """A direct field and a colour: a leaf of the tree."""
+    """A direct field and a colour: a leaf of the tree.
+
+    Its field is a function of the point itself, not of the distance from a skeleton.
+
+    Examples
+    --------
+    >>> from blobtree import FieldPrimitive, Gyroid, Point, Superquadric
+    >>> [issubclass(kind, FieldPrimitive) for kind in (Gyroid, Superquadric, Point)]
+    [True, True, False]
+    """
 
     field_kind: ClassVar[FieldKind]
 

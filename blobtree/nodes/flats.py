@@ -149,8 +149,8 @@ class Polygon(Macro, Leaf):
     --------
     >>> from blobtree import Polygon
     >>> arrow = Polygon([(0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)], radius=0.1)
-    >>> arrow([[1, 1, 0.1], [0.4, 1, 0]]).round(3).tolist()
-    [0.5, 0.5]
+    >>> arrow([[1, 1, 0.1], [0.2, 1, 0]]).round(3).tolist()
+    [0.5, 0.0]
     """
 
     file_tag = "polygon"

@@ -34,6 +34,13 @@ class NumericParameter:
         Place of the number in the parameter's value: () for a number, (i,) in a vector, (i, j) in a matrix.
     declaration
         What the node's class says about the parameter: meaning and range.
+
+    Examples
+    --------
+    >>> from blobtree import NumericParameter, Point, numeric_parameters
+    >>> last = numeric_parameters(Point((0, 0, 0), radius=1.0))[-1]
+    >>> isinstance(last, NumericParameter), last.path, last.name, last.index
+    (True, (), 'radius', ())
     """
 
     path: Path
@@ -50,22 +57,81 @@ def numeric_parameters(tree: ProgramNode) -> list[NumericParameter]:
     """Return all numbers of a tree on which its field depends, node by node from the root, left to right.
 
     Widths and weights that texts leave out are left out too.
+
+    Parameters
+    ----------
+    tree : Node
+        The tree.
+
+    Returns
+    -------
+    list of NumericParameter
+        A parameter for each number; each component of a vector is one.
+
+    Examples
+    --------
+    >>> from blobtree import Point, numeric_parameters
+    >>> pair = Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=0.5)
+    >>> [str(parameter) for parameter in numeric_parameters(pair)][3:6]
+    ['0: radius', '1: center[0]', '1: center[1]']
     """
     return [parameter for path, node in nodes_with_paths(tree) for parameter in _numbers_of(path, node)]
 
 
 def numeric_values(tree: ProgramNode, parameters: Sequence[NumericParameter]) -> Float64Array:
-    """Return the values (p,) of numbers of a tree."""
+    """Return the values (p,) of numbers of a tree.
+
+    Parameters
+    ----------
+    tree : Node
+        The tree.
+    parameters : sequence of NumericParameter
+        The p parameters, see `numeric_parameters`.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64[p]: the values, in the units of the parameters.
+
+    Examples
+    --------
+    >>> from blobtree import Point, numeric_parameters, numeric_values
+    >>> ball = Point((0, 0, 2), radius=1.0)
+    >>> numeric_values(ball, numeric_parameters(ball)).tolist()
+    [0.0, 0.0, 2.0, 1.0]
+    """
     return np.array([_number(getattr(node_along(tree, p.path), p.name), p.index) for p in parameters])
 
 
 def with_numeric_values(tree: AnyNode, parameters: Sequence[NumericParameter], values: ArrayLike) -> AnyNode:
     """Return the tree with other values (p,) for some of its numbers.
 
+    Parameters
+    ----------
+    tree : Node
+        The tree, which stays as it is.
+    parameters : sequence of NumericParameter
+        The p parameters, see `numeric_parameters`.
+    values : array-like (p,)
+        Their new values, in the units of the parameters.
+
+    Returns
+    -------
+    Node
+        A tree of the same structure.
+
     Raises
     ------
     InvalidNode
         A node refuses its value.
+
+    Examples
+    --------
+    >>> from blobtree import Point, numeric_parameters, with_numeric_values
+    >>> ball = Point((0, 0, 0), radius=1.0)
+    >>> *_, radius = numeric_parameters(ball)
+    >>> with_numeric_values(ball, [radius], [2.5]).radius
+    2.5
     """
     changed: dict[Path, dict[str, Any]] = {}
     for parameter, value in zip(parameters, np.asarray(values, np.float64).tolist(), strict=True):

@@ -55,6 +55,15 @@ class ParameterGradient:
         float32[n, p]: ∂f/∂(parameter), per unit of the parameter.
     parameters
         The p parameters, see `NumericParameter`.
+
+    Examples
+    --------
+    >>> from blobtree import ParameterGradient, Point
+    >>> gradient = Point((0, 0, 0), radius=1.0).parameter_gradient([[1, 0, 0], [5, 0, 0]])
+    >>> isinstance(gradient, ParameterGradient), gradient.values.shape, len(gradient.parameters)
+    (True, (2, 4), 4)
+    >>> gradient.values[:, 3].astype(float).round(3).tolist()
+    [0.78, 0.0]
     """
 
     values: Float32Array

@@ -25,6 +25,13 @@ class SignedDistances:
     error
         Largest distance, in model units, between the surface and the mesh to which distances were measured,
         estimated at the middles of all triangles. The distances differ from exact ones by about that at most.
+
+    Examples
+    --------
+    >>> from blobtree import Point, SignedDistances, to_sdf
+    >>> distances = to_sdf(Point((0, 0, 0), radius=1.0), [[3, 0, 0]], resolution=32)
+    >>> isinstance(distances, SignedDistances), bool(abs(distances.values[0] - 2.0) <= 2 * distances.error)
+    (True, True)
     """
 
     values: Float32Array

@@ -42,7 +42,7 @@ from blobtree.formulas.library import LIBRARY_SKELETONS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
-from blobtree.nodes.primitives import PROFILE, Leaf, Primitive
+from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
 from blobtree.nodes.tree import NODE_KINDS
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
@@ -273,7 +273,7 @@ def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -
         assert f"{name} : " in document
         assert describe(parameter) in document
     operands = {field.name for field in fields(kind)} - set(parameters)  # type: ignore[arg-type]
-    assert operands <= {"operands", "child", "solid", "tool", "obstacle", "first", "second"}
+    assert operands <= {"operands", "child", "solid", "tool", "obstacle", "first", "second", "region"}
     assert ">>> " in document
 
 
@@ -304,7 +304,7 @@ def test_the_guide_lists_every_primitive_with_its_parameters() -> None:
     guide = (Path(__file__).parents[3] / "docs" / "modelling.md").read_text()
     for kind in NODE_KINDS.values():
         if issubclass(kind, Leaf):
-            shared = {"color", "attributes", *PROFILE}
+            shared = {"color", "attributes", *(PROFILE if issubclass(kind, Profile) else ())}
             declared = [p for name, p in parameters_of(kind).items() if name not in shared]
             arguments = [p.name + "=…" * (p.quantity is Quantity.RADIUS) for p in declared]
             assert f"`{kind.__name__}({', '.join(arguments)})`" in guide
