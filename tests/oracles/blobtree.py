@@ -7,6 +7,7 @@ fold does not matter, save on exact ties of a union or an intersection. A differ
 
 from dataclasses import dataclass, fields, replace
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from blobtree import (
     Contact,
     ConvolutionArc,
     ConvolutionSegment,
+    ConvolutionStroke,
     ConvolutionTriangle,
     CurveWarp,
     CustomCombination,
@@ -291,6 +293,10 @@ def written_out(node: Node) -> Node:
             return Difference(child, grown(child, -thickness))
         case SymmetricDifference(first=a, second=b):
             return Union(Difference(a, b), Difference(b, a))
+        case ConvolutionStroke(points=points, radii=radii, color=color):
+            ends = list(zip(pairwise(points), pairwise(radii), strict=True))
+            same: Any = {"color": color}
+            return Sum([ConvolutionSegment(*p, radius=r[0], end_radius=r[1], **same) for p, r in ends])
         case LocalBlend(first=a, second=b, region=region):
             return Sum(Union(a, b), Masked(Intersection(a, b), region))
         case BlendGraph(operands=operands, names=names, pairs=pairs):
@@ -390,7 +396,7 @@ def _falling(
     d = rim * ratio if width is None else rim + (ratio - 1.0) * radius * (1.0 - rim) / width
     value = node.weight * falloffs.value(name, np.clip(d, 0.0, 1.0))
     if width is not None and width * rim > radius * (1.0 - rim):  # the field has a kink on the skeleton
-        margin = np.minimum(margin, ratio)
+        margin = np.minimum(margin, 0.1 * ratio)  # beside it, float32 has few digits of the direction
     return Field(value, np.tile(np.array(node.color), (len(ratio), 1)), margin)
 
 

@@ -1,0 +1,14 @@
+"""Random trees of all classes of nodes: meshes and rays against dense evaluation."""
+
+import numpy as np
+import pytest
+
+from tests.soundness import failures_of, random_tree
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
+def test_random_trees_of_all_nodes_are_sound(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    trees = [random_tree(rng) for _ in range(10)]
+    found = {repr(tree): failures_of(tree, rng) for tree in trees}
+    assert {text: failures for text, failures in found.items() if failures} == {}
