@@ -140,6 +140,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         name: {"a": interval(2.0), "b": interval(2.0)}
         for name in ("intersection_like_choice", "difference_like_choice", "unclaimed_choice")
     },
+    "newton_step": {"gap": uniform(0.0, 0.01), "rise": uniform(-1.0, 3.0), "tolerance": uniform(1e-3, 0.1)},
     "widened_range": {"smallest": field, "largest": field},
 }  # fmt: skip
 

@@ -55,12 +55,21 @@ WRITTEN_TWICE = {
 }
 """Switches over the tables, written per backend."""
 
+OF_LIBRARY_KINDS = {
+    "direct_value_gradient",
+    "direct_bounds",
+    "value_direct",
+    "bound_direct",
+    "gradient_direct",
+}
+"""Functions of direct fields; the core tables have none of these, and `test_tapes` compares the library's."""
+
 
 def shared(module: str) -> list[TypedFunction]:
     """What both backends have from one source, save what reads a whole tape: see `test_glsl_tapes`."""
     functions = typed_functions(import_module(module))
-    whole_tapes = {"span", "cells"}
-    return [f for f in functions if f.name not in WRITTEN_TWICE and not whole_tapes & set(f.parameters)]
+    left_out, whole_tapes = WRITTEN_TWICE | OF_LIBRARY_KINDS, {"span", "cells"}
+    return [f for f in functions if f.name not in left_out and not whole_tapes & set(f.parameters)]
 
 
 FUNCTIONS = {f"{module}.{typed.name}": typed for module in MODULES for typed in shared(module)}
