@@ -115,7 +115,7 @@ def sample(kind: type[Node], rng: Rng, operand: Operand = random_leaf) -> Node:
     for _ in range(ATTEMPTS):
         try:
             node = SPECIAL[kind.file_tag](rng) if kind.file_tag in SPECIAL else _drawn(kind, rng, operand)
-            node.tape  # noqa: B018  (it may refuse a combination of parameters)
+            node.tape, node.support  # noqa: B018  (they may refuse a combination of parameters)
         except InvalidNode:
             continue
         return node

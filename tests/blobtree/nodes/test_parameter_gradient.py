@@ -92,16 +92,6 @@ def test_a_polygon_may_change_its_triangles() -> None:
     np.testing.assert_allclose(radial, (ends[0] - ends[1]) / (2.0 * STEP), rtol=1e-4)
 
 
-@pytest.mark.slow
-def test_derivatives_match_differences_in_many_trees() -> None:
-    rng = np.random.default_rng(5)
-    more = [*random_trees(seed=16, count=60, more=SOLIDS), *CUSTOM_TREES[:20]]
-    for kinds in (SHAPES, FIELDS, CONTACTS, DEFORMED):
-        more += random_trees(seed=17, count=40, depth=2, more=kinds)
-    for tree in more:
-        check(tree, rng, columns=30)
-
-
 def test_parameters_have_names_values_and_copies() -> None:
     tree = Ricci(
         (Point((1, 2, 3), radius=1.0), Segment((0, 0, 0), (1, 0, 0), radius=0.5).twist(20)), exponent=2
