@@ -58,7 +58,7 @@ def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Fallof
     Returns
     -------
     Falloff
-        A value for the keyword `falloff` of every primitive; so is its name.
+        A value for the keyword `falloff` of primitives around a skeleton; so is its name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The kernel of derivatives of gradients by parameters; it is compiled when the first one is asked for."""
+"""The kernel of derivatives of gradients by parameters; it compiles at its first use."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""The kernel of Hessians; it is compiled when the first one is asked for."""
+"""The kernel of Hessians; it compiles at its first use."""
 
 import warp as wp
 

@@ -57,7 +57,7 @@ _OPTIONAL = {OPTIONAL: True}
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Profile:
-    """How the field of a primitive falls with the distance: keywords of every primitive.
+    """How the field of a primitive falls with the distance: keywords of primitives around a skeleton.
 
     With weight 1 an isolated primitive shows its `radius`, whatever falloff and width it has.
     """

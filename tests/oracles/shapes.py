@@ -1,7 +1,7 @@
 """Distances from the skeletons of curves, flats and solids in float64 NumPy, by dense search or by geometry.
 
 Each function returns |q − closest| over the visible radius there (n,), and the same (n,) for the next local
-minimum at another place of the skeleton, infinite if there is none.
+minimum at another place of the skeleton, infinite without another one.
 """
 
 from collections.abc import Callable
