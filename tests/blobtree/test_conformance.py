@@ -1,6 +1,7 @@
 """Every class of nodes conforms: generated from the declarations, so that new classes are taken up."""
 
 import pytest
+import warp as wp
 
 from blobtree import Node
 from blobtree.nodes.kinds import NODE_KINDS
@@ -17,3 +18,10 @@ def test_a_class_of_nodes_conforms(tag: str) -> None:
 @pytest.mark.parametrize("tag", NODE_KINDS)
 def test_many_nodes_of_a_class_conform(tag: str) -> None:
     assert problems_of(NODE_KINDS[tag], seed=2, samples=12) == []
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("tag", NODE_KINDS)
+def test_a_class_of_nodes_conforms_on_a_graphics_card(tag: str) -> None:
+    with wp.ScopedDevice("cuda:0"):
+        assert problems_of(NODE_KINDS[tag], seed=3, samples=2) == []
