@@ -153,6 +153,13 @@ def problems_of(kind: type[Node], seed: int, samples: int) -> list[str]:
     return found
 
 
+def field_problems(kind: type[Node], seed: int, samples: int) -> list[str]:
+    """Return how values and gradients of a class differ from float64; nothing if they agree."""
+    rng = np.random.default_rng(seed)
+    nodes = [sample(kind, rng) for _ in range(samples)]
+    return [f"{p}: {node!r}" for node in nodes for p in _fields(node, points_around(rng, node, 150), "plain")]
+
+
 def _problems(node: Node, rng: Rng) -> Iterator[str]:
     points = points_around(rng, node, 150)
     try:

@@ -5,7 +5,7 @@ import warp as wp
 
 from blobtree import Node
 from blobtree.nodes.kinds import NODE_KINDS
-from tests.conformance import problems_of
+from tests.conformance import field_problems, problems_of
 
 
 @pytest.mark.parametrize("tag", NODE_KINDS)
@@ -24,4 +24,4 @@ def test_many_nodes_of_a_class_conform(tag: str) -> None:
 @pytest.mark.parametrize("tag", NODE_KINDS)
 def test_a_class_of_nodes_conforms_on_a_graphics_card(tag: str) -> None:
     with wp.ScopedDevice("cuda:0"):
-        assert problems_of(NODE_KINDS[tag], seed=3, samples=2) == []
+        assert field_problems(NODE_KINDS[tag], seed=3, samples=4) == []
