@@ -8,7 +8,7 @@ from decals.rendering.gl_libraries import missing_gl_libraries
 
 @pytest.fixture(autouse=True)
 def own_kinds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give each test a registry of its own: pages and examples define kinds under the names of other tests."""
+    """Give each test its own registry: pages and examples define kinds under names of other tests."""
     monkeypatch.setattr(definition, "_KINDS", dict(definition._KINDS))
 
 
