@@ -18,7 +18,8 @@ wp.set_module_options({"enable_backward": False})
 class Contact(IntEnum):
     """Contact mode: how neighbours push the owner of a point.
 
-    `decals.field.contact` and `decals.field.radial` state the formulas.
+    `decals.field.contact` and `decals.field.radial` state the formulas. This is a mode of decals;
+    `blobtree.Contact` is a node whose solids deform each other.
 
     Examples
     --------

@@ -37,7 +37,7 @@ R_NOTHING = wp.constant(1e-12)
 def superelliptic_partials(
     a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
 ) -> wp.vec3:
-    """F = l + ((a − l)ⁿ + (b − l)ⁿ)^(1/n) with l = ½ − width; negative terms are 0 (Rockwood 1989, eq. 6).
+    """F = l + ((a − l)ⁿ + (b − l)ⁿ)^(1/n) with l = ½ − width; negative terms are 0 (Rockwood 1989).
 
     Rockwood's surfaces are P = 1 − Σ [1 − Pᵢ / rᵢ]₊ᵗ = 0 with Pᵢ = 0 on a surface. Here Pᵢ = ½ − fᵢ, r is
     the width and t = n. An operand that is below l changes nothing: width ½ is the blend of Ricci.
@@ -88,7 +88,7 @@ def superelliptic_choice(
 
 # -- R-functions ----------------------------------------------------------------------------------------
 #
-# R-functions (Pasko et al. 1995, eq. 2 with α = 0) join functions x, y that are 0 on surfaces: x ∨ y =
+# R-functions (Pasko et al. 1995, with α = 0) join functions x, y that are 0 on surfaces: x ∨ y =
 # x + y + √(x² + y²), x ∧ y = x + y − √(x² + y²), x \ y = x ∧ −y. Here x = φ(a) with φ(a) = 1 − 1/(2a) outside
 # and 2a − 1 inside: φ rises, has a slope, and is −∞ where a = 0. So F = φ⁻¹(φ(a) ∨ φ(b)) is exactly a where b
 # is 0, and 0 where both are. φ is written as a fraction n / d, so that nothing overflows.
@@ -384,8 +384,8 @@ def inverse_distance(x: wp.float32) -> wp.float32:
 def clean_union_partials(a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
     """F = smooth maximum of a and b of width k, 2/k = 1/|½ − a| + 1/|½ − b| + 1/a + 1/b.
 
-    Gourmel et al. (2013, section 4) ask for a union that is smooth everywhere but at the crease a = b = ½,
-    and draw its level lines with arcs. Here they are parabolas: their width vanishes on both surfaces, so the
+    Gourmel et al. (2013) use a union that is smooth everywhere but at the crease a = b = ½, and tabulate it.
+    Here its level lines are rounded by parabolas. Their width vanishes where an operand is ½, so that the
     surface is that of the union, and where an operand is 0.
     """
     if b <= 0.0 or a <= 0.0:

@@ -288,9 +288,10 @@ class SymmetricDifference(Macro):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LocalBlend(Macro):
-    """Blend of two nodes that is restricted to a region, and their union elsewhere (Bernhardt et al. 2010).
+    """Blend of two nodes in a region, and their union elsewhere (after Bernhardt et al. 2010).
 
-    With the region's field h it is F = max(f, g) + s(2h) min(f, g), s(t) = 3t² − 2t³ up to t = 1. So it is
+    The paper places regions at the crease itself, and interpolates other operators. Here the region is a
+    node with the field h: F = max(f, g) + s(2h) min(f, g), s(t) = 3t² − 2t³ up to t = 1. So it is
     the sum f + g within the region's surface, and the union where h = 0.
 
     Examples

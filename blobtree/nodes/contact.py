@@ -208,6 +208,8 @@ class Contact(Macro):
     surface where they meet. An offset above it grows the deformed solids; to let the solids grow
     before they touch, offset them.
 
+    This is a node. `decals.Contact` is the mode in which decals push each other on a surface.
+
     Examples
     --------
     >>> from blobtree import Contact, Point

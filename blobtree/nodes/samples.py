@@ -69,7 +69,8 @@ class Samples(msgspec.Struct, frozen=True):
         return _decoded(self)
 
     def __repr__(self) -> str:
-        return f"Samples(shape={self.shape}, data=<{len(self.data)} bytes>)"
+        nx, ny, nz = self.shape
+        return f"<{nx} × {ny} × {nz} numbers; save() or to_json() keep them>"
 
 
 @lru_cache(maxsize=32)
