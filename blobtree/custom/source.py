@@ -10,7 +10,7 @@ import inspect
 import linecache
 import re
 import textwrap
-from dataclasses import dataclass, make_dataclass
+from dataclasses import dataclass, field, make_dataclass
 from types import FunctionType
 from typing import Any
 
@@ -38,6 +38,7 @@ class CustomSource:
     python: FunctionType
     digest: str
     """Digest of its source, of the functions that it calls, and of their constants."""
+    _references: dict[Precision, FunctionType] = field(default_factory=dict, init=False, repr=False)
 
     def digest_with(self, *claims: object) -> str:
         """Return a digest of the function and the claims about it, the same in every process."""
@@ -53,8 +54,10 @@ class CustomSource:
         return InvalidDefinition(f"{self.location}: {self.name}: {reason}")
 
     def reference(self, precision: Precision = np.float64) -> FunctionType:
-        """Return the function as plain Python, in a floating-point type."""
-        return plain_python(self.python, precision)
+        """Return the function as plain Python, in a floating-point type; it is translated once."""
+        if precision not in self._references:
+            self._references[precision] = plain_python(self.python, precision)
+        return self._references[precision]
 
 
 def custom_source(function: Any, *, returns: Any) -> CustomSource:

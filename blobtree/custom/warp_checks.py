@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,7 @@ class _Trial:
         """Return the result of a function, whose own parameters follow the leading arguments."""
         arguments = [_typed(value, precision) for value in (*leading, *self.values.values())]
         where = f"{_shown(leading[0]) if leading else ''} {self.values or ''}".strip()
-        plain = _plain(function, np.dtype(precision).name)
+        plain = function.reference(precision)
         return result_of(function, lambda *given: np.atleast_1d(plain(*given)), arguments, where, size)
 
     def at(self, q: Float64Array, precision: Precision = np.float64) -> Float64Array:
@@ -176,11 +175,6 @@ def _try_box(trial: _Trial, claims: WarpClaims, numbers: tuple[float, ...], rng:
                 f"box: {_shown(q)} comes from {_shown(image)}, but the box {_shown(lower)} to "
                 f"{_shown(upper)} around that does not hold it, with {trial.values}"
             )
-
-
-@lru_cache(maxsize=16)
-def _plain(function: CustomSource, precision: str) -> Callable[..., Any]:
-    return function.reference(np.float64 if precision == "float64" else np.float32)
 
 
 def _typed(value: Any, precision: Precision) -> Any:

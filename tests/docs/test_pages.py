@@ -22,6 +22,7 @@ from decals import load_scene
 from decals.apps.cli import app
 from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
 from tests.decals.baking.glb import need
+from tests.docs import published
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -67,6 +68,17 @@ def check_custom_nodes(session: Session) -> None:
     page = (DOCS / "custom-nodes.md").read_text(encoding="utf-8")
     (promise,) = re.findall(r"print\(error\)  # ([\w.]+):(\d+): halfway: ", page)
     assert f"{promise[0]}:{promise[1]}: halfway: " in session["printed"]
+
+
+def check_published_nodes(session: Session) -> None:
+    published.check_all(session)
+    nodes = (DOCS / "published-nodes.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    assert len(nodes) == 12
+    for node in nodes:
+        (block,) = re.findall(r"```python\n(.*?)```", node, flags=re.DOTALL)
+        (picture,) = re.findall(r"\]\((images/published/\w+\.jpg)\)", node)
+        assert len(block.splitlines()) <= 40
+        assert (DOCS / picture).stat().st_size <= 40_000
 
 
 def test_the_page_of_custom_nodes_lists_the_whole_language() -> None:
@@ -168,6 +180,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "modelling": check_modelling,
     "character": check_character,
     "custom-nodes": check_custom_nodes,
+    "published-nodes": check_published_nodes,
     "meshing": check_meshing,
     "decals": check_decals,
     "rendering": check_rendering,
