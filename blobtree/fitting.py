@@ -25,7 +25,7 @@ from blobtree.nodes.numeric_parameters import (
 from blobtree.nodes.parameter_gradient import gradient_sensitivities, parameter_gradient_of
 from blobtree.nodes.parameters import Quantity
 from blobtree.nodes.tree import Node
-from blobtree.progress import Cancel, Progress, watched
+from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
 from blobtree.validation import point_array
 
@@ -170,21 +170,22 @@ def fit(
         raise InvalidPoints(
             f"points: expected at least as many numbers as free parameters ({len(free)}), got {samples.count}"
         )
-    problem = _Problem(tree, free, samples, watched(progress, cancel), max_evaluations)
     start = numeric_values(tree, free)
     lower, upper = _ranges(free, start)
-    result = least_squares(
-        problem.residuals,
-        np.clip(start, lower, upper),
-        problem.jacobian,
-        bounds=(lower, upper),
-        x_scale="jac",
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
-        gtol=None,
-        tr_solver="lsmr" if samples.size * len(free) ** 2 > LARGEST_EXACT else "exact",
-        max_nfev=max_evaluations,
-    )
+    with reporting(progress, cancel) as report:
+        problem = _Problem(tree, free, samples, report, max_evaluations)
+        result = least_squares(
+            problem.residuals,
+            np.clip(start, lower, upper),
+            problem.jacobian,
+            bounds=(lower, upper),
+            x_scale="jac",
+            ftol=TOLERANCE,
+            xtol=TOLERANCE,
+            gtol=None,
+            tr_solver="lsmr" if samples.size * len(free) ** 2 > LARGEST_EXACT else "exact",
+            max_nfev=max_evaluations,
+        )
     field, directions = samples.split(result.fun[: samples.size])
     return Fit(
         tree=problem.tree_of(result.x),

@@ -17,8 +17,7 @@ import shutil
 import sys
 import tempfile
 import threading
-import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -27,6 +26,7 @@ from typing import Any
 import warp as wp
 
 from blobtree.errors import UnusableCache
+from blobtree.progress import Progress, reporting
 
 KERNEL_OPTIONS: dict[str, Any] = {
     "enable_backward": False,
@@ -49,13 +49,8 @@ HEADERS = "headers"
 CUDA_BLOCK = 256
 """Threads of a block, where a module of kernels sets no other number; Warp's default."""
 
-REPORT_SECONDS = 2.0
-"""Time after which a compilation that nothing displays is logged as a warning, which Python prints."""
-
-CompilationReport = Callable[[int, int], None]
-"""A function (files of kernels compiled by this process, files it has to compile so far)."""
-
-_MESSAGE = "Compiling kernels for this machine (once): %d of %d"
+COMPILING = "compiling kernels for this machine (once)"
+"""Stage of progress reports; the number of compiled files of kernels follows, as in ``": 3 of 11"``."""
 
 _logger = logging.getLogger(__name__)
 
@@ -67,7 +62,6 @@ class _State:
         self.lock = threading.RLock()
         self.loaded: dict[tuple[str, str], bytes] = {}
         self.compiled = 0
-        self.displays: list[CompilationReport] = []
 
 
 _state = _State()
@@ -85,16 +79,6 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
 def kernel_cache() -> Path:
     """Return the folder in which Warp keeps compiled kernels; Warp must have been started."""
     return Path(str(wp.config.kernel_cache_dir))
-
-
-@contextmanager
-def compilation_displayed(display: CompilationReport) -> Iterator[None]:
-    """Within a ``with`` block, call `display` before kernels compile, and after each file of them."""
-    _state.displays.append(display)
-    try:
-        yield
-    finally:
-        _state.displays.remove(display)
 
 
 def loaded(kernel: wp.Kernel, device: Any = None) -> wp.Kernel:
@@ -240,27 +224,20 @@ def _copy_newer(source: Path, target: Path) -> None:
 def _compile(modules: list[wp.Module], device: wp.Device) -> None:
     """Compile and load modules at the same time, and report the progress."""
     total = _state.compiled + len(modules)
-    _report(_state.compiled, total)
-    with ThreadPoolExecutor(os.cpu_count() or 1, "blobtree compiler") as threads:
+    with reporting() as report, ThreadPoolExecutor(os.cpu_count() or 1, "blobtree compiler") as threads:
+        _report(report, total)
         pending = {threads.submit(_load, module, device) for module in modules}
-        start, warned = time.monotonic(), -1
         while pending:
-            done, pending = wait(pending, REPORT_SECONDS, FIRST_COMPLETED)
+            done, pending = wait(pending, return_when=FIRST_COMPLETED)
             for future in done:
                 future.result()
             _state.compiled += len(done)
-            if done:
-                _report(_state.compiled, total)
-            late = time.monotonic() - start > REPORT_SECONDS
-            if late and pending and not _state.displays and warned != _state.compiled:
-                _logger.warning(_MESSAGE, _state.compiled, total)
-                warned = _state.compiled
+            _report(report, total)
 
 
-def _report(done: int, total: int) -> None:
-    _logger.info(_MESSAGE, done, total)
-    for display in _state.displays:
-        display(done, total)
+def _report(report: Progress, total: int) -> None:
+    """Report how many files of kernels this process has compiled of those that it has to compile so far."""
+    report(f"{COMPILING}: {_state.compiled} of {total}", _state.compiled / total)
 
 
 @contextmanager

@@ -1,6 +1,25 @@
-"""Callbacks by which long work reports its progress and is cancelled."""
+"""Progress of long work: how it is reported, where it is shown, and how it is cancelled.
 
-from collections.abc import Callable
+Long functions do their work within `reporting`. Their reports go to the first of these that exists:
+
+1. the function that the caller passed as ``progress``;
+2. the innermost display (`displayed`), such as the title of a window;
+3. once the work takes long: the output of the notebook's cell, the logger ``blobtree.progress`` if logging is
+   configured, or else stderr. A thread repeats the last report with the elapsed seconds.
+
+Reports of functions that the work calls, and of kernels that it compiles, go the same way.
+"""
+
+import logging
+import os
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
 
 from blobtree.errors import Cancelled, ImplicitDecalsError
 
@@ -10,17 +29,272 @@ Progress = Callable[[str, float], None]
 Cancel = Callable[[], bool]
 """A function that returns True once the work is to stop; it is called often."""
 
+LINE_SECONDS, UPDATE_SECONDS = 1.5, 0.5
+"""Seconds until work is shown, and between two texts, where they stay and where they are replaced."""
 
-def watched(progress: Progress | None, cancel: Cancel | None) -> Progress:
-    """Return a callback that forwards reports, and raises `Cancelled` after `cancel` returned True."""
+TICK = 0.25
+"""Seconds between two looks at the work."""
+
+IDLE_TICKS = 20
+"""Number of looks without work after which their thread ends."""
+
+CLEAR_LINE = "\r\x1b[2K"
+"""Moves a terminal's cursor to the start of its line, and clears the line."""
+
+_logger = logging.getLogger("blobtree.progress")
+_PACKAGE_LOGGER = logging.getLogger("blobtree")
+
+
+# -- reports --------------------------------------------------------------------------------------------
+
+_outer: ContextVar["Progress | _Work | None"] = ContextVar("outer", default=None)
+"""Where reports of the present work go; each thread has its own."""
+
+_displays: list[Progress] = []
+
+
+@contextmanager
+def reporting(progress: Progress | None = None, cancel: Cancel | None = None) -> Iterator[Progress]:
+    """Within a ``with`` block, pass on reports of long work, and of the functions that it calls.
+
+    Parameters
+    ----------
+    progress
+        Receives the reports. Default: the work that called this one, or a display.
+    cancel
+        Called at each report, which raises `Cancelled` once it returns True.
+
+    Examples
+    --------
+    >>> seen = []
+    >>> with reporting(lambda stage, fraction: seen.append(stage)) as report:
+    ...     report("placing vertices", 0.5)
+    >>> seen
+    ['placing vertices']
+    """
     for name, callback in (("progress", progress), ("cancel", cancel)):
         if callback is not None and not callable(callback):
             raise ImplicitDecalsError(f"{name}: expected a function or None, got {callback!r}")
+    target = progress or _outer.get() or _Work()
 
     def report(stage: str, fraction: float) -> None:
         if cancel is not None and cancel():
             raise Cancelled(f"cancelled while {stage}")
-        if progress is not None:
-            progress(stage, fraction)
+        target(stage, fraction)
 
-    return report
+    token = _outer.set(target)
+    try:
+        if isinstance(target, _Work):
+            with target.nested():
+                yield report
+        else:
+            yield report
+    finally:
+        _outer.reset(token)
+
+
+@contextmanager
+def displayed(display: Progress) -> Iterator[None]:
+    """Within a ``with`` block, show the reports of work without a callback, in all threads, by `display`.
+
+    The thread that works calls it, with an empty stage at the end.
+
+    Examples
+    --------
+    >>> from blobtree import Point, polygonize
+    >>> stages = []
+    >>> with displayed(lambda stage, fraction: stages.append(stage)):
+    ...     mesh = polygonize(Point((0, 0, 0), radius=1.0), resolution=16)
+    >>> stages[-2:]
+    ['connecting vertices', '']
+    """
+    _displays.append(display)
+    try:
+        yield
+    finally:
+        _displays.remove(display)
+
+
+class _Work:
+    """Work whose caller passed no callback; calling it reports a stage."""
+
+    def __init__(self) -> None:
+        self._stage, self._fraction = "", 0.0
+        self._depth, self._displayed = 0, False
+        self._began = self._shown_at = time.monotonic()
+        self._line = _new_line()
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        self._stage, self._fraction = stage, fraction
+        if _displays:
+            _displays[-1](stage, fraction)
+            self._displayed = True
+
+    @contextmanager
+    def nested(self) -> Iterator[None]:
+        """Within a ``with`` block, watch this work; the stage is then what it was before the block."""
+        before = self._stage, self._fraction
+        if not self._depth:
+            _watcher.add(self)
+        self._depth += 1
+        try:
+            yield
+        finally:
+            self._depth -= 1
+            self._stage, self._fraction = before
+            if not self._depth:
+                _watcher.remove(self)
+                self._line.end()
+                if self._displayed and _displays:
+                    _displays[-1]("", 1.0)
+
+    def show(self, now: float) -> None:
+        """Show the stage, if it is time to."""
+        if not _displays and now - self._shown_at >= self._line.seconds:
+            self._shown_at = now
+            self._line.show(self._text(now))
+
+    def _text(self, now: float) -> str:
+        """Return the stage, its fraction unless the stage counts itself, and the elapsed seconds."""
+        stage, fraction = self._stage or "working", self._fraction
+        part = f": {100 * fraction:.0f} %" if 0.0 < fraction < 1.0 and ":" not in stage else ""
+        return f"{stage[0].upper()}{stage[1:]}{part} ({now - self._began:.0f} s)"
+
+
+# -- the thread that watches the work -------------------------------------------------------------------
+
+
+class _Watcher:
+    """Shows work that takes long, from a thread that lives while there is work."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._work: list[_Work] = []
+        self._running = False
+
+    def add(self, work: _Work) -> None:
+        """Watch some work."""
+        with self._lock:
+            self._work.append(work)
+            if not self._running:
+                self._running = True
+                threading.Thread(target=self._run, name="blobtree progress", daemon=True).start()
+
+    def remove(self, work: _Work) -> None:
+        """Watch some work no more; it is not being shown when this returns."""
+        with self._lock:
+            if work in self._work:  # else this process was forked from the one that added it
+                self._work.remove(work)
+
+    def _run(self) -> None:
+        idle = 0
+        while True:
+            time.sleep(TICK)
+            with self._lock:
+                idle = 0 if self._work else idle + 1
+                if idle == IDLE_TICKS:
+                    self._running = False
+                    return
+                for work in self._work:
+                    work.show(time.monotonic())
+
+
+_watcher = _Watcher()
+
+
+def _renew() -> None:
+    """In a forked child: forget the parent's work, its displays and the thread that the child lacks."""
+    global _watcher
+    _watcher = _Watcher()
+    _displays.clear()
+    _outer.set(None)
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_renew)
+
+
+# -- where work is shown by default ---------------------------------------------------------------------
+
+
+class _Line:
+    """A text that replaces the one before, or follows it in a line of its own; this one is not shown."""
+
+    seconds = LINE_SECONDS
+
+    def show(self, text: str) -> None:
+        """Show a text."""
+
+    def end(self) -> None:
+        """Finish the output."""
+
+
+class _LoggedLine(_Line):
+    """Records of the logger."""
+
+    def show(self, text: str) -> None:
+        _logger.info("%s", text)
+
+
+class _PrintedLine(_Line):
+    """Lines on stderr."""
+
+    def show(self, text: str) -> None:
+        if sys.stderr is not None:  # as in a program without a console
+            print(text, file=sys.stderr, flush=True)
+
+
+class _TerminalLine(_Line):
+    """One line of a terminal, which is cleared at the end."""
+
+    seconds = UPDATE_SECONDS
+
+    def __init__(self) -> None:
+        self._shown = False
+
+    def show(self, text: str) -> None:
+        text = text[: shutil.get_terminal_size().columns - 1]
+        print(f"{CLEAR_LINE}{text}", end="", file=sys.stderr, flush=True)
+        self._shown = True
+
+    def end(self) -> None:
+        if self._shown:
+            print(CLEAR_LINE, end="", file=sys.stderr, flush=True)
+
+
+class _NotebookLine(_Line):
+    """One line below the cell of a notebook."""
+
+    seconds = UPDATE_SECONDS
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+
+    def show(self, text: str) -> None:
+        output = {"text/plain": text}
+        if self._handle is None:
+            from IPython.display import display
+
+            self._handle = display(output, raw=True, display_id=True)
+        else:
+            self._handle.update(output, raw=True)
+
+
+def _new_line() -> _Line:
+    """Return where work is shown by default."""
+    if max(_logger.level, _PACKAGE_LOGGER.level) > logging.INFO:
+        return _Line()
+    if _in_notebook():
+        return _NotebookLine()
+    if _logger.hasHandlers():
+        return _LoggedLine()
+    return _TerminalLine() if _is_terminal() else _PrintedLine()
+
+
+def _is_terminal() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def _in_notebook() -> bool:
+    shell = sys.modules.get("IPython")
+    return shell is not None and getattr(shell.get_ipython(), "kernel", None) is not None

@@ -16,7 +16,7 @@ from decals.apps.commands.options import (
     Whole,
     check_count,
 )
-from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_model
 from decals.apps.output import check_output
 
@@ -67,8 +67,9 @@ def bake(
     check_output(output, (".glb",))
     check_count("--samples", samples, 1, MAX_SAMPLES)
     import_definitions(define)
-    loaded = load_model(scene, trust=trust)
     with progress_bars() as progress:
+        progress(PREPARING, 0.0)
+        loaded = load_model(scene, trust=trust)
         bake_scene(
             loaded,
             output,

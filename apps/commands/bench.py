@@ -140,7 +140,7 @@ def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str | None =
         with progress_bars() as progress:
             rows = []
             for step, name in enumerate(names):
-                progress("Measuring", step / len(names))
+                progress("measuring", step / len(names))
                 try:
                     rows += measure(renderer, name, numbers, pixels)
                 except InvalidInput as error:

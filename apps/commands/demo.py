@@ -82,11 +82,11 @@ def demo(
     make_folder(output)
     for name in PICTURES:
         check_output(output / name, (".png",))
-    with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:
+    with progress_bars() as progress, Renderer(max_tile=TILE) as renderer:
         progress(PREPARING, 0.0)
         nest = nest_scene(progress=progress)
         for name, scene in zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True):
-            progress(f"Drawing {name}", 0.0)
+            progress(f"drawing {name}", 0.0)
             Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
     for name in PICTURES:
         Console().print(str(output / name), soft_wrap=True, highlight=False)

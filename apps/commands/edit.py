@@ -22,7 +22,7 @@ from decals.apps.commands.options import (
     check_count,
     parse_size,
 )
-from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
@@ -106,17 +106,20 @@ def edit(
             raise InvalidInput("an empty scene has no decals; name a model, or leave out --decals and --seed")
         scene = _empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
         path = path or (Path(model[0]) if model else new_file(Path(), "scene"))
-    elif isinstance(loaded := load_models(model, trust=trust), Scene):
-        if decals is not None or seed is not None:
-            raise InvalidInput("a saved scene has its own decals; leave out --decals and --seed")
-        scene, path = loaded, path or Path(model[0])
-        added = tuple(DecalImage.load(source) for source in image or ())
     else:
         with progress_bars() as progress:
-            options = ScatterOptions.from_arguments(decals, image, seed)
-            where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
-            scene = options.scene(loaded, where, pixels, progress)
-        path = path or new_file(Path(), f"{Path(model[0]).stem}-decals")
+            progress(PREPARING, 0.0)
+            loaded = load_models(model, trust=trust)
+            if isinstance(loaded, Scene):
+                if decals is not None or seed is not None:
+                    raise InvalidInput("a saved scene has its own decals; leave out --decals and --seed")
+                scene, path = loaded, path or Path(model[0])
+                added = tuple(DecalImage.load(source) for source in image or ())
+            else:
+                options = ScatterOptions.from_arguments(decals, image, seed)
+                where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
+                scene = options.scene(loaded, where, pixels, progress)
+                path = path or new_file(Path(), f"{Path(model[0]).stem}-decals")
 
     def load_recovered(path: Path) -> Scene:
         recovered = load_models([str(path)], trust=trust)

@@ -75,9 +75,9 @@ def _draw(pictures: dict[str, Path], side: int) -> None:
     for path in pictures.values():
         check_output(path, PICTURE_SUFFIXES)
     failures: dict[str, InvalidInput] = {}
-    with Renderer() as renderer, progress_bars() as progress:
+    with progress_bars() as progress, Renderer() as renderer:
         for name, path in pictures.items():
-            progress(f"Drawing {name}", 0.0)
+            progress(f"drawing {name}", 0.0)
             try:
                 panels = import_module(f"{examples.__name__}.{name}").panels()
             except InvalidInput as error:

@@ -9,7 +9,7 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.pyvista_views import MESH_SUFFIXES, write_polydata
 from decals import MeshObject, Scene
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust
-from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_model
 from decals.apps.output import check_output
 from decals.errors import InvalidInput, InvalidMesh, InvalidScene
@@ -61,13 +61,14 @@ def polygonize(
     """
     check_output(output, MESH_SUFFIXES)
     import_definitions(define)
-    loaded = load_model(model, trust=trust)
-    if isinstance(loaded, MeshObject):
-        raise InvalidInput(
-            f"expected a BlobTree or a scene in JSON, or a sample (creature, spheres), got {model!r}"
-        )
-    objects = loaded.objects if isinstance(loaded, Scene) else [loaded]
     with progress_bars() as progress:
+        progress(PREPARING, 0.0)
+        loaded = load_model(model, trust=trust)
+        if isinstance(loaded, MeshObject):
+            raise InvalidInput(
+                f"expected a BlobTree or a scene in JSON, or a sample (creature, spheres), got {model!r}"
+            )
+        objects = loaded.objects if isinstance(loaded, Scene) else [loaded]
         try:
             surface = as_polydata(
                 objects,

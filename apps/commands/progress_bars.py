@@ -1,4 +1,4 @@
-"""Progress bars on stderr, one per stage."""
+"""Progress of commands on stderr: a bar for each stage in a terminal, else lines."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from blobtree import Progress as Report
-from blobtree.kernels import compilation_displayed
+from blobtree.progress import reporting
 
-PREPARING = "Preparing the surfaces"
+PREPARING = "preparing the surfaces"
 """Stage in which surfaces are built."""
 
 _COLUMNS = (TextColumn("{task.description:<34}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
@@ -17,40 +17,50 @@ _COLUMNS = (TextColumn("{task.description:<34}"), BarColumn(), TextColumn("{task
 
 @contextmanager
 def progress_bars() -> Iterator[Report]:
-    """Show a bar with the elapsed time for each stage that the callback reports.
+    """Show the reports of the callback, and of all work in the ``with`` block.
 
-    A new stage completes the bar of the previous one. Another bar appears if kernels must be compiled. After
-    an error or an interrupt the bars disappear, so only the message remains.
+    In a terminal, each stage has a bar with the elapsed time, and a new stage completes the bars of previous
+    ones. After an error or an interrupt the bars disappear, so only the message remains. Elsewhere, work
+    that takes long writes lines; see `blobtree.progress`.
 
     Examples
     --------
     >>> with progress_bars() as progress:
-    ...     progress("Drawing", 0.5)
+    ...     progress("drawing", 0.5)
     """
-    with Progress(*_COLUMNS, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
-        stages: dict[str, TaskID] = {}
-
-        def report(stage: str, fraction: float) -> None:
-            if stage not in stages:
-                for task in stages.values():
-                    bars.update(task, completed=1.0)
-                stages[stage] = bars.add_task(stage[:1].upper() + stage[1:], total=1.0)
-            bars.update(stages[stage], completed=min(max(fraction, 0.0), 1.0))
-
-        compiling: list[TaskID] = []
-
-        def report_compilation(done: int, total: int) -> None:
-            if not compiling:
-                compiling.append(bars.add_task(""))
-            description = f"Compiling kernels for this machine (once): {done} of {total}"
-            bars.update(compiling[0], description=description, completed=done, total=total)
-
+    console = Console(stderr=True)
+    if not console.is_interactive:
+        with reporting() as report:
+            yield report
+        return
+    with Progress(*_COLUMNS, TimeElapsedColumn(), console=console) as bars:
+        stages = _Stages(bars)
         try:
-            with compilation_displayed(report_compilation):
+            with reporting(stages.show) as report:
                 yield report
         except BaseException:
             bars.live.transient = True
-            bars.console.quiet = not bars.console.is_interactive  # avoid an empty line in a redirected stderr
             raise
-        for task in stages.values():
-            bars.update(task, completed=1.0)
+        stages.complete()
+
+
+class _Stages:
+    """One bar for each stage."""
+
+    def __init__(self, bars: Progress) -> None:
+        self._bars = bars
+        self._tasks: dict[str, TaskID] = {}
+
+    def show(self, stage: str, fraction: float) -> None:
+        """Show a report; what follows a colon in the name of a stage may change."""
+        name = stage.partition(":")[0]
+        if name not in self._tasks:
+            self.complete()
+            self._tasks[name] = self._bars.add_task("", total=1.0)
+        description = stage[:1].upper() + stage[1:]
+        self._bars.update(self._tasks[name], completed=min(max(fraction, 0.0), 1.0), description=description)
+
+    def complete(self) -> None:
+        """Complete all bars."""
+        for task in self._tasks.values():
+            self._bars.update(task, completed=1.0)

@@ -1,5 +1,6 @@
 """``implicit-decals render``: a picture of models with scattered decals, or of a saved scene."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -18,7 +19,7 @@ from decals.apps.commands.options import (
     check_count,
     parse_size,
 )
-from decals.apps.commands.progress_bars import progress_bars
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
@@ -94,18 +95,21 @@ def render(
     if save is not None:
         check_output(save, (".json",))
     import_definitions(define)
-    loaded = load_models(model, trust=trust)
-    if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
-        raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
-    options = ScatterOptions.from_arguments(decals, image, seed)
-    # The renderer comes first: without graphics the command fails before the long work.
-    with Renderer(max_tile=TILE) as renderer, progress_bars() as progress:
+    with ExitStack() as stack:
+        progress = stack.enter_context(progress_bars())
+        progress(PREPARING, 0.0)
+        loaded = load_models(model, trust=trust)
+        if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
+            raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
+        options = ScatterOptions.from_arguments(decals, image, seed)
+        # The renderer comes first: without graphics the command fails before the long work.
+        renderer = stack.enter_context(Renderer(max_tile=TILE))
         scene = loaded if isinstance(loaded, Scene) else options.scene(loaded, view, pixels, progress)
         if isinstance(loaded, Scene) and (camera is not None or up is not None):
             scene = scene.replace(camera=frame(scene.objects, view, pixels))
         if save is not None:
             save_scene(scene, save)
-        progress("Drawing", 0.0)
+        progress("drawing", 0.0)
         picture = renderer.render(
             scene,
             RenderOptions(

@@ -107,14 +107,14 @@ def scatter(
     check_count("--seed", seed, 0, MAX_SEED)
     check_output(output, SUFFIXES)
     import_definitions(define)
-    loaded = load_models(model, trust=trust)
-    objects = loaded.objects if isinstance(loaded, Scene) else tuple(loaded)
-    if not objects:
-        raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
-    own = loaded.images if images is None and isinstance(loaded, Scene) else ()
-    pictures = own or scale_images(images or 1)
     with progress_bars() as progress:
         progress(PREPARING, 0.0)
+        loaded = load_models(model, trust=trust)
+        objects = loaded.objects if isinstance(loaded, Scene) else tuple(loaded)
+        if not objects:
+            raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
+        own = loaded.images if images is None and isinstance(loaded, Scene) else ()
+        pictures = own or scale_images(images or 1)
         surfaces = [item.surface for item in objects]
         density = None
         if painted is not None:
@@ -133,14 +133,14 @@ def scatter(
             seed=seed,
             progress=progress,
         )
-    if output.suffix.lower() == ".csv":
-        write_table(decals, output)
-        return
-    if isinstance(loaded, Scene):
-        camera = loaded.camera
-    else:
-        camera = frame(objects, parse_view(None, axes_of(model[0])), ASPECT)
-    save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals), output)
+        if output.suffix.lower() == ".csv":
+            write_table(decals, output)
+            return
+        if isinstance(loaded, Scene):
+            camera = loaded.camera
+        else:
+            camera = frame(objects, parse_view(None, axes_of(model[0])), ASPECT)
+        save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals), output)
 
 
 def write_table(decals: Decals, path: Path) -> None:

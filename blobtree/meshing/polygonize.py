@@ -28,7 +28,7 @@ from blobtree.meshing.creases import sharpened
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
-from blobtree.progress import Cancel, Progress, watched
+from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.validation import LARGEST_NUMBER, shown
 
@@ -164,8 +164,8 @@ def polygonize(
     chord_error = _chord_error(tree, chord_error)
     if not isinstance(max_triangles, int | np.integer) or max_triangles < 1:
         raise InvalidResolution(f"max_triangles: expected a whole number from 1, got {shown(max_triangles)}")
-    report = watched(progress, cancel)
-    return _within_chord_error(tree, chord_error, int(max_triangles), creases, device, report)
+    with reporting(progress, cancel) as report:
+        return _within_chord_error(tree, chord_error, int(max_triangles), creases, device, report)
 
 
 def _within_chord_error(
@@ -255,10 +255,15 @@ def _announce_count(triangles: float, chord_error: float) -> None:
 
 
 def _numbered(report: Progress, number: int) -> Progress:
-    """Return a callback that reports the stages of one pass as fractions of that pass."""
-    return lambda stage, fraction: report(
-        f"meshing, pass {number}", (_STAGES.index(stage) + fraction) / len(_STAGES)
-    )
+    """Return a callback that reports the stages of one pass as fractions of that pass, and others as is."""
+
+    def numbered(stage: str, fraction: float) -> None:
+        if stage in _STAGES:
+            report(f"meshing, pass {number}", (_STAGES.index(stage) + fraction) / len(_STAGES))
+        else:
+            report(stage, fraction)
+
+    return numbered
 
 
 class Polygonizer:
@@ -304,9 +309,9 @@ class Polygonizer:
         self._creases = creases
         self._cell_size = _cell_size(tree, resolution, cell_size)
         kernels = (*CELL_KERNELS, sample_blocks, place_vertices)
-        load_together(map(tree.tape.instruction_set.kernel_for, kernels), known_device(device))
-        report = watched(progress, cancel)
-        self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
+        with reporting(progress, cancel) as report:
+            load_together(map(tree.tape.instruction_set.kernel_for, kernels), known_device(device))
+            self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
         self._tree = tree
         self._mesh: Mesh | None = None
 
@@ -348,9 +353,9 @@ class Polygonizer:
         self, tree: ImplicitModel, *, progress: Progress | None = None, cancel: Cancel | None = None
     ) -> DeviceMesh:
         """Do the same as `update`, and leave the triangles on the device."""
-        report = watched(progress, cancel)
         checked_tree(tree)
-        extracted = self._extract(tree, self._dual_mesh, report)
+        with reporting(progress, cancel) as report:
+            extracted = self._extract(tree, self._dual_mesh, report)
         self._dual_mesh, self._device_mesh, self._sheet_counts = extracted
         self._tree, self._mesh = tree, None
         return self._device_mesh

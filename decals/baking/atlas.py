@@ -1,13 +1,29 @@
 """Texture atlas: xatlas cuts meshes into charts and packs all charts into one square texture."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int32Array, Int64Array
+from blobtree.progress import Progress
+from decals.baking.atlas_child import Arrays, atlas, packed, unpacked
 from decals.baking.meshes import BakeMesh
+from decals.errors import InvalidMesh
+from decals.surfaces.vtk_process import can_isolate
 from decals.validation import optional_package
+
+UNWRAPPING = "unwrapping the surface"
+"""Stage of progress reports."""
+
+REPORT_SECONDS = 0.25
+"""Seconds between reports while xatlas works."""
 
 PADDING = 4
 """Texels between charts. Packing is estimated before the atlas has its final size, so it may be fewer."""
@@ -38,37 +54,69 @@ class Unwrapped:
     places: Float32Array
 
 
-def unwrap(meshes: Sequence[BakeMesh], size: int) -> list[Unwrapped]:
+def unwrap(meshes: Sequence[BakeMesh], size: int, report: Progress) -> list[Unwrapped]:
     """Return places for all meshes on one texture of ``size`` × ``size`` texels.
 
     All charts have about the same number of texels per area. Charts do not overlap, but may be mirrored.
+    While xatlas works, ``report`` is called repeatedly; an error that it raises ends the work.
 
     Raises
     ------
     MissingPackage
         If xatlas is not installed.
+    InvalidMesh
+        If xatlas fails.
     """
-    xatlas = optional_package("xatlas", "bake")
+    optional_package("xatlas", "bake")
     corners = np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes]).astype(np.float64)
     sides = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     # xatlas compares lengths and areas with absolute limits: give it faces of mean area 1.
     scale = 1.0 / np.sqrt(0.5 * np.linalg.norm(np.cross(*sides), axis=1).mean())
     center = corners.mean(axis=(0, 1))
-    atlas = xatlas.Atlas()
+    arrays: list[NDArray[Any]] = []
     for mesh in meshes:
         scaled = np.ascontiguousarray((mesh.vertices - center) * scale, np.float32)
-        atlas.add_mesh(scaled, mesh.faces.astype(np.uint32), mesh.normals)
-    charts, packing = xatlas.ChartOptions(), xatlas.PackOptions()
-    charts.max_chart_area = MAX_CHART_FACES
-    packing.padding = PADDING
-    packing.texels_per_unit = float(size * np.sqrt(EXPECTED_USE / len(corners)))
-    # Without a fixed resolution all charts lie on one page of about the right size, scaled afterwards.
-    packing.resolution = 0
-    atlas.generate(charts, packing)
-    page = np.array([atlas.width, atlas.height], np.float64)
+        arrays += [scaled, mesh.faces.astype(np.uint32), np.ascontiguousarray(mesh.normals, np.float32)]
+    texels_per_unit = float(size * np.sqrt(EXPECTED_USE / len(corners)))
+    page, *parts = _atlas(arrays, texels_per_unit, report)
     unwrapped = []
-    for number in range(len(meshes)):
-        rows, faces, uv = atlas.get_mesh(number)
+    for rows, faces, uv in zip(parts[0::3], parts[1::3], parts[2::3], strict=True):
         places = uv * page * (size / page.max())
         unwrapped.append(Unwrapped(rows.astype(np.int64), faces.astype(np.int32), places.astype(np.float32)))
     return unwrapped
+
+
+def _atlas(arrays: Arrays, texels_per_unit: float, report: Progress) -> Arrays:
+    """Call `atlas` in a process of its own, where there can be one."""
+    report(UNWRAPPING, 0.0)
+    options = texels_per_unit, MAX_CHART_FACES, PADDING
+    if not can_isolate():
+        return atlas(arrays, *options)
+    folders = os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path)
+    with subprocess.Popen(
+        [sys.executable, "-P", "-W", "ignore", "-m", atlas.__module__],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": folders},
+    ) as child:
+        try:
+            request: bytes | None = packed([*map(np.asarray, options), *arrays])
+            while True:
+                try:
+                    answer, errors = child.communicate(request, timeout=REPORT_SECONDS)
+                    break
+                except subprocess.TimeoutExpired:
+                    request = None
+                    report(UNWRAPPING, 0.0)
+        except BaseException:
+            child.kill()
+            raise
+    if child.returncode:
+        reason = errors.decode(errors="replace").strip().splitlines()[-1:] or [
+            f"exit code {child.returncode}"
+        ]
+        raise InvalidMesh(
+            f"xatlas could not unwrap the surface ({reason[0]}); repair the mesh, or bake with vertex colours"
+        )
+    return unpacked(answer)

@@ -9,7 +9,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, UInt8Array
 from blobtree.files import write_atomically
-from blobtree.progress import Cancel, Progress, watched
+from blobtree.progress import Cancel, Progress, reporting
 from decals.baking.atlas import Unwrapped, unwrap
 from decals.baking.glb import Node, glb_bytes
 from decals.baking.meshes import BakeMesh, bake_mesh
@@ -110,31 +110,30 @@ def bake(
     samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     contact = member("contact", contact, Contact, InvalidScene)
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
-    report = watched(progress, cancel)
     for package in ("trimesh",) if vertex_colors else ("trimesh", "xatlas"):
         optional_package(package, "bake")
-    objects, decals, images = _parts(scene)
-    if not objects:
-        raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
-    meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
-    colors = SurfaceColors(meshes, decals, images, contact, mapping)
-    texture = None
-    if vertex_colors:
-        nodes = _colored_nodes(meshes, colors, report)
-    else:
-        report("unwrapping the surface", 0.0)
-        unwrapped = unwrap(meshes, size)
-        texture = bake_texture(meshes, unwrapped, size, samples, colors.at, report)
-        nodes = [_textured_node(mesh, part, size) for mesh, part in zip(meshes, unwrapped, strict=True)]
-    report("writing the file", 0.0)
-    content = glb_bytes(nodes, texture)
-    report("writing the file", 0.5)
-    try:
-        write_atomically(path, content)
-    except OSError as error:
-        raise InvalidScene(
-            f"could not write {str(path)!r} ({error.strerror}); choose another folder"
-        ) from error
+    with reporting(progress, cancel) as report:
+        objects, decals, images = _parts(scene)
+        if not objects:
+            raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
+        meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
+        colors = SurfaceColors(meshes, decals, images, contact, mapping)
+        texture = None
+        if vertex_colors:
+            nodes = _colored_nodes(meshes, colors, report)
+        else:
+            unwrapped = unwrap(meshes, size, report)
+            texture = bake_texture(meshes, unwrapped, size, samples, colors.at, report)
+            nodes = [_textured_node(mesh, part, size) for mesh, part in zip(meshes, unwrapped, strict=True)]
+        report("writing the file", 0.0)
+        content = glb_bytes(nodes, texture)
+        report("writing the file", 0.5)
+        try:
+            write_atomically(path, content)
+        except OSError as error:
+            raise InvalidScene(
+                f"could not write {str(path)!r} ({error.strerror}); choose another folder"
+            ) from error
     if progress is not None:  # without the check of `cancel`, as the file is written
         progress("writing the file", 1.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
-from blobtree.progress import Progress
+from blobtree.progress import Progress, reporting
 from blobtree.validation import point_array
 from decals.errors import InvalidScattering
 from decals.model import Decals
@@ -243,14 +243,14 @@ class Relaxation:
             )
         function_or_none("progress", progress, InvalidScattering)
         function_or_none("cancel", cancel, InvalidScattering)
-        while not self.finished and not (cancel is not None and cancel()):
-            self._advance()
-            if self.finished:
-                self.polish(close=CLOSE_DISTANCE if until is None else min(CLOSE_DISTANCE, until))
-            if progress is not None:
-                progress("spreading particles", self.steps / self.iterations)
-            if until is not None and self.steps % CHECK_INTERVAL == 0 and self._least_distance() >= until:
-                break
+        with reporting(progress) as report:
+            while not self.finished and not (cancel is not None and cancel()):
+                self._advance()
+                if self.finished:
+                    self.polish(close=CLOSE_DISTANCE if until is None else min(CLOSE_DISTANCE, until))
+                report("spreading particles", self.steps / self.iterations)
+                if until is not None and self.steps % CHECK_INTERVAL == 0 and self._least_distance() >= until:
+                    break
 
     def step(self) -> None:
         """Take one step: move every particle, relocate crowded ones at intervals, polish after the last."""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from blobtree.progress import Progress
+from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.appearance import Appearance
@@ -126,33 +126,33 @@ def scatter(
     )
     function_or_none("progress", progress, InvalidScattering)
     Appearance(sizing, factor, direction, images, weights, choice, jitter)  # check before the long work
-    report = progress or (lambda stage, fraction: None)
-    relaxation = Relaxation(
-        checked_surfaces,
-        count=count,
-        spacing=spacing,
-        seed=seed,
-        density=density,
-        mask=mask,
-        fixed=fixed,
-        device=device,
-    )
-    if regularity > 0.0:
-        relaxation.run(
-            lambda stage, fraction: report(stage, RELAXATION_SHARE * fraction),
-            until=None if regularity == 1.0 else regularity * CLOSE_DISTANCE,
-            cancel=cancel,
+    with reporting(progress) as report:
+        relaxation = Relaxation(
+            checked_surfaces,
+            count=count,
+            spacing=spacing,
+            seed=seed,
+            density=density,
+            mask=mask,
+            fixed=fixed,
+            device=device,
         )
-    report("measuring radii", RELAXATION_SHARE)
-    decals = relaxation.to_decals(
-        seed=seed,
-        sizing=sizing,
-        factor=factor,
-        direction=direction,
-        images=images,
-        weights=weights,
-        choice=choice,
-        jitter=jitter,
-    )
-    report("measuring radii", 1.0)
+        if regularity > 0.0:
+            relaxation.run(
+                lambda stage, fraction: report(stage, RELAXATION_SHARE * fraction),
+                until=None if regularity == 1.0 else regularity * CLOSE_DISTANCE,
+                cancel=cancel,
+            )
+        report("measuring radii", RELAXATION_SHARE)
+        decals = relaxation.to_decals(
+            seed=seed,
+            sizing=sizing,
+            factor=factor,
+            direction=direction,
+            images=images,
+            weights=weights,
+            choice=choice,
+            jitter=jitter,
+        )
+        report("measuring radii", 1.0)
     return decals

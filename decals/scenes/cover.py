@@ -6,8 +6,8 @@ from typing import cast
 
 import numpy as np
 
-from blobtree import Progress
 from blobtree._typing import Float32Array
+from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScene
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.rendering.options import SceneLike, is_scene_like
@@ -81,20 +81,18 @@ def cover(
     pictures = as_images(images)
     if not objects:
         raise InvalidScene("expected at least one model, got none")
-    decals = scatter(
-        [item.surface for item in objects],
-        count=count,
-        seed=seed,
-        direction=direction,
-        images=len(pictures),
-        progress=progress,
-    )
-    return Scene(
-        objects=tuple(objects),
-        camera=fitting_camera(objects, direction=view_direction),
-        decals=decals,
-        images=pictures,
-    )
+    with reporting(progress) as report:
+        report("preparing the surfaces", 0.0)
+        decals = scatter(
+            [item.surface for item in objects],
+            count=count,
+            seed=seed,
+            direction=direction,
+            images=len(pictures),
+            progress=report,
+        )
+        camera = fitting_camera(objects, direction=view_direction)
+    return Scene(objects=tuple(objects), camera=camera, decals=decals, images=pictures)
 
 
 def fitting_camera(

@@ -29,7 +29,7 @@ import msgspec
 from msgspec import Raw, Struct
 
 from blobtree.files import write_atomically
-from blobtree.progress import Progress, watched
+from blobtree.progress import Progress, reporting
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
@@ -183,13 +183,15 @@ def as_path(path: object) -> Path:
 def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> bytes:
     """Write a scene as UTF-8 JSON whose paths are relative to ``folder``; one object or decal a line."""
     camera = scene.camera
+    with reporting(progress) as report:
+        decals = _lines(_decal_records(scene.decals, report))
     parts = {
         "format": FORMAT,
         "version": VERSION,
         "objects": _lines(record_of(item, folder) for item in scene.objects),
         "images": [_image_source(image, folder) for image in scene.images],
         "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
-        "decals": _lines(_decal_records(scene.decals, watched(progress, None))),
+        "decals": decals,
     }
     fields = [
         b"  %b: %b" % (msgspec.json.encode(key), msgspec.json.encode(value)) for key, value in parts.items()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import cast
 
+from blobtree.progress import reporting
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering.lights import Lighting
@@ -78,6 +79,8 @@ def render(
     """
     options = RenderOptions(size, samples, contact, mapping, background, lights)
     width, height = options.size
-    drawn = cast(SceneLike, scene) if is_scene_like(scene) else as_scene(scene, aspect=width / height)
-    with Renderer() as renderer:
-        return Picture(renderer.render(drawn, options, viewpoint=viewpoint))
+    with reporting() as report:
+        report("drawing", 0.0)
+        drawn = cast(SceneLike, scene) if is_scene_like(scene) else as_scene(scene, aspect=width / height)
+        with Renderer() as renderer:
+            return Picture(renderer.render(drawn, options, viewpoint=viewpoint))

@@ -1,6 +1,5 @@
 """Kernels are compiled once, taken from the package if they fit, and compiled again if a file is damaged."""
 
-import logging
 import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +13,8 @@ import warp as wp
 import blobtree.kernels as kernels
 from blobtree.device import start_warp
 from blobtree.errors import UnusableCache
-from blobtree.kernels import HEADERS, KERNEL_OPTIONS, compilation_displayed, loaded
+from blobtree.kernels import COMPILING, HEADERS, KERNEL_OPTIONS, loaded
+from blobtree.progress import reporting
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -53,15 +53,15 @@ def _object_file(cache: Path) -> Path:
 
 
 def test_a_second_process_would_compile_nothing(cache: Path) -> None:
-    reports: list[tuple[int, int]] = []
-    with compilation_displayed(lambda done, total: reports.append((done, total))):
+    stages: list[str] = []
+    with reporting(lambda stage, _fraction: stages.append(stage)):
         assert _doubled() == [2.0, 5.0]
         before = kernels._state.compiled
-        assert reports == [(before - 1, before), (before, before)]
+        assert stages == [f"{COMPILING}: {done} of {before}" for done in (before - 1, before)]
         written = _object_file(cache).stat().st_mtime_ns
         _forget()
         assert _doubled() == [2.0, 5.0]
-    assert len(reports) == 2
+    assert len(stages) == 2
     assert _object_file(cache).stat().st_mtime_ns == written
     assert kernels._state.compiled == before
 
@@ -113,27 +113,6 @@ def test_a_cache_that_cannot_be_written_is_named(cache: Path) -> None:
     with pytest.raises(UnusableCache, match="set the environment variable WARP_CACHE_PATH") as raised:
         _doubled()
     assert repr(str(cache)) in str(raised.value)
-
-
-def test_a_long_compilation_is_logged_as_a_warning(
-    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(kernels, "REPORT_SECONDS", 0.0)
-    with caplog.at_level(logging.WARNING, "blobtree.kernels"):
-        _doubled()
-    done = kernels._state.compiled
-    assert [record.getMessage() for record in caplog.records] == [
-        f"Compiling kernels for this machine (once): {done - 1} of {done}"
-    ]
-
-
-def test_a_display_takes_the_place_of_the_log(
-    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(kernels, "REPORT_SECONDS", 0.0)
-    with caplog.at_level(logging.WARNING), compilation_displayed(lambda done, total: None):
-        _doubled()
-    assert not caplog.records
 
 
 def test_headers_are_parsed_once_per_machine(cache: Path) -> None:

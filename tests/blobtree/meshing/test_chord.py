@@ -7,6 +7,7 @@ import pytest
 
 from blobtree import Cone, InvalidResolution, Mesh, Node, Point, Segment, polygonize
 from blobtree._typing import Float64Array
+from blobtree.kernels import COMPILING
 from tests.blobtree.meshing.test_polygonize import assert_closed
 
 BALL = Point((0, 0, 0), radius=1.0)
@@ -85,6 +86,7 @@ def test_chord_errors_below_float32_are_refused() -> None:
 def test_progress_names_the_passes_and_never_decreases() -> None:
     told: list[tuple[str, float]] = []
     polygonize(BALL, chord_error=2e-3, creases=True, progress=lambda stage, part: told.append((stage, part)))
+    told = [report for report in told if not report[0].startswith(COMPILING)]
     assert [stage for stage, _ in told] == sorted(stage for stage, _ in told)
     for stage in ("meshing, pass 1", "meshing, pass 2"):
         fractions = [part for name, part in told if name == stage]

@@ -8,6 +8,7 @@ import pytest
 
 from blobtree import ISO, InvalidResolution, Mesh, Node, Point, Segment, Sum, polygonize
 from blobtree._typing import Float64Array
+from blobtree.kernels import COMPILING
 from tests.blobtree.trees import random_trees
 
 BALL = Point((0, 0, 0), radius=1.0, color=(1, 0, 0))
@@ -190,6 +191,7 @@ def test_invalid_sizes_are_refused(options: dict[str, float], message: str) -> N
 def test_progress_never_decreases() -> None:
     told: list[tuple[str, float]] = []
     polygonize(BALL, resolution=64, progress=lambda stage, fraction: told.append((stage, fraction)))
+    told = [(stage, fraction) for stage, fraction in told if not stage.startswith(COMPILING)]
     stages = list(dict.fromkeys(stage for stage, _ in told))
     assert len(stages) >= 2
     assert [stage for stage, _ in told] == sorted((stage for stage, _ in told), key=stages.index)

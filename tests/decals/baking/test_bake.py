@@ -299,7 +299,9 @@ def textured(size: int, samples: int = 1) -> Array:
         decals.Contact.PRODUCT,
         decals.ImageMapping.CORRECTED,
     )
-    return bake_texture(meshes, unwrap(meshes, size), size, samples, colors.at, lambda *_: None)
+    return bake_texture(
+        meshes, unwrap(meshes, size, lambda *_: None), size, samples, colors.at, lambda *_: None
+    )
 
 
 def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
