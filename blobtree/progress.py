@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from importlib import import_module
 from typing import Any
 
 from blobtree.errors import Cancelled, ImplicitDecalsError
@@ -273,8 +274,7 @@ class _NotebookLine(_Line):
     def show(self, text: str) -> None:
         output = {"text/plain": text}
         if self._handle is None:
-            from IPython.display import display
-
+            display: Any = import_module("IPython.display").display
             self._handle = display(output, raw=True, display_id=True)
         else:
             self._handle.update(output, raw=True)

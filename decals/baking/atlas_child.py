@@ -7,6 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -42,8 +43,7 @@ def atlas(arrays: Arrays, texels_per_unit: float, max_area: float, padding: int)
         Width and height of the page; then for each mesh the rows ``[k]``, faces ``[m, 3]`` and positions
         ``float32[k, 2]`` of its new vertices, from 0 to 1.
     """
-    import xatlas
-
+    xatlas = import_module("xatlas")
     made = xatlas.Atlas()
     for first in range(0, len(arrays), 3):
         made.add_mesh(*arrays[first : first + 3])
