@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any, cast
@@ -17,6 +17,7 @@ from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkActor
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
@@ -32,6 +33,7 @@ from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_pro
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.injection import InjectedDecals
 from decals.vtk.proxy_actor import ProxyActor, box_around
+from decals.vtk.window_title import WindowTitle
 
 MAX_SAMPLES = 16
 """Samples per pixel along each axis, at most: graphics cards have no larger targets for usual windows."""
@@ -176,6 +178,7 @@ class SubplotRenderer:
         self._enclosed: tuple[object, ...] = ()
         self.applied = InjectedDecals(self)
         self._warned: set[str] = set()
+        self._title = WindowTitle(plotter)
         self._tags = [
             renderer.AddObserver(vtkCommand.StartEvent, weak_callback(self._begin_frame)),
             renderer.AddObserver(vtkCommand.EndEvent, weak_callback(self._end_frame)),
@@ -482,9 +485,20 @@ class SubplotRenderer:
             frames.composite_again(window, viewport)
             return
         self.status = FrameStatus.DRAWN
-        targets = frames.draw(scene, options, self.viewpoint(), wait=self.wait_for_gpu)
+        with self._first_frame_reported(frames.is_warm(scene, options)):
+            targets = frames.draw(scene, options, self.viewpoint(), wait=self.wait_for_gpu)
         samples = 0 if self.draw_scale < 1.0 else options.options.samples  # 0: magnified
         frames.composite(window, viewport, targets, samples)
+
+    @contextmanager
+    def _first_frame_reported(self, warm: bool) -> Iterator[None]:
+        """Report the work of a frame that needs a warm-up, on a screen in the title of the window."""
+        with ExitStack() as stack:
+            if not warm:
+                if self._title.visible:
+                    stack.enter_context(displayed(self._title.show))
+                stack.enter_context(reporting())("preparing the picture", 0.0)
+            yield
 
     def _frame_options(self, size: Size, scale: float, samples: int) -> FrameOptions:
         """Return the options of a frame for a part of a window of some size."""

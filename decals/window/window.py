@@ -1,7 +1,9 @@
 """The editing window."""
 
 import os
+import weakref
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import pyvista as pv
 
 import decals.vtk  # noqa: F401  (registers `plotter.decals`)
 from blobtree._typing import Float32Array
+from blobtree.progress import displayed
 from decals.editing.actions import Actions
 from decals.editing.background import BackgroundJobs
 from decals.editing.document import Document
@@ -26,6 +29,7 @@ from decals.surfaces.convert import Model
 from decals.validation import describe, whole_number
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
+from decals.vtk.window_title import WindowTitle
 from decals.window.event_bindings import TICK_MILLISECONDS, AsyncTicker, EventBindings, running_loop
 from decals.window.frames import STATUS_INTERVAL, FrameController, FrameState, RateLimit, Warmup
 from decals.window.host_plotter import (
@@ -137,6 +141,8 @@ class EditWindow:
         self._host = HostPlotter(plotter, off_screen=off_screen, size=size)
         self.session = scene if isinstance(scene, EditSession) else EditSession(scene)
         self._closed = False
+        self._work, self._title = "", WindowTitle(self.plotter)
+        self._opened = ExitStack()
         self._interrupts: list[int] = []
         self.actions = Actions(self.session, path=path, threaded=True)
         if recover is not None:
@@ -254,8 +260,14 @@ class EditWindow:
     def _status(self) -> str:
         state = self.actions.state
         hint = HELP_HINT if self.document.objects else EMPTY_HINT
-        parts = (state.prompt.text or hint, self.warmup.status, self.background.progress, state.message)
+        progress = self.warmup.status, self._work, self.background.progress
+        parts = (state.prompt.text or hint, *progress, state.message)
         return "   ".join(filter(None, parts))
+
+    def _show_work(self, stage: str, fraction: float) -> None:
+        """Show other work, such as a compilation: the next status has it, and the title if it blocks."""
+        self._work = stage
+        self._title.show(stage, fraction)
 
     def _show_status(self) -> None:
         self.overlay.show_status(self._status())
@@ -326,6 +338,10 @@ class EditWindow:
         """Start the timer and the first, coarse frame; `show` calls it."""
         if self._closed:
             raise InvalidEdit("the window was closed; open another EditWindow on its session")
+        alive = weakref.ref(self)
+        self._opened.enter_context(
+            displayed(lambda *report: None if (window := alive()) is None else window._show_work(*report))
+        )
         self.update_overlay()
         if self.ticking:
             self.frames.begin()
@@ -354,6 +370,7 @@ class EditWindow:
             self._release()
 
     def _release(self) -> None:
+        self._opened.close()
         self.session.end_stroke()
         self.actions.state.close()
         self.handle.release()

@@ -1,16 +1,22 @@
 """What takes long goes on beside a driven window, and is seen once it is done."""
 
 from pathlib import Path
-from typing import Any
+from threading import Thread
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
+from blobtree.kernels import COMPILING
+from blobtree.progress import displayed, reporting
 from decals.editing.commands import ScaleDecals
 from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidEdit, InvalidScene
 from decals.scenes.files import load_scene
+from decals.vtk.window_title import WindowTitle
+from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 from tests.decals.window.driver import Driver
 
@@ -106,3 +112,43 @@ def test_a_window_that_is_closed_and_could_not_save_says_so(opened: Any, tmp_pat
         driver.window.close()
     with pytest.raises(InvalidEdit, match="was closed"):
         driver.window.show()
+
+
+def test_the_status_names_a_compilation_in_another_thread() -> None:
+    shown: list[str] = []
+
+    with EditWindow(scene(), off_screen=True, size=(120, 80)) as window:
+        window.show()
+
+        def work() -> None:
+            with reporting() as report:
+                report(f"{COMPILING}: 3 of 11", 3 / 11)
+                shown.append(window._status())
+            shown.append(window._status())
+
+        thread = Thread(target=work)
+        thread.start()
+        thread.join()
+    during, after = shown
+    assert "compiling kernels for this machine (once): 3 of 11" in during
+    assert "compiling" not in after
+
+
+def test_the_title_names_work_that_blocks_the_window() -> None:
+    class Window:
+        titles: ClassVar[list[str]] = []
+
+        def SetWindowName(self, title: str) -> None:
+            self.titles.append(title)
+
+    plotter = SimpleNamespace(render_window=Window(), off_screen=False, title="knot.json")
+    title = WindowTitle(plotter)
+    with displayed(title.show):
+        thread = Thread(target=lambda: title.show("of another thread", 0.5))
+        thread.start()
+        thread.join()
+        with reporting() as report:
+            report("preparing the picture", 0.0)
+    assert Window.titles == ["Preparing the picture - knot.json", "knot.json"]
+    plotter.off_screen = True
+    assert not title.visible
