@@ -1,4 +1,4 @@
-// A mesh's vertices, with area-weighted normals.
+// A mesh's vertices, split at creases, with area-weighted normals.
 //@ include camera.glsl
 in vec3 vertex_position;
 in vec3 vertex_normal;

@@ -11,7 +11,7 @@ from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
 from blobtree.progress import Progress
 from decals.errors import InvalidMesh, InvalidScene
-from decals.rendering.mesh import vertex_normals
+from decals.rendering.mesh import split_mesh
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.surfaces.mesh import MeshSurface
 from decals.validation import describe
@@ -55,8 +55,9 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
         If polygonization refuses the resolution.
     """
     if isinstance(item, MeshObject):
-        normals = vertex_normals(item.vertices, item.faces)
-        return _used_parts(item.name, item.surface, normals, _constant(item.color))
+        split = split_mesh(item)
+        surface = MeshSurface(item.vertices[split.rows], split.faces)
+        return _used_parts(item.name, surface, split.normals, _constant(item.color))
     if isinstance(item, TreeObject):
         return _tree_mesh(item.name, item.tree, resolution, creases, report)
     raise InvalidScene(f"expected an object of a scene, got {describe(item)}; wrap it in a MeshObject")

@@ -1,4 +1,4 @@
-"""Triangle meshes in the G-buffer: rasterised, with smooth normals."""
+"""Triangle meshes in the G-buffer: rasterised, with normals that are smooth up to the crease angle."""
 
 from typing import Protocol, runtime_checkable
 
@@ -6,18 +6,22 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Int32Array
+from blobtree._typing import Float32Array
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import attach_camera, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
+from decals.surfaces.normals import CREASE_ANGLE, SplitMesh, split_at_creases
 
 
 @runtime_checkable
 class ColoredMesh(Protocol):
-    """A mesh object: ``float[n, 3]`` vertices, ``int[m, 3]`` faces, one sRGB colour or one per vertex."""
+    """A mesh object: ``float[n, 3]`` vertices, ``int[m, 3]`` faces, one sRGB colour or one per vertex.
+
+    It may have a ``crease_angle`` in degrees; the default is `CREASE_ANGLE`.
+    """
 
     @property
     def vertices(self) -> ArrayLike: ...  # noqa: D102
@@ -31,8 +35,8 @@ class MeshDrawable:
     """A mesh's vertices and faces on the GPU."""
 
     def __init__(self, context: Context, mesh: ColoredMesh) -> None:
-        rows = mesh_rows(mesh)
-        faces = np.ascontiguousarray(mesh.faces, np.int32)
+        split = split_mesh(mesh)
+        rows, faces = mesh_rows(mesh, split), np.ascontiguousarray(split.faces, np.int32)
         self._faces = len(faces)
         self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
         self._program = _program(context)
@@ -74,27 +78,18 @@ def _program(context: Context) -> moderngl.Program:
     return attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
 
 
-def mesh_rows(mesh: ColoredMesh) -> Float32Array:
-    """Return position, normal and sRGB colour of every vertex, ``float32[n, 9]``, as in the vertex buffer."""
-    vertices = np.asarray(mesh.vertices, np.float32)
-    rows = np.empty((len(vertices), 9), np.float32)
-    rows[:, :3] = vertices
-    rows[:, 3:6] = vertex_normals(vertices, np.ascontiguousarray(mesh.faces, np.int32))
-    rows[:, 6:] = np.asarray(mesh.color, np.float32)
+def split_mesh(mesh: ColoredMesh) -> SplitMesh:
+    """Return the mesh as it is drawn: split at its creases."""
+    angle: float = getattr(mesh, "crease_angle", CREASE_ANGLE)
+    faces = np.ascontiguousarray(mesh.faces, np.int32)
+    return split_at_creases(np.asarray(mesh.vertices, np.float32), faces, angle)
+
+
+def mesh_rows(mesh: ColoredMesh, split: SplitMesh) -> Float32Array:
+    """Return position, normal and sRGB colour of every split vertex, ``float32[n, 9]``."""
+    rows = np.empty((len(split.rows), 9), np.float32)
+    rows[:, :3] = np.asarray(mesh.vertices, np.float32)[split.rows]
+    rows[:, 3:6] = split.normals
+    colors = np.asarray(mesh.color, np.float32)
+    rows[:, 6:] = colors if colors.ndim == 1 else colors[split.rows]
     return rows
-
-
-def vertex_normals(vertices: Float32Array, faces: Int32Array) -> Float32Array:
-    """Return unit normals at the vertices, each the sum of its faces' normals weighted by area.
-
-    A vertex without any face, or whose faces cancel, gets the z axis.
-    """
-    a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
-    crosses = np.cross(b - a, c - a)
-    corners = faces.reshape(-1)
-    sums = np.stack(
-        [np.bincount(corners, np.repeat(crosses[:, i], 3), len(vertices)) for i in range(3)], axis=1
-    )
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
-    units = np.where(lengths > 0, sums / np.where(lengths > 0, lengths, 1), [0.0, 0.0, 1.0])
-    return units.astype(np.float32)

@@ -18,6 +18,7 @@ from decals.scenes.files import load_model
 from decals.scenes.objects import SceneObject, as_objects
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
+from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import instance
 
 FRAMING_SAMPLES = 2000
@@ -34,6 +35,7 @@ def cover(
     seed: int = 0,
     direction: Direction = None,
     view_direction: Vector = THREE_QUARTER,
+    crease_angle: float = CREASE_ANGLE,
     progress: Progress | None = None,
 ) -> Scene:
     """Cover models with decals that lie evenly, also across the places where models touch.
@@ -54,6 +56,9 @@ def cover(
         Of the images' u axes: None (random), a vector, or a function of points (n, 3) to vectors (n, 3).
     view_direction : (x, y, z)
         Direction from the models toward the camera.
+    crease_angle : float
+        Angle between two faces of a mesh, in degrees, from which their edge is drawn sharp. Objects of a
+        scene keep their own.
     progress : callable, optional
         Called with the name of a stage and the fraction done.
 
@@ -77,7 +82,7 @@ def cover(
     >>> len(scene.decals)
     12
     """
-    objects = as_objects(models)
+    objects = as_objects(models, crease_angle=crease_angle)
     pictures = as_images(images)
     if not objects:
         raise InvalidScene("expected at least one model, got none")

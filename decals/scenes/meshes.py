@@ -11,8 +11,8 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.progress import Progress
 from blobtree.pyvista_views import to_polydata, write_polydata
 from decals.errors import InvalidMesh, InvalidScene
-from decals.rendering.mesh import vertex_normals
 from decals.scenes.objects import MeshObject, SceneObject
+from decals.surfaces.normals import split_at_creases, vertex_normals
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -50,7 +50,7 @@ def as_polydata(
     parts = []
     for item in objects:
         if isinstance(item, MeshObject):
-            parts.append(_mesh_polydata(item))
+            parts.append(_mesh_polydata(item, split_normals))
             continue
         part = item.tree.to_pyvista(
             resolution=resolution,
@@ -74,9 +74,15 @@ def as_polydata(
     return merged
 
 
-def _mesh_polydata(item: MeshObject) -> "pv.PolyData":
-    colors = np.tile(np.asarray(item.color, np.float32), (len(item.vertices), 1))
-    return to_polydata(Mesh(item.vertices, item.faces, vertex_normals(item.vertices, item.faces), colors))
+def _mesh_polydata(item: MeshObject, split_normals: bool) -> "pv.PolyData":
+    vertices, faces = item.vertices, item.faces
+    if split_normals:
+        split = split_at_creases(vertices, faces, item.crease_angle)
+        vertices, faces, normals = vertices[split.rows], split.faces, split.normals
+    else:
+        normals = vertex_normals(vertices, faces)
+    colors = np.tile(np.asarray(item.color, np.float32), (len(vertices), 1))
+    return to_polydata(Mesh(vertices, faces, normals, colors))
 
 
 def write_mesh(

@@ -17,7 +17,8 @@ from decals.errors import InvalidScene
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
-from decals.validation import describe, instance, is_unicode
+from decals.surfaces.normals import CREASE_ANGLE
+from decals.validation import describe, instance, is_unicode, real_number
 
 Color = tuple[float, float, float]
 Box = tuple[Float32Array, Float32Array]
@@ -43,13 +44,16 @@ class MeshObject:
         sRGB colour between the decals, each channel in [0, 1]; or the name of a colour.
     source : str, optional
         Where the mesh came from, so that a scene file need not repeat it: a path, or ``"sample:NAME"``.
+    crease_angle : float
+        Least angle between two faces in degrees, from 0 to 180, at which their edge is drawn sharp. Smaller
+        angles are smoothed. Default 35.
 
     Raises
     ------
     InvalidMesh
         If the arrays have wrong shapes or indices, NaN, or no area.
     InvalidScene
-        If the name is empty or the colour is out of range.
+        If the name is empty, or the colour or the crease angle is out of range.
 
     Examples
     --------
@@ -66,6 +70,7 @@ class MeshObject:
     faces: Int32Array
     color: Color = CLAY
     source: str | None = None
+    crease_angle: float = CREASE_ANGLE
     surface: MeshSurface = field(init=False, repr=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
@@ -77,6 +82,7 @@ class MeshObject:
             faces: ArrayLike,
             color: ColorLike = CLAY,
             source: str | None = None,
+            crease_angle: float = CREASE_ANGLE,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -85,6 +91,7 @@ class MeshObject:
             "name": _name(self.name),
             "color": color_rgb(f"object {self.name!r}, colour", self.color, InvalidScene),
             "source": _source(self.name, self.source),
+            "crease_angle": as_crease_angle(self.crease_angle),
             "surface": surface,
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -148,7 +155,16 @@ class TreeObject:
 SceneObject = MeshObject | TreeObject
 
 
-def as_object(model: object, name: str, *, color: ColorLike = CLAY) -> SceneObject:
+def as_crease_angle(angle: object) -> float:
+    """Return a crease angle in degrees; InvalidScene for other values."""
+    return real_number(
+        "crease_angle", angle, "degrees from 0 to 180", lambda value: 0.0 <= value <= 180.0, InvalidScene
+    )
+
+
+def as_object(
+    model: object, name: str, *, color: ColorLike = CLAY, crease_angle: float = CREASE_ANGLE
+) -> SceneObject:
     """Return a model as an object of a scene.
 
     Parameters
@@ -159,28 +175,33 @@ def as_object(model: object, name: str, *, color: ColorLike = CLAY) -> SceneObje
         Name of the object; the model of a file is named after the file.
     color : (red, green, blue) or str
         Colour of a mesh.
+    crease_angle : float
+        Crease angle of a mesh, in degrees; see `MeshObject`.
 
     Raises
     ------
     InvalidScene, InvalidMesh, InvalidFile
         If the model is of another kind, or cannot be used.
     """
+    angle = as_crease_angle(crease_angle)
     if isinstance(model, MeshObject | TreeObject):
         return model
     source = os.fspath(model) if isinstance(model, str | os.PathLike) else None
     shape = as_shape(model, name=name, error=InvalidScene)
     name = name if source is None else Path(source).stem
-    return TreeObject(name, shape) if isinstance(shape, Node) else MeshObject(name, *shape, color, source)
+    return (
+        TreeObject(name, shape) if isinstance(shape, Node) else MeshObject(name, *shape, color, source, angle)
+    )
 
 
-def as_objects(models: Iterable[object]) -> list[SceneObject]:
+def as_objects(models: Iterable[object], *, crease_angle: float = CREASE_ANGLE) -> list[SceneObject]:
     """Return models as objects with different names: the second object of a name becomes ``name-2``.
 
-    Kinds of models and errors are those of `as_object`.
+    Kinds of models, the crease angle of meshes and errors are those of `as_object`.
     """
     objects: list[SceneObject] = []
     for number, model in enumerate(models, 1):
-        item = as_object(model, f"model {number}")
+        item = as_object(model, f"model {number}", crease_angle=crease_angle)
         objects.append(_renamed(item, {other.name for other in objects}))
     return objects
 

@@ -17,6 +17,7 @@ from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.surfaces.mesh_file import MeshArrays, read_mesh
+from decals.surfaces.normals import CREASE_ANGLE
 
 SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""
@@ -41,6 +42,7 @@ class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=Tru
     color: Vector
     source: str | None = None
     data: _InlineMesh | None = None
+    crease_angle: float = CREASE_ANGLE
 
 
 class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True):
@@ -54,10 +56,11 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     """Describe an object; paths are relative to the folder."""
     if isinstance(item, TreeObject):
         return TreeRecord(item.name, to_tree_file(item.tree))
+    angle = item.crease_angle
     if item.source is not None:
-        return MeshRecord(item.name, item.color, source=relative(item.source, folder))
+        return MeshRecord(item.name, item.color, source=relative(item.source, folder), crease_angle=angle)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
-    return MeshRecord(item.name, item.color, data=data)
+    return MeshRecord(item.name, item.color, data=data, crease_angle=angle)
 
 
 def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoader | None) -> SceneObject:
@@ -74,10 +77,10 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
         raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
     if record.data is not None:
         vertices, faces = _unpacked(record.name, record.data)
-        return MeshObject(record.name, vertices, faces, record.color)
+        return MeshObject(record.name, vertices, faces, record.color, None, record.crease_angle)
     vertices, faces = _mesh(str(record.source), folder, samples)
     source = absolute(str(record.source), folder)
-    return MeshObject(record.name, vertices, faces, record.color, source)
+    return MeshObject(record.name, vertices, faces, record.color, source, record.crease_angle)
 
 
 def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshArrays:

@@ -22,6 +22,7 @@ from decals.scenes.cover import as_scene
 from decals.scenes.objects import CLAY, MeshObject, SceneObject, TreeObject
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model, as_shape
+from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
 from decals.vtk.exports import restore_exports, warn_of_exports
@@ -110,7 +111,12 @@ class DecalsComponent:
         return item
 
     def add_mesh(
-        self, mesh: Model | MeshObject, *, color: ColorLike = CLAY, name: str | None = None
+        self,
+        mesh: Model | MeshObject,
+        *,
+        color: ColorLike = CLAY,
+        name: str | None = None,
+        crease_angle: float = CREASE_ANGLE,
     ) -> MeshObject:
         """Add a mesh, lit like the other objects.
 
@@ -125,6 +131,8 @@ class DecalsComponent:
             sRGB, each channel in [0, 1]; or the name of a colour.
         name
             Its name, unique in the subplot.
+        crease_angle
+            Angle between two faces, in degrees, from which their edge is drawn sharp.
         """
         if isinstance(mesh, MeshObject):
             item = mesh
@@ -133,7 +141,7 @@ class DecalsComponent:
             shape = as_shape(mesh, name=label, error=InvalidScene)
             if isinstance(shape, Node):
                 raise InvalidScene(f"{label}: expected a mesh, got a BlobTree; `add_implicit` adds it")
-            item = MeshObject(label, *shape, color)
+            item = MeshObject(label, *shape, color, crease_angle=crease_angle)
         self._add_object(item)
         return item
 

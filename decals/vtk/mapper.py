@@ -1,4 +1,4 @@
-"""VTK's polygon mappers: code added to their shaders, and smooth normals added to their meshes."""
+"""VTK's polygon mappers: code added to their shaders, and normals added to their meshes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonCore import reference, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkPointSet
+from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
 from vtkmodules.vtkRenderingCore import vtkDataSetMapper, vtkProp, vtkRenderer
 from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
 
 from decals.errors import InvalidScene
-from decals.rendering.mesh import vertex_normals
+from decals.surfaces.normals import CREASE_ANGLE, split_at_creases, vertex_normals
 
 ShaderTag = tuple[str, str]
 """A shader stage (Vertex, Geometry or Fragment), and a tag of VTK's template for it."""
@@ -83,7 +84,10 @@ class ShaderAdditions:
 POLYGON_MAPPER = "vtkOpenGLPolyDataMapper"
 """Class of VTK's polygon mappers; its subclasses draw points, composites and more."""
 NORMALS = "decal normals"
-"""Name of the point data with smooth unit normals, as the renderer computes them."""
+"""Name of the point data with unit normals, smooth between creases, as the renderer computes them."""
+
+KEPT_NORMALS = "normals before the split at creases"
+"""Name of the point data with a mesh's own normals, while VTK splits it."""
 
 
 def polygon_mapper(actor: Any) -> Any:
@@ -127,6 +131,8 @@ _Filter: Any = VTKPythonAlgorithmBase
 class SmoothNormals(_Filter):  # type: ignore[misc]
     """A filter before a mapper that adds the point data NORMALS; the pipeline before it stays.
 
+    Points of polygons at a crease are split, as the renderer splits them.
+
     The output has its own points. VTK uploads an array of points once for all mappers of a window, shifted
     and scaled as its first mapper asks, but decals need the unchanged points.
     """
@@ -162,9 +168,9 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
         return 1
 
     def RequestData(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
-        """Copy the input and add the normals."""
+        """Copy the input, split polygons at creases, and add the normals."""
         out = pv.wrap(self.GetOutputData(outputs, 0))
-        out.ShallowCopy(self.GetInputData(inputs, 0, 0))
+        out.ShallowCopy(split_polygons(pv.wrap(self.GetInputData(inputs, 0, 0))))
         if isinstance(out, vtkPointSet) and out.GetPoints() is not None:
             points = vtkPoints()
             points.DeepCopy(out.GetPoints())
@@ -173,6 +179,37 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
         array = pv.convert_array(normals, name=NORMALS)
         out.GetPointData().AddArray(array)
         return 1
+
+
+def split_polygons(dataset: pv.DataSet) -> pv.DataSet:
+    """Return polygons with a point for each side of a crease; any other dataset as it is."""
+    if not isinstance(dataset, pv.PolyData) or dataset.GetNumberOfPolys() == 0:
+        return dataset
+    triangles = np.ascontiguousarray(dataset.triangulate().regular_faces, np.int32)
+    split = split_at_creases(np.asarray(dataset.points, np.float32), triangles)
+    if len(split.rows) == dataset.n_points:
+        return dataset
+    copy = dataset.copy(deep=False)
+    normals = copy.GetPointData().GetNormals()
+    if normals is not None:  # VTK's filter would replace them
+        kept = normals.NewInstance()
+        kept.ShallowCopy(normals)
+        kept.SetName(KEPT_NORMALS)
+        copy.GetPointData().RemoveArray(normals.GetName())
+        copy.GetPointData().AddArray(kept)
+    sides = vtkPolyDataNormals()
+    sides.SetInputData(copy)
+    sides.SetFeatureAngle(CREASE_ANGLE)
+    sides.SplittingOn()
+    sides.ConsistencyOff()
+    sides.Update()
+    out = pv.PolyData(sides.GetOutput())
+    out.GetPointData().RemoveArray("Normals")
+    if normals is not None:
+        kept = out.GetPointData().GetArray(KEPT_NORMALS)
+        kept.SetName(normals.GetName())
+        out.GetPointData().SetNormals(kept)
+    return out
 
 
 def smooth_normals(dataset: pv.DataSet) -> NDArray[np.float32]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from decals.record import Contact
 from decals.rendering import context as context_module
 from decals.rendering.context import Context
-from decals.rendering.mesh import mesh_rows
+from decals.rendering.mesh import mesh_rows, split_mesh
 from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend, PixelPass, pass_source
 from decals.rendering.renderer import Renderer
@@ -44,7 +44,8 @@ def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact 
     passes: dict[str, dict[str, Any]] = {}
     for number, item in enumerate(scene.objects):
         assert isinstance(item, MeshObject)
-        arrays[f"rows/{number}"], arrays[f"faces/{number}"] = mesh_rows(item), item.faces
+        split = split_mesh(item)
+        arrays[f"rows/{number}"], arrays[f"faces/{number}"] = mesh_rows(item, split), split.faces
     for backend in PassBackend:
         with (
             Context.standalone(backend=backend) as context,

@@ -15,6 +15,7 @@ class Shape:
     vertices: np.ndarray
     faces: np.ndarray
     color: tuple[float, float, float] = (0.7, 0.6, 0.5)
+    crease_angle: float = 35.0
 
 
 @dataclass(frozen=True, eq=False)

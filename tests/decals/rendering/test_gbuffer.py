@@ -1,13 +1,17 @@
 """What is visible at every pixel, against rays cast in float64."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from decals.errors import InvalidScene
-from decals.rendering.mesh import vertex_normals
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
+from decals.scattering.scatter import scatter
 from decals.scenes.camera import Camera
+from decals.surfaces.normals import vertex_normals
+from tests.decals.meshes import box
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.raster import cast, edges
 
@@ -127,7 +131,7 @@ def test_both_sides_are_lit(renderer: Renderer) -> None:
 
 def test_silhouettes_are_not_speckled(renderer: Renderer) -> None:
     """Smooth normals of a coarse mesh look away from the eye at its edge: no pixel there may go dark."""
-    shape = torus(1, 0.4, 10, 5)
+    shape = replace(torus(1, 0.4, 10, 5), crease_angle=180.0)
     view = look((shape,))
     buffers = renderer.buffers(view, RenderOptions(size=SIZE))
     toward = np.array(view.camera.position) - buffers.position
@@ -136,3 +140,24 @@ def test_silhouettes_are_not_speckled(renderer: Renderer) -> None:
     upper = away & (buffers.normal @ view.camera.axes[1] > 0.5)
     assert upper.sum() > 3
     assert buffers.color[upper][:, :3].min() > 100
+
+
+def test_a_cube_shows_the_normals_of_its_faces(renderer: Renderer) -> None:
+    cube = box()
+    view = look((Shape(cube.vertices, cube.faces),))
+    buffers = renderer.buffers(view, RenderOptions(size=SIZE))
+    seen = buffers.object_id == 0
+    assert seen.sum() > 500
+    np.testing.assert_allclose(np.abs(buffers.normal[seen]).max(axis=1), 1.0, atol=1e-6)
+
+
+def test_no_pixel_is_bare_where_boxes_abut(renderer: Renderer) -> None:
+    """Smoothed normals near the edges looked away from decals that lie across the seam."""
+    boxes = [box(center=(x, 0, 0)) for x in (-0.5, 0.5)]
+    shapes = tuple(Shape(part.vertices, part.faces) for part in boxes)
+    decals = scatter(boxes, count=60, seed=3)
+    camera = Camera.framing(([-1, -0.5, -0.5], [1, 0.5, 0.5]), direction=(0.1, -0.3, 1), up=(0, 1, 0))
+    buffers = renderer.buffers(View(shapes, camera, decals), RenderOptions(size=(160, 120)))
+    top = np.abs(buffers.position[..., 2] - 0.5) < 1e-4
+    assert (buffers.object_id[top] >= 0).sum() > 5000
+    assert (buffers.owner[top] >= 0).all()

@@ -119,6 +119,17 @@ def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, con
         assert np.quantile(error, 0.995) < 0.01
 
 
+def test_creases_are_those_of_the_renderer(plotter: Factory) -> None:
+    cube = pv.Cube(x_length=1.6, y_length=1.6, z_length=1.6)
+    pl, _ = subplot_with(plotter, cube, decals_over(cube), paint=OWNER, lighting=False)
+    seen, ours = shot(pl), found_by_us(pl, cube)
+    sure = (ours.object_id == 0) & ~edges(ours.object_id)
+    owner = seen[..., 0] + 256 * seen[..., 1] - 1
+    assert (owner == ours.owner)[sure].mean() > 0.998
+    assert cube.n_points == 8  # the plotter's own mesh stays
+    assert "Normals" in cube.point_data
+
+
 def test_light_is_vtks(plotter: Factory) -> None:
     """Under an opaque decal of one colour an actor looks as if it were of it, elsewhere as without us."""
     mesh = torus()
