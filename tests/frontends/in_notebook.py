@@ -8,6 +8,7 @@ import asyncio
 import base64
 import io
 import re
+from typing import Any
 
 import nbformat
 import numpy as np
@@ -32,8 +33,9 @@ MENU = 70
 
 async def main() -> None:
     """Run the cells; look at the picture of the first, and at the frame of the last."""
-    cells = [nbformat.v4.new_code_cell(source) for source in (MAKE, docs.code("notebook"))]
-    client = NotebookClient(nbformat.v4.new_notebook(cells=cells), timeout=300, kernel_name="python3")
+    v4: Any = nbformat.v4  # its functions have no types
+    cells = [v4.new_code_cell(source) for source in (MAKE, docs.code("notebook"))]
+    client = NotebookClient(v4.new_notebook(cells=cells), timeout=300, kernel_name="python3")
     names: dict[str, Scene] = {}
     exec(MAKE, names)
     async with client.async_setup_kernel():
