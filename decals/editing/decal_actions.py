@@ -11,7 +11,7 @@ from decals.editing.action_state import ActionState, Cursor, require_pick
 from decals.editing.commands import AddDecals, MapValues, ScaleDecals, TurnDecals
 from decals.editing.document import Document
 from decals.editing.key_bindings import Group, action
-from decals.editing.queries import nearest_points
+from decals.editing.queries import mean_normal, nearest_points
 from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
 from decals.editing.session import Command
 from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
@@ -46,11 +46,13 @@ def new_decal(document: Document, position: Float32Array, normal: Float32Array, 
     positions, normals = position[None], normal[None]
     if model is not None:
         like = document.decals[model]
+        normals = mean_normal(document.objects, position, normal, float(like.radii[0]))[None]
         turned = tangents(positions, normals, like.tangents[0], 0)
         return like.replace(positions=positions, normals=normals, tangents=turned)
     radii = document.decals.column("radii")
     low, high = bounds_of(document.objects)
     radius = float(np.median(radii)) if len(radii) else FIRST_RADIUS * float(np.linalg.norm(high - low))
+    normals = mean_normal(document.objects, position, normal, radius)[None]
     return Decals(
         positions,
         normals,

@@ -14,7 +14,9 @@ from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
-from decals.scenes.objects import SceneObject
+from decals.scattering.mean_normals import mean_normals
+from decals.scenes.objects import SceneObject, TreeObject
+from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
 from decals.validation import describe, finite_vector, instance, member, whole_number
 
@@ -113,6 +115,49 @@ def first_hit(objects: Sequence[SceneObject], origin: ArrayLike, direction: Arra
     hits = origins + np.float32(distances[index]) * directions
     positions, normals = objects[index].surface.project(hits)
     return SurfacePoints(positions, normals, np.array([index], np.int32))
+
+
+def mean_normal(
+    objects: Sequence[SceneObject], position: ArrayLike, normal: ArrayLike, radius: float
+) -> Float32Array:
+    """Return the normal for a decal at a surface point: at an edge the mean of its sides, shape (3,).
+
+    Parameters
+    ----------
+    objects
+        Objects of a scene.
+    position, normal
+        Surface point and unit normal there, shape (3,) each.
+    radius
+        Radius of the decal.
+
+    Examples
+    --------
+    >>> import pyvista
+    >>> from decals.editing.queries import mean_normal
+    >>> from decals.scenes.objects import as_objects
+    >>> mean_normal(as_objects([pyvista.Cube()]), (0.5, 0.0, 0.5), (0, 0, 1), radius=0.2).round(1)
+    array([0.7, 0. , 0.7], dtype=float32)
+    """
+    center = finite_vector("position", position, InvalidPoints)[None].astype(np.float32)
+    own = unit_rows(finite_vector("normal", normal, InvalidPoints)[None])
+
+    def near(points: Float32Array, _: Int64Array) -> tuple[Float32Array, Float32Array, Int64Array]:
+        found = [part for item in objects if (part := _surface_near(item, points)) is not None]
+        positions, normals = (
+            np.concatenate([points[:0], *(part[column] for part in found)]) for column in (0, 1)
+        )
+        return positions, normals, np.tile(np.arange(len(points)), len(found))
+
+    mean: Float32Array = mean_normals(center, own, np.array([radius], np.float64), near)[0]
+    return mean
+
+
+def _surface_near(item: SceneObject, points: Float32Array) -> tuple[Float32Array, Float32Array] | None:
+    """Return the surface of an object near points; None where a tree has none."""
+    if isinstance(item, TreeObject):
+        return project_without_mesh(item.tree, points)
+    return item.surface.project(points)
 
 
 def _check_objects(objects: Sequence[SceneObject]) -> None:

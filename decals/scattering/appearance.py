@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.mean_normals import mean_normals
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
@@ -20,6 +21,9 @@ SAMPLES_PER_DECAL = 64
 
 MIN_SAMPLES = 4096
 """Least number of samples, so that the radii of few decals are accurate as well."""
+
+EXPECTED_RADIUS = 0.6
+"""Radius of a decal before it is measured, in spacings: that of a hexagonal tiling without gaps."""
 
 _SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
 _POSITION_JITTER_STREAM, _SIZE_JITTER_STREAM, _ANGLE_JITTER_STREAM = 7, 8, 9
@@ -102,6 +106,8 @@ class Appearance:
         """
         jitter = self.jitter or Jitter()
         points = jitter.move(domain, points, spacings, movable, _stream(seed, _POSITION_JITTER_STREAM))
+        images_at = points
+        points = self._with_mean_normals(domain, points, spacings)
         radii = jitter.scale(
             self.factor * self._radii(domain, points, seed), _stream(seed, _SIZE_JITTER_STREAM)
         )
@@ -113,8 +119,20 @@ class Appearance:
             normals=points.normals,
             tangents=directions,
             radii=radii.astype(np.float32),
-            images=self._chosen_images(points, radii, seed),
+            images=self._chosen_images(images_at, radii, seed),
         )
+
+    def _with_mean_normals(
+        self, domain: Domain, points: OrientedPoints, spacings: Float32Array
+    ) -> OrientedPoints:
+        """Return points with the mean normals of the surfaces where these bend sharply."""
+
+        def near(trials: Float32Array, rows: Int64Array) -> tuple[Float32Array, Float32Array, Int64Array]:
+            return domain.near(trials, points.surface_ids[rows])
+
+        radii = self.factor * EXPECTED_RADIUS * spacings.astype(np.float64)
+        normals = mean_normals(points.positions, points.normals, radii, near)
+        return OrientedPoints(points.positions, normals, points.surface_ids)
 
     def _radii(self, domain: Domain, points: OrientedPoints, seed: int) -> Float64Array:
         """Return radii by the sizing; a surface without particles is not sampled."""

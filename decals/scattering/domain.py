@@ -177,6 +177,28 @@ class Domain:
         projected = OrientedPoints(positions.numpy()[back], normals.numpy()[back], points.surface_ids)
         return projected, (flags.numpy() == 0)[back]
 
+    def near(
+        self, points: Float32Array, surface_ids: Int32Array
+    ) -> tuple[Float32Array, Float32Array, Int64Array]:
+        """Project points onto their own surfaces and those that may touch these.
+
+        Returns
+        -------
+        positions, normals : float32[n, 3]
+            The surface points where particles may lie.
+        rows : int64[n]
+            The row of each in `points`.
+        """
+        parts: list[tuple[OrientedPoints, Int64Array]] = [(OrientedPoints.empty(), np.zeros(0, np.int64))]
+        for index in range(len(self.surfaces)):
+            rows = np.flatnonzero(np.isin(surface_ids, [index, *self.projection.overlapping(index)]))
+            if len(rows):
+                ids = np.full(len(rows), index, np.int32)
+                found, allowed = self.project(OrientedPoints(points[rows], points[rows], ids))
+                parts.append((found[np.flatnonzero(allowed)], rows[allowed]))
+        joined = OrientedPoints.joined([found for found, _ in parts])
+        return joined.positions, joined.normals, np.concatenate([rows for _, rows in parts])
+
     def project_fixed(self, fixed: ArrayLike | None) -> OrientedPoints:
         """Project fixed particles onto the surfaces that they are closest to."""
         if fixed is None or np.size(fixed) == 0:

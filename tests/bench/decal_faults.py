@@ -1,0 +1,42 @@
+"""Faults of covered models: stretched, folded, oversized and missing decals, on the models of the tests."""
+
+import numpy as np
+
+import decals
+from tests.decals.distortion import distortion
+from tests.decals.fault_models import FAULT_MODELS, visible
+
+TARGETS = {
+    "stretch5_worst": "≤ 0.003",
+    "folded_worst": "≤ 5e-4",
+    "radius_worst": "≤ 1.5",
+    "bare_worst": "0",
+    "rho_worst": "≥ 0.87",
+}
+"""Targets of the worst model."""
+
+COUNT = 300
+"""Decals on each model."""
+
+
+def measure(*, quick: bool) -> dict[str, float]:
+    """Cover each model evenly, and measure it at points that the scattering did not use."""
+    samples = 50_000 if quick else 1_000_000
+    figures: dict[str, float] = {}
+    for name, model in FAULT_MODELS.items():
+        relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*model()), count=COUNT, seed=1)
+        relaxation.run()
+        layout = relaxation.to_decals(seed=1)
+        found = distortion(layout, visible(name), samples)
+        figures |= {
+            f"stretch5_{name}": found.stretched,
+            f"folded_{name}": found.folded,
+            f"radius_{name}": float(layout.radii.max() / np.median(layout.radii)),
+            f"bare_{name}": found.bare,
+            f"rho_{name}": relaxation.statistics().rho,
+        }
+    for key in TARGETS:
+        kind = key.removesuffix("_worst")
+        values = [figures[f"{kind}_{name}"] for name in FAULT_MODELS]
+        figures[key] = min(values) if kind == "rho" else max(values)
+    return figures

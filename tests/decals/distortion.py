@@ -1,0 +1,70 @@
+"""How decals lie on a mesh: stretched, folded and bare shares at points that the scattering did not use."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import decals
+from decals.model import Decals
+from tests.decals.fault_models import Arrays
+
+STRETCHED = 5.0
+"""Ratio of the largest to the smallest stretch of an image from which it counts as stretched."""
+
+STEP = 1e-3
+"""Step of the differences, in median radii."""
+
+CHUNK = 1 << 16
+"""Points that are evaluated at a time."""
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """Shares of the area: stretched, folded, and without an image."""
+
+    stretched: float
+    folded: float
+    bare: float
+
+
+def random_points(mesh: Arrays, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points uniform by area, and the normals of their faces, ``float64[n, 3]`` each."""
+    vertices, faces = np.asarray(mesh[0], np.float64), mesh[1]
+    rng = np.random.default_rng(seed)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    crosses = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(crosses, axis=1)
+    rows = rng.choice(len(faces), count, p=doubled / doubled.sum())
+    root, along = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+    points = (1 - root) * a[rows] + root * ((1 - along) * b[rows] + along * c[rows])
+    return points, crosses[rows] / doubled[rows, None]
+
+
+def distortion(layout: Decals, mesh: Arrays, count: int, seed: int = 7) -> Distortion:
+    """Measure what `decals.evaluate` shows at random points, and at steps along their faces."""
+    points, normals = random_points(mesh, count, seed)
+    parts = [
+        _measured(layout, points[first : first + CHUNK], normals[first : first + CHUNK])
+        for first in range(0, count, CHUNK)
+    ]
+    stretched, folded, sure, bare = (sum(part[k] for part in parts) for k in range(4))
+    return Distortion(stretched / sure, folded / sure, bare / count)
+
+
+def _measured(layout: Decals, points: np.ndarray, normals: np.ndarray) -> tuple[int, int, int, int]:
+    """Counts of stretched, folded, measured and bare points."""
+    axis = np.where(np.abs(normals[:, :1]) > 0.8, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
+    u = np.cross(normals, axis)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(normals, u)
+    step = STEP * float(np.median(layout.radii))
+    shifts = (0 * u, step * u, -step * u, step * v, -step * v)
+    center, *sides = [decals.evaluate(layout, points + shift, normals) for shift in shifts]
+    shown = (center.owner >= 0) & (((center.uv - 0.5) ** 2).sum(axis=1) <= 0.2501)
+    sure = shown & np.all([side.owner == center.owner for side in sides], axis=0)
+    columns = [(sides[k].uv - sides[k + 1].uv)[sure].astype(np.float64) for k in (0, 2)]
+    jacobians = np.stack(columns, axis=-1)
+    sizes = np.linalg.svd(jacobians, compute_uv=False)
+    stretched = sizes[:, 0] > STRETCHED * sizes[:, 1]
+    folded = np.linalg.det(jacobians) < 0
+    return int(stretched.sum()), int(folded.sum()), int(sure.sum()), int((~shown).sum())

@@ -1,0 +1,60 @@
+"""Normals of decals at edges: the mean of the sides, so that images bend over them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blobtree
+import decals
+from decals.editing.queries import mean_normal
+from decals.scenes.objects import as_objects
+from tests.decals.distortion import distortion
+from tests.decals.fault_models import FAULT_MODELS
+from tests.decals.meshes import box, sphere
+
+
+@pytest.mark.parametrize(
+    ("position", "expected"),
+    [
+        ((0.5, 0.1, 0.5), (1, 0, 1)),
+        ((0.5, 0.5, 0.5), (1, 1, 1)),
+        ((0.0, 0.1, 0.5), (0, 0, 1)),
+        ((0.38, 0.1, 0.5), (0, 0, 1)),  # the edge is farther than half the radius
+    ],
+)
+def test_edge_corner_and_flat_side_of_a_cube(position: Any, expected: Any) -> None:
+    cube = box()
+    normal = mean_normal(as_objects([(cube.vertices, cube.faces)]), position, (0, 0, 1), radius=0.2)
+    angle = np.degrees(np.arccos(np.clip(normal @ np.array(expected) / np.linalg.norm(expected), -1, 1)))
+    assert angle < 6.0
+    if expected == (0, 0, 1):
+        np.testing.assert_array_equal(normal, (0, 0, 1))
+
+
+def test_the_other_side_of_a_thin_plate_does_not_count() -> None:
+    plate = box((1.0, 1.0, 0.02))
+    objects = as_objects([(plate.vertices, plate.faces)])
+    np.testing.assert_array_equal(mean_normal(objects, (0, 0, 0.01), (0, 0, 1), radius=0.3), (0, 0, 1))
+
+
+def test_trees_have_means_too() -> None:
+    lens = blobtree.Intersection(
+        (blobtree.Point((0, 0, -0.6), radius=1.0), blobtree.Point((0, 0, 0.6), radius=1.0))
+    )
+    normal = mean_normal(as_objects([lens]), (0.8, 0, 0), (0.8, 0, 0.6), radius=0.1)
+    np.testing.assert_allclose(normal, (1, 0, 0), atol=0.15)
+
+
+def test_smooth_surfaces_keep_their_normals() -> None:
+    ball = sphere(level=4)
+    layout = decals.scatter(ball, count=30, seed=2)
+    np.testing.assert_array_equal(layout.normals, ball.normal(layout.positions))
+
+
+@pytest.mark.parametrize("name", ["gear", "knob"])
+def test_images_bend_over_the_edges_of_parts(name: str) -> None:
+    mesh = FAULT_MODELS[name]()
+    found = distortion(decals.scatter(mesh, count=300, seed=1), mesh, 20_000)
+    assert found.stretched <= 0.003
+    assert found.folded <= 5e-4
