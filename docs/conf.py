@@ -12,6 +12,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
 
 import api_pages  # noqa: E402
+import node_pages  # noqa: E402
 from gallery_scripts import GalleryArguments, PictureScraper  # noqa: E402
 
 from decals.apps.gallery import DOWNLOADED  # noqa: E402
@@ -36,6 +37,7 @@ myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
 
 api_pages.write(DOCS / "api")
+node_pages.write(DOCS / "nodes")
 autosummary_generate = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False

@@ -42,6 +42,7 @@ def draw_trees(
     direction: Sequence[float] = DIRECTION,
     resolution: int = 64,
     lines: bool = False,
+    quality: int = 80,
 ) -> None:
     """Write a picture of trees side by side, all at the same scale.
 
@@ -59,6 +60,8 @@ def draw_trees(
         That of the meshes.
     lines
         Add a part with level lines of the last tree's field in the plane z = 0.
+    quality
+        That of the JPEG file, up to 100.
     """
     width, height = size
     toward = np.asarray(direction, float) / np.linalg.norm(direction)
@@ -88,10 +91,12 @@ def draw_trees(
         )
         plotter.add_mesh(field["lines"], color="white", line_width=2)
         plotter.add_mesh(field["surface"], color="black", line_width=5)
+        low_x, high_x, low_y, high_y, *_ = field["plane"].bounds
         plotter.view_xy()
-        plotter.camera.tight()
+        plotter.enable_parallel_projection()
+        plotter.camera.parallel_scale = 0.5 * max(high_y - low_y, (high_x - low_x) * height / width)
     pixels = plotter.screenshot(return_img=True)
     plotter.close()
     small = Image.fromarray(pixels).resize((width * parts, height), Image.Resampling.LANCZOS)
     path.parent.mkdir(parents=True, exist_ok=True)
-    small.save(path, quality=80, optimize=True)
+    small.save(path, quality=quality, optimize=True)

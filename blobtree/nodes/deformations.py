@@ -242,7 +242,7 @@ class NoiseWarp(Placed):
 
     @Lazy
     def warp_parameters(self) -> tuple[float, ...]:
-        """Return the number of waves, and (ω, phase), (d, |d| |ω|) of each."""
+        """Return the number of waves, and (ω, phase), (d, steepness) of each."""
         rng = np.random.default_rng(self.seed)
         z, turn, phase, side = rng.random((4, WAVES))
         across = np.sqrt(1.0 - (2.0 * z - 1.0) ** 2)

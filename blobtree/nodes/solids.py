@@ -31,8 +31,8 @@ LARGEST_RATIO = 1e5
 class Ellipsoid(Macro, Profile, Leaf):
     """An ellipsoid, its axes parallel to those of its space: a ball of radius 1 under a scale.
 
-    Its field is g(r · RIM) with r = |(x/a, y/b, z/c)|, so its level sets are ellipsoids too. Along an axis of
-    length a, a `width` w is w · a / ∛(abc).
+    Its field is g(r · RIM) with r² = (x/a)² + (y/b)² + (z/c)², so its level sets are ellipsoids too.
+    Along an axis of length a, a `width` w is w · a / ∛(abc).
 
     Examples
     --------
