@@ -147,7 +147,7 @@ def fit(
     InvalidNode
         No parameter is free, or `fixed` names what the tree does not have.
     InvalidPoints
-        The samples are not n rows of finite numbers, or fewer numbers than parameters.
+        The samples are not n rows of finite numbers, fewer numbers than parameters, or all out of reach.
     Cancelled
         `cancel` returned True.
 
@@ -169,6 +169,10 @@ def fit(
     if samples.count < len(free):
         raise InvalidPoints(
             f"points: expected at least as many numbers as free parameters ({len(free)}), got {samples.count}"
+        )
+    if not tree(samples.points).any():
+        raise InvalidPoints(
+            "points: expected samples within reach of the start's field, got none; move or enlarge the start"
         )
     start = numeric_values(tree, free)
     lower, upper = _ranges(free, start)

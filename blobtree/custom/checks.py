@@ -153,7 +153,7 @@ def _try_convexity(
         if apart > TOLERANCE * (1.0 + np.abs(closest_points).max()):
             raise source.refusal(
                 f"convex: {_format(one)} and {_format(other)} belong to the skeleton, but the middle between "
-                f"them is {apart:.6g} away from it, with {values}"
+                f"them is {apart:.6g} away from it{f', with {values}' if values else ''}"
             )
 
 
@@ -176,7 +176,7 @@ def _try_bounds(
             if np.linalg.norm(c) > FAR_SHARE * distance:
                 raise source.refusal(
                     f"for q = {_format(q)} it returns {_format(c)}, so its skeleton seems to be unbounded; "
-                    f"end the skeleton at a finite distance, with {values}"
+                    f"end the skeleton at a finite distance{f', with {values}' if values else ''}"
                 )
 
 

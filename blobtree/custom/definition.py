@@ -54,7 +54,7 @@ def custom_parameters(
             )
         if name in taken:
             raise source.refusal(
-                f"parameter {name!r}: every node has an attribute of that name; choose another"
+                f"parameter {name!r}: every node of this sort has an attribute of that name; choose another"
             )
         low, high = _limits(source, name, remaining.pop(name, (None, None)))
         parameters.append(

@@ -80,8 +80,8 @@ def custom_source(function: Any, *, returns: Any) -> CustomSource:
         raise InvalidDefinition(f"{location}: {python.__name__}: parameter {missing[0]!r} lacks its type")
     if hints.get("return") not in (returns, None) or "return" not in hints:
         raise InvalidDefinition(
-            f"{location}: {python.__name__}: expected it to return wp.{returns.__name__}, "
-            f"got {_spelled(hints.get('return'))}; annotate it `-> wp.{returns.__name__}`"
+            f"{location}: {python.__name__}: expected it to return {_spelled(returns)}, "
+            f"got {_spelled(hints.get('return'))}; annotate it `-> {_spelled(returns)}`"
         )
     _require_plain_names(python)
     digest = hashlib.sha256("\n".join(_sources(python, ())).encode()).hexdigest()[:12]
@@ -160,7 +160,12 @@ def _hints(python: FunctionType) -> dict[str, Any]:
 
 
 def _spelled(hint: Any) -> str:
-    return "no annotation" if hint is None else getattr(hint, "__name__", repr(hint))
+    """Return a type as users write it."""
+    if hint is None:
+        return "no annotation"
+    name = getattr(hint, "__name__", repr(hint))
+    name = re.sub(r"^(vec[234])f$", r"\1", name)  # the names of Warp's own classes end in f
+    return f"wp.{name}" if getattr(wp, name, None) is hint else name
 
 
 def _require_plain_names(python: FunctionType) -> None:

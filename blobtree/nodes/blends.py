@@ -75,7 +75,13 @@ class SuperellipticBlend(AssociativeCombination):
     width: Annotated[float, _WIDTH] = field(kw_only=True)
     exponent: Annotated[
         float,
-        Parameter(Quantity.FACTOR, "exponent n", low=1.0, high=LARGEST_EXPONENT, hint="for more use a union"),
+        Parameter(
+            Quantity.FACTOR,
+            "exponent n",
+            low=1.0,
+            high=LARGEST_EXPONENT,
+            hint="1 is the sum; for more use a union",
+        ),
     ] = field(kw_only=True)
 
 

@@ -103,12 +103,12 @@ class Superquadric(FieldPrimitive):
     vertical: Annotated[
         float,
         Parameter(Quantity.FACTOR, "exponent ε₁ between z and the others: 0.1 square, 1 round, 2 a diamond",
-                  low=0.1, high=2.0, hint="larger exponents make concave edges without a slope bound"),
+                  low=0.1, high=2.0, hint="above 2 edges are concave, without a slope bound"),
     ] = 1.0  # fmt: skip
     horizontal: Annotated[
         float,
         Parameter(Quantity.FACTOR, "exponent ε₂ between x and y", low=0.1, high=2.0,
-                  hint="larger exponents make concave edges without a slope bound"),
+                  hint="above 2 edges are concave, without a slope bound"),
     ] = 1.0  # fmt: skip
     _: KW_ONLY
     color: Color = DEFAULT_COLOR

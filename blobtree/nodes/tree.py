@@ -261,7 +261,7 @@ class Node(ImplicitModel):
             raise InvalidNode(f"factor: expected a scale other than 0, got {factor!r}")
         return self.transform(np.column_stack([np.diag(factors), np.zeros(3)]))
 
-    def twist(self, degrees: float, *, limits: tuple[float, float] | None = None) -> "Node":
+    def twist(self, degrees: float, limits: tuple[float, float] | None = None) -> "Node":
         """Return this node turned about the z axis by an angle that grows with the height.
 
         Parameters
@@ -841,7 +841,7 @@ class Node(ImplicitModel):
         split_normals : bool
             Give each side of a crease its own vertices and normals; implies `creases`. Creases then look
             sharp, and the mesh is not closed there.
-        attributes : iterable of str
+        attributes : str or iterable of str
             Names of attributes to add as point data, see `attribute`.
         rest_coordinates : bool
             Add point data "rest_coordinates".
@@ -878,7 +878,7 @@ class Node(ImplicitModel):
         )
         surface = to_polydata(split_creases(self, mesh) if split_normals else mesh)
         if surface.n_points:
-            for name in attributes:
+            for name in (attributes,) if isinstance(attributes, str) else attributes:
                 surface.point_data[name] = self.attribute(name, surface.points)
             if rest_coordinates:
                 surface.point_data["rest_coordinates"] = self.rest_coordinates(surface.points)
@@ -1092,7 +1092,13 @@ class Ricci(AssociativeCombination):
 
     exponent: Annotated[
         float,
-        Parameter(Quantity.FACTOR, "exponent n", low=1.0, high=LARGEST_EXPONENT, hint="for more use a union"),
+        Parameter(
+            Quantity.FACTOR,
+            "exponent n",
+            low=1.0,
+            high=LARGEST_EXPONENT,
+            hint="1 is the sum; for more use a union",
+        ),
     ] = field(kw_only=True)
 
 
@@ -1248,11 +1254,13 @@ def _bound(kind: type[Node], arguments: tuple[Any, ...], named: dict[str, Any]) 
     missing = [name for name in names if name not in values | given]
     unknown = [name for name in named if name not in names]
     if missing or unknown or len(positional) > len(names) or len(given) < len(positional) + len(named):
-        expected = ", ".join(names[1:]) or "nothing else"
-        raise TypeError(
-            f"{kind.__name__}: expected operands and {expected}, got {len(positional)} arguments by position "
-            f"and {', '.join(named) or 'none'} by name"
-        )
+        expected = ", ".join(f"{name}=…" for name in names[1:]) or "nothing else"
+        problem = f"got {len(positional)} arguments by position and {', '.join(named) or 'none'} by name"
+        if missing:
+            problem = f"{', '.join(missing)} missing"
+        elif unknown:
+            problem = f"{', '.join(unknown)} unknown"
+        raise TypeError(f"{kind.__name__}: expected operands and {expected}; {problem}")
     return values | given
 
 

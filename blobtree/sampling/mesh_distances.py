@@ -55,7 +55,9 @@ class Triangles:
         keys, edge = np.unique(low * (len(weld) + 1) + high, return_inverse=True)
         balance = np.bincount(edge.ravel(), np.where(starts < ends, 1, -1), len(keys))
         open_edges = int((balance != 0).sum())
-        if open_edges or not len(faces):
+        if not len(faces):
+            raise InvalidNode("mesh: expected triangles with three different corners, got none")
+        if open_edges:
             raise InvalidNode(
                 f"mesh: expected a closed surface, got {open_edges} edges with a hole or a turned triangle "
                 "beside them; close it, or pass radius=… for a shell around it"

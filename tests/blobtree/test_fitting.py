@@ -145,5 +145,7 @@ def test_bad_input_is_refused() -> None:
         fit(ball, points, normals=np.zeros((3, 3)), fixed=["radius"])
     with pytest.raises(InvalidPoints):
         fit(ball, [[np.inf, 0, 0]])
+    with pytest.raises(InvalidPoints, match="within reach of the start's field, got none"):
+        fit(ball, points + 9.0, fixed=["radius"])
     with pytest.raises(Cancelled):
         fit(ball, points, fixed=["radius"], cancel=lambda: True)

@@ -16,7 +16,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 def module(name: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return a script of the folder docs as a module."""
-    monkeypatch.syspath_prepend(DOCS)  # type: ignore[no-untyped-call]
+    monkeypatch.syspath_prepend(DOCS)
     return import_module(name)
 
 

@@ -118,7 +118,11 @@ def test_parameters_of_a_leaf_are_checked() -> None:
         (kernels.wrong_gradient, {"steepest": 1.0}, "∂f/∂x at .* by differences, but 1 is returned"),
         (kernels.returns_a_point, {"steepest": 1.0}, "expected it to return wp.float32"),
         (kernels.takes_no_point, {"steepest": 1.0}, "expected the point `q: wp.vec3`"),
-        (kernels.takes_a_size, {"steepest": 1.0}, "'size': every node has an attribute of that name"),
+        (
+            kernels.takes_a_size,
+            {"steepest": 1.0},
+            "'size': every node of this sort has an attribute of that name",
+        ),
         (kernels.imprecise, {"steepest": 2e6}, "in single precision"),
         (kernels.waves, {"steepest": -1.0}, "steepest: expected a number from 0"),
         (kernels.waves, {"steepest": float("nan")}, "steepest: expected a number from 0"),

@@ -19,11 +19,11 @@ from tests.blobtree.custom import kernels
 
 REFUSED_SKELETONS = [
     (kernels.no_types, "parameter 'q' lacks its type"),
-    (kernels.no_return, "expected it to return wp.vec3"),
-    (kernels.returns_a_number, "expected it to return wp.vec3"),
+    (kernels.no_return, "expected it to return wp.vec3, got no annotation"),
+    (kernels.returns_a_number, "expected it to return wp.vec3, got wp.float32; annotate it `-> wp.vec3`"),
     (kernels.takes_text, "no type that GLSL knows"),
-    (kernels.takes_a_radius, "every node has an attribute of that name"),
-    (kernels.takes_a_scale, "'scale': every node has an attribute of that name"),
+    (kernels.takes_a_radius, "every node of this sort has an attribute of that name"),
+    (kernels.takes_a_scale, "'scale': every node of this sort has an attribute of that name"),
     (kernels.no_place, "expected the query point `q: wp.vec3`"),
     (kernels.no_arguments, "expected the query point `q: wp.vec3`"),
     (kernels.makes_a_list, "List expression"),

@@ -180,6 +180,7 @@ def test_meshes_have_attributes_as_point_data() -> None:
     assert surface.point_data["flow"].shape == (surface.n_points, 3)
     np.testing.assert_allclose(surface.point_data["age"], tree.attribute("age", surface.points))
     assert np.isfinite(surface.point_data["rest_coordinates"]).all()
+    assert "age" in tree.to_pyvista(resolution=12, attributes="age").point_data
     hits = tree.raycast([[5, 0, 0]], [[-1, 0, 0]])
     assert 10.0 <= tree.attribute("age", hits.positions)[0] <= 20.0
 

@@ -89,6 +89,13 @@ def test_wrong_arguments_are_refused(make: Any, error: type[Exception]) -> None:
         make()
 
 
+def test_messages_name_what_is_missing_or_unknown() -> None:
+    with pytest.raises(TypeError, match=r"^Ricci: expected operands and exponent=…; exponent missing$"):
+        Ricci(A, B)
+    with pytest.raises(TypeError, match=r"^Sum: expected operands and nothing else; exponent unknown$"):
+        Sum(A, B, exponent=2.0)
+
+
 @EVERY_NODE
 def test_files_text_and_copies(node: Node) -> None:
     names: dict[str, Any] = {name: getattr(blobtree, name) for name in blobtree.__all__}

@@ -196,7 +196,7 @@ def test_below_the_limits_nothing_moves() -> None:
         KNOBBED.taper(0.5, (1, 3)),
         KNOBBED.shear(1, 2, (1, 3)),
         KNOBBED.stretch(2, (1, 3)),
-        KNOBBED.twist(90, limits=(1, 3)),
+        KNOBBED.twist(90, (1, 3)),
         KNOBBED.bend(40, (1, 3)),
     ):
         np.testing.assert_array_equal(node(below), KNOBBED(below))
