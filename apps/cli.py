@@ -49,6 +49,16 @@ implicit-decals edit knot.json --images moss.png
 
 implicit-decals edit
 """,
+    "sandbox": """Open models or a scene in the sandbox, a page in the browser.
+
+For example:
+
+implicit-decals sandbox
+
+implicit-decals sandbox knot --decals 300 --save knot.json
+
+implicit-decals sandbox knot.json
+""",
     "scatter": """Scatter decals over models and write a scene, or a table of decals.
 
 All models share one coordinate system. Decals of different models push each other where the models touch.

@@ -106,6 +106,11 @@ def registered(name: str) -> CustomKind | None:
     return _KINDS.get(name)
 
 
+def custom_kinds() -> tuple[CustomKind, ...]:
+    """Return all kinds that are defined in this process, in the order of their definition."""
+    return tuple(_KINDS.values())
+
+
 def find_kind(name: str) -> CustomKind:
     """Return the kind of this name.
 

@@ -27,7 +27,9 @@ from .tree_commands import (
     MovePrimitive,
     PaintPrimitive,
     RemovePrimitive,
+    ReplaceNode,
     ResizePrimitive,
+    SetParameter,
 )
 
 __all__ = [
@@ -54,11 +56,13 @@ __all__ = [
     "RemovePrimitive",
     "ReplaceDecals",
     "ReplaceImage",
+    "ReplaceNode",
     "ReplaceScene",
     "ResizePrimitive",
     "ScaleDecals",
     "ScatterDecals",
     "SetCamera",
+    "SetParameter",
     "SetValues",
     "TurnDecals",
     "UndoEntry",

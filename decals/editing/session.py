@@ -189,6 +189,11 @@ class EditSession:
         """Labels of the entries that can be undone, oldest first."""
         return tuple(entry.label for entry in self._history.done)
 
+    @property
+    def undone_labels(self) -> tuple[str, ...]:
+        """Labels of the entries that can be redone, the next one first."""
+        return tuple(entry.label for entry in reversed(self._history.undone))
+
     # -- strokes ----------------------------------------------------------------------------------------
 
     @property

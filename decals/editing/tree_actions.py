@@ -1,12 +1,14 @@
 """Actions on objects and on the primitives of BlobTrees: select, move, add, resize, join and remove."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import Node, Point, Segment
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
-from blobtree.nodes.paths import Path, node_in_world, primitive_at
+from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, world_space_path
 from decals.editing.action_state import ActionState, Cursor, require_pick
 from decals.editing.background import Step
@@ -22,7 +24,9 @@ from decals.editing.tree_commands import (
     MovePrimitive,
     PaintPrimitive,
     RemovePrimitive,
+    ReplaceNode,
     ResizePrimitive,
+    SetParameter,
     StructureCommand,
 )
 from decals.errors import ImplicitDecalsError, InvalidEdit
@@ -43,6 +47,9 @@ FIRST_OBJECT_RADIUS = 0.2
 
 FIRST_LIMB_RADIUS = 0.06
 """Radius of a limb that is the first object, likewise."""
+
+NEW_NODE_SIZE = 0.4
+"""Size of a new node of a panel, in sizes of the selected node or the scene."""
 
 MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
@@ -137,7 +144,10 @@ class TreeActions:
         """
         if self._state.primitive is None:
             return
-        command = MovePrimitive(*self._state.primitive, offset, quick=True)
+        self._drag_to(MovePrimitive(*self._state.primitive, offset, quick=True))
+
+    def _drag_to(self, command: MovePrimitive | SetParameter) -> None:
+        """Replace the edit of the open stroke by that of a command."""
 
         def step(session: EditSession) -> str:
             session.revert_stroke()
@@ -153,11 +163,80 @@ class TreeActions:
         if state.primitive is not None:
             step = _surface_check(state.primitive[0])
             state.background.when_followed(
-                lambda: state.run_latest_step(
-                    MovePrimitive.label, step, long=not state.background.busy_editing
-                )
+                lambda: state.run_latest_step("drag", step, long=not state.background.busy_editing)
             )
         state.end_stroke()
+
+    # -- panels -----------------------------------------------------------------------------------------
+
+    @property
+    def selected_node(self) -> Node:
+        """The node that is selected; `InvalidEdit` if none is."""
+        if self._state.primitive is None:
+            raise InvalidEdit("no node is selected; select one in the outline, or press M on the surface")
+        number, path = self._state.primitive
+        return node_at(self._tree(number), path)
+
+    def select_node(self, number: int, path: Path) -> None:
+        """Select a node of an object's tree, with its handle on the side that the camera sees."""
+        self._state.session.document.object(number)  # raises for a number without an object
+        low, high = node_in_world(self._tree(number), path).support
+        eye, _ = self._state.view()
+        toward = unit_rows((np.asarray(eye) - (low + high) / 2)[None])[0]
+        self._state.select_primitive(number, path, float((high - low).min()) / 2 * toward)
+
+    def set_parameter(self, name: str, value: Any, *, last: bool = True) -> None:
+        """Set a parameter of the selected node.
+
+        Parameters
+        ----------
+        name
+            Name of the parameter.
+        value
+            Its new value.
+        last
+            If False, more values of the same parameter follow, as from a slider: all are one undo entry.
+        """
+        self.selected_node  # noqa: B018  # raises without a selected node
+        state = self._state
+        assert state.primitive is not None
+        command = SetParameter(*state.primitive, name, value, quick=True)
+        command.changed_node(state.session.document)  # raises before a stroke begins
+        state.begin_series(("set", (*state.primitive, name)), command.label)
+        self._drag_to(command)
+        if last:
+            self.end_drag()
+
+    def place_of_new_node(self) -> tuple[Float64Array, float]:
+        """Return centre (3,) and size for a new node: on the selected one, or at the camera's target."""
+        state = self._state
+        if state.primitive is not None:
+            number, path = state.primitive
+            low, high = node_in_world(self._tree(number), path).bounds
+            size = float((high - low).max()) * NEW_NODE_SIZE
+            return np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2], np.float64), size
+        eye, target = (np.asarray(point, np.float64) for point in state.view())
+        if state.session.document.objects:
+            low, high = bounds_of(state.session.document.objects)
+            size = float((high - low).max()) * NEW_NODE_SIZE
+            return np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size
+        return target, FIRST_OBJECT_RADIUS * float(np.linalg.norm(eye - target))
+
+    def add_node(self, node: Node, join: Join = Join.BLEND) -> None:
+        """Join a node, given in the world, to the selected one and select it; without one it is an object."""
+        if self._state.primitive is None:
+            self._add_tree(type(node).__name__.lower(), node, np.zeros(3, np.float32))
+            return
+        number, path = self._state.primitive
+        above = world_space_path(self._tree(number), path)
+        self._restructure(AddPrimitive(number, above, node, join), handle_offset=np.zeros(3, np.float32))
+
+    def replace_node(self, node: Node) -> None:
+        """Put a node in the place of the selected one, and select it."""
+        self.selected_node  # noqa: B018  # raises without a selected node
+        assert self._state.primitive is not None
+        command = ReplaceNode(*self._state.primitive, node)
+        self._restructure(command, handle_offset=np.zeros(3, np.float32))
 
     # -- primitives -------------------------------------------------------------------------------------
 

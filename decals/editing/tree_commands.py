@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import ISO, Node
 from blobtree.nodes import surgery
+from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import (
     Path,
     moved,
@@ -24,7 +25,7 @@ from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject
-from decals.validation import finite_number, finite_vector, instance, member
+from decals.validation import describe, finite_number, finite_vector, instance, member
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +71,21 @@ class PrimitiveCommand:
         item = TreeObject(document.objects[self.object].name, after)
         if not quick:
             item.surface  # noqa: B018  # raises for a tree without a visible surface
-        objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
+        objects = self._with_object(document, item)
         numbers, points = followers(
             document, self.object, tuple(self.path), item, np.asarray(offset, np.float64)
         )
         moved_along = move_decals(document.decals.take(numbers), points)
         return document.compute_replacement(numbers, moved_along, objects=objects)
+
+    def compute_repainting(self, document: Document, node: Node) -> Edit:
+        """Return the edit that puts a node of the same shape at the path."""
+        item = TreeObject(document.objects[self.object].name, with_node(self.tree(document), self.path, node))
+        return document.compute_parts(objects=self._with_object(document, item))
+
+    def _with_object(self, document: Document, item: SceneObject) -> tuple[SceneObject, ...]:
+        """Return the document's objects with the command's object exchanged."""
+        return (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +167,64 @@ class ResizePrimitive(PrimitiveCommand):
 
 
 @dataclass(frozen=True, eq=False)
+class SetParameter(PrimitiveCommand):
+    """Set one parameter of a node; decals stay on the surface.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    name
+        Name of the parameter, such as "radius".
+    value
+        Its new value.
+    quick
+        If True, the tree is not checked for a visible surface: for the steps of a drag. Check it at the end.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, SetParameter
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(SetParameter(0, (1,), "radius", 0.8))
+    >>> session.document.objects[0].tree.children[1].radius
+    0.8
+    """
+
+    name: str
+    value: Any
+    quick: bool = False
+
+    @property
+    def label(self) -> str:
+        """What the command does."""
+        return f"set {self.name}"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        node = self.changed_node(document)
+        if parameters_of(type(node))[self.name].quantity in (Quantity.COLOR, Quantity.ATTRIBUTES):
+            return self.compute_repainting(document, node)
+        return self.compute_exchange(document, node, quick=self.quick)
+
+    def changed_node(self, document: Document) -> Node:
+        """Return the node with the new value; raise `InvalidEdit` or `InvalidNode` if it takes none such."""
+        node: Any = node_at(self.tree(document), self.path)
+        declared = parameters_of(type(node))
+        if not isinstance(self.name, str) or self.name not in declared:
+            raise InvalidEdit(
+                f"parameter: expected one of {', '.join(declared)} for a {type(node).__name__}, "
+                f"got {describe(self.name)}"
+            )
+        changed: Node = replace(node, **{self.name: self.value})
+        return changed
+
+
+@dataclass(frozen=True, eq=False)
 class PaintPrimitive(PrimitiveCommand):
     """Set the colour of a primitive.
 
@@ -187,12 +255,9 @@ class PaintPrimitive(PrimitiveCommand):
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         tree = self.tree(document)
-        path = primitive_path(tree, self.path)
-        leaf: Any = primitive_at(tree, path)
-        primitive = replace(leaf, color=self.color)
-        item = TreeObject(document.objects[self.object].name, with_node(tree, path, primitive))
-        objects = (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
-        return document.compute_parts(objects=objects)
+        command = replace(self, path=primitive_path(tree, self.path))
+        leaf: Any = primitive_at(tree, self.path)
+        return command.compute_repainting(document, replace(leaf, color=self.color))
 
 
 def same_structure(before: SceneObject, after: SceneObject) -> bool:
@@ -275,6 +340,40 @@ class AddPrimitive(StructureCommand):
         instance("node", self.node, Node, InvalidEdit, "such as Point(...)")
         join = member("join", self.join, Join, InvalidEdit)
         return surgery.add_node(tree, self.path, self.node, join)
+
+
+@dataclass(frozen=True, eq=False)
+class ReplaceNode(StructureCommand):
+    """Put another node at a path, such as the same operands under another operator, or a warp of the node.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    node
+        The new node, in the space of the old one.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, ReplaceNode
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(ReplaceNode(0, (), tree.twist(20)))
+    >>> session.document.objects[0].tree.degrees
+    20.0
+    """
+
+    node: Node
+    label: ClassVar[str] = "replace a node"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the new node."""
+        instance("node", self.node, Node, InvalidEdit, "such as Point(...)")
+        return with_node(tree, self.path, self.node), tuple(self.path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ async def opened(url: str, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Pag
 
 
 @asynccontextmanager
-async def served(server: Any) -> AsyncIterator[Page]:
+async def served(server: Any, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Page]:
     """The page of a trame server of this process."""
     task = server.start(
         exec_mode="task",
@@ -53,7 +53,7 @@ async def served(server: Any) -> AsyncIterator[Page]:
         show_connection_info=False,
     )
     await server.ready
-    async with opened(f"http://127.0.0.1:{server.port}/") as page:
+    async with opened(f"http://127.0.0.1:{server.port}/", size=size) as page:
         yield page
     await server.stop()
     await task

@@ -1,6 +1,6 @@
 """Decals in a real browser, served by trame, as a program: ``python -m tests.frontends.in_browser NAME``.
 
-``page`` takes a path behind its name, where it saves the picture of docs/pyvista.md.
+``page`` and ``sandbox`` take a path behind their name, where they save the picture of their page of docs.
 """
 
 import asyncio
@@ -18,13 +18,18 @@ from trame.ui.vuetify3 import VAppLayout
 from trame_pyvista.widgets import PyVistaRCAView, PyVistaRemoteView
 from trame_server.core import Server
 
+import decals
+from blobtree import Point
+from decals.apps.sandbox.page import Page as SandboxPage
 from decals.editing.scatter_commands import decals_on
 from decals.window import EditWindow
-from tests.decals.editing.scenes import scene
+from tests.decals.editing.scenes import digest, scene
 from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
 from tests.frontends import page as docs
 from tests.frontends.browsing import LOSS, PATIENCE, drag, drawn, point, seen, served, shows, until
+
+BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 
 
 async def page(picture: str | None = None) -> None:
@@ -129,10 +134,52 @@ async def streamed() -> None:
         assert np.abs(await shows(browser, plotter) - turned).mean() > 2
 
 
+async def sandbox(picture: str | None = None) -> None:
+    """A user of the sandbox builds, changes and undoes a model, and sees each step."""
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("sandbox", client_type="vue3")
+    window = EditWindow(decals.cover(BLOB, count=60, images=["tile"]), plotter=plotter)
+    window.show()
+    sandbox_page = SandboxPage(server, window)
+    state = digest(window.document)
+    requests: list[str] = []
+    async with served(server, size=(1280, 800)) as browser:
+        browser.on("request", lambda request: requests.append(request.url))
+        first = await shows(browser, plotter)
+        await browser.get_by_text("Point").nth(1).click()
+        await until(lambda: window.actions.state.primitive == (0, (1,)))
+        for _ in range(3):
+            await browser.get_by_role("slider", name="radius").press("ArrowRight")
+        await until(lambda: set(window.session.labels) == {"set radius"} and not window.session.stroke_open)
+        slid = window.session.labels
+        assert np.abs(await shows(browser, plotter) - first).mean() > 0.5
+        await browser.get_by_role("button", name="Add").click()
+        await browser.get_by_text("Torus", exact=True).click()
+        await until(lambda: window.session.labels[-1:] == ("add a primitive",))
+        field = browser.get_by_role("textbox", name="ring radius")
+        await field.fill("0.6")
+        await field.press("Enter")
+        await until(lambda: window.session.labels[-1:] == ("set ring_radius",))
+        if picture is not None:
+            window.subplot.vtk_renderer.ResetCamera()
+            window.redraw(whole=True)
+            await shows(browser, plotter)
+            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+        await browser.get_by_role("textbox", name="ring radius").fill("-1")
+        await browser.get_by_role("textbox", name="ring radius").press("Enter")
+        await until(lambda: "expected a number above 0" in sandbox_page.sandbox.status)
+        await browser.get_by_text("Start", exact=True).click()
+        await until(lambda: digest(window.document) == state)
+        await until(lambda: window.session.undone_labels == (*slid, "add a primitive", "set ring_radius"))
+        assert all("127.0.0.1" in url for url in requests)
+    window.close()
+
+
 def main() -> None:
     """Run one of the functions above, by its name."""
     name, *arguments = sys.argv[1:]
-    asyncio.run({"page": page, "user": user, "streamed": streamed}[name](*arguments))
+    asyncio.run({"page": page, "user": user, "streamed": streamed, "sandbox": sandbox}[name](*arguments))
     print("done")
 
 

@@ -25,9 +25,11 @@ from decals.editing import (
     RemovePrimitive,
     ReplaceDecals,
     ReplaceImage,
+    ReplaceNode,
     ResizePrimitive,
     ScaleDecals,
     SetCamera,
+    SetParameter,
     SetValues,
     TurnDecals,
 )
@@ -148,7 +150,11 @@ class RandomCommands:
 
     def primitive(self) -> Any:
         number, path, _ = self.path()
-        kind = self.rng.integers(3)
+        kind = self.rng.integers(5)
+        if kind == 3:
+            return SetParameter(number, path, "center" if self.nonsense() else "radius", 0.3)
+        if kind == 4:
+            return ReplaceNode(number, path, Point(self.place()[0], radius=0.4))
         if kind == 0:
             return PaintPrimitive(number, path, self.rng.uniform(0, 1.05, 3))
         if kind == 1:

@@ -12,7 +12,9 @@ from decals.editing import (
     EditSession,
     MovePrimitive,
     PaintPrimitive,
+    ReplaceNode,
     ResizePrimitive,
+    SetParameter,
 )
 from decals.editing.actions import Actions
 from decals.editing.followers import DragAnchor, following_weights
@@ -254,3 +256,33 @@ def test_below_a_twist_nothing_moves_alone() -> None:
     session = session_of((A + B).twist(30))
     with pytest.raises(InvalidNode, match="below a Twist"):
         session.do(MovePrimitive(0, (0, 0), (0, 0, 1)))
+
+
+def test_a_parameter_of_any_node_is_set_and_decals_stay_on_the_surface() -> None:
+    session = session_of((A + B).twist(10.0))
+    before = digest(session.document)
+    session.do(SetParameter(0, (), "degrees", 25.0))
+    session.do(SetParameter(0, (0, 1), "end", (2.2, 0.3, 0)))
+    tree: Any = tree_of(session.document)
+    assert (tree.degrees, tree.child.operands[1].end) == (25.0, (2.2, 0.3, 0.0))
+    np.testing.assert_allclose(tree(session.document.decals.decals.positions), ISO, atol=1e-4)
+    assert session.labels == ("set degrees", "set end")
+    for _ in range(2):
+        session.undo()
+    assert digest(session.document) == before
+
+
+def test_a_color_is_set_without_a_look_at_the_decals() -> None:
+    session = session_of(A + B)
+    edit = session.do(SetParameter(0, (1,), "color", "red"))
+    tree: Any = tree_of(session.document)
+    assert tree.operands[1].color == (1.0, 0.0, 0.0)
+    assert len(edit.after.numbers) == 0
+
+
+def test_a_node_is_replaced_by_any_other() -> None:
+    session = session_of(A + B)
+    session.do(ReplaceNode(0, (1,), C))
+    assert tree_of(session.document) == A + C
+    with pytest.raises(InvalidEdit, match="expected one of start, end"):
+        session.do(SetParameter(0, (1,), "size", 1.0))

@@ -1,0 +1,138 @@
+"""Opening of what `edit` and `sandbox` edit: models with decals, a saved scene, or an empty one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import chain, count
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from decals import Camera, DecalImage, Scene
+from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
+from decals.apps.commands.scatter_options import ScatterOptions
+from decals.apps.models.loading import load_models
+from decals.apps.models.samples import axes_of
+from decals.apps.output import check_output
+from decals.apps.views import UPRIGHT, Axes, parse_view
+from decals.editing import AddImage, recovery_path
+from decals.errors import InvalidInput
+from decals.window import EditWindow
+
+
+def new_file(folder: Path, name: str) -> Path:
+    """Return the first path that does not exist: NAME.json, NAME-2.json, ..."""
+    endings = chain([""], (f"-{number}" for number in count(2)))
+    paths = (folder / f"{name}{ending}.json" for ending in endings)
+    return next(path for path in paths if not path.exists())
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A scene to edit, and where it is saved.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    path
+        File to save to.
+    added
+        Images to add to the scene, as the first edits.
+    recover
+        Reads a recovery file.
+    """
+
+    scene: Scene
+    path: Path
+    added: tuple[DecalImage, ...]
+    recover: Callable[[Path], Scene]
+
+    def add_images(self, window: EditWindow) -> None:
+        """Add the images to a window's scene."""
+        for picture in self.added:
+            window.session.do(AddImage(picture))
+
+
+def check_options(decals: int | None, seed: int | None, save: Path | None) -> None:
+    """Raise `InvalidInput` for options out of range, before anything slow."""
+    if decals is not None:
+        check_count("--decals", decals, 0, MAX_DECALS)
+    if seed is not None:
+        check_count("--seed", seed, 0, MAX_SEED)
+    if save is not None:
+        check_output(save, (".json",))
+
+
+def opened(
+    model: list[str] | None,
+    *,
+    decals: int | None,
+    image: list[str] | None,
+    up: str | None,
+    pixels: tuple[int, int],
+    seed: int | None,
+    save: Path | None,
+    trust: bool,
+) -> Opened:
+    """Return the scene that the arguments of a command name; see `decals.apps.commands.edit.edit`."""
+    added: tuple[DecalImage, ...] = ()
+    path = save
+    if not model or _is_unsaved(model):
+        if decals is not None or seed is not None:
+            raise InvalidInput("an empty scene has no decals; name a model, or leave out --decals and --seed")
+        scene = _empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
+        path = path or (Path(model[0]) if model else new_file(Path(), "scene"))
+    else:
+        with progress_bars() as progress:
+            progress(PREPARING, 0.0)
+            loaded = load_models(model, trust=trust)
+            if isinstance(loaded, Scene):
+                if decals is not None or seed is not None:
+                    raise InvalidInput("a saved scene has its own decals; leave out --decals and --seed")
+                scene, path = loaded, path or Path(model[0])
+                added = tuple(DecalImage.load(source) for source in image or ())
+            else:
+                options = ScatterOptions.from_arguments(decals, image, seed)
+                where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
+                scene = options.scene(loaded, where, pixels, progress)
+                path = path or new_file(Path(), f"{Path(model[0]).stem}-decals")
+
+    def load_recovered(path: Path) -> Scene:
+        recovered = load_models([str(path)], trust=trust)
+        if not isinstance(recovered, Scene):
+            raise InvalidInput(f"expected a scene in the recovery file {str(path)!r}, got a model")
+        return recovered
+
+    return Opened(scene, path, added, load_recovered)
+
+
+def _is_unsaved(models: list[str]) -> bool:
+    """Return True for one scene file that was never saved, with a recovery file beside it."""
+    first = Path(models[0])
+    return (
+        len(models) == 1 and first.suffix == ".json" and not first.exists() and recovery_path(first).is_file()
+    )
+
+
+def _empty_scene(images: Sequence[str], axes: Axes) -> Scene:
+    """Return a scene without objects, whose camera looks at the origin."""
+    where = parse_view(None, axes)
+    corner = np.ones(3, np.float32)
+    camera = Camera.framing((-corner, corner), direction=where.direction, up=where.up)
+    return Scene(objects=(), camera=camera, images=tuple(DecalImage.load(source) for source in images))
+
+
+def report_unsaved(window: EditWindow, command: str) -> None:
+    """Say where unsaved changes are, if the window was closed with some."""
+    files, console = window.actions.files, Console(stderr=True, soft_wrap=True)
+    if files.recovery.exists:
+        console.print(
+            f"unsaved changes are kept in {files.recovery.path}; "
+            f"`implicit-decals {command} {files.path}` opens them",
+            highlight=False,
+            markup=False,
+        )
+    elif window.session.modified:
+        console.print("closed without saving the last changes", highlight=False)

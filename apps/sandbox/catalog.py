@@ -1,0 +1,175 @@
+"""New nodes for a scene: primitives of every kind, and what can stand above a node.
+
+Values follow from the declarations of the classes, so a new class is in the catalog at once.
+"""
+
+import itertools
+import math
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from blobtree import Node
+from blobtree._typing import Float64Array
+from blobtree.custom.definition import custom_kinds
+from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
+from blobtree.nodes.primitives import Leaf
+from blobtree.nodes.values import OPTIONAL, fields_of
+from decals.errors import InvalidEdit
+from decals.validation import describe
+
+PLACES = np.array([(-0.6, 0.0, 0.0), (0.0, 0.5, 0.0), (0.6, 0.0, 0.0), (0.0, -0.5, 0.0)])
+"""Points of a new primitive in turn: a planar, convex loop."""
+
+SHARES: dict[Quantity, float | tuple[float, ...]] = {
+    Quantity.LENGTH: 0.5,
+    Quantity.RADIUS: 0.25,
+    Quantity.RADII: (0.25,) * len(PLACES),
+    Quantity.EXTENTS: (1.0, 1.0, 1.0),
+    Quantity.SEMI_AXES: (0.7, 0.5, 0.4),
+    Quantity.WIDTH: 0.3,
+    Quantity.DISTANCE: 0.1,
+}
+"""Lengths of a new node, as parts of its size."""
+
+ANGLE = 30.0
+"""Degrees; per size where a class counts them per unit."""
+
+NATURAL = {
+    "exponent": 3.0,
+    "factor": 1.5,
+    "slope_x": 0.5,
+    "height": 0.05,
+    "level": 0.0,
+    "softness": 0.2,
+    "fade": 0.25,
+}
+"""Numbers without unit by the name of their parameter; others are as near to 1 as their range allows."""
+
+DIRECTIONS = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+"""Directions of a new primitive in turn."""
+
+NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union")
+"""Kinds that need data or are parts of others: the gizmo moves nodes, and `Contact` makes the last three."""
+
+NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1}
+"""Lengths by the name of their parameter: the ends of a deformation, the thickness of a wall."""
+
+
+def kinds() -> dict[str, type[Node]]:
+    """Return all classes of nodes that a scene can get, by name: built-in ones, then custom ones."""
+    built_in = {kind.__name__: kind for tag, kind in NODE_KINDS.items() if tag not in NOT_OFFERED}
+    return built_in | {kind.__name__: kind for kind in custom_kinds()}
+
+
+def operand_count(kind: type[Node]) -> int:
+    """Return the smallest number of operands of a class: 0 for primitives, 1 for warps."""
+    return sum(2 if several else 1 for several in _operand_fields(kind).values())
+
+
+def most_operands(kind: type[Node]) -> float:
+    """Return the largest number of operands of a class; infinity for any number."""
+    return sum(math.inf if several else 1 for several in _operand_fields(kind).values())
+
+
+def _operand_fields(kind: type[Node]) -> dict[str, bool]:
+    """Return the fields that hold operands: True for several, False for one."""
+    hints, declared = get_type_hints(kind), parameters_of(kind)
+    names = [field.name for field in fields_of(kind) if field.name not in declared]
+    return {name: hints[name] is not Node for name in names}
+
+
+def primitives() -> list[str]:
+    """Return the names of the classes without operands, in the order of the catalog."""
+    return [name for name, kind in kinds().items() if issubclass(kind, Leaf) or operand_count(kind) == 0]
+
+
+def modifiers() -> list[str]:
+    """Return the names of the classes with one operand: warps, offsets, shells."""
+    return [name for name, kind in kinds().items() if operand_count(kind) == 1]
+
+
+def combinations() -> list[str]:
+    """Return the names of the classes with two or more operands."""
+    return [name for name, kind in kinds().items() if operand_count(kind) > 1]
+
+
+def new_node(
+    name: str, operands: tuple[Node, ...] = (), *, center: Float64Array | None = None, size: float = 1.0
+) -> Node:
+    """Return a node of a class with natural values.
+
+    Parameters
+    ----------
+    name
+        Name of the class, see `kinds`.
+    operands
+        Its operands, in order. A combination of two takes more only if it takes any number.
+    center
+        Middle of a primitive, shape (3,). Default: the origin.
+    size
+        Size of a primitive, or of the operands.
+
+    Raises
+    ------
+    InvalidEdit
+        There is no such class, or it does not take so many operands.
+    InvalidNode
+        The class refuses the values.
+    """
+    known = kinds()
+    if name not in known:
+        raise InvalidEdit(f"kind: expected one of {', '.join(known)}, got {describe(name)}")
+    kind = known[name]
+    least, most = operand_count(kind), most_operands(kind)
+    if not least <= len(operands) <= most:
+        raise InvalidEdit(f"{name}: expected {least} or more operands, at most {most:g}, got {len(operands)}")
+    declared, several = parameters_of(kind), _operand_fields(kind)
+    values: dict[str, Any] = {}
+    pending = list(operands)
+    used: dict[Quantity, int] = {}
+    for field in fields_of(kind):
+        parameter = declared.get(field.name)
+        if parameter is None:
+            values[field.name] = tuple(pending) if several[field.name] else pending[0]
+            pending = [] if several[field.name] else pending[1:]
+        elif OPTIONAL not in field.metadata and parameter.quantity is not Quantity.COLOR:
+            turn = used.get(parameter.quantity, 0)
+            used[parameter.quantity] = turn + 1
+            middle = np.zeros(3) if center is None else center
+            values[field.name] = _natural(parameter, turn, middle, size, len(operands))
+    return kind(**values)
+
+
+def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float, operands: int) -> Any:
+    """Return a value of the parameter that has this turn among those of its quantity."""
+    match parameter.quantity:
+        case Quantity.POINT:
+            alone = parameter.name in ("center", "point", "corner")
+            return tuple((center if alone else center + size * PLACES[turn % len(PLACES)]).tolist())
+        case Quantity.POINTS:
+            lift = np.array((0.0, 0.0, 0.2 * turn))
+            return tuple(map(tuple, (center + size * (PLACES + lift)).tolist()))
+        case Quantity.DIRECTION:
+            return DIRECTIONS[turn % len(DIRECTIONS)]
+        case Quantity.ANGLE:
+            return min(ANGLE, parameter.high) if parameter.is_bounded else ANGLE / size
+        case Quantity.FACTOR | Quantity.NUMBERS:
+            number = float(np.clip(NATURAL.get(parameter.name, 1.0), parameter.low, parameter.high))
+            if parameter.size > 1:
+                return (number,) * parameter.size
+            return int(number) if parameter.whole else number
+        case Quantity.FACTORS | Quantity.DISTANCES:
+            return (NATURAL["height"],) if parameter.name == "height" else ()
+        case Quantity.NAMES:
+            return _letters(operands)
+        case Quantity.NAME_PAIRS:
+            letters = _letters(operands)
+            return tuple(itertools.pairwise(letters))
+    share: Any = NAMED_SHARES.get(parameter.name, SHARES[parameter.quantity])
+    return tuple(size * part for part in share) if isinstance(share, tuple) else size * share
+
+
+def _letters(count: int) -> tuple[str, ...]:
+    return tuple("abcdefghijklmnopqrstuvwxyz"[i % 26] + str(i // 26 or "") for i in range(count))

@@ -1,0 +1,159 @@
+"""Controls of a panel, from the parameters that classes of nodes declare."""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from blobtree import Node
+from blobtree.formulas.falloff import Falloff
+from blobtree.formulas.falloffs import FALLOFF_NAMES
+from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
+from decals.errors import InvalidEdit
+from decals.validation import describe as describe_value
+
+SLIDER_REACH = 4.0
+"""Largest value of a slider without a range of its own, over the present value or the node's size."""
+
+STEPS = 200
+"""Steps of a slider from end to end."""
+
+VECTORS = (Quantity.POINT, Quantity.DIRECTION, Quantity.EXTENTS, Quantity.SEMI_AXES)
+SIGNED = (Quantity.DISTANCE, Quantity.ANGLE, Quantity.FACTOR, Quantity.NUMBERS)
+NUMBERS = (Quantity.LENGTH, Quantity.RADIUS, Quantity.WIDTH, *SIGNED)
+LISTS = (Quantity.POINTS, Quantity.RADII, Quantity.FACTORS, Quantity.DISTANCES)
+ANGLE_REACH = 360.0
+
+
+@dataclass(frozen=True)
+class Control:
+    """One control of a panel; plain values, as a page receives them.
+
+    Attributes
+    ----------
+    name
+        Name of the parameter.
+    kind
+        "number" (a slider and a field), "vector" and "list" (fields), "color", "choice" or "text" (shown
+        only).
+    value
+        The present value: a number, numbers, "#rrggbb", or text.
+    doc
+        What the parameter means, with unit and range.
+    unit
+        Its unit, or "".
+    low, high, step
+        Ends and step of the slider. The field takes any value that the node accepts.
+    choices
+        Texts of a choice.
+    optional
+        An empty field gives None.
+    """
+
+    name: str
+    kind: str
+    value: Any
+    doc: str
+    unit: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    step: float = 0.0
+    choices: tuple[str, ...] = ()
+    optional: bool = False
+
+
+def controls_of(node: Node, size: float) -> list[dict[str, Any]]:
+    """Return the controls of a node's parameters, in the order of their declaration.
+
+    Parameters
+    ----------
+    node
+        The node.
+    size
+        Size of the object, for the ends of sliders of lengths.
+    """
+    declared = parameters_of(type(node))
+    return [asdict(_control(p, getattr(node, name), size)) for name, p in declared.items()]
+
+
+def _control(parameter: Parameter, value: Any, size: float) -> Control:
+    doc, quantity = describe(parameter), parameter.quantity
+    unit = UNITS.get(quantity, "°" if quantity is Quantity.ANGLE else "")
+    if quantity is Quantity.COLOR:
+        return Control(parameter.name, "color", hex_color(value), doc)
+    if quantity is Quantity.FALLOFF:
+        return Control(parameter.name, "choice", _falloff_name(value), doc, choices=tuple(FALLOFF_NAMES))
+    if quantity in NUMBERS and not isinstance(value, tuple):
+        low, high = _ends(parameter, value, size)
+        step = 1.0 if parameter.whole else (high - low) / STEPS
+        return Control(parameter.name, "number", value, doc, unit, low, high, step, optional=value is None)
+    if quantity in VECTORS or quantity is Quantity.NUMBERS:
+        return Control(parameter.name, "vector", list(value), doc, unit)
+    if quantity in LISTS:
+        rows = [list(row) if isinstance(row, tuple) else row for row in value]
+        return Control(parameter.name, "list", rows, doc, unit)
+    return Control(parameter.name, "text", _shortened(value), doc, unit)
+
+
+def _ends(parameter: Parameter, value: float | None, size: float) -> tuple[float, float]:
+    """Return the ends of a slider: the declared range, or one that holds the value."""
+    present = abs(value or 0.0)
+    match parameter.quantity:
+        case Quantity.ANGLE:
+            reach = max(ANGLE_REACH, present)
+        case Quantity.FACTOR | Quantity.NUMBERS:
+            reach = SLIDER_REACH * max(1.0, present)
+        case _:
+            reach = max(size, present)
+    least = -reach if parameter.quantity in SIGNED else reach / STEPS
+    return max(parameter.low, least), min(parameter.high, reach)
+
+
+def hex_color(rgb: tuple[float, float, float]) -> str:
+    """Return a colour as pages write it, "#rrggbb"."""
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in rgb)
+
+
+def _falloff_name(falloff: Falloff) -> str:
+    return next((name for name, other in FALLOFF_NAMES.items() if other == falloff), falloff.name)
+
+
+def _shortened(value: Any) -> str:
+    text = ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def parsed(node: Node, name: str, raw: Any) -> Any:
+    """Return what a page sent for a parameter as the value that the node's class takes.
+
+    Raises
+    ------
+    InvalidEdit
+        The node has no such parameter, or the text is no number.
+    """
+    declared = parameters_of(type(node))
+    if not isinstance(name, str) or name not in declared:
+        raise InvalidEdit(f"parameter: expected one of {', '.join(declared)}, got {describe_value(name)}")
+    parameter = declared[name]
+    if parameter.quantity is Quantity.WIDTH and raw in (None, ""):
+        return None
+    if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF):
+        return raw
+    number: Callable[[Any], Any] = _whole if parameter.whole else _number
+    if isinstance(raw, list | tuple):
+        return tuple(tuple(map(number, row)) if isinstance(row, list | tuple) else number(row) for row in raw)
+    return number(raw)
+
+
+def _number(raw: Any) -> float:
+    try:
+        return float(raw)
+    except (TypeError, ValueError):
+        raise InvalidEdit(f"expected a number, got {describe_value(raw)}") from None
+
+
+def _whole(raw: Any) -> int:
+    number = _number(raw)
+    if not math.isfinite(number):
+        raise InvalidEdit(f"expected a whole number, got {describe_value(raw)}")
+    return round(number)

@@ -1,0 +1,73 @@
+"""The outline of a scene: objects, the nodes of their trees, and images, as rows of a list."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from blobtree.nodes.paths import Path as TreePath
+from decals.editing.document import Document
+from decals.scenes.objects import TreeObject
+
+MAX_ROWS = 2000
+"""Most rows of one object; a page with more is slow, and nobody reads them."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the outline; plain values, as a page receives them.
+
+    Attributes
+    ----------
+    key
+        Text that names the row: "object/path".
+    label
+        Name of the object, or class of the node.
+    kind
+        "object", "combination", "modifier", "primitive", "mesh", "image" or "more".
+    depth
+        Indentation.
+    """
+
+    key: str
+    label: str
+    kind: str
+    depth: int
+
+
+def key_of(number: int, path: TreePath) -> str:
+    """Return the key of a node's row."""
+    return "/".join(map(str, (number, *path)))
+
+
+def parse_key(key: str) -> tuple[int, TreePath]:
+    """Return object and path of a row's key; raise `ValueError` for other texts."""
+    number, *path = map(int, key.split("/"))
+    return number, tuple(path)
+
+
+def outline(document: Document) -> list[dict[str, Any]]:
+    """Return the rows of a document: each object, with the nodes of its tree below it, then the images."""
+    rows: list[Row] = []
+    for number, item in enumerate(document.objects):
+        kind = "object" if isinstance(item, TreeObject) else "mesh"
+        rows.append(Row(f"object {number}", item.name, kind, 0))
+        if isinstance(item, TreeObject):
+            rows += _nodes(number, item)
+    images = (Path(image.source).name for image in document.images)
+    rows += [Row(f"image {number}", name, "image", 0) for number, name in enumerate(images)]
+    return [asdict(row) for row in rows]
+
+
+def _nodes(number: int, item: TreeObject) -> list[Row]:
+    rows: list[Row] = []
+    pending: list[tuple[TreePath, Any]] = [((), item.tree)]
+    while pending:
+        path, node = pending.pop()
+        if len(rows) == MAX_ROWS:
+            rows.append(Row(f"more {number}", f"more than {MAX_ROWS} nodes", "more", 1))
+            break
+        count = len(node.children)
+        kind = "primitive" if count == 0 else "modifier" if count == 1 else "combination"
+        rows.append(Row(key_of(number, path), type(node).__name__, kind, 1 + len(path)))
+        pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
+    return rows

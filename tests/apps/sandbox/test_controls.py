@@ -1,0 +1,84 @@
+"""Controls of the sandbox: every parameter has one, and what a page sends back is the parameter's value."""
+
+import math
+from typing import Any
+
+import pytest
+
+from blobtree import Node, Point, Polygon, Twist
+from blobtree.nodes.parameters import parameters_of
+from decals.apps.sandbox import catalog
+from decals.apps.sandbox.controls import controls_of, hex_color, parsed
+from decals.errors import InvalidEdit
+
+BALL = Point((1, 2, 3), radius=0.5, color=(1.0, 0.5, 0.0))
+OPERANDS = BALL, Point((1.4, 2, 3), radius=0.4), Point((1, 2.4, 3), radius=0.4)
+
+
+def made(name: str) -> Node:
+    return catalog.new_node(name, OPERANDS[: catalog.operand_count(catalog.kinds()[name])])
+
+
+@pytest.mark.parametrize("name", catalog.kinds())
+def test_every_parameter_has_a_control_whose_value_comes_back(name: str) -> None:
+    node = made(name)
+    controls = {control["name"]: control for control in controls_of(node, 2.0)}
+    assert list(controls) == list(parameters_of(type(node)))
+    for control in controls.values():
+        assert control["doc"]
+        if control["kind"] == "text":
+            continue
+        value: Any = getattr(node, control["name"])
+        sent = parsed(node, control["name"], control["value"])
+        if control["kind"] == "color":
+            assert sent == hex_color(value)
+        elif control["kind"] == "choice":
+            assert sent in control["choices"]
+        else:
+            assert sent == value
+
+
+@pytest.mark.parametrize("name", catalog.kinds())
+def test_sliders_hold_the_value_and_stay_in_the_declared_range(name: str) -> None:
+    node = made(name)
+    for control in controls_of(node, 2.0):
+        if control["kind"] != "number":
+            continue
+        parameter = parameters_of(type(node))[control["name"]]
+        assert control["low"] < control["high"]
+        assert parameter.low <= control["low"]
+        assert control["high"] <= parameter.high
+        assert control["value"] is None or control["low"] <= control["value"] <= control["high"]
+
+
+def test_controls_of_a_ball() -> None:
+    center, radius, color = controls_of(BALL, 2.0)[:3]
+    assert (center["kind"], center["value"], center["unit"]) == ("vector", [1.0, 2.0, 3.0], "model units")
+    assert (radius["kind"], radius["value"], radius["high"]) == ("number", 0.5, 2.0)
+    assert (color["kind"], color["value"]) == ("color", "#ff8000")
+
+
+def test_what_a_page_sends_is_parsed() -> None:
+    square = Polygon(((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), radius=0.2)
+    assert parsed(BALL, "radius", "0.75") == 0.75
+    assert parsed(BALL, "width", "") is None
+    assert parsed(square, "points", [["0", 1, "2.5"]]) == ((0.0, 1.0, 2.5),)
+    assert parsed(catalog.new_node("Noise"), "seed", "7.0") == 7
+    assert math.isnan(parsed(BALL, "radius", "nan"))  # the node refuses it
+
+
+@pytest.mark.parametrize(
+    ("node", "name", "raw"),
+    [
+        (BALL, "radius", "thick"),
+        (BALL, "radius", None),
+        (BALL, "center", [0, "x", 0]),
+        (BALL, "centre", 1),
+        (BALL, 7, 1),
+        (Twist(BALL, 20.0), "radius", 1),
+        (catalog.new_node("Noise"), "seed", "inf"),
+    ],
+)
+def test_wrong_values_are_refused(node: Node, name: Any, raw: Any) -> None:
+    with pytest.raises(InvalidEdit, match="expected"):
+        parsed(node, name, raw)

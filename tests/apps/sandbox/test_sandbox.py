@@ -1,0 +1,214 @@
+"""The sandbox without a browser: its values follow the session, and its events edit the scene."""
+
+import json
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import decals
+from blobtree import Point, Torus, Twist, Union
+from decals.apps.sandbox.outline import key_of, outline, parse_key
+from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
+from decals.editing.actions import KEYS
+from decals.editing.document import Document
+from decals.scenes.camera import Camera
+from decals.scenes.objects import MeshObject, TreeObject
+from decals.scenes.scene import Scene
+from decals.window import EditWindow
+from tests.decals.editing.scenes import box, digest
+
+TREE = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
+CAMERA = Camera((0, 0, 8))
+
+
+@pytest.fixture
+def window(vtk_display: None) -> Iterator[EditWindow]:
+    scene = decals.cover(TREE, count=20, images=["tile"])
+    with EditWindow(scene, off_screen=True, size=(80, 60)) as window:
+        window.show()
+        yield window
+
+
+def finish(window: EditWindow) -> None:
+    """Wait until background work is done."""
+    end = time.monotonic() + 60.0
+    while window.background.busy:
+        window.tick()
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def shapes(window: EditWindow) -> list[str]:
+    return [row["label"] for row in outline(window.document) if "/" in row["key"] or row["key"].isdigit()]
+
+
+def test_values_of_a_page_are_plain_and_follow_the_session(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    values = sandbox.values()
+    assert json.loads(json.dumps(values, default=list)) is not None
+    assert [row["key"] for row in values["outline"]] == ["object 0", "0", "0/0", "0/1", "image 0"]
+    assert (values["selected"], values["panel"]["controls"], values["done"]) == ("", [], [])
+    sandbox.select("0/1")
+    values = sandbox.values()
+    assert (values["selected"], values["panel"]["kind"]) == ("0/1", "Point")
+    sandbox.select("object 0")
+    assert sandbox.values()["panel"]["kind"] == "Sum"
+    sandbox.select("")
+    assert sandbox.values()["selected"] == ""
+
+
+def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+    sandbox.select("0/1")
+    for radius in (0.65, 0.7, 0.75):
+        sandbox.set_value("radius", radius, False)
+    sandbox.set_value("radius", 0.8, True)
+    finish(window)
+    tree = window.document.objects[0].tree
+    assert tree.children[1].radius == 0.8
+    positions = window.document.decals.decals.positions
+    np.testing.assert_allclose(tree(positions), 0.5, atol=1e-4)  # decals follow the surface
+    assert sandbox.values()["done"] == ["set radius"]
+    sandbox.perform("undo")
+    assert digest(window.document) == before
+
+
+def test_a_slider_that_rests_ends_its_edit(window: EditWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+    sandbox, now = Sandbox(window), time.monotonic()
+    sandbox.select("0/1")
+    sandbox.set_value("radius", 0.7, False)
+    sandbox.settle()
+    assert window.session.stroke_open
+    monkeypatch.setattr(time, "monotonic", lambda: now + 2.0 * REST_SECONDS + 60.0)
+    sandbox.settle()
+    monkeypatch.undo()
+    finish(window)
+    assert not window.session.stroke_open
+    assert sandbox.values()["done"] == ["set radius"]
+
+
+def test_parameters_of_all_sorts_are_set(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.select("0/1")
+    sandbox.set_value("color", "#ff0000")
+    sandbox.set_component("center", [1], "0.5")
+    finish(window)
+    ball = window.document.objects[0].tree.children[1]
+    assert ball.color == (1.0, 0.0, 0.0)
+    assert ball.center == (1.2, 0.5, 0.0)
+    assert sandbox.values()["done"] == ["set color", "set center"]
+
+
+def test_nodes_are_added_wrapped_and_combined_anew(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+    sandbox.select("0/0")
+    sandbox.add("Torus")
+    finish(window)
+    assert isinstance(window.document.objects[0].tree.children[2], Torus)
+    assert sandbox.values()["selected"] == "0/2"
+    sandbox.wrap("Twist")
+    finish(window)
+    assert isinstance(window.document.objects[0].tree.children[2], Twist)
+    sandbox.unwrap()
+    finish(window)
+    sandbox.select("0")
+    sandbox.combine("Union")
+    finish(window)
+    assert isinstance(window.document.objects[0].tree, Union)
+    assert shapes(window) == ["Union", "Point", "Point", "Torus"]
+    sandbox.go_to(1)
+    assert shapes(window) == ["Sum", "Point", "Point", "Torus"]
+    sandbox.go_to(0)
+    assert digest(window.document) == before
+    assert len(sandbox.values()["undone"]) == 4
+    sandbox.go_to(4)
+    assert shapes(window) == ["Union", "Point", "Point", "Torus"]
+
+
+def test_a_new_node_without_a_selection_is_an_object(vtk_display: None) -> None:
+    with EditWindow(Scene(objects=(), camera=CAMERA), off_screen=True, size=(80, 60)) as window:
+        window.show()
+        sandbox = Sandbox(window)
+        for kind in ("Box", "Point"):
+            sandbox.add(kind)
+            finish(window)
+            sandbox.select("")
+        assert [item.name for item in window.document.objects] == ["box 1", "point 1"]
+
+
+def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+    sandbox.set_value("radius", 0.5)
+    assert "no node is selected" in sandbox.status
+    for key in ("0/7", "9", "x", "object x", None, 3, "image 0"):
+        sandbox.select(key)  # type: ignore[arg-type]
+        assert "expected" in sandbox.status
+    sandbox.select("0/1")
+    for name, raw in (("radius", -1), ("radius", "x"), ("nothing", 1), ("center", 3)):
+        sandbox.set_value(name, raw)
+        finish(window)
+        assert sandbox.status
+        sandbox.set_component(name, [5], raw)
+        assert "expected" in sandbox.status
+    for event, value in ((sandbox.add, "No"), (sandbox.wrap, "Sum"), (sandbox.combine, "Union")):
+        event(value)
+        assert "expected" in sandbox.status or "select" in sandbox.status
+    sandbox.unwrap()
+    assert "one operand" in sandbox.status
+    for entry in (-1, 99, "1", True):
+        sandbox.go_to(entry)  # type: ignore[arg-type]
+        assert "history" in sandbox.status
+    sandbox.perform("no such action")
+    assert "expected" in sandbox.status
+    finish(window)
+    assert digest(window.document) == before
+
+
+def test_random_events_leave_a_scene_that_undo_restores(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+    kinds = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Ricci", "Nothing"]
+    actions = [b.action for b in KEYS.bindings if b.action not in ("close", "camera", "move", "add_image")]
+    values: Any = st.one_of(st.floats(-3, 3), st.sampled_from(["", "x", None, [1, 2, 3], "#00ff00"]))
+    events: Any = st.one_of(
+        st.tuples(st.just("select"), st.sampled_from(["", "0", "0/0", "0/1", "0/1/0", "object 0", "q"])),
+        st.tuples(st.just("set_value"), st.sampled_from(["radius", "center", "degrees", "color"]), values),
+        st.tuples(st.sampled_from(["add", "wrap", "combine"]), st.sampled_from(kinds)),
+        st.tuples(st.just("perform"), st.sampled_from(actions)),
+        st.tuples(st.just("go_to"), st.integers(-1, 4)),
+        st.tuples(st.just("unwrap")),
+    )
+
+    @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
+    @given(st.lists(events, min_size=1, max_size=5))
+    def run(chosen: list[Any]) -> None:
+        for name, *arguments in chosen:
+            getattr(sandbox, name)(*arguments)
+            finish(window)
+            if window.actions.state.prompt.open:
+                window.actions.state.prompt.close()
+            json.dumps(sandbox.values(), default=list)
+        sandbox.go_to(0)
+        assert digest(window.document) == before
+
+    run()
+
+
+def test_the_outline_lists_objects_nodes_and_images() -> None:
+    objects = TreeObject("blob", Twist(TREE, 10.0)), MeshObject("crate", *box((-1, -4, -1), (1, -2, 1)))
+    rows = outline(Document.from_scene(Scene(objects=objects, camera=CAMERA)))
+    assert [(row["label"], row["kind"], row["depth"]) for row in rows] == [
+        ("blob", "object", 0),
+        ("Twist", "modifier", 1),
+        ("Sum", "combination", 2),
+        ("Point", "primitive", 3),
+        ("Point", "primitive", 3),
+        ("crate", "mesh", 0),
+    ]
+    assert parse_key(key_of(2, (0, 1))) == (2, (0, 1))
+    many = TreeObject("many", Union(tuple(Point((3.0 * i, 0, 0), radius=1.0) for i in range(2500))))
+    assert len(outline(Document.from_scene(Scene(objects=(many,), camera=CAMERA)))) == 2002
