@@ -60,7 +60,8 @@ NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1}
 def kinds() -> dict[str, type[Node]]:
     """Return all classes of nodes that a scene can get, by name: built-in ones, then custom ones."""
     built_in = {kind.__name__: kind for tag, kind in NODE_KINDS.items() if tag not in NOT_OFFERED}
-    return built_in | {kind.__name__: kind for kind in custom_kinds()}
+    custom: dict[str, Any] = {kind.__name__: kind for kind in custom_kinds()}
+    return built_in | custom
 
 
 def operand_count(kind: type[Node]) -> int:

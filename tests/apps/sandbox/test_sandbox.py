@@ -20,7 +20,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
 from decals.window import EditWindow
-from tests.decals.editing.scenes import box, digest
+from tests.decals.editing.scenes import box, digest, tree_of
 
 TREE = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 CAMERA = Camera((0, 0, 8))
@@ -69,7 +69,7 @@ def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWind
         sandbox.set_value("radius", radius, False)
     sandbox.set_value("radius", 0.8, True)
     finish(window)
-    tree = window.document.objects[0].tree
+    tree: Any = tree_of(window.document)
     assert tree.children[1].radius == 0.8
     positions = window.document.decals.decals.positions
     np.testing.assert_allclose(tree(positions), 0.5, atol=1e-4)  # decals follow the surface
@@ -98,7 +98,7 @@ def test_parameters_of_all_sorts_are_set(window: EditWindow) -> None:
     sandbox.set_value("color", "#ff0000")
     sandbox.set_component("center", [1], "0.5")
     finish(window)
-    ball = window.document.objects[0].tree.children[1]
+    ball: Any = tree_of(window.document).children[1]
     assert ball.color == (1.0, 0.0, 0.0)
     assert ball.center == (1.2, 0.5, 0.0)
     assert sandbox.values()["done"] == ["set color", "set center"]
@@ -109,17 +109,17 @@ def test_nodes_are_added_wrapped_and_combined_anew(window: EditWindow) -> None:
     sandbox.select("0/0")
     sandbox.add("Torus")
     finish(window)
-    assert isinstance(window.document.objects[0].tree.children[2], Torus)
+    assert isinstance(tree_of(window.document).children[2], Torus)
     assert sandbox.values()["selected"] == "0/2"
     sandbox.wrap("Twist")
     finish(window)
-    assert isinstance(window.document.objects[0].tree.children[2], Twist)
+    assert isinstance(tree_of(window.document).children[2], Twist)
     sandbox.unwrap()
     finish(window)
     sandbox.select("0")
     sandbox.combine("Union")
     finish(window)
-    assert isinstance(window.document.objects[0].tree, Union)
+    assert isinstance(tree_of(window.document), Union)
     assert shapes(window) == ["Union", "Point", "Point", "Torus"]
     sandbox.go_to(1)
     assert shapes(window) == ["Sum", "Point", "Point", "Torus"]
