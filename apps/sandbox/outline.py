@@ -9,7 +9,7 @@ from decals.editing.document import Document
 from decals.scenes.objects import TreeObject
 
 MAX_ROWS = 2000
-"""Most rows of one object; a page with more is slow, and nobody reads them."""
+"""Most rows of one object: a page with more is slow."""
 
 
 @dataclass(frozen=True)
