@@ -27,6 +27,7 @@ def polygonize(
     cell_size: OptionalLength = None,
     chord_error: OptionalLength = None,
     max_triangles: int = MAX_TRIANGLES,
+    adaptive: bool = True,
     creases: bool = False,
     split_normals: bool = False,
     define: Definitions = None,
@@ -49,6 +50,8 @@ def polygonize(
     max_triangles
         Triangles that a mesh by --chord-error may have in each object; more are refused before they are
         computed.
+    adaptive
+        Cells of several sizes for --chord-error; --no-adaptive takes cells of one size.
     creases
         Put vertices on the edges and corners that unions, intersections and differences leave.
     split_normals
@@ -76,6 +79,7 @@ def polygonize(
                 cell_size=cell_size,
                 chord_error=chord_error,
                 max_triangles=max_triangles,
+                adaptive=adaptive,
                 creases=creases,
                 split_normals=split_normals,
                 progress=progress,

@@ -196,7 +196,7 @@ class _Refinement:
     ) -> None:
         self._above, self._device = above, device
         self._kernel, self._start = tape.instruction_set.kernel_for, tape.start
-        self._grid = _child_grid(grid, number)
+        self._grid = child_grid(grid, number)
         self._old, self._shift = _old_level(previous, grid, number)
         if self._old is not None and previous is not None and previous.grid.pad == grid.pad:
             self._changed = where_negative(above.sources)
@@ -293,7 +293,7 @@ class _Refinement:
         launch(match_children, len(self._changed) * CHILDREN, inputs, [level.sources], self._device)
 
 
-def _child_grid(grid: Grid, number: int) -> Any:
+def child_grid(grid: Grid, number: int) -> Any:
     """Return the lattice of the blocks of a level as an argument of kernels."""
     lattice: Any = ChildGrid()
     lattice.base, lattice.corner = wp.vec3i(*grid.base_of(number)), wp.vec3(*grid.corner)

@@ -7,13 +7,14 @@ as exactly as float32 can tell.
 The chord error is the distance of the triangles to the surface. Samples are the middles of triangles and of
 their edges, and points between. Each is projected onto the surface by steps whose length bounds the distance.
 Between samples the error is not bounded: a surface that bends within a third of a triangle may lie farther
-away. Parts of a model that fall between all cells are not measured.
+away. Parts of a model that fall between all cells are not measured. The cells are adaptive (`adaptive`), or
+have one size.
 """
 
 import logging
 import math
 from functools import partial
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import warp as wp
@@ -31,6 +32,9 @@ from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.validation import LARGEST_NUMBER, shown
+
+if TYPE_CHECKING:
+    pass
 
 DEFAULT_RESOLUTION = 64
 
@@ -50,6 +54,15 @@ MIN_SIZE_RATIO = 0.2
 """Smallest ratio of the cell sizes of two passes: estimates hold no farther."""
 
 MAX_PASSES = 8
+
+MAX_ADAPTIVE_PASSES = 24
+"""Most passes with adaptive cells; each divides some leaves."""
+
+BASE_SCALES = (1.0, 2.0**-0.25, 2.0**-0.5, 2.0**-0.75)
+"""Sizes of the base's cells to choose from, over the first one: each division halves them."""
+
+RESTART_SHARE = 0.8
+"""Share of the expected triangles from which on the first pass is repeated with other cells."""
 
 MIN_RELATIVE_ERROR = 2.0**-20
 """Smallest error that float32 can resolve, over the largest coordinate."""
@@ -81,6 +94,7 @@ def polygonize(
     chord_error: float | None = None,
     max_triangles: int = MAX_TRIANGLES,
     creases: bool = False,
+    adaptive: bool = True,
     device: str | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
@@ -99,13 +113,17 @@ def polygonize(
         Side of a cell, in the model's units. Features thinner than a cell may be lost.
     chord_error : float, optional
         Largest distance of the triangles to the surface, in the model's units. Passes with smaller and
-        smaller cells are measured at seven samples in every triangle, until no sample lies farther. Features
+        smaller cells are measured at samples in every triangle, until no sample lies farther. Features
         thinner than a 32nd of the box may be lost. A warning is logged if two million triangles are needed.
     max_triangles : int, optional
         Triangles that a mesh by chord error may have. Each pass is estimated by the one before it, and is
         refused before it starts.
     creases : bool, optional
         Move vertices onto the edges and corners that unions, intersections and differences leave.
+    adaptive : bool, optional
+        Choose the size of each cell by the chord error there, which takes far fewer triangles where the
+        surface bends more in some places than in others. False gives all cells one size, as `resolution` and
+        `cell_size` always do.
     device : str, optional
         Warp device that computes the mesh; by default the current one.
     progress : callable, optional
@@ -164,8 +182,9 @@ def polygonize(
     chord_error = _chord_error(tree, chord_error)
     if not isinstance(max_triangles, int | np.integer) or max_triangles < 1:
         raise InvalidResolution(f"max_triangles: expected a whole number from 1, got {shown(max_triangles)}")
+    within = _adaptive_within_chord_error if adaptive else _within_chord_error
     with reporting(progress, cancel) as report:
-        return _within_chord_error(tree, chord_error, int(max_triangles), creases, device, report)
+        return within(tree, chord_error, int(max_triangles), creases, device, report)
 
 
 def _within_chord_error(
@@ -195,6 +214,46 @@ def _within_chord_error(
     raise InvalidResolution(
         f"chord_error: {chord_error:g} was not reached in {MAX_PASSES} passes, the last with cells of "
         f"{passes[-1][0]:g} came to {passes[-1][1]:g}; allow more, or ask for creases where CSG cuts edges"
+    )
+
+
+def _adaptive_within_chord_error(
+    tree: ImplicitModel,
+    chord_error: float,
+    max_triangles: int,
+    creases: bool,
+    device: str | None,
+    report: Progress,
+) -> Mesh:
+    """Return a mesh of adaptive cells whose triangles lie within `chord_error` of the surface."""
+    # Imported here, because all imported kernels of a package compile together.
+    from blobtree.meshing.adaptive import AdaptivePasses
+
+    wish = f"chord_error: {chord_error:g}"
+    size = _cell_size(tree, FIRST_RESOLUTION, None)
+    passes: AdaptivePasses | None = None
+    for number in range(1, MAX_ADAPTIVE_PASSES + 1):
+        pass_report = _never_decreasing(_numbered(report, number))
+        pass_report(_STAGES[0], 0.0)
+        if passes is None:
+            cells = build_cells(tree.tape, _grid(tree, size), device=device, report=pass_report)
+            passes = AdaptivePasses(cells, chord_error, creases)
+        within = passes.run(pass_report)
+        pass_report(_STAGES[-1], 1.0)
+        if within:
+            return passes.mesh.mesh(creases)
+        if number == 1:
+            counts = [passes.expected_triangles(scale=scale) for scale in BASE_SCALES]
+            _announce_count(min(counts), chord_error)
+            _check_count(min(counts), max_triangles, wish)
+            if min(counts) < RESTART_SHARE * counts[0]:
+                size, passes = size * BASE_SCALES[int(np.argmin(counts))], None
+                continue
+        _check_count(passes.expected_triangles(1), max_triangles, wish)
+        passes.refine()
+    raise InvalidResolution(
+        f"{wish} was not reached in {MAX_ADAPTIVE_PASSES} passes; allow more, or ask for creases where CSG "
+        "cuts edges"
     )
 
 
@@ -264,6 +323,23 @@ def _numbered(report: Progress, number: int) -> Progress:
             report(stage, fraction)
 
     return numbered
+
+
+def _never_decreasing(report: Progress) -> Progress:
+    """Return a callback that repeats the largest fraction where a stage is repeated."""
+    largest = 0.0
+
+    def forward(stage: str, fraction: float) -> None:
+        nonlocal largest
+        if stage not in _STAGES:
+            report(stage, fraction)
+            return
+        done = _STAGES.index(stage) + fraction
+        largest = done = max(done, largest)
+        number = min(int(done), len(_STAGES) - 1)
+        report(_STAGES[number], done - number)
+
+    return forward
 
 
 class Polygonizer:

@@ -824,6 +824,7 @@ class Node(ImplicitModel):
         cell_size: float | None = None,
         chord_error: float | None = None,
         max_triangles: int = MAX_TRIANGLES,
+        adaptive: bool = True,
         creases: bool = False,
         split_normals: bool = False,
         attributes: Iterable[str] = (),
@@ -836,7 +837,7 @@ class Node(ImplicitModel):
 
         Parameters
         ----------
-        resolution, cell_size, chord_error, max_triangles, creases, device, progress, cancel
+        resolution, cell_size, chord_error, max_triangles, adaptive, creases, device, progress, cancel
             As for `polygonize`.
         split_normals : bool
             Give each side of a crease its own vertices and normals; implies `creases`. Creases then look
@@ -871,6 +872,7 @@ class Node(ImplicitModel):
             cell_size=cell_size,
             chord_error=chord_error,
             max_triangles=max_triangles,
+            adaptive=adaptive,
             creases=creases or split_normals,
             device=device,
             progress=progress,

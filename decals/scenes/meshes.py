@@ -25,6 +25,7 @@ def as_polydata(
     cell_size: float | None = None,
     chord_error: float | None = None,
     max_triangles: int = MAX_TRIANGLES,
+    adaptive: bool = True,
     creases: bool = False,
     split_normals: bool = False,
     progress: Progress | None = None,
@@ -35,7 +36,7 @@ def as_polydata(
     ----------
     objects
         Objects of a scene.
-    resolution, cell_size, chord_error, max_triangles, creases, split_normals
+    resolution, cell_size, chord_error, max_triangles, adaptive, creases, split_normals
         See `blobtree.polygonize`.
     progress
         Called with a stage and the fraction done.
@@ -57,6 +58,7 @@ def as_polydata(
             cell_size=cell_size,
             chord_error=chord_error,
             max_triangles=max_triangles,
+            adaptive=adaptive,
             creases=creases,
             split_normals=split_normals,
             progress=progress,

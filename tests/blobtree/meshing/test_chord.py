@@ -51,8 +51,11 @@ def test_other_shapes(tree: Node) -> None:
 
 def test_creases_need_fewer_triangles() -> None:
     """An edge that is cut off lies as far away as a cell is large, one that is kept lies exact."""
-    plain, sharp = (polygonize(CUT, chord_error=0.02, creases=creases) for creases in (False, True))
-    assert len(plain.faces) > 4 * len(sharp.faces)
+    for adaptive, gain in ((False, 4), (True, 2)):
+        plain, sharp = (
+            polygonize(CUT, chord_error=0.02, creases=creases, adaptive=adaptive) for creases in (False, True)
+        )
+        assert len(plain.faces) > gain * len(sharp.faces)
 
 
 def test_a_tenth_of_the_error_takes_ten_times_the_triangles() -> None:

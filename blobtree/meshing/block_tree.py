@@ -1,0 +1,194 @@
+"""A tree of blocks that is refined where its users ask for it, each block with its pruned tape and samples.
+
+The blocks of the base are those of `sparse_cells`. A cell of a block can be refined into a block of 4³ cells,
+a quarter as large. All blocks are numbered in the order in which they are made; number · CHILDREN + cell
+identifies a cell of any level.
+"""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from blobtree._typing import Float32Array, IndexArray, Int32Array
+from blobtree.cells.block_kernels import LevelBlocks
+from blobtree.cells.grid import CHILDREN, KEY_DIGITS, MAX_CELL_COORDINATE, Grid
+from blobtree.cells.refine_kernels import count_child_texels, write_children
+from blobtree.cells.scan import DeviceArray, exclusive_scan
+from blobtree.cells.sparse_cells import MAX_BLOCKS, TEXEL_BYTES, SparseCells, child_grid
+from blobtree.device import demand_memory, launch
+from blobtree.errors import InvalidResolution
+from blobtree.meshing.adaptive_kernels import BlockTreeArrays
+from blobtree.meshing.dual_kernels import SAMPLES, SAMPLES_PER_SIDE, sample_blocks
+
+UNREFINED = -3
+"""Mark of a cell without a block of its own, of which nothing else is known."""
+
+
+class BlockTree:
+    """Blocks of several levels, the base being level 0."""
+
+    def __init__(self, cells: SparseCells) -> None:
+        self._cells, self._device = cells, cells.device
+        self._kernel = cells.tape.instruction_set.kernel_for
+        leaves = cells.leaves
+        self._blocks, self._spans, self._tape = leaves.blocks, leaves.spans, leaves.tape
+        self._keys = leaves.keys
+        self.levels: IndexArray = np.zeros(len(leaves), np.int64)
+        """Level of each block (n,)."""
+        self.coordinates: Int32Array = leaves.blocks.numpy().reshape(-1, 3)
+        """Coordinates (n, 3), in blocks of their level from the root's lowest one."""
+        self.children: Int32Array = np.full(len(leaves) * CHILDREN, UNREFINED, np.int32)
+        """For each cell the block that refines it, SURELY_OUTSIDE, SURELY_INSIDE or UNREFINED (64 n,)."""
+        self.parents: IndexArray = np.full(len(leaves), -1, np.int64)
+        """For each block the cell that it refines (n,), −1 at the base."""
+        self.values: Float32Array = self._sample(0, 0, len(leaves))
+        """The field at the corners of each block's cells (n, 5, 5, 5)."""
+
+    def __len__(self) -> int:
+        return len(self.levels)
+
+    @property
+    def cells(self) -> SparseCells:
+        """The cells of the base."""
+        return self._cells
+
+    @property
+    def depth(self) -> int:
+        """The finest level."""
+        return int(self.levels.max(initial=0))
+
+    @property
+    def max_level(self) -> int:
+        """The finest level whose cells float32 can tell apart."""
+        base = self._cells.grid
+        far = base.origin + base.blocks_per_side * 4 * base.cell_size
+        farthest = float(np.abs([base.origin, far]).max()) / base.cell_size
+        room = int(np.log2(MAX_CELL_COORDINATE / farthest) // 2)
+        return max(0, min(room, KEY_DIGITS - 1 - base.depth))
+
+    def grid(self, level: int) -> Grid:
+        """Return the lattice of the cells of a level."""
+        base = self._cells.grid
+        i, j, k = (first << (2 * level) for first in base.base)
+        return Grid(base.cell_size / 4.0**level, (i, j, k), base.depth + level, base.corner)
+
+    def arrays(self) -> Any:
+        """Return the blocks and their lattice as an argument of kernels, coordinates in the finest cells."""
+        arrays: Any = BlockTreeArrays()
+        finest = self.grid(self.depth)
+        arrays.keys, arrays.spans, arrays.tape = self._cells.leaves.keys, self._spans, self._tape
+        arrays.children = on_device(self.children, wp.int32, self._device)
+        arrays.base, arrays.corner = wp.vec3i(*finest.base), wp.vec3(*finest.corner)
+        arrays.cell, arrays.depth = finest.cell_size, self.depth
+        whole = self._cells.tape.on(self._device)
+        arrays.whole, arrays.whole_span = whole.data, whole.span
+        return arrays
+
+    @property
+    def spans(self) -> DeviceArray:
+        """First texel of each block's tape, and one past its last (n, 2)."""
+        return self._spans
+
+    @property
+    def tape(self) -> DeviceArray:
+        """The tapes of all blocks."""
+        return self._tape
+
+    def refine(self, cells: IndexArray) -> int:
+        """Refine cells that the surface may cross, and return the number of new blocks.
+
+        Cells that have a block, or that the surface surely does not cross, stay as they are.
+
+        Raises
+        ------
+        InvalidResolution
+            There are too many blocks, or cells too small for float32.
+        """
+        before = len(self)
+        cells = np.unique(cells[self.children[cells] == UNREFINED])
+        levels = self.levels[cells // CHILDREN]
+        if levels.max(initial=-1) >= self.max_level:
+            raise InvalidResolution(
+                f"cells of {self.grid(self.max_level).cell_size:g} are the smallest that float32 can tell "
+                "apart there; allow a larger error, or move the model to the origin"
+            )
+        for level in np.unique(levels):
+            self._refine_level(cells[levels == level], int(level))
+        return len(self) - before
+
+    def _refine_level(self, cells: IndexArray, level: int) -> None:
+        """Refine cells of one level."""
+        device, count = self._device, len(self.children)
+        grid = self.grid(level + 1)
+        lattice = child_grid(grid, grid.depth)
+        parents = on_device(np.unique(cells // CHILDREN), wp.int32, device)
+        above: Any = self._level_arrays(self._blocks, self._keys, self._spans, self._tape)
+        children = on_device(self.children, wp.int32, device)
+        flags, texels = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
+        outputs = [children, flags, texels]
+        threads = len(parents) * CHILDREN
+        launch(self._kernel(count_child_texels), threads, [parents, above, lattice], outputs, device)
+        wanted = np.zeros(count + 1, np.int32)
+        wanted[cells] = 1
+        flags, texels = (on_device(array.numpy() * wanted, wp.int32, device) for array in (flags, texels))
+        old, old_texels = len(self), len(self._tape)
+        slots, blocks = exclusive_scan(flags, "blocks", start=old)
+        starts, total = exclusive_scan(texels, "texels of the blocks' tapes", start=old_texels)
+        if blocks > MAX_BLOCKS:
+            raise InvalidResolution(
+                f"expected at most {MAX_BLOCKS:,} blocks of cells, got {blocks:,}; allow a larger error"
+            )
+        self.children = children.numpy()
+        if blocks == old:
+            return
+        demand_memory(TEXEL_BYTES * total, device, f"the tapes of {blocks:,} blocks")
+        grown = [
+            _grown(array, length)
+            for array, length in zip(
+                (self._blocks, self._keys, self._spans, self._tape), (blocks,) * 3 + (total,), strict=True
+            )
+        ]
+        level_arrays = self._level_arrays(*grown)
+        inputs = [parents, above, lattice, slots, starts]
+        launch(self._kernel(write_children), threads, inputs, [children, level_arrays], device)
+        self._blocks, self._keys, self._spans, self._tape = grown
+        self.children = np.concatenate(
+            [children.numpy(), np.full((blocks - old) * CHILDREN, UNREFINED, np.int32)]
+        )
+        refined = np.flatnonzero(flags.numpy()[:-1])
+        self.parents = np.concatenate([self.parents, refined])
+        self.levels = np.concatenate([self.levels, np.full(blocks - old, level + 1)])
+        self.coordinates = self._blocks.numpy().reshape(-1, 3)
+        self.values = np.concatenate([self.values, self._sample(level + 1, old, blocks)])
+
+    @staticmethod
+    def _level_arrays(blocks: DeviceArray, keys: DeviceArray, spans: DeviceArray, tape: DeviceArray) -> Any:
+        """Return blocks and their tapes as an argument of kernels."""
+        arrays: Any = LevelBlocks()
+        arrays.blocks, arrays.keys, arrays.spans, arrays.tape = blocks, keys, spans, tape
+        return arrays
+
+    def _sample(self, level: int, first: int, end: int) -> Float32Array:
+        """Return the field at the corners of the cells of blocks of one level (n, 5, 5, 5)."""
+        grid, count = self.grid(level), end - first
+        listed = on_device(np.arange(first, end), wp.int32, self._device)
+        values: DeviceArray = wp.empty(count * SAMPLES, dtype=wp.float32, device=self._device)
+        inputs: list[Any] = [listed, self._blocks, self._spans, self._tape]
+        inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
+        launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device)
+        samples: Float32Array = values.numpy().reshape(count, *(SAMPLES_PER_SIDE,) * 3)
+        return samples
+
+
+def on_device(values: NDArray[Any], dtype: Any, device: str) -> DeviceArray:
+    """Return a copy of an array on a device."""
+    return wp.array(values, dtype=dtype, device=device)
+
+
+def _grown(array: DeviceArray, length: int) -> DeviceArray:
+    """Return a longer array that begins as `array`."""
+    longer: DeviceArray = wp.empty(length, dtype=array.dtype, device=array.device)
+    wp.copy(longer, array, count=len(array))
+    return longer
