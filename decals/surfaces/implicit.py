@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from blobtree import ISO, Node, polygonize
 from blobtree._typing import BoolArray, Float32Array
 from blobtree.device import known_device, launch
+from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
@@ -34,6 +35,9 @@ RESOLUTION = 64
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
 
+CREASED = frozenset(map(OPERATORS.index, (UNION, INTERSECTION, DIFFERENCE)))
+"""Codes of the operators that leave creases; the coarse mesh of other trees needs no search for them."""
+
 MAX_PROJECTION_ROUNDS = 4
 """Runs of Newton's method, each from the result of the one before, in `project_without_mesh`."""
 
@@ -42,8 +46,8 @@ class ImplicitSurface:
     """Iso surface of a BlobTree, as a `Surface`.
 
     Points are projected by Newton's method along the exact field gradient. Where the field is flat, or the
-    distance too large, they start at the closest point of a coarse mesh. Area and bounds are those of the
-    coarse mesh.
+    distance too large, they start at the closest point of a coarse mesh, which has the creases of unions,
+    intersections and differences. Area and bounds are those of the coarse mesh.
 
     Parameters
     ----------
@@ -82,7 +86,8 @@ class ImplicitSurface:
             raise InvalidMesh(f"tree: expected a BlobTree, got {describe(tree)}; meshes go into MeshSurface")
         whole_number("resolution", resolution, 1, None, InvalidScattering)
         self.tree, self.device = tree, known_device(device)
-        coarse = polygonize(tree, resolution=resolution, device=device)
+        creases = not CREASED.isdisjoint(tree.tape.operators)
+        coarse = polygonize(tree, resolution=resolution, creases=creases, device=device)
         if len(coarse.faces) == 0:
             raise InvalidMesh(
                 f"expected a tree with a surface, got none in {resolution} cells; "

@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Point, Segment
+from blobtree import Intersection, Node, Point, Segment, Union
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces.implicit import ImplicitSurface, project_without_mesh
 from decals.surfaces.surface import Surface
@@ -105,3 +105,22 @@ def test_a_tree_without_surface_is_refused() -> None:
 def test_what_are_no_points_is_refused() -> None:
     with pytest.raises(InvalidPoints):
         ball().project([[np.nan, 0, 0]])
+
+
+def pair(distance: float) -> list[Point]:
+    return [Point((0, 0, z), radius=1.0) for z in (-distance, distance)]
+
+
+@pytest.mark.parametrize(
+    ("tree", "height"),
+    [(Intersection(pair(0.6)), 0.4), (Intersection(pair(0.9)), 0.1), (Union(pair(0.6)), 1.6)],
+)
+def test_samples_reach_creases(tree: Node, height: float) -> None:
+    """Two caps of balls: their area is exact, and samples lie on both sides of the edge between them."""
+    surface = ImplicitSurface(tree)
+    assert surface.area == pytest.approx(4 * np.pi * height, rel=5e-3)
+    edge = np.sqrt(1 - (1 - height) ** 2)
+    positions, normals = surface.sample(4000, seed=5)
+    gaps = np.hypot(np.hypot(positions[:, 0], positions[:, 1]) - edge, positions[:, 2])
+    for side in (normals[:, 2] < 0, normals[:, 2] > 0):
+        assert gaps[side].min() < 0.02
