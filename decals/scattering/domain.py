@@ -260,7 +260,8 @@ class Domain:
 
     def _is_whole(self, index: int) -> bool:
         """Return True if the density is uniform and no part of the surface can be forbidden."""
-        return self.uniform and self._mask is None and not self.projection.overlapping(index)
+        alone = not self.projection.overlapping(index) and not self.projection.shells(index)
+        return self.uniform and self._mask is None and alone
 
     def _outside_mask(self, positions: Float32Array) -> BoolArray:
         assert self._mask is not None

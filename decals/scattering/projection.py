@@ -9,6 +9,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.device import launch
 from decals.scattering.step_kernels import offset_points
+from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import DeviceSurface, Scalars, Surface, Vectors, on_device
 
 HIDING_OFFSET = 1e-4
@@ -71,9 +72,37 @@ class SurfaceProjection:
                 launch(offset_points, last - first, inputs, [points], device=self.device)
                 for other in others:
                     self._on_device(other).mark_inside(points, forbidden[first:last])
+            for shell in self.shells(index):
+                self._mark_behind(
+                    shell, index, positions[first:last], normals[first:last], forbidden[first:last]
+                )
         if self._forbidden is not None and len(positions):
             flags = forbidden.numpy() | self._forbidden(positions.numpy())
             forbidden.assign(flags.astype(np.int32))
+
+    def shells(self, index: int) -> tuple[MeshSurface, ...]:
+        """Return the closed parts of a mesh that may hide its other parts; none for other surfaces."""
+        surface = self._surfaces[index]
+        return surface.shells if isinstance(surface, MeshSurface) else ()
+
+    def _mark_behind(
+        self, shell: MeshSurface, index: int, positions: Vectors, normals: Vectors, forbidden: Scalars
+    ) -> None:
+        """Write 1 where a point lies inside a part of its own surface.
+
+        A part whose normals point inward contains the side above its own points, so it hides only points both
+        of whose sides it contains.
+        """
+        count = len(positions)
+        sides = []
+        for sign in (1.0, -1.0) if shell.inverted else (1.0,):
+            points: Any = wp.empty(count, dtype=wp.vec3, device=self.device)
+            inputs = [sign * float(self._heights[index]), positions, normals]
+            launch(offset_points, count, inputs, [points], device=self.device)
+            flags: Any = wp.zeros(count, dtype=wp.int32, device=self.device)
+            on_device(shell, self.device).mark_inside(points, flags)
+            sides.append(flags.numpy())
+        forbidden.assign(np.maximum(forbidden.numpy(), np.minimum.reduce(sides)))
 
     def overlapping(self, index: int) -> list[int]:
         """Return the other surfaces whose boxes intersect the box of this one."""

@@ -1,5 +1,6 @@
 """`MeshSurface`: a triangle mesh, on the host and on devices, and its edges."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +25,10 @@ from decals.surfaces.surface import (
     project_host,
     vectors,
 )
+from decals.surfaces.topology import consistent_winding, first_copies, parts_of, shared_edges, welded
 from decals.validation import whole_number
+
+_logger = logging.getLogger(__name__)
 
 MIN_FACE_QUALITY = 1e-6
 """Smallest ratio of a face's doubled area to its squared edges; faces below it have no usable normal.
@@ -35,6 +39,9 @@ Warp's mesh queries skip the same faces.
 MAX_SAMPLES = 1 << 30
 """Most points that `sample` returns."""
 
+MAX_SHELLS = 32
+"""Most parts of a mesh that may hide others."""
+
 R2_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the R2 sequence (Roberts 2018): powers of the inverse of the plastic number."""
 
@@ -42,8 +49,9 @@ R2_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 class MeshSurface:
     """Triangle mesh as a `Surface`, with a bounding volume hierarchy for all queries.
 
-    Degenerate faces are allowed, but get no samples and no projected points. A mesh contains points only if
-    it is closed: with equal vertices welded, every edge is used equally often in both directions.
+    Degenerate faces and copies of other faces are allowed, but get no samples and no projected points. Faces
+    that wind differently from their neighbours are turned, and the log says so. A mesh contains points only
+    if it is closed: with equal vertices welded, every edge is used equally often in both directions.
 
     Parameters
     ----------
@@ -80,7 +88,9 @@ class MeshSurface:
         self.device = known_device(device)
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
-        self.sound, normals, areas = _sound_faces(self.vertices, self.faces)
+        self._welded = welded(self.vertices)
+        copies = _wind_alike(self.vertices, self.faces, self._welded)
+        self.sound, normals, areas = _sound_faces(self.vertices, self.faces, copies)
         self._corners = corners = np.ascontiguousarray(self.faces[self.sound])
         self._cumulative = np.cumsum(areas)
         self._normals = normals
@@ -109,11 +119,44 @@ class MeshSurface:
         return any(_is_closed(self.vertices, faces) for faces in (self.faces, self._corners))
 
     @Lazy
+    def shells(self) -> tuple["MeshSurface", ...]:
+        """Return the closed connected parts whose boxes meet the box of another part; they may hide it.
+
+        Of many parts the `MAX_SHELLS` largest count.
+        """
+        corners = self._welded[self._corners]
+        parts = parts_of(corners)
+        count = int(parts.max()) + 1
+        if count == 1:
+            return ()
+        boxes = np.empty((count, 2, 3))
+        for side, fold in enumerate((np.minimum, np.maximum)):
+            boxes[:, side] = np.inf if side == 0 else -np.inf
+            fold.at(boxes[:, side], np.repeat(parts, 3), self.vertices[self._corners].reshape(-1, 3))
+        found: list[MeshSurface] = []
+        for number in np.argsort(-np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1), kind="stable")[
+            :MAX_SHELLS
+        ]:
+            meet = (boxes[:, 0] <= boxes[number, 1]).all(axis=1) & (boxes[:, 1] >= boxes[number, 0]).all(
+                axis=1
+            )
+            if meet.sum() > 1:
+                rows, corners = np.unique(self._corners[parts == number], return_inverse=True)
+                part = MeshSurface(self.vertices[rows], corners.reshape(-1, 3), device=self.device)
+                found += [part] if part.closed else []
+        return tuple(found)
+
+    @Lazy
     def _winding(self) -> int:
         """1 if the mesh is closed and winds counter-clockwise seen from outside, -1 if clockwise, else 0."""
         if not self.closed:
             return 0
         return -1 if _volume(self.vertices, self.faces) < 0 else 1
+
+    @property
+    def inverted(self) -> bool:
+        """True if the mesh is closed and its normals point inward."""
+        return self._winding < 0
 
     def sample(self, count: int, seed: int) -> tuple[Float32Array, Float32Array]:
         """Return positions and normals of points uniform by area, ``float32[n, 3]`` each.
@@ -214,13 +257,40 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
     return np.array(indices, dtype=np.int32, order="C")
 
 
-def _sound_faces(vertices: Float32Array, faces: Int32Array) -> tuple[Int64Array, Float32Array, Float64Array]:
-    """Return the rows of the faces that have a normal, their unit normals and areas."""
+def _wind_alike(vertices: Float32Array, faces: Int32Array, same: Int64Array) -> BoolArray:
+    """Turn faces that wind differently from their neighbours; return True for copies of other faces."""
+    corners = same[faces]
+    edges = shared_edges(corners)
+    if not edges.differ.any() and not edges.branching:
+        return np.zeros(len(faces), np.bool_)
+    first = first_copies(corners)
+    rows = np.flatnonzero(first)
+    edges = shared_edges(corners[rows])
+    a, b, c = np.moveaxis(vertices.astype(np.float64)[faces[rows]], 1, 0)
+    winding = consistent_winding(edges, np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    turned = rows[winding.turned]
+    if len(turned):
+        faces[turned] = faces[turned][:, ::-1]
+        _logger.warning(
+            "Turned %d of %d faces that wound differently from their neighbours", len(turned), len(faces)
+        )
+    if winding.inconsistent:
+        _logger.warning(
+            "The mesh has one side only: %d edges join faces that wind differently; decals may end there",
+            winding.inconsistent,
+        )
+    return ~first
+
+
+def _sound_faces(
+    vertices: Float32Array, faces: Int32Array, copies: BoolArray
+) -> tuple[Int64Array, Float32Array, Float64Array]:
+    """Return the rows of the faces that have a normal and are no copies, their unit normals and areas."""
     a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
     crosses = np.cross(b - a, c - a)
     doubled = np.linalg.norm(crosses, axis=1)
     edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
-    sound = doubled > MIN_FACE_QUALITY * edges
+    sound = (doubled > MIN_FACE_QUALITY * edges) & ~copies
     if not sound.any():
         raise InvalidMesh(
             f"expected a mesh with area, got {len(faces)} degenerate faces; check its units and its indices"

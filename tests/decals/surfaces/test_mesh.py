@@ -114,8 +114,7 @@ def test_unwelded_closed_mesh_is_closed_and_open_ones_contain_nothing() -> None:
     assert split.closed
     assert split.contains([[0.0, 0, 0], [0.6, 0, 0]]).tolist() == [True, False]
     lidless = MeshSurface(cube.vertices, cube.faces[1:])
-    one_flipped = MeshSurface(cube.vertices, np.vstack([cube.faces[:1, ::-1], cube.faces[1:]]))
-    for surface in (lidless, one_flipped, plane()):
+    for surface in (lidless, plane()):
         assert not surface.closed
         assert not surface.contains([[0, 0, 0]]).any()
 

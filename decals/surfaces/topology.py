@@ -1,0 +1,148 @@
+"""Connectivity of a triangle mesh: vertices at one position, winding, coincident faces, connected parts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+
+
+def welded(vertices: Float32Array) -> Int64Array:
+    """Return for each vertex the first vertex at the same position, ``int64[n]``."""
+    bits = np.ascontiguousarray(vertices + np.float32(0)).view(np.uint32).astype(np.uint64)
+    factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+    keys = bits[:, 0] * factors[0] + bits[:, 1] * factors[1] + bits[:, 2] * factors[2]
+    keys ^= keys >> np.uint64(29)
+    _, first, which = np.unique(keys, return_index=True, return_inverse=True)
+    same: Int64Array = first[which.reshape(-1)]
+    if not np.array_equal(vertices[same], vertices):  # two positions with one key
+        _, first, which = np.unique(vertices + np.float32(0), axis=0, return_index=True, return_inverse=True)
+        same = first[which.reshape(-1)]
+    return same
+
+
+@dataclass(frozen=True, eq=False)
+class SharedEdges:
+    """Edges of two faces, and whether there are others.
+
+    Attributes
+    ----------
+    faces : int64[k, 2]
+        The two faces at each edge.
+    differ : bool[k]
+        True where both go along the edge in the same direction, so one of them winds the wrong way.
+    branching : int
+        Number of edges of more than two faces.
+    """
+
+    faces: Int64Array
+    differ: BoolArray
+    branching: int
+
+
+def shared_edges(corners: Int64Array) -> SharedEdges:
+    """Return the edges of two faces, for welded corners ``int64[m, 3]``."""
+    starts = corners.reshape(-1)
+    ends = np.roll(corners, -1, axis=1).reshape(-1)
+    size = int(starts.max()) + 1
+    forward = starts < ends
+    keys = np.where(forward, starts * size + ends, ends * size + starts)
+    keys[starts == ends] = -1
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+    counts = np.diff(np.append(first, len(ordered)))
+    counts[ordered[first] < 0] = 0
+    pairs = first[counts == 2]
+    one, other = order[pairs], order[pairs + 1]
+    faces = np.stack([one, other], axis=1) // 3
+    return SharedEdges(faces, forward[one] == forward[other], int((counts > 2).sum()))
+
+
+def first_copies(corners: Int64Array) -> BoolArray:
+    """Return True for faces that are no copies of an earlier face with the same winding, ``bool[m]``."""
+    lowest = corners.argmin(axis=1)
+    turned = np.take_along_axis(corners, (lowest[:, None] + np.arange(3)) % 3, axis=1)
+    first = np.zeros(len(corners), np.bool_)
+    first[np.unique(turned, axis=0, return_index=True)[1]] = True
+    return first
+
+
+@dataclass(frozen=True, eq=False)
+class Winding:
+    """Faces to turn so that neighbours wind alike.
+
+    Attributes
+    ----------
+    turned : bool[m]
+        True for each face to turn.
+    inconsistent : int
+        Edges of two faces that wind differently even then: the surface there has one side only.
+    """
+
+    turned: BoolArray
+    inconsistent: int
+
+
+def consistent_winding(edges: SharedEdges, areas: Float64Array) -> Winding:
+    """Pass the winding on from face to face across edges of two faces.
+
+    Each connected part keeps the winding of the larger share of its area. A part with one side only, such as
+    a Möbius strip, stays as it is.
+
+    Parameters
+    ----------
+    edges
+        Edges of two faces.
+    areas
+        Area of each face, ``float64[m]``.
+    """
+    count = len(areas)
+    turned = np.zeros(count, np.bool_)
+    if edges.differ.any():
+        turned = _turned(edges, count)
+        parts = _components(edges.faces, count)
+        balance = np.bincount(parts, np.where(turned, areas, -areas))
+        turned ^= (balance > 0)[parts] & ~_one_sided(edges, turned, parts)
+    left = edges.differ ^ turned[edges.faces[:, 0]] ^ turned[edges.faces[:, 1]]
+    return Winding(turned, int(left.sum()))
+
+
+def _one_sided(edges: SharedEdges, turned: BoolArray, parts: Int64Array) -> BoolArray:
+    """Return True for faces of parts in which some neighbours wind differently, ``bool[m]``."""
+    left = edges.differ ^ turned[edges.faces[:, 0]] ^ turned[edges.faces[:, 1]]
+    marked = np.zeros(int(parts.max()) + 1, np.bool_)
+    marked[parts[edges.faces[left, 0]]] = True
+    return marked[parts]
+
+
+def parts_of(corners: Int64Array) -> Int64Array:
+    """Return the number of the connected part of each face; parts share no vertex, ``int64[m]``."""
+    links = np.concatenate([corners[:, :2], corners[:, 1:]])
+    return np.unique(_components(links, int(corners.max()) + 1)[corners[:, 0]], return_inverse=True)[1]
+
+
+def _components(links: Int64Array, count: int) -> Int64Array:
+    """Return the component of each of `count` nodes that pairs link."""
+    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(count, count))
+    numbers: Int64Array = connected_components(graph, directed=False)[1]
+    return numbers
+
+
+def _turned(edges: SharedEdges, count: int) -> BoolArray:
+    """Return the faces to turn in one of the two windings of each part.
+
+    Each face is two nodes, as it is and turned. An edge links like nodes of two faces that wind alike, and
+    unlike ones of faces that do not. A part has two components, one for each winding; where it has one side
+    only, it has one.
+    """
+    (a, b), differ = edges.faces.T, edges.differ
+    pairs = [
+        np.stack([a, np.where(differ, b + count, b)], axis=1),
+        np.stack([a + count, np.where(differ, b, b + count)], axis=1),
+    ]
+    labels = _components(np.concatenate(pairs), 2 * count)
+    turned: BoolArray = labels[:count] > labels[count:]
+    return turned
