@@ -26,9 +26,21 @@ def closest_on_rectangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 
 
 @wp.func
-def from_edge(w: wp.vec3, edge: wp.vec3) -> wp.vec3:
-    """Return w − c, c being the point of the line segment from 0 to `edge` that is closest to w."""
-    return w - edge * wp.clamp(wp.dot(w, edge) / wp.max(wp.dot(edge, edge), 1.0e-37), 0.0, 1.0)
+def foot_on_edge(w: wp.vec3, edge: wp.vec3) -> wp.vec3:
+    """Return the point of the line segment from 0 to `edge` that is closest to w."""
+    return edge * wp.clamp(wp.dot(w, edge) / wp.max(wp.dot(edge, edge), 1.0e-37), 0.0, 1.0)
+
+
+@wp.func
+def closer(w: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec3:
+    """Return a, or b if it is closer to w.
+
+    |w − a|² − |w − b|² is written as a product with b − a: feet near a corner differ little, and float32 does
+    not show in the squares which one is closer.
+    """
+    if wp.dot(b - a, (w - a) + (w - b)) > 0.0:
+        return b
+    return a
 
 
 @wp.func
@@ -47,17 +59,11 @@ def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32)
     bc = ac - ab
     n = wp.vec3(upright[0], upright[1], upright[2])
     inside = wp.dot(wp.cross(n, ab), w) >= 0.0 and wp.dot(wp.cross(n, ac), w) <= 0.0
-    away = n * wp.dot(w, n)
+    c = w - n * wp.dot(w, n)
     if not (inside and wp.dot(wp.cross(n, bc), w - ab) >= 0.0):
-        away = from_edge(w, ab)
-        other = from_edge(w, ac)
-        if wp.dot(other, other) < wp.dot(away, away):
-            away = other
-        other = from_edge(w - ab, bc)
-        if wp.dot(other, other) < wp.dot(away, away):
-            away = other
-    c = q - away
-    return wp.vec4(c[0], c[1], c[2], corner[3])
+        c = closer(w, foot_on_edge(w, ab), foot_on_edge(w, ac))
+        c = closer(w, c, ab + foot_on_edge(w - ab, bc))
+    return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], corner[3])
 
 
 @wp.func
