@@ -334,17 +334,17 @@ def swept_angle(distance: wp.float32, first: wp.float32, last: wp.float32) -> wp
 
 
 @wp.func
-def triangle_edge(a: wp.vec3, b: wp.vec3, normal: wp.vec3, margin: wp.float32) -> wp.vec4:
+def triangle_edge(a: wp.vec3, edge: wp.vec3, normal: wp.vec3, margin: wp.float32) -> wp.vec4:
     """Return what an edge adds to (∫∫ k³, ∫∫ k², ∫ k³ along the edge, 0), with k = margin − |x|².
 
-    a and b lie in the plane of the triangle, relative to the foot of the point. By Green's theorem the
+    a, where the edge starts, is relative to the foot of the point in the triangle's plane. By Green's theorem the
     integral of a function of |x| alone is a sum over the edges: of distance ∫ F(|x|²) / |x|² dt, F being the
     function's integral along the ray to the edge; outside the kernel's disc F is constant, and its factor is
     the angle.
     """
-    direction = wp.normalize(b - a)
+    direction = wp.normalize(edge)
     first = wp.dot(a, direction)
-    last = wp.dot(b, direction)
+    last = first + wp.length(edge)
     distance = wp.dot(wp.cross(a, direction), normal)
     reach = wp.sqrt(wp.max(margin - distance * distance - TOUCH, 0.0))
     enter = wp.clamp(first, -reach, reach)
@@ -373,54 +373,55 @@ def triangle_edge(a: wp.vec3, b: wp.vec3, normal: wp.vec3, margin: wp.float32) -
 
 @wp.func
 def convolution_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """Return (f, ∇f); tape[at] = (first corner, 1/τ), tape[at + 1] and tape[at + 2] = the other corners."""
+    """Return (f, ∇f); tape[at] = (corner a, 1/τ); tape[at + 1] = (b − a, 0); tape[at + 2] = (c − a, 0).
+
+    tape[at + 3] = (unit normal, 0), which float32 could not compute for slivers.
+    """
     corner = tape[at]
     z = corner[3]
     a = (wp.vec3(corner[0], corner[1], corner[2]) - q) * z
-    b = (wp.vec3(tape[at + 1][0], tape[at + 1][1], tape[at + 1][2]) - q) * z
-    c = (wp.vec3(tape[at + 2][0], tape[at + 2][1], tape[at + 2][2]) - q) * z
-    normal = wp.normalize(wp.cross(b - a, c - a))
+    to_b = wp.vec3(tape[at + 1][0], tape[at + 1][1], tape[at + 1][2]) * z
+    to_c = wp.vec3(tape[at + 2][0], tape[at + 2][1], tape[at + 2][2]) * z
+    normal = wp.vec3(tape[at + 3][0], tape[at + 3][1], tape[at + 3][2])
     height = -wp.dot(a, normal)
     margin = 1.0 - height * height
     if margin <= 0.0:
         return wp.vec4()
     a = a + normal * height
-    b = b + normal * height
-    c = c + normal * height
-    ab = triangle_edge(a, b, normal, margin)
-    bc = triangle_edge(b, c, normal, margin)
-    ca = triangle_edge(c, a, normal, margin)
+    ab = triangle_edge(a, to_b, normal, margin)
+    bc = triangle_edge(a + to_b, to_c - to_b, normal, margin)
+    ca = triangle_edge(a + to_c, -to_c, normal, margin)
     inside = ab + bc + ca
     if inside[0] <= 0.0:
         return wp.vec4()
     if inside[2] <= 0.0 and 8.0 * inside[0] < wp.PI * margin * margin * margin * margin:
         return wp.vec4()  # no edge lies in the kernel's disc, and the triangle does not hold it
-    outward = wp.normalize(b - a) * ab[2] + wp.normalize(c - b) * bc[2] + wp.normalize(a - c) * ca[2]
+    outward = wp.normalize(to_b) * ab[2] + wp.normalize(to_c - to_b) * bc[2] - wp.normalize(to_c) * ca[2]
     gradient = normal * (-6.0 * height * inside[1]) - wp.cross(outward, normal)
     gradient = gradient * (SHEET_FACTOR * z)
     return wp.vec4(SHEET_FACTOR * inside[0], gradient[0], gradient[1], gradient[2])
 
 
 @wp.func
-def squared_distance_to_edge(a: wp.vec3, b: wp.vec3) -> wp.float32:
-    """Return the squared distance of the origin from a line segment."""
-    axis = b - a
-    t = wp.clamp(-wp.dot(a, axis) / wp.max(wp.dot(axis, axis), SHORTEST_AXIS), 0.0, 1.0)
-    return wp.length_sq(a + axis * t)
+def squared_distance_to_edge(a: wp.vec3, edge: wp.vec3) -> wp.float32:
+    """Return the squared distance of the origin from the line segment from a to a + `edge`."""
+    t = wp.clamp(-wp.dot(a, edge) / wp.max(wp.dot(edge, edge), SHORTEST_AXIS), 0.0, 1.0)
+    return wp.length_sq(a + edge * t)
 
 
 @wp.func
-def distance_to_triangle(a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.float32:
-    """Return the distance of the origin from a triangle."""
-    normal = wp.normalize(wp.cross(b - a, c - a))
+def distance_to_triangle(a: wp.vec3, to_b: wp.vec3, to_c: wp.vec3, normal: wp.vec3) -> wp.float32:
+    """Return the distance of the origin from the triangle of a, a + `to_b` and a + `to_c`."""
+    to_c_from_b = to_c - to_b
+    b = a + to_b
     if (
-        wp.dot(wp.cross(a, b), normal) >= 0.0
-        and wp.dot(wp.cross(b, c), normal) >= 0.0
-        and wp.dot(wp.cross(c, a), normal) >= 0.0
+        wp.dot(wp.cross(a, to_b), normal) >= 0.0
+        and wp.dot(wp.cross(b, to_c_from_b), normal) >= 0.0
+        and wp.dot(wp.cross(a, to_c), normal) <= 0.0
     ):
         return wp.abs(wp.dot(a, normal))
-    nearest = wp.min(squared_distance_to_edge(a, b), squared_distance_to_edge(b, c))
-    return wp.sqrt(wp.min(nearest, squared_distance_to_edge(c, a)))
+    nearest = wp.min(squared_distance_to_edge(a, to_b), squared_distance_to_edge(b, to_c_from_b))
+    return wp.sqrt(wp.min(nearest, squared_distance_to_edge(a, to_c)))
 
 
 @wp.func
@@ -431,13 +432,14 @@ def convolution_triangle_bounds(
     corner = tape[at]
     z = corner[3]
     a = (wp.vec3(corner[0], corner[1], corner[2]) - center) * z
-    b = (wp.vec3(tape[at + 1][0], tape[at + 1][1], tape[at + 1][2]) - center) * z
-    c = (wp.vec3(tape[at + 2][0], tape[at + 2][1], tape[at + 2][2]) - center) * z
-    nearest = wp.max(distance_to_triangle(a, b, c) - radius * z, 0.0)
+    to_b = wp.vec3(tape[at + 1][0], tape[at + 1][1], tape[at + 1][2]) * z
+    to_c = wp.vec3(tape[at + 2][0], tape[at + 2][1], tape[at + 2][2]) * z
+    normal = wp.vec3(tape[at + 3][0], tape[at + 3][1], tape[at + 3][2])
+    nearest = wp.max(distance_to_triangle(a, to_b, to_c, normal) - radius * z, 0.0)
     if nearest >= 1.0:
         return wp.vec3()
     k = 1.0 - nearest * nearest
-    area = wp.min(0.5 * wp.length(wp.cross(b - a, c - a)), wp.PI)
+    area = wp.min(0.5 * wp.length(wp.cross(to_b, to_c)), wp.PI)
     slope = 6.0 * SHEET_FACTOR * area * wp.min(STEEPEST_KERNEL, k * k)
     curvature = 6.0 * SHEET_FACTOR * wp.min(area * wp.min(1.0, 4.0 * k), SHEET_CURVATURE)
     return taylor_bounds(
@@ -454,7 +456,7 @@ CONVOLUTION_SEGMENT = FieldKind(
 )
 CONVOLUTION_ARC = FieldKind("convolution_arc", convolution_arc, convolution_arc_bounds, parameters=3)
 CONVOLUTION_TRIANGLE = FieldKind(
-    "convolution_triangle", convolution_triangle, convolution_triangle_bounds, parameters=3
+    "convolution_triangle", convolution_triangle, convolution_triangle_bounds, parameters=4
 )
 
 CONVOLUTION_FIELDS = (CONVOLUTION_SEGMENT, CONVOLUTION_ARC, CONVOLUTION_TRIANGLE)

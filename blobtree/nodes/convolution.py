@@ -22,6 +22,7 @@ from blobtree.formulas.convolution import (
 from blobtree.lazy import Lazy
 from blobtree.nodes.curves import Arc
 from blobtree.nodes.fields import FieldPrimitive
+from blobtree.nodes.flats import triangle_texels
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius, parameters_of
 from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
 from blobtree.nodes.tree import Macro, Node, Sum
@@ -226,10 +227,8 @@ class ConvolutionTriangle(ConvolutionPrimitive):
 
     @classmethod
     def texels(cls, columns: Columns) -> Float64Array:
-        """Return the corners, the first beside 1 / kernel radius."""
-        inverses = 1.0 / cls.kernel_radii(columns)[:, 0]
-        corners = [beside(columns[name], inverses) for name in ("a", "b", "c")]
-        return np.stack(corners, axis=1)
+        """Return the first corner beside 1 / kernel radius, the edges from it, and the unit normal."""
+        return triangle_texels(columns, 1.0 / cls.kernel_radii(columns)[:, 0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

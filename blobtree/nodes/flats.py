@@ -127,11 +127,16 @@ class Triangle(Primitive):
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
         """Return the first corner and the influence radius; the edges from it; the unit normal."""
-        a, b, c = columns["a"], columns["b"], columns["c"]
-        normals = unit_vectors(np.cross(unit_vectors(b - a), unit_vectors(c - a)))
-        zeros = np.zeros(len(a))
-        rows = [beside(vectors, zeros) for vectors in (b - a, c - a, normals)]
-        return np.stack([beside(a, influences[:, 0]), *rows], axis=1)
+        return triangle_texels(columns, influences[:, 0])
+
+
+def triangle_texels(columns: Columns, numbers: Float64Array) -> Float64Array:
+    """Return the first corners beside numbers (n,), the edges from it, and the unit normals (n, 4, 4)."""
+    a, b, c = columns["a"], columns["b"], columns["c"]
+    normals = unit_vectors(np.cross(unit_vectors(b - a), unit_vectors(c - a)))
+    zeros = np.zeros(len(a))
+    rows = [beside(vectors, zeros) for vectors in (b - a, c - a, normals)]
+    return np.stack([beside(a, numbers), *rows], axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

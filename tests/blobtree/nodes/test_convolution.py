@@ -142,7 +142,10 @@ def random_texels(kind: int, rng: np.random.Generator) -> tuple[list[Any], float
         angle = rng.choice([0.2, 1.0, 2.5, 3.1])
         texels = [vector(*b, 1.0 / start), vector(*u, np.cos(angle)), vector(*across, np.sin(angle))]
         return texels, start, a + rng.normal(size=3) * 0.4 * start
-    return [vector(*corner, 1.0 / start) for corner in (a, b, c)], start, q
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal)
+    rows = [vector(*a, 1.0 / start), *(vector(*row, 0.0) for row in (b - a, c - a, normal))]
+    return rows, start, q
 
 
 @pytest.mark.parametrize("kind", range(3))
