@@ -50,13 +50,28 @@ HELPERS = """\
 vec2 wp_normalize(vec2 v) { float l = length(v); return l > 0.0 ? v / l : vec2(0.0); }
 vec3 wp_normalize(vec3 v) { float l = length(v); return l > 0.0 ? v / l : vec3(0.0); }
 vec4 wp_normalize(vec4 v) { float l = length(v); return l > 0.0 ? v / l : vec4(0.0); }
+float wp_atan2(float y, float x) {
+    float small = min(abs(x), abs(y));
+    float large = max(abs(x), abs(y));
+    bool upper = small > 0.41421356 * large;
+    float t = large > 0.0 ? (upper ? (small - large) / (small + large) : small / large) : 0.0;
+    float z = t * t;
+    float series = ((0.0805374449538 * z - 0.138776856032) * z + 0.199777106478) * z - 0.333329491539;
+    float angle = series * z * t + t;
+    angle += upper ? 0.785398163397 : 0.0;
+    angle = abs(y) > abs(x) ? 1.57079632679 - angle : angle;
+    angle = x < 0.0 ? 3.14159265359 - angle : angle;
+    return y < 0.0 ? -angle : angle;
+}
 #define ivec4_sampler isampler2D
 
 """
 """GLSL above every library.
 
-Warp normalises the zero vector to zero, where `normalize` of GLSL is undefined. Textures of integers have one
-type in GLSL and two names here, because their elements are an int or an ivec4.
+Warp normalises the zero vector to zero, where `normalize` of GLSL is undefined. GLSL's own functions of
+angles have errors of 1e-6 and more in drivers (4096 units in the last place are allowed), so all of them use
+a polynomial here (Moshier 1989, Cephes, atanf), whose error is 2e-7. Textures of integers have one type in
+GLSL and two names here, because their elements are an int or an ivec4.
 """
 
 
@@ -100,10 +115,12 @@ def _template(pattern: str, result: str | None = None) -> Callable[..., Expressi
 
 BUILTINS: dict[str, Callable[..., Expression]] = {
     **{name: _same(name) for name in ("abs", "ceil", "clamp", "cross", "exp", "floor", "log", "max", "min")},
-    **{name: _same(name) for name in ("acos", "asin", "cos", "pow", "sin", "sqrt", "tan", "trunc")},
+    **{name: _same(name) for name in ("cos", "pow", "sin", "sqrt", "tan", "trunc")},
     **{name: _scalar(name) for name in ("dot", "length")},
-    "atan": _same("atan"),
-    "atan2": _same("atan"),
+    "acos": _template("wp_atan2(sqrt((1.0 - {0}) * (1.0 + {0})), {0})"),
+    "asin": _template("wp_atan2({0}, sqrt((1.0 - {0}) * (1.0 + {0})))"),
+    "atan": _template("wp_atan2({0}, 1.0)"),
+    "atan2": _same("wp_atan2"),
     "lerp": _same("mix"),
     "normalize": _same("wp_normalize"),
     "length_sq": _template("dot({0}, {0})", "float"),

@@ -9,20 +9,25 @@ from decals.rendering.context import Context
 from decals.rendering.tree import Kinds
 from tests.blobtree.trees import points_around
 from tests.conformance import AWAY, sample
-from tests.decals.glsl.tapes import GRADIENT, TAPE_AGREEMENT
+from tests.decals.glsl.tapes import GRADIENT
 from tests.decals.glsl.test_tapes import read_tape
 from tests.oracles import blobtree as oracle
+
+AGREEMENT = 1e-5
+"""Largest relative difference of values and gradients, absolute below 1."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tag", NODE_KINDS)
 def test_a_class_of_nodes_is_the_same_in_both_languages(context: Context, tag: str) -> None:
     rng = np.random.default_rng(3)
-    node = sample(NODE_KINDS[tag], rng)
-    points = points_around(rng, node, 200)
-    smooth = oracle.signed(node, points).margin > AWAY
-    seen = read_tape(context, node, GRADIENT, points, kinds=Kinds.of(node.tape))
-    expected = gradients_at(node.tape, points)
-    assert np.abs(seen[:, 0] - expected[:, 0]).max() <= TAPE_AGREEMENT
-    error = np.abs(seen - expected)[smooth] / np.maximum(1.0, np.abs(expected[smooth]))
-    assert error.max(initial=0.0) <= 5.0 * TAPE_AGREEMENT
+    for _ in range(3):
+        node = sample(NODE_KINDS[tag], rng)
+        points = points_around(rng, node, 200)
+        smooth = oracle.signed(node, points).margin > AWAY
+        seen = read_tape(context, node, GRADIENT, points, kinds=Kinds.of(node.tape))
+        expected = gradients_at(node.tape, points)
+        assert np.abs(seen[:, 0] - expected[:, 0]).max() <= AGREEMENT
+        slopes = np.maximum(1.0, np.linalg.norm(expected[:, 1:], axis=1))
+        error = np.linalg.norm(seen[:, 1:] - expected[:, 1:], axis=1) / slopes
+        assert error[smooth].max(initial=0.0) <= AGREEMENT

@@ -21,12 +21,13 @@ from blobtree.tape.dispatch import (
     warp_pullback,
     warp_stretch,
 )
+from blobtree.transpile.builtins import BUILTINS, HELPERS, Expression
 from blobtree.transpile.glsl import translate_library
 from decals.rendering.context import Context
 from decals.rendering.tree import _dispatch
 from tests.blobtree.transpile.warp_functions import TypedFunction, call, typed_functions
 from tests.decals.glsl.arguments import COUNT, arguments_of
-from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, through_glsl
+from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, run_program, through_glsl
 
 MODULES = (
     "blobtree.formulas.falloff",
@@ -113,3 +114,33 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
     at_worst = {key: value[worst] for key, value in arguments.items() if np.shape(value)[:1] == (count,)}
     assert error.max() <= AGREEMENT, f"{error.max()}: {seen[worst]} and {expected[worst]} at {at_worst}"
     assert not typed.parameters or typed.returned is None or np.ptp(expected) > 0.0, "they never change"
+
+
+ANGLES = """#version 330 core
+uniform sampler2D points;
+out vec4 result;
+void main() {
+    vec2 p = texelFetch(points, ivec2(gl_FragCoord.xy), 0).xy;
+    float share = clamp(p.x, -1.0, 1.0);
+    result = vec4(%s);
+}
+"""
+
+
+def test_angles_are_as_exact_as_float32(context: Context) -> None:
+    """Functions of drivers have errors of 1e-6 and more, which bends and convolution surfaces magnify."""
+    rng = np.random.default_rng(0)
+    points = np.zeros((4000, 4), np.float32)
+    points[:, :2] = rng.normal(size=(4000, 2)) * 10.0 ** rng.uniform(-3.0, 3.0, (4000, 2))
+    points[:8, :2] = [(0, 1), (1, 0), (0, -1), (-1, 0), (0, 0), (1, 1), (-1, 1), (1e-30, 1e-30)]
+    arguments = {"atan2": ("p.y", "p.x"), "atan": ("p.y",), "asin": ("share",), "acos": ("share",)}
+    calls = [
+        BUILTINS[name](*(Expression(argument, "float") for argument in used)).code
+        for name, used in arguments.items()
+    ]
+    source = ANGLES.replace("uniform", HELPERS + "uniform", 1) % ", ".join(calls)
+    seen = run_program(context, source, len(points), {"points": points}, {})
+    x, y = points[:, :2].astype(np.float64).T
+    share = np.clip(x, -1.0, 1.0)
+    exact = np.stack([np.arctan2(y, x), np.arctan(y), np.arcsin(share), np.arccos(share)], axis=1)
+    np.testing.assert_allclose(seen, exact, rtol=5e-7, atol=5e-7)

@@ -89,8 +89,8 @@ def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     fields = {code for tree in FIELD_TREES for code in tree.tape.fields}
     assert fields == set(range(len(used.fields)))
     kinds = replace(ALL_KINDS, fields=tuple(sorted(fields)), instruction_set=used)
-    # Arcs through random points have centres far away, so their coordinates round more.
-    assert_same_in_both_languages(context, FIELD_TREES, kinds, 0, agreement=1e-4)
+    # Bounds of arcs depend on where the kernel ends, a square root of a difference that is near 0.
+    assert_same_in_both_languages(context, FIELD_TREES, kinds, 0, bounds_agreement=1e-4)
 
 
 def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> None:
@@ -116,7 +116,7 @@ def test_deformations_are_the_same_in_both_languages(context: Context) -> None:
     used = trees[0].tape.instruction_set
     kinds = replace(ALL_KINDS, warps=tuple(range(len(used.warps))), warp_registers=5, instruction_set=used)
     assert {code for tree in trees for code in tree.tape.warps} == set(range(1, len(used.warps)))
-    assert_same_in_both_languages(context, trees, kinds, 0, agreement=1e-4)  # strong warps magnify rounding
+    assert_same_in_both_languages(context, trees, kinds, 0)
 
 
 @pytest.mark.parametrize("more", [PROFILED, SIGNED], ids=["profiled", "signed"])
@@ -126,7 +126,7 @@ def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: M
 
 
 def assert_same_in_both_languages(
-    context: Context, trees: list[Node], kinds: Kinds, seed: int, agreement: float = TAPE_AGREEMENT
+    context: Context, trees: list[Node], kinds: Kinds, seed: int, bounds_agreement: float = TAPE_AGREEMENT
 ) -> None:
     rng = np.random.default_rng(seed)
     compared = 0
@@ -134,7 +134,7 @@ def assert_same_in_both_languages(
         points = points_around(rng, tree, 500)
         reach = (10.0 ** rng.uniform(-3.0, 0.5, 500)).astype(np.float32)
         seen = read_tape(context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), kinds=kinds)
-        assert_close(seen[:, :2], bounds_at(tree.tape, points, reach), agreement)
+        assert_close(seen[:, :2], bounds_at(tree.tape, points, reach), bounds_agreement)
         heading = units(rng, 4)[3]
         seen = read_tape(
             context, tree, BOUND_AND_VALUE, np.column_stack([points, reach]), tuple(heading.tolist()), kinds
@@ -142,15 +142,14 @@ def assert_same_in_both_languages(
         field = oracle.evaluate(tree, points)
         smooth = field.margin > 1e-5  # on a tie of two operands, rounding may choose either bound
         expected = bounds_along(tree.tape, points, np.tile(heading, (500, 1)), reach)
-        assert_close(seen[smooth, :3], expected[smooth], agreement)
+        assert_close(seen[smooth, :3], expected[smooth], bounds_agreement)
         assert_close(
             read_tape(context, tree, GRADIENT, points, kinds=kinds)[smooth],
             gradients_at(tree.tape, points)[smooth],
-            agreement,
         )
         strong = smooth & (field.value > 1e-3)
         seen = read_tape(context, tree, COLOR, points, kinds=kinds)[:, 1:]
-        assert_close(seen[strong], colors_at(tree.tape, points)[strong], agreement)
+        assert_close(seen[strong], colors_at(tree.tape, points)[strong])
         compared += int(strong.sum())
     assert compared > 0.25 * 6 * 500
 
