@@ -1,5 +1,7 @@
 """Soundness of random trees of all classes of nodes: meshes and rays against dense evaluation."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -8,7 +10,7 @@ from blobtree import InvalidNode, Mesh, Node, polygonize
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance
-from tests.blobtree.trees import random_leaf
+from tests.blobtree.trees import random_leaf, random_profile
 from tests.conformance import Rng, sample
 from tests.oracles import dense_polygonize
 
@@ -18,18 +20,33 @@ FAR = 1e-3
 """Distance of a hit from the surface, over the model's size, at which it is false."""
 
 
+WEIGHTS = (1.0, 1.0, 0.6, 1.5, -0.5)
+PROFILED = 0.3
+"""Probability that an operand with a falloff has another one, another width and weight."""
+
+
 def random_tree(rng: Rng, depth: int = 2) -> Node:
     """Return a tree whose nodes are of any class, all equally probable."""
     kinds = list(NODE_KINDS.values())
 
     def operand(rng: Rng) -> Node:
-        return random_tree(rng, depth - 1) if depth and rng.random() < 0.5 else random_leaf(rng)
+        node = random_tree(rng, depth - 1) if depth and rng.random() < 0.5 else random_leaf(rng)
+        return random_profile(rng, node, WEIGHTS) if rng.random() < PROFILED else node
 
     while True:
         try:
             return sample(kinds[int(rng.integers(len(kinds)))], rng, operand)
         except (InvalidNode, LookupError):  # a combination that no class accepts
             continue
+
+
+def failures_by_seed(seed: int, count: int) -> Iterator[tuple[int, Node, list[str]]]:
+    """Yield the numbers of random trees that violate something, the trees, and what they violate."""
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        tree = random_tree(rng)
+        if failures := failures_of(tree, rng):
+            yield number, tree, failures
 
 
 def failures_of(tree: Node, rng: Rng) -> list[str]:

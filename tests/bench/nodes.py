@@ -1,14 +1,23 @@
-"""Benchmark of the modeller's nodes: conformance, soundness, and the cost of kinds outside the core.
+"""Benchmark of the modeller's nodes: conformance, soundness, mathematics, and costs.
 
-    python -m tests.bench.nodes --trees 2000                # all figures but the paired one
-    python -m tests.bench.nodes --against ../before         # also pure sums, paired with another checkout
+    python -m tests.bench.nodes                             # every group but `fits`, which takes an hour
+    python -m tests.bench.nodes --only soundness --trees 2000 --seed 3
+    python -m tests.bench.nodes --only costs --against ../before   # pure sums, paired with another checkout
     python -m tests.bench.nodes --quick --json nodes.json
 
-`nodes_conforming` of `nodes_total` classes pass `tests.conformance`; `soundness_failures` is a number of
-random trees (`tests.soundness`). `mixed_over_sum` is the cost per crossing cell of a tree with a clean union,
-solids in contact and a bend, over that of a pure sum. `sum_regression` is the time of a pure sum here over
-that in the other checkout, by alternating processes. `first_use_s` is the time of the first mesh of a new
-kind.
+* conformance: `nodes_conforming` of `nodes_total` classes pass `tests.conformance`.
+* bounds: `bounds_violations` of intervals, slopes and boxes in `bounds_samples` samples of each class.
+* soundness: `soundness_failures` of `soundness_trees` random trees (`tests.soundness`).
+* derivatives: `parameter_gradients_wrong`, derivatives of random trees by parameters that differ from
+  float64 by more than 1e-4; `curvature_error`, the largest relative one on a torus and an ellipsoid.
+* rest: `rest_error` of rest coordinates, and `rest_over_colors`, their time over that of colours.
+* contact, convolution: see `tests.bench.contact` and `tests.bench.convolution_surfaces`.
+* meshes: `mesh_error_cells`, the distance of a sampled mesh's surface from the mesh in cells, and the times
+  of a blend and of 10,000 rays with a mesh of 100,352 triangles.
+* fits: see `tests.bench.fitting`.
+* costs: `mixed_over_sum` is the cost per crossing cell of a tree with a clean union, solids in contact and a
+  bend, over that of a pure sum. `sum_regression` is the time of a pure sum here over that in the other
+  checkout, by alternating processes. `first_use_s` is the time of the first mesh of a new kind.
 """
 
 import argparse
@@ -17,16 +26,24 @@ import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyvista as pv
 import warp as wp
 
-from blobtree import CleanUnion, Contact, Node, Point, Sum, define_skeleton, polygonize
+from blobtree import CleanUnion, Contact, Node, Point, Segment, Sum, define_skeleton, from_mesh, polygonize
 from blobtree.nodes.kinds import NODE_KINDS
+from tests.bench import contact, convolution_surfaces, fitting
 from tests.bench.blobtree import blobs, median_time
-from tests.conformance import problems_of
-from tests.soundness import failures_of, random_tree
+from tests.blobtree.derivatives import test_curvature
+from tests.blobtree.nodes.test_attributes import REST, rest
+from tests.blobtree.trees import points_around
+from tests.bounds import violations_of
+from tests.conformance import problems_of, sample
+from tests.parameter_derivatives import wrong_derivatives
+from tests.soundness import failures_by_seed, random_tree
 
 Figures = dict[str, float]
 
@@ -45,28 +62,122 @@ print(time.process_time() - start)
 """
 
 
-def conformance(samples: int) -> Figures:
+def conformance(options: argparse.Namespace) -> Figures:
     """Count the classes that conform; print what the others violate."""
     conforming = 0
     for tag, kind in NODE_KINDS.items():
-        problems = problems_of(kind, seed=1, samples=samples)
+        problems = problems_of(kind, seed=options.seed, samples=1 if options.quick else 8)
         conforming += not problems
         for problem in problems:
-            print(f"  {tag}: {problem[:200]}")
+            print(f"  {tag}: {problem[:200]}", flush=True)
     return {"nodes_total": len(NODE_KINDS), "nodes_conforming": conforming}
 
 
-def soundness(count: int) -> Figures:
+def bounds(options: argparse.Namespace) -> Figures:
+    """Count the violated bounds of all classes; print them."""
+    samples, count = 20_000 if options.quick else 1_000_000, 0
+    for tag, kind in NODE_KINDS.items():
+        violations = violations_of(kind, options.seed, samples)
+        count += len(violations)
+        for violation in violations:
+            print(f"  {tag}: {violation[:300]}", flush=True)
+    return {"bounds_samples": samples, "bounds_violations": count}
+
+
+def soundness(options: argparse.Namespace) -> Figures:
     """Count the random trees that violate something; print what."""
-    rng = np.random.default_rng(1)
+    count = min(options.trees, 20) if options.quick else options.trees
     failing = 0
-    for number in range(count):
-        tree = random_tree(rng)
-        failures = failures_of(tree, rng)
-        failing += bool(failures)
+    for number, tree, failures in failures_by_seed(options.seed, count):
+        failing += 1
         for failure in failures:
-            print(f"  tree {number}: {failure}: {repr(tree)[:200]}")
+            print(f"  tree {number}: {failure}: {repr(tree)[:200]}", flush=True)
     return {"soundness_trees": count, "soundness_failures": failing}
+
+
+def derivatives(options: argparse.Namespace) -> Figures:
+    """Compare derivatives by parameters, of nodes of each class and of random trees; and curvatures."""
+    rng = np.random.default_rng(options.seed)
+    rounds = 1 if options.quick else 10
+    trees = [sample(kind, rng) for _ in range(rounds) for kind in NODE_KINDS.values()]
+    trees += [random_tree(rng, 1) for _ in range(20 * rounds)]
+    compared, wrong = 0, 0
+    for tree in trees:
+        count, problems = wrong_derivatives(tree, rng)
+        compared += count
+        wrong += len(problems)
+        for problem in problems:
+            print(f"  {problem}", flush=True)
+    curvature_error = 0.0
+    for node, samples in (
+        (test_curvature.TORUS, test_curvature.torus_samples),
+        (test_curvature.ELLIPSOID, test_curvature.ellipsoid_samples),
+    ):
+        points, _, expected = samples(500)
+        size = np.abs(expected).max(axis=1, keepdims=True)
+        errors = np.abs(node.curvatures(points).principal - expected) / size
+        curvature_error = max(curvature_error, float(errors.max()))
+    return {
+        "parameter_gradients": compared,
+        "parameter_gradients_wrong": wrong,
+        "curvature_error": curvature_error,
+    }
+
+
+def rest_coordinates(options: argparse.Namespace) -> Figures:
+    """Compare rest coordinates with float64, and their time with that of colours."""
+    rng = np.random.default_rng(options.seed)
+    largest = 0.0
+    for name, tree in REST.items():
+        points = points_around(rng, tree, 400)
+        value, expected = rest(tree, points.astype(np.float64))
+        strong = value > 1e-2
+        if name == "united":  # where two solids have equal fields, either is right
+            values = np.array([operand(points) for operand in tree.children])
+            strong &= np.ptp(values, axis=0) > 1e-4
+        error = np.abs(tree.rest_coordinates(points) - expected)[strong]
+        largest = max(largest, float(error.max()))
+    limbs = [
+        Segment((0, 0, 0), (0.5, 0, 0), radius=0.2)
+        .rotate(rng.normal(size=3), float(rng.uniform(0, 180)))
+        .translate(rng.uniform(-1.0, 1.0, 3))
+        for _ in range(30)
+    ]
+    tree = Sum(tuple(limbs))
+    points = points_around(rng, tree, 20_000)
+    times = [
+        median_time(lambda call=call: call(points), ROUNDS, time.process_time)  # type: ignore[misc]
+        for call in (tree.rest_coordinates, tree.colors)
+    ]
+    return {"rest_error": largest, "rest_over_colors": times[0] / times[1]}
+
+
+def meshes(_: argparse.Namespace) -> Figures:
+    """Measure a large sampled mesh: its error, and times of a blend and of rays."""
+    sphere = pv.Sphere(radius=1.0, theta_resolution=225, phi_resolution=225)
+    start = time.perf_counter()
+    solid = from_mesh(sphere)
+    figures = {"mesh_triangles": float(sphere.n_cells), "mesh_sampled_s": time.perf_counter() - start}
+    vertices = polygonize(solid, resolution=64).vertices
+    away = np.abs(np.linalg.norm(vertices, axis=1) - 1.0).max()
+    tree = solid + Segment((0, 0, 0), (0, 0, 1.5), radius=0.2)
+    rays = np.random.default_rng(7).normal(size=(10_000, 3))
+    polygonize(tree, resolution=48)
+    tree.raycast(4.0 * rays[:10], -rays[:10])
+    start = time.perf_counter()
+    polygonize(tree.translate((0.1, 0.0, 0.0)), resolution=48)
+    blended = time.perf_counter()
+    tree.raycast(4.0 * rays, -rays)
+    return figures | {
+        "mesh_error_cells": float(away) / solid.spacing,
+        "mesh_blended_s": blended - start,
+        "mesh_traced_s": time.perf_counter() - blended,
+    }
+
+
+def fits(options: argparse.Namespace) -> Figures:
+    """Recover random trees from samples."""
+    return fitting.figures(2, 3000) if options.quick else fitting.figures(fitting.TREES, fitting.SAMPLES)
 
 
 def mixed() -> Node:
@@ -78,14 +189,18 @@ def mixed() -> Node:
     )
 
 
-def costs(resolution: int) -> Figures:
-    """Compare times per vertex, of which each crossing cell has one."""
+def costs(options: argparse.Namespace) -> Figures:
+    """Compare times per vertex, of which each crossing cell has one; and pure sums with another checkout."""
+    resolution = 48 if options.quick else 96
     trees = {"sum": Sum(tuple(blobs(COUNT))), "mixed": mixed()}
     per_cell = {}
     for name, tree in trees.items():
         seconds = median_time(lambda tree=tree: polygonize(tree, resolution=resolution), 3, time.process_time)  # type: ignore[misc]
         per_cell[name] = seconds / len(polygonize(tree, resolution=resolution).vertices)
-    return {"mixed_over_sum": per_cell["mixed"] / per_cell["sum"]}
+    figures = {"mixed_over_sum": per_cell["mixed"] / per_cell["sum"]} | first_use()
+    if options.against:
+        figures |= regression(options.against.resolve(), 3 if options.quick else ROUNDS)
+    return figures
 
 
 @wp.func
@@ -113,6 +228,20 @@ def regression(other: Path, rounds: int) -> Figures:
     return {"sum_regression": here / there}
 
 
+GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
+    "conformance": conformance,
+    "bounds": bounds,
+    "soundness": soundness,
+    "derivatives": derivatives,
+    "rest": rest_coordinates,
+    "contact": lambda options: contact.figures(quick=options.quick),
+    "convolution": lambda _: convolution_surfaces.figures(),
+    "meshes": meshes,
+    "costs": costs,
+    "fits": fits,
+}
+
+
 def main() -> None:
     """Parse the command line and measure."""
     parser = argparse.ArgumentParser(
@@ -120,19 +249,19 @@ def main() -> None:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--only", nargs="+", choices=GROUPS, help="groups of figures")
     parser.add_argument("--trees", type=int, default=200, help="number of random trees")
+    parser.add_argument("--seed", type=int, default=1, help="seed of random nodes and trees")
     parser.add_argument("--against", type=Path, help="another checkout, for sum_regression")
     parser.add_argument("--quick", action="store_true", help="few samples and trees")
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
-    figures = conformance(1 if options.quick else 8)
-    figures |= soundness(10 if options.quick else options.trees)
-    figures |= costs(48 if options.quick else 96)
-    figures |= first_use()
-    if options.against:
-        figures |= regression(options.against.resolve(), 3 if options.quick else ROUNDS)
-    for name, number in figures.items():
-        print(f"  {name:20} {number:10.3f}")
+    figures: Figures = {}
+    for group in options.only or [name for name in GROUPS if name != "fits"]:
+        added = GROUPS[group](options)
+        figures |= added
+        for name, number in added.items():
+            print(f"  {name:28} {number:12.4g}", flush=True)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 

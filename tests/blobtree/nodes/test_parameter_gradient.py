@@ -11,8 +11,6 @@ from blobtree import (
     Ellipsoid,
     InvalidNode,
     InvalidPoints,
-    Node,
-    NumericParameter,
     Point,
     Polygon,
     Ricci,
@@ -22,48 +20,14 @@ from blobtree import (
     numeric_values,
     with_numeric_values,
 )
-from blobtree.nodes.numeric_parameters import node_along
+from blobtree.nodes.kinds import NODE_KINDS
 from tests.blobtree.custom_kinds import CUSTOM_TREES
 from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.conformance import sample
 from tests.oracles import blobtree as oracle
+from tests.parameter_derivatives import AWAY, STEP, difference, wrong_derivatives
 
 Numbers = NDArray[np.float64]
-POINTS = 20
-AWAY = 1e-2
-STEP = 1e-5
-
-
-def differences(tree: Node, parameter: NumericParameter, points: Numbers) -> Numbers:
-    """Return the derivative (n,) by a parameter as a difference in float64."""
-    (value,) = numeric_values(tree, [parameter])
-    ends = [oracle.value(with_numeric_values(tree, [parameter], [value + d]), points) for d in (STEP, -STEP)]
-    result: Numbers = (ends[0] - ends[1]) / (2.0 * STEP)
-    return result
-
-
-def check(tree: Node, rng: np.random.Generator, columns: int = 10) -> int:
-    """Compare some columns; return how many values were compared."""
-    points = points_around(rng, tree, POINTS)
-    exact = points.astype(np.float64)
-    smooth = oracle.evaluate(tree, exact).margin > AWAY
-    parameters = numeric_parameters(tree)
-    chosen = [parameters[i] for i in rng.permutation(len(parameters))[:columns]]
-    seen = tree.parameter_gradient(points, chosen)
-    assert seen.values.shape == (POINTS, len(chosen))
-    compared = 0
-    for parameter, column in zip(chosen, seen.values.T, strict=True):
-        try:
-            expected = differences(tree, parameter, exact)
-        except InvalidNode:  # at the end of its range
-            continue
-        node = node_along(tree, parameter.path)
-        if isinstance(node, Segment) and node.start == node.end:  # it has no derivative by its ends
-            continue
-        size = max(1.0, float(np.abs(expected).max()))
-        assert (np.abs(column - expected) <= 1e-4 * size)[smooth].all(), (str(parameter), tree)
-        compared += int(smooth.sum())
-    return compared
-
 
 TREES = {
     "solids": random_trees(seed=15, count=4, more=SOLIDS),
@@ -78,7 +42,38 @@ TREES = {
 @pytest.mark.parametrize("kind", TREES)
 def test_derivatives_match_differences(kind: str) -> None:
     rng = np.random.default_rng(4)
-    assert sum(check(tree, rng) for tree in TREES[kind]) > 40 * len(TREES[kind])
+    compared = 0
+    for tree in TREES[kind]:
+        count, wrong = wrong_derivatives(tree, rng)
+        assert wrong == []
+        compared += count
+    assert compared > 40 * len(TREES[kind])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tag", NODE_KINDS)
+def test_derivatives_of_a_class_match_differences(tag: str) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        assert wrong_derivatives(sample(NODE_KINDS[tag], rng), rng)[1] == []
+
+
+def test_the_corners_of_a_polygon_move_in_its_plane() -> None:
+    flat = np.array([(0.8, 0.0), (0.2, 0.3), (0.1, 0.9), (-0.7, 0.2), (-0.1, -0.1), (0.1, -0.8)])
+    axes = np.linalg.qr(np.array([[1.0, 0.2], [0.1, 1.0], [0.4, -0.3]]))[0].T
+    polygon = Polygon((flat @ axes).tolist(), radius=0.3)
+    points = points_around(np.random.default_rng(6), polygon, 60)
+    exact = points.astype(np.float64)
+    away = oracle.signed(polygon, exact).margin > AWAY
+    seen = polygon.parameter_gradient(points).values[:, : flat.size * 3 // 2].reshape(-1, len(flat), 3)
+    for corner in range(len(flat)):
+        for axis in axes:
+            shift = STEP * np.eye(len(flat))[corner][:, None] * axis
+            ends = [
+                oracle.value(Polygon((flat @ axes + d).tolist(), radius=0.3), exact) for d in (shift, -shift)
+            ]
+            expected = (ends[0] - ends[1]) / (2.0 * STEP)
+            np.testing.assert_allclose((seen[:, corner] @ axis)[away], expected[away], atol=1e-4)
 
 
 def test_a_polygon_may_change_its_triangles() -> None:
@@ -154,7 +149,7 @@ def test_nested_blends_of_equal_exponents_have_separate_derivatives() -> None:
     seen = tree.parameter_gradient(points)
     for column in (0, 1):
         np.testing.assert_allclose(
-            seen.values[:, column], differences(tree, seen.parameters[column], points), rtol=1e-3
+            seen.values[:, column], difference(tree, seen.parameters[column], points), rtol=1e-3
         )
 
 
@@ -166,7 +161,7 @@ def test_similar_and_other_maps() -> None:
         ball.scale((1, 2, 1)),
         Ellipsoid((0, 0, 0), (1, 1, 1)).offset(0.1),
     ):
-        check(tree + Segment((0, 0, 0), (1, 1, 0), radius=0.3), rng, columns=40)
+        assert wrong_derivatives(tree + Segment((0, 0, 0), (1, 1, 0), radius=0.3), rng, columns=40)[1] == []
 
 
 def test_outside_every_support_derivatives_are_0_and_bad_points_are_refused() -> None:
