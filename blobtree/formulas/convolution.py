@@ -406,7 +406,7 @@ def convolution_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 def squared_distance_to_edge(a: wp.vec3, edge: wp.vec3) -> wp.float32:
     """Return the squared distance of the origin from the line segment from a to a + `edge`."""
     t = wp.clamp(-wp.dot(a, edge) / wp.max(wp.dot(edge, edge), SHORTEST_AXIS), 0.0, 1.0)
-    return wp.length_sq(a + edge * t)
+    return wp.length_sq(a + edge * t)  # type: ignore[call-overload]  # mypy takes the vector for a number
 
 
 @wp.func
