@@ -337,10 +337,10 @@ def swept_angle(distance: wp.float32, first: wp.float32, last: wp.float32) -> wp
 def triangle_edge(a: wp.vec3, edge: wp.vec3, normal: wp.vec3, margin: wp.float32) -> wp.vec4:
     """Return what an edge adds to (∫∫ k³, ∫∫ k², ∫ k³ along the edge, 0), with k = margin − |x|².
 
-    a, where the edge starts, is relative to the foot of the point in the triangle's plane. By Green's theorem the
-    integral of a function of |x| alone is a sum over the edges: of distance ∫ F(|x|²) / |x|² dt, F being the
-    function's integral along the ray to the edge; outside the kernel's disc F is constant, and its factor is
-    the angle.
+    a, where the edge starts, is relative to the foot of the point in the triangle's plane. By Green's theorem
+    the integral of a function of |x| alone is a sum over the edges: of distance ∫ F(|x|²) / |x|² dt, F being
+    the function's integral along the ray to the edge; outside the kernel's disc F is constant, and its factor
+    is the angle.
     """
     direction = wp.normalize(edge)
     first = wp.dot(a, direction)
