@@ -18,14 +18,14 @@ wp.set_module_options({"enable_backward": False})
 class Contact(IntEnum):
     """Contact mode: how neighbours push the owner of a point.
 
-    `decals.field.contact` and `decals.field.radial` state the formulas. This is a mode of decals;
-    `blobtree.Contact` is a node whose solids deform each other.
+    `decals.field.contact`, `decals.field.radial` and `decals.field.elastic` state the formulas. This is a
+    mode of decals; `blobtree.Contact` is a node whose solids deform each other.
 
     Examples
     --------
     >>> import decals
     >>> list(decals.Contact)
-    [<Contact.PRODUCT: 0>, <Contact.MIN: 1>, <Contact.RADIAL: 2>]
+    [<Contact.PRODUCT: 0>, <Contact.MIN: 1>, <Contact.RADIAL: 2>, <Contact.ELASTIC: 3>]
     """
 
     PRODUCT = 0
@@ -34,7 +34,14 @@ class Contact(IntEnum):
     """Smallest factor h: only the strongest push counts, so no image is torn where three decals meet."""
     RADIAL = 2
     """Scaling along rays from the centre, in convex cells: no image folds."""
+    ELASTIC = 3
+    """Compression at contact lines, along rays in the cells of RADIAL: no image folds, the middle stays."""
 
+
+DEFAULT_CONTACT = Contact.PRODUCT
+
+DEFAULT_STIFFNESS = 2.0
+"""Stiffness of elastic contact."""
 
 NEIGHBOR_REACH = 0.575
 """Neighbour reach in influence radii. A neighbour beyond it would move r by less than 7e-5 of the rim."""
@@ -74,6 +81,12 @@ def rank_of(decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.int32:
 def is_contact_rank(rank: wp.int32) -> wp.bool:
     """Return True if the decals of this rank are contact decals, which push each other."""
     return (rank & INTERACTION_MASK) == Interaction.PUSH
+
+
+@wp.func
+def has_cells(contact: wp.int32) -> wp.bool:
+    """Return True in the contact modes whose owners are those of convex cells, RADIAL and ELASTIC."""
+    return contact >= Contact.RADIAL
 
 
 @wp.func

@@ -100,6 +100,16 @@ def real_number(
     return number
 
 
+MAX_STIFFNESS = 64.0
+"""Greatest stiffness of elastic contact; beyond it, float32 does not resolve the width of the contact."""
+
+
+def stiffness_number(value: Any, error: type[ImplicitDecalsError]) -> float:
+    """Return a stiffness of elastic contact as a float."""
+    expected = f"a number from 1 to {MAX_STIFFNESS:g}"
+    return real_number("stiffness", value, expected, lambda number: 1.0 <= number <= MAX_STIFFNESS, error)
+
+
 def finite_vector(name: str, value: Any, error: type[ImplicitDecalsError]) -> Float64Array:
     """Return three finite numbers as ``float64[3]``."""
     try:

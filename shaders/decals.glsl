@@ -8,6 +8,7 @@ uniform isampler2D index_ids;
 uniform int index_level_count;
 uniform int index_mask;
 uniform int decal_mapping;
+uniform float decal_stiffness;
 uniform sampler2DArray decal_images;  // linear, premultiplied
 
 const float OPAQUE = 0.9999;  // alpha under which no further decal is searched

@@ -7,6 +7,8 @@ from cyclopts import Parameter
 
 from decals import bake as bake_scene
 from decals.apps.commands.options import (
+    DEFAULT_CONTACT,
+    DEFAULT_STIFFNESS,
     MAX_SAMPLES,
     ContactName,
     Definitions,
@@ -29,7 +31,8 @@ def bake(
     size: Whole = 2048,
     samples: Whole = 2,
     vertex_colors: Annotated[bool, Parameter(negative=())] = False,
-    contact: ContactName = "product",
+    contact: ContactName = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
     mapping: MappingName = "corrected",
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
@@ -52,6 +55,8 @@ def bake(
         Write colours at the vertices instead of a texture.
     contact
         Contact mode, as for render.
+    stiffness
+        Stiffness of elastic contact, as for render.
     mapping
         Image mapping, as for render.
     resolution
@@ -77,6 +82,7 @@ def bake(
             samples=samples,
             vertex_colors=vertex_colors,
             contact=contact,
+            stiffness=stiffness,
             mapping=mapping,
             resolution=resolution,
             creases=creases,

@@ -8,6 +8,8 @@ from cyclopts import Parameter
 from decals import Contact, ImageMapping
 from decals.apps.commands.opening import check_options, opened, report_unsaved
 from decals.apps.commands.options import (
+    DEFAULT_CONTACT,
+    DEFAULT_STIFFNESS,
     ContactName,
     Definitions,
     MappingName,
@@ -16,6 +18,8 @@ from decals.apps.commands.options import (
     parse_size,
 )
 from decals.apps.models.loading import import_definitions
+from decals.errors import InvalidInput
+from decals.validation import stiffness_number
 from decals.window import EditWindow
 
 
@@ -29,7 +33,8 @@ def edit(
     ] = None,
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x800",
-    contact: ContactName = "product",
+    contact: ContactName = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
     mapping: MappingName = "corrected",
     seed: OptionalWhole = None,
     save: Path | None = None,
@@ -56,6 +61,8 @@ def edit(
         Width and height of the window in pixels.
     contact
         Contact mode at the beginning, as for render; a scene does not store it. P changes it in the window.
+    stiffness
+        Stiffness of elastic contact at the beginning, likewise. Shift + P changes it.
     mapping
         Image mapping at the beginning, likewise. U changes it in the window.
     seed
@@ -71,6 +78,7 @@ def edit(
     """
     pixels = parse_size(size)
     check_options(decals, seed, save)
+    stiffness_number(stiffness, InvalidInput)
     EditWindow.require_screen()
     import_definitions(define)
     opening = opened(
@@ -82,6 +90,7 @@ def edit(
         size=pixels,
         recover=opening.recover,
         contact=Contact[contact.upper()],
+        stiffness=stiffness,
         mapping=ImageMapping[mapping.upper()],
     )
     opening.add_images(window)

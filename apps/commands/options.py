@@ -41,8 +41,12 @@ OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=F
 Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
 """Modules that define custom nodes."""
 
-ContactName = Literal["product", "min", "radial"]
+ContactName = Literal["product", "min", "radial", "elastic"]
 """Contact modes on the command line."""
+
+DEFAULT_CONTACT: ContactName = "product"
+DEFAULT_STIFFNESS = 2.0
+"""Those of `decals.render`."""
 
 MappingName = Literal["corrected", "chord"]
 """Image mappings on the command line."""

@@ -8,6 +8,8 @@ from cyclopts import Parameter
 
 from decals import Scene, save_scene
 from decals.apps.commands.options import (
+    DEFAULT_CONTACT,
+    DEFAULT_STIFFNESS,
     MAX_SAMPLES,
     TILE,
     ContactName,
@@ -41,7 +43,8 @@ def render(
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x900",
     samples: Whole = 2,
-    contact: ContactName = "product",
+    contact: ContactName = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
     mapping: MappingName = "corrected",
     seed: OptionalWhole = None,
     save: Path | None = None,
@@ -74,8 +77,10 @@ def render(
     samples
         Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine.
     contact
-        Contact mode: product (equation 5 of the paper), min (only the strongest push counts), or radial
-        (never folds an image).
+        Contact mode: product (equation 5 of the paper), min (only the strongest push counts), radial
+        (scales images along rays), or elastic (compresses images at contact lines; never folds one).
+    stiffness
+        Stiffness of elastic contact, from 1 to 64: how close to contact lines images are compressed.
     mapping
         Image mapping: corrected for the curvature of the surface, or chord (the paper's projection).
     seed
@@ -91,6 +96,9 @@ def render(
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
     check_count("--samples", samples, 1, MAX_SAMPLES)
+    drawing = RenderOptions(
+        size=pixels, samples=samples, contact=contact, stiffness=stiffness, mapping=mapping
+    )
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
         check_output(save, (".json",))
@@ -110,13 +118,4 @@ def render(
         if save is not None:
             save_scene(scene, save)
         progress("drawing", 0.0)
-        picture = renderer.render(
-            scene,
-            RenderOptions(
-                size=pixels,
-                samples=samples,
-                contact=contact,
-                mapping=mapping,
-            ),
-        )
-        Picture(picture).save(output)
+        Picture(renderer.render(scene, drawing)).save(output)

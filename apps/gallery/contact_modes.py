@@ -2,7 +2,7 @@
 =============
 
 From the left: PRODUCT (equation 5 of the paper, repaired), MIN (only the strongest push counts), RADIAL
-(never folds).
+(scales rays) and ELASTIC (compresses them at the contact line; both never fold).
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """Decals of unlike size
 =====================
 
-A large decal among small ones, in the contact modes PRODUCT, MIN and RADIAL.
+A large decal among small ones, in the contact modes PRODUCT, MIN, RADIAL and ELASTIC.
 """
 
 from collections.abc import Sequence

@@ -21,12 +21,12 @@ from decals.images.load import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering.options import SceneLike
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
 from decals.surfaces.convert import Model
-from decals.validation import describe, member, optional_package, whole_number
+from decals.validation import describe, member, optional_package, stiffness_number, whole_number
 
 SUFFIX = ".glb"
 
@@ -44,7 +44,8 @@ def bake(
     size: int = 2048,
     samples: int = 2,
     vertex_colors: bool = False,
-    contact: Contact | str = Contact.PRODUCT,
+    contact: Contact | str = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
     resolution: int | None = None,
     creases: bool = False,
@@ -72,8 +73,10 @@ def bake(
         Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
         not needed.
     contact : Contact or str
-        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"`` or
-        ``"radial"``.
+        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"``,
+        ``"radial"`` or ``"elastic"``.
+    stiffness : float
+        Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str
         Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     resolution : int, optional
@@ -110,6 +113,7 @@ def bake(
     samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     contact = member("contact", contact, Contact, InvalidScene)
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
+    stiffness = stiffness_number(stiffness, InvalidScene)
     for package in ("trimesh",) if vertex_colors else ("trimesh", "xatlas"):
         optional_package(package, "bake")
     with reporting(progress, cancel) as report:
@@ -117,7 +121,7 @@ def bake(
         if not objects:
             raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
         meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
-        colors = SurfaceColors(meshes, decals, images, contact, mapping)
+        colors = SurfaceColors(meshes, decals, images, contact, mapping, stiffness)
         texture = None
         if vertex_colors:
             nodes = _colored_nodes(meshes, colors, report)
@@ -149,7 +153,7 @@ class SurfaceColors:
         The decals on them.
     images : sequence of uint8[h, w, 4]
         Images of the decals.
-    contact, mapping
+    contact, mapping, stiffness
         See `bake`.
     """
 
@@ -160,9 +164,10 @@ class SurfaceColors:
         images: Sequence[UInt8Array],
         contact: Contact,
         mapping: ImageMapping,
+        stiffness: float,
     ) -> None:
         self._meshes, self._decals, self._images = meshes, decals, images
-        self._contact, self._mapping = contact, mapping
+        self._contact, self._mapping, self._stiffness = contact, mapping, stiffness
         self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
 
     def at(self, number: int, points: Float32Array, normals: Float32Array) -> Float64Array:
@@ -174,6 +179,7 @@ class SurfaceColors:
             normals,
             mapping=self._mapping,
             contact=self._contact,
+            stiffness=self._stiffness,
             index=self._index,
             images=self._images,
         ).color

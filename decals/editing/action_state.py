@@ -17,7 +17,7 @@ from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.validation import instance
 
 Cursor = Callable[[], SurfacePick | None]
@@ -29,14 +29,16 @@ class DrawModes(Protocol):
 
     contact: Contact
     mapping: ImageMapping
+    stiffness: float
 
 
 @dataclass
 class DefaultModes:
     """Modes without a window."""
 
-    contact: Contact = Contact.PRODUCT
+    contact: Contact = DEFAULT_CONTACT
     mapping: ImageMapping = ImageMapping.CORRECTED
+    stiffness: float = DEFAULT_STIFFNESS
 
 
 def require_pick(cursor: Cursor) -> SurfacePick:
@@ -70,7 +72,7 @@ class ActionState:
     prompt
         The open prompt, if any; it receives all keys.
     modes
-        Contact mode and image mapping of the window.
+        Contact mode, image mapping and stiffness of the window.
     view
         Returns the eye and its target. Default: the document camera's.
     background

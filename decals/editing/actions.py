@@ -20,6 +20,9 @@ from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.validation import describe
 
+STIFFNESSES = 1.0, 1.5, 2.0, 3.0, 6.0
+"""Stiffnesses that a key goes through."""
+
 
 class Actions:
     """Carries out the actions of the key table on an edit session.
@@ -203,7 +206,7 @@ class Actions:
     @action(
         "next_contact",
         "p",
-        summary="contact mode of the window: product, min, radial (not saved)",
+        summary="contact mode: product, min, radial, elastic (not saved)",
         group=Group.SCENE,
     )
     def next_contact(self, _cursor: Cursor) -> None:
@@ -211,6 +214,18 @@ class Actions:
         modes = self.state.modes
         modes.contact = Contact((modes.contact + 1) % len(Contact))
         self.state.message = f"contact mode: {modes.contact.name.lower()}"
+
+    @action(
+        "next_stiffness",
+        "Shift+p",
+        summary="stiffness of elastic contact: 1, 1.5, 2, 3, 6 (not saved)",
+        group=Group.SCENE,
+    )
+    def next_stiffness(self, _cursor: Cursor) -> None:
+        """Draw with the next stiffness."""
+        modes = self.state.modes
+        modes.stiffness = next((one for one in STIFFNESSES if one > modes.stiffness), STIFFNESSES[0])
+        self.state.message = f"stiffness of elastic contact: {modes.stiffness:g}"
 
     @action(
         "next_mapping",

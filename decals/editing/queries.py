@@ -13,7 +13,7 @@ from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, Contact
 from decals.scattering.mean_normals import mean_normals
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.surfaces.implicit import project_without_mesh
@@ -217,7 +217,7 @@ class SurfacePick:
 
 
 def pick(
-    document: Document, origin: ArrayLike, direction: ArrayLike, *, contact: Contact | str = Contact.PRODUCT
+    document: Document, origin: ArrayLike, direction: ArrayLike, *, contact: Contact | str = DEFAULT_CONTACT
 ) -> SurfacePick | None:
     """Return the first surface point along a ray and its owner, or None for a miss.
 
@@ -269,7 +269,7 @@ def outline(
     document: Document,
     number: int,
     *,
-    contact: Contact | str = Contact.PRODUCT,
+    contact: Contact | str = DEFAULT_CONTACT,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
 ) -> Float32Array:
     """Return the line around the visible part of a decal.
@@ -315,7 +315,7 @@ def outlines(
     document: Document,
     numbers: ArrayLike,
     *,
-    contact: Contact | str = Contact.PRODUCT,
+    contact: Contact | str = DEFAULT_CONTACT,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
     angles: int = ANGLES,
 ) -> Float32Array:

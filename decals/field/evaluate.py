@@ -19,8 +19,8 @@ from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
-from decals.record import Contact
-from decals.validation import describe, member
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.validation import describe, member, stiffness_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,8 @@ def evaluate(
     normals: ArrayLike,
     *,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
-    contact: Contact | str = Contact.PRODUCT,
+    contact: Contact | str = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
     index: DecalIndex | None = None,
     images: AnyImage | Iterable[AnyImage] | None = None,
     device: Any = None,
@@ -70,7 +71,9 @@ def evaluate(
     mapping : ImageMapping or str, optional
         Image mapping: CORRECTED (default) or CHORD.
     contact : Contact or str, optional
-        Contact mode: PRODUCT (default), MIN or RADIAL.
+        Contact mode: PRODUCT (default), MIN, RADIAL or ELASTIC.
+    stiffness : float, optional
+        Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     index : DecalIndex, optional
         Index of these decals. Built if not given; an editor has its own.
     images : image or sequence of images, optional
@@ -92,7 +95,7 @@ def evaluate(
     InvalidDecals
         No decals, or the index of others.
     InvalidScene
-        An unknown mapping or contact mode.
+        An unknown mapping or contact mode, or a stiffness out of range.
     InvalidDevice
         Warp has no such device.
 
@@ -114,12 +117,14 @@ def evaluate(
     """
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
     contact = member("contact", contact, Contact, InvalidScene)
+    stiffness = stiffness_number(stiffness, InvalidScene)
     device = known_device(device)
     positions, facings = _as_rows("points", points), _as_rows("normals", normals)
     count = len(positions)
     if count != len(facings):
         raise InvalidPoints(f"normals: expected one for each of {count} points, got {len(facings)}")
     indexed = _indexed(decals, index, device)
+    indexed.stiffness = stiffness
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
     field: Any = wp.zeros(count, dtype=wp.float32, device=device)

@@ -25,6 +25,7 @@ from decals.field.contact import (
     contact_uv,
     rim_distance,
 )
+from decals.field.elastic import MAX_KEPT, elastic_complement, single_layer_elastic
 from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates, unroll
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
@@ -34,6 +35,7 @@ from decals.record import (
     RECORD,
     Contact,
     complement_of,
+    has_cells,
     is_contact_rank,
     rank_of,
     visible_radius,
@@ -44,9 +46,6 @@ wp.set_module_options({"enable_backward": False})
 
 NO_OWNER = CELL_NO_OWNER
 """Owner of a point outside all rims."""
-
-MAX_KEPT = 8
-"""Number of complements that are kept. Where more decals act, the index is traversed a second time."""
 
 
 @wp.func
@@ -61,9 +60,9 @@ def owner_below(
     """Return the topmost decal that shows at q below (rank, decal) in the draw order, or NO_OWNER.
 
     Among contact decals of one rank it is the decal of highest field, and among equals that of lowest number.
-    In radial contact it is the topmost decal whose cell contains q.
+    In radial and elastic contact it is the topmost decal whose cell contains q.
     """
-    if contact == Contact.RADIAL:
+    if has_cells(contact):
         if not index.layered:
             return cell_owner(q, n_q, 0, index)
     owner = wp.int32(NO_OWNER)
@@ -100,7 +99,7 @@ def owner_below(
                             owner = index.ids[j]
                             top = other
                         break
-    if contact == Contact.RADIAL and owner >= 0:
+    if has_cells(contact) and owner >= 0:
         if is_contact_rank(top):
             return cell_owner(q, n_q, rank_of(owner, index.records), index)
     return owner
@@ -154,6 +153,8 @@ def complement_at(
             return complement_of(q, n_q, owner, index.records)
     if contact == Contact.RADIAL:
         return radial_complement(q, n_q, owner, index)
+    if contact == Contact.ELASTIC:
+        return elastic_complement(q, n_q, owner, index)
     return pushed_complement(q, n_q, owner, contact, index)
 
 
@@ -187,10 +188,12 @@ def single_layer_at(
     contact: wp.int32,
     index: IndexedDecals,
 ) -> wp.vec2:
-    """Return (owner, E) at q in the contact modes PRODUCT and MIN; (NO_OWNER, 0) outside all rims.
+    """Return (owner, E) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
 
     They are those of `owner_at` and `complement_at`. The decals must not be layered.
     """
+    if contact == Contact.ELASTIC:
+        return single_layer_elastic(q, n_q, index)
     owner = wp.int32(NO_OWNER)
     least = wp.float32(0.5)
     ties = wp.int32(0)

@@ -35,6 +35,7 @@ MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
     table="index_table",
     mask="index_mask",
     ids="index_ids",
+    stiffness="decal_stiffness",
 )
 class IndexedDecals:
     """Records and index of a set of decals on one device; ``shaders/decals.glsl`` has them as uniforms.
@@ -47,6 +48,8 @@ class IndexedDecals:
         `decals.model.Decals.layered`. Ranks are not read where it is False.
     level_count, levels, table, mask, ids
         Arrays of the index, as `decals.index.index` describes them; the table has ``mask + 1`` slots.
+    stiffness
+        Stiffness of elastic contact (`decals.field.elastic`).
     """
 
     records: wp.array(dtype=wp.vec4)
@@ -56,6 +59,7 @@ class IndexedDecals:
     table: wp.array(dtype=wp.vec4i)
     mask: wp.int32
     ids: wp.array(dtype=wp.int32)
+    stiffness: wp.float32
 
 
 @wp.func

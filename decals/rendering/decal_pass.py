@@ -56,6 +56,7 @@ class DecalPass:
         images: ImageArray | None,
         mapping: ImageMapping,
         contact: Contact,
+        stiffness: float,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours."""
@@ -67,6 +68,7 @@ class DecalPass:
             images.use(FIRST_DECAL_UNIT)
             set_uniform(program, "decal_images", FIRST_DECAL_UNIT)
             set_uniform(program, "decal_mapping", int(mapping))
+            set_uniform(program, "decal_stiffness", stiffness)
             decals.use(program, FIRST_DECAL_UNIT + 1)
         painting.run(rectangle.rows(part))
 

@@ -10,10 +10,10 @@ from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.model import Decals
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
-from decals.validation import describe, instance, member, whole_number
+from decals.validation import describe, instance, member, stiffness_number, whole_number
 
 Size: TypeAlias = tuple[int, int]
 """Width and height."""
@@ -78,14 +78,16 @@ class RenderOptions:
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
     contact : Contact or str
-        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"`` or
-        ``"radial"``.
+        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"``,
+        ``"radial"`` or ``"elastic"``.
     mapping : ImageMapping or str
         Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     background : Background
         Colours behind the objects.
     lights : Lighting, optional
         Lights in place of the studio light.
+    stiffness : float
+        Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
 
     Raises
     ------
@@ -101,10 +103,11 @@ class RenderOptions:
 
     size: Size = (800, 600)
     samples: int = 2
-    contact: Contact = Contact.PRODUCT
+    contact: Contact = DEFAULT_CONTACT
     mapping: ImageMapping = ImageMapping.CORRECTED
     background: Background = STUDIO
     lights: Lighting | None = None
+    stiffness: float = DEFAULT_STIFFNESS
 
     if TYPE_CHECKING:  # names of modes are converted
 
@@ -112,10 +115,11 @@ class RenderOptions:
             self,
             size: Size = (800, 600),
             samples: int = 2,
-            contact: Contact | str = Contact.PRODUCT,
+            contact: Contact | str = DEFAULT_CONTACT,
             mapping: ImageMapping | str = ImageMapping.CORRECTED,
             background: Background = STUDIO,
             lights: Lighting | None = None,
+            stiffness: float = DEFAULT_STIFFNESS,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -124,6 +128,7 @@ class RenderOptions:
             "samples": whole_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
             "contact": member("contact", self.contact, Contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
+            "stiffness": stiffness_number(self.stiffness, InvalidScene),
         }
         instance("background", self.background, Background, InvalidScene, "such as decals.rendering.STUDIO")
         if self.lights is not None:

@@ -154,7 +154,7 @@ class TargetState:
     version
         Version of the editor.
     options
-        Mapping, contact mode and lights.
+        Mapping, contact mode, stiffness and lights.
     """
 
     objects: tuple[object, ...]
@@ -174,7 +174,7 @@ class TargetState:
             bounds,
             (tile.block(), tile.x, tile.y, tile.width, tile.height, tile.inner, depth),
             (decals, *(image.pixels for image in scene.images)),
-            (options.mapping, options.contact, *_editor_formulas(decals)),
+            (options.mapping, options.contact, options.stiffness, *_editor_formulas(decals)),
             decal_version(scene),
             options,
         )
@@ -366,7 +366,8 @@ def plan_frame(
     dirty = state.dirty(previous, tile)
     steps = _surface_steps(uploaded, tile, targets, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
-    decal_arguments = gbuffer, uploaded.decals, uploaded.images, options.mapping, options.contact
+    modes = options.mapping, options.contact, options.stiffness
+    decal_arguments = gbuffer, uploaded.decals, uploaded.images, *modes
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     light_arguments = gbuffer, paint, tile, radius, options.lights

@@ -5,7 +5,7 @@ from typing import cast
 
 from blobtree.progress import reporting
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering.lights import Lighting
 from decals.rendering.options import STUDIO, Background, RenderOptions, SceneLike, Size, is_scene_like
 from decals.rendering.picture import Picture
@@ -21,7 +21,8 @@ def render(
     *,
     size: Size = (800, 600),
     samples: int = 2,
-    contact: Contact | str = Contact.PRODUCT,
+    contact: Contact | str = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
     background: Background = STUDIO,
     lights: Lighting | None = None,
@@ -41,8 +42,10 @@ def render(
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
     contact : Contact or str
-        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"`` or
-        ``"radial"``.
+        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"``,
+        ``"radial"`` or ``"elastic"``.
+    stiffness : float
+        Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str
         Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     background : Background
@@ -77,7 +80,7 @@ def render(
     >>> decals.render(scene, size=(64, 48))
     Picture(64 × 48 pixels)
     """
-    options = RenderOptions(size, samples, contact, mapping, background, lights)
+    options = RenderOptions(size, samples, contact, mapping, background, lights, stiffness)
     width, height = options.size
     with reporting() as report:
         report("drawing", 0.0)

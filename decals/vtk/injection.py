@@ -76,6 +76,8 @@ class InjectionTarget(Protocol):
     def mapping(self) -> ImageMapping: ...  # noqa: D102
     @property
     def contact(self) -> Contact: ...  # noqa: D102
+    @property
+    def stiffness(self) -> float: ...  # noqa: D102
     def world_matrix(self) -> Float64Array: ...  # noqa: D102
     def viewport(self) -> tuple[int, int, int, int]: ...  # noqa: D102
     def current(self) -> AbstractContextManager[None]: ...  # noqa: D102
@@ -174,6 +176,7 @@ class Injection:
         uniforms |= {"decal_images": units[0], "decal_mapping": int(subplot.mapping)}
         for name, value in uniforms.items():
             program.SetUniformi(name, value)
+        program.SetUniformf("decal_stiffness", subplot.stiffness)
         subplot.vtk_renderer.GetRenderWindow().GetState().ResetGLActiveTexture()
 
     def _source(self) -> tuple[InjectionTarget, DecalData, ImageArray] | None:

@@ -20,7 +20,7 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.lights import Lighting
 from decals.rendering.options import check_scene
@@ -28,7 +28,7 @@ from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, bounds_of
-from decals.validation import finite_number, member, whole_number
+from decals.validation import finite_number, member, stiffness_number, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.injection import InjectedDecals
@@ -165,7 +165,8 @@ class SubplotRenderer:
     ) -> None:
         self.plotter, self.vtk_renderer = plotter, renderer
         self._samples, self._draw_scale = 2, 1.0
-        self._mapping, self._contact = ImageMapping.CORRECTED, Contact.PRODUCT
+        self._mapping, self._contact = ImageMapping.CORRECTED, DEFAULT_CONTACT
+        self._stiffness = DEFAULT_STIFFNESS
         self._lights = Lights.SCENE
         self.wait_for_gpu = self.keep_previous_frame = False
         self.status = FrameStatus.EMPTY
@@ -271,6 +272,15 @@ class SubplotRenderer:
         self._contact = member("contact", contact, Contact, InvalidScene)
 
     @property
+    def stiffness(self) -> float:
+        """Stiffness of elastic contact, from 1: how close to contact lines images are compressed."""
+        return self._stiffness
+
+    @stiffness.setter
+    def stiffness(self, stiffness: float) -> None:
+        self._stiffness = stiffness_number(stiffness, InvalidScene)
+
+    @property
     def lights(self) -> Lights:
         """Lights: the studio light, or the plotter's lights; see `Lights`."""
         return self._lights
@@ -328,7 +338,9 @@ class SubplotRenderer:
         inside = 0 <= column - left < width and 0 <= row - low < height
         if self.scene is None or not inside:
             return None
-        options = RenderOptions(size=(width, height), mapping=self.mapping, contact=self.contact)
+        options = RenderOptions(
+            size=(width, height), mapping=self.mapping, contact=self.contact, stiffness=self.stiffness
+        )
         with self.current():
             buffers = self.renderer.buffers_at(
                 self.scene, column - left, row - low, options, viewpoint=self.viewpoint()
@@ -509,7 +521,9 @@ class SubplotRenderer:
         return FrameOptions(self._render_options(size, 1 if supersampled else samples))
 
     def _render_options(self, size: Size, samples: int) -> RenderOptions:
-        return RenderOptions(size, samples, self.contact, self.mapping, lights=self.lighting())
+        return RenderOptions(
+            size, samples, self.contact, self.mapping, lights=self.lighting(), stiffness=self.stiffness
+        )
 
     def prepare(self, samples: int, seconds: float) -> float | None:
         """Draw a slice of a later frame of the window's size, without showing it.

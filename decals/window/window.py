@@ -19,7 +19,7 @@ from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering.gl_libraries import require_gl
 from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
@@ -84,6 +84,8 @@ class EditWindow:
         Contact mode at the beginning; a scene does not store it. Default: that of the plotter's subplot.
     mapping : ImageMapping or str, optional
         Image mapping at the beginning, likewise.
+    stiffness : float, optional
+        Stiffness of elastic contact at the beginning, likewise.
 
     Attributes
     ----------
@@ -130,6 +132,7 @@ class EditWindow:
         recover: Callable[[Path], Scene] | None = None,
         contact: Contact | str | None = None,
         mapping: ImageMapping | str | None = None,
+        stiffness: float | None = None,
     ) -> None:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
@@ -161,6 +164,8 @@ class EditWindow:
             self.subplot.contact = contact
         if mapping is not None:
             self.subplot.mapping = mapping
+        if stiffness is not None:
+            self.subplot.stiffness = stiffness
         self.actions.state.view = lambda: eye_and_target(self.subplot)
         self.tools = PointerTools(
             self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
@@ -202,8 +207,9 @@ class EditWindow:
         unsaved = self.actions.files.recovery.pending
         return not self._closed and (self.background.busy or coarse or unsaved or self.subplot.warming_up)
 
-    def _content_version(self) -> tuple[int, ...]:
-        document, modes = self.document, (self.subplot.contact, self.subplot.mapping)
+    def _content_version(self) -> tuple[float, ...]:
+        subplot, document = self.subplot, self.document
+        modes = subplot.contact, subplot.mapping, subplot.stiffness
         return id(document.objects), id(document.images), document.decals.version, *modes
 
     # -- frames -----------------------------------------------------------------------------------------
@@ -401,8 +407,9 @@ def edit(
     *,
     path: str | os.PathLike[str] | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
-    contact: Contact | str = Contact.PRODUCT,
+    contact: Contact | str = DEFAULT_CONTACT,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
+    stiffness: float = DEFAULT_STIFFNESS,
 ) -> Scene:
     """Open a window to edit a scene, and return the edited scene when the window is closed.
 
@@ -420,6 +427,8 @@ def edit(
         Contact mode at the beginning; a scene does not store it.
     mapping : ImageMapping or str
         Image mapping at the beginning, likewise.
+    stiffness : float
+        Stiffness of elastic contact at the beginning, likewise.
 
     Returns
     -------
@@ -442,7 +451,13 @@ def edit(
     """
     edited = scene if isinstance(scene, EditSession) else as_scene(scene)
     with EditWindow(
-        edited, path=path, size=size, recover=load_scene, contact=contact, mapping=mapping
+        edited,
+        path=path,
+        size=size,
+        recover=load_scene,
+        contact=contact,
+        mapping=mapping,
+        stiffness=stiffness,
     ) as window:
         window.show()
         return window.document.scene

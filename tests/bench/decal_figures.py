@@ -113,6 +113,7 @@ def folds(rays: int) -> Figures:
         inputs: list[Any] = [
             wp.array(owners, dtype=wp.int32, device="cpu"),
             wp.array(directions, dtype=wp.vec3, device="cpu"),
+            int(Contact.RADIAL),
         ]
         outputs = [wp.zeros(rays // 2, dtype=wp.float32, device="cpu") for _ in range(2)]
         least, most = test_radial.launch(slopes_of_rays, rays // 2, decals, inputs, outputs)

@@ -8,6 +8,7 @@ oracles of the tests. Other parts:
     --only index [--device cuda:0]   building the index of 100,000 and 1,000,000 decals; needs no graphics
     --only million                   rendering 1,000,000 decals
     --only faults                    stretched, folded, oversized and missing decals on six models
+    --only contact                   folds, stretch, continuity and time of all contact modes
     --peers                          mesh-clipped decals, log maps, and texture coordinates at vertices
 """
 
@@ -96,6 +97,17 @@ def measure_faults(*, quick: bool) -> Figures:
     return figures
 
 
+def measure_contact(*, quick: bool) -> Figures:
+    """Compare the contact modes, and print the figures."""
+    from tests.bench import contact_modes
+
+    figures = contact_modes.measure(quick=quick)
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
+    for name, value in figures.items():
+        print(f"{name:28} {value:12.4g}  {contact_modes.TARGETS.get(name, '')}".rstrip())
+    return figures
+
+
 def measure_peers(*, quick: bool) -> Figures:
     """Measure other methods, and print the figures."""
     from tests.bench import decal_peers
@@ -117,7 +129,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench.decals", description=__doc__)
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
-    parser.add_argument("--only", choices=["index", "million", "faults"], help="measure one part")
+    parser.add_argument("--only", choices=["index", "million", "faults", "contact"], help="measure one part")
     parser.add_argument("--peers", action="store_true", help="measure other methods")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
@@ -125,6 +137,8 @@ def main() -> None:
         figures = measure_million(quick=options.quick)
     elif options.only == "faults":
         figures = measure_faults(quick=options.quick)
+    elif options.only == "contact":
+        figures = measure_contact(quick=options.quick)
     elif options.only:
         figures = measure_index(options.device)
     elif options.peers:

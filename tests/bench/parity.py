@@ -56,7 +56,7 @@ LIMITS = {
 """Largest allowed value of each figure.
 
 ``contact_error_rh``: error of r/r_h by float32 alone, for sizes to 20:1. ``unlike_error_rh``: the same for
-sizes to 1,000:1, where radial contact subtracts squares of sizes. ``cut_error_rh``: with the effect of
+sizes to 1,000:1, where contact in cells subtracts squares of sizes. ``cut_error_rh``: with the effect of
 neighbours beyond NEIGHBOR_REACH, less than 7e-5 each. ``uv_error``: divided by chord over tangent offset, the
 condition number of
 the direction. Owners are compared where no relative change of 1e-4 decides between two, contact where no

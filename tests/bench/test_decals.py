@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from decals.record import Contact
+from tests.bench import contact_modes, decal_index, decals
 from tests.bench import decal_figures as bench
-from tests.bench import decal_index, decals
 
 
 def test_errors_and_folds() -> None:
@@ -11,6 +12,16 @@ def test_errors_and_folds() -> None:
     assert 0 < figures["contact_error_rh"] < 2e-5
     assert figures["folds_radial"] == 0
     assert figures["map_sphere"] < 1e-4 < figures["map_torus"] < figures["map_torus_chord"]
+
+
+def test_contact_modes_differ_in_folds_and_stretch() -> None:
+    modes = Contact.PRODUCT, Contact.ELASTIC
+    folds = [contact_modes.folds(contact, 4000) for contact in modes]
+    assert folds[0] > 40
+    assert folds[1] == 0
+    paper, elastic = (np.quantile(contact_modes.stretch(contact, 8000), 0.95) for contact in modes)
+    assert elastic < 0.5 * paper
+    assert contact_modes.jump(Contact.ELASTIC, 20_000) < 1e-3
 
 
 def test_missing_figures_are_reported() -> None:

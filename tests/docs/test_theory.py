@@ -20,6 +20,7 @@ RIM = np.sqrt(1 - 2 ** (-1 / 3))
 NEIGHBOUR_REACH = 0.575
 FACING_LIMIT = -0.25
 LEAST_PART = 0.21
+STIFFNESS = 2.0
 ABSENT = 2.0
 POINTS = 6000
 
@@ -71,7 +72,7 @@ def shown_product(world: World, group: Ints, contact: Contact) -> tuple[Ints, Ar
     return np.where(owned, group[k], -1), e_k[:, 0] + (0.5 - e_k[:, 0]) * push
 
 
-def shown_radial(world: World, group: Ints) -> tuple[Ints, Array]:
+def shown_in_cells(world: World, group: Ints, contact: Contact) -> tuple[Ints, Array]:
     """Section 6: owner in the group or −1, and E."""
     centres, radii = world.centres[group], world.radii[group]
     offsets = centres[None] - centres[:, None]
@@ -92,9 +93,27 @@ def shown_radial(world: World, group: Ints) -> tuple[Ints, Array]:
     ahead = np.einsum("ma,mja->mj", ray, offsets[owner])
     counts = world.faces[:, group] & ~stacked[owner] & (ahead > 0)
     plane = 0.5 * (distance**2 + radii[:, None] ** 2 - radii[None] ** 2)[owner]
-    leaves = np.where(counts, plane / np.where(counts, ahead, 1.0), np.inf).min(axis=1)
-    end = np.minimum(radii[owner], leaves)
-    return np.where(owner >= 0, group[owner], -1), complement((np.minimum(x / end, 1) * RIM) ** 2)
+    leaves = np.where(counts, plane / np.where(counts, ahead, 1.0), np.inf)
+    own = radii[owner]
+    if contact == Contact.ELASTIC:
+        t = np.minimum(x / own, 1)
+        drawn = compressed(t, leaves / own[:, None], own, radii, distance[owner])
+    else:
+        drawn = np.minimum(x / np.minimum(own, leaves.min(axis=1)), 1)
+    return np.where(owner >= 0, group[owner], -1), complement((drawn * RIM) ** 2)
+
+
+def compressed(t: Array, planes: Array, radius: Array, radii: Array, distance: Array) -> Array:
+    """Section 6, mode ELASTIC: λ of points at t, with the planes of all competitors at R_j."""
+    g = distance**2 - radii**2 - radius[:, None] ** 2
+    root = np.sqrt(g**2 + 2.4 * (radius[:, None] * radii) ** 2)
+    y = np.minimum(1.2 * radii**2 / (g + root), 1)
+    x = np.clip(1 - (1 - t[:, None] / planes) / y, 0, 1)
+    left = np.maximum(1 - planes, 1e-300)
+    delta = np.where(planes < 1, left * x ** (STIFFNESS + 0.1 / left), 0)
+    z = np.sqrt(((delta / np.maximum(1 - t[:, None] - delta, 1e-12)) ** 2).sum(axis=1))
+    result: Array = t + (1 - t) * z / (1 + z)
+    return result
 
 
 def image_coordinates(world: World, owner: Ints, e: Array, mapping: ImageMapping) -> Array:
@@ -137,8 +156,8 @@ def reference(
         if decals.interactions[group[0]] != Interaction.PUSH:
             complements = world.e[:, group[0]]
             shown = np.where(complements <= 0.5, group[0], -1)
-        elif contact == Contact.RADIAL:
-            shown, complements = shown_radial(world, group)
+        elif contact in (Contact.RADIAL, Contact.ELASTIC):
+            shown, complements = shown_in_cells(world, group, contact)
         else:
             shown, complements = shown_product(world, group, contact)
         free = (owner < 0) & (shown >= 0)

@@ -14,6 +14,7 @@ from tests.oracles.contact import RIM, complements, log_factor, rim_distance
 
 FACING_LIMIT = -0.25
 LEAST = 0.21
+STIFFNESS = 2.0
 CHUNK = 2_000_000
 
 
@@ -137,8 +138,8 @@ class _Scene:
     def shown(self, members: Any, contact: Any) -> Any:
         """Who of a sheet, or of one other decal, shows; E = 1 − F; and the doubt about it."""
         squared, acts = self.squared[:, members], self.acts[:, members]
-        if contact == "radial" and not self.alone[members[0]]:
-            return self.radial(members)
+        if contact in ("radial", "elastic") and not self.alone[members[0]]:
+            return self.cells(members, elastic=contact == "elastic")
         count = len(squared)
         e = np.column_stack([np.where(acts, complements(squared), 2.0), np.full(count, 2.0)])
         owner = e.argmin(axis=1)
@@ -156,7 +157,7 @@ class _Scene:
         who = np.append(members, -1)
         return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
 
-    def radial(self, members: Any) -> Any:
+    def cells(self, members: Any, *, elastic: bool) -> Any:
         """Convex cells between radical planes; stacked decals over each other, the smaller uppermost."""
         centres, radii = self.centres[members], self.radii[members]
         apart = centres[None] - centres[:, None]
@@ -180,8 +181,12 @@ class _Scene:
         ray = w / np.maximum(x, 1e-300)[:, None]
         ahead = np.einsum("ma,mna->mn", ray, apart[owner])
         blocks = facing & ~stacked[owner] & (ahead > 0)
-        end = np.where(blocks, share[owner] / np.where(ahead > 0, ahead, 1), np.inf).min(axis=1)
-        z = (np.minimum(x / np.minimum(end, radii[owner]), 1) * RIM) ** 2
+        planes = np.where(blocks, share[owner] / np.where(ahead > 0, ahead, 1), np.inf)
+        if elastic:
+            r = _compressed(x / radii[owner], planes / radii[owner, None], distance[owner], radii, owner)
+        else:
+            r = x / np.minimum(planes.min(axis=1), radii[owner])
+        z = (np.minimum(r, 1) * RIM) ** 2
         near = inside | (np.abs(power) < 1e-3 * radii**2)
         sizes = np.where(near[:, None] & near[:, :, None], radii**2 + (radii**2)[:, None], 1e-300)
         gap = np.abs(power[:, None] - power[:, :, None]) / sizes
@@ -193,6 +198,27 @@ class _Scene:
         """Distance to the facing limit of a decal that reaches the point."""
         near = (self.squared < 1) & ~self.spill
         return np.where(near, np.abs(self.cosine - FACING_LIMIT), 4.0).min(axis=1, initial=4.0)
+
+
+def _compressed(
+    t: NDArray[Any], planes: NDArray[Any], apart: NDArray[Any], radii: NDArray[Any], owner: Any
+) -> Any:
+    """r of points at distances t, with planes at these distances on their rays, all in the owners' radii.
+
+    Each plane takes up what its own side of the rim loses, from where the neighbour's reach of √1.6 of its
+    radius begins at the latest, on the ray that needs the most; several add up as squares of moved over left.
+    """
+    own, other = radii[owner, None], radii[None]
+    g = apart**2 - other**2 - own**2
+    begin = 1 - (np.sqrt(g**2 + 2.4 * own**2 * other**2) - g) / (2 * own**2)
+    begin = np.maximum(begin, 0)
+    lost = np.maximum(1 - planes, 0)
+    way = (t[:, None] / planes - begin) / (1 - begin)
+    with np.errstate(all="ignore"):
+        moved = np.where((lost > 0) & (way > 0), lost * np.minimum(way, 1) ** (STIFFNESS + 0.1 / lost), 0)
+        total = np.sqrt(((moved / (1 - t[:, None] - moved)) ** 2).sum(axis=1))
+        r = 1 - (1 - t) / (1 + total)
+    return np.where((t >= 1) | (t[:, None] >= planes).any(axis=1), 1.0, np.where(total > 0, r, t))
 
 
 def _tie_doubt(squared: NDArray[Any], acts: Any) -> Any:

@@ -30,6 +30,9 @@ UNDERFLOW = wp.constant(wp.float64(1e-36))
 PUSH = wp.constant(1)
 MIN = wp.constant(1)
 RADIAL = wp.constant(2)
+ELASTIC = wp.constant(3)
+STIFFNESS = wp.constant(wp.float64(2.0))
+REACH_SQUARED = wp.constant(wp.float64(1.6))
 
 
 @wp.struct
@@ -198,8 +201,30 @@ def doubt_of_pair(own: wp.float64, other: wp.float64, i: wp.int32, j: wp.int32, 
 
 
 @wp.func
-def convex(q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, these: Members) -> Answer:
-    """Radial contact: the uppermost cell that holds q, and how far along the ray to its end q lies."""
+def moved_by(
+    t: wp.float64, plane: wp.float64, own: wp.float64, other: wp.float64, d: wp.float64
+) -> wp.float64:
+    """How far a plane moves the image at t; t and the plane's distance on the ray in the radius `own`."""
+    if plane >= ONE:
+        return ZERO
+    if t >= plane:
+        return ONE - t
+    # The share 1 - y of the way where the point on the ray with its plane on the rim enters the neighbour's
+    # reach: y² own² + y (d² - other² - own²) = (1.6 - 1) other².
+    p = HALF * (d * d / (own * own) - other * other / (own * own) - ONE)
+    y = wp.sqrt(p * p + (REACH_SQUARED - ONE) * other * other / (own * own)) - p
+    way = ONE - (ONE - t / plane) / wp.min(y, ONE)
+    if way <= ZERO:
+        return ZERO
+    lost = ONE - plane
+    return lost * wp.exp((STIFFNESS + wp.float64(0.1) / lost) * wp.log(way))
+
+
+@wp.func
+def convex(
+    q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, contact: wp.int32, these: Members
+) -> Answer:
+    """Radial and elastic contact: the uppermost cell that holds q, and where q lies on the ray to its end."""
     owner = wp.int32(-1)
     doubt = wp.float64(4.0)
     smallest = wp.float64(1e300)
@@ -222,6 +247,8 @@ def convex(q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, these: Mem
     w = q - wide(these.positions[owner])
     x = wp.length(w)
     end = wp.float64(these.radii[owner])
+    t = wp.min(x / end, ONE)
+    squares = wp.float64(0.0)
     for j in range(first, first + these.size):
         if j != owner and these.ranks[j] == rank and facing(n, j, these):
             apart = wide(these.positions[j]) - wide(these.positions[owner])
@@ -229,8 +256,16 @@ def convex(q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, these: Mem
             if ahead > ZERO:
                 if not lie_over(owner, j, these):
                     r = wp.float64(these.radii[owner])
-                    end = wp.min(end, kept_share(owner, j, these) * r * wp.length(apart) / ahead)
+                    plane = kept_share(owner, j, these) * r * wp.length(apart) / ahead
+                    end = wp.min(end, plane)
+                    moved = moved_by(t, plane / r, r, wp.float64(these.radii[j]), wp.length(apart))
+                    ratio = moved / wp.max(ONE - t - moved, TINY)
+                    if ratio < wp.float64(1e100):
+                        squares += ratio * ratio
     share = wp.min(x / end, ONE) * RIM
+    if contact == ELASTIC and share < RIM:
+        total = wp.sqrt(squares)
+        share = (t + (ONE - t) * total / (ONE + total)) * RIM
     return Answer(owner, complement(share * share), doubt, FOUR)
 
 
@@ -291,8 +326,8 @@ def topmost(
     if rank < 0:
         return Answer(-1, ONE, doubt_of_rims(q, n, first, these), FOUR)
     if (rank & 3) == PUSH:
-        if contact == RADIAL:
-            return doubted(convex(q, n, first, rank, these), doubt_of_rims(q, n, first, these))
+        if contact >= RADIAL:
+            return doubted(convex(q, n, first, rank, contact, these), doubt_of_rims(q, n, first, these))
         return doubted(sheet(q, n, first, rank, contact, reach, these), doubt_of_rims(q, n, first, these))
     owner = wp.int32(-1)
     e = wp.float64(1.0)

@@ -70,7 +70,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 
     assert complete("implicit-decals", "re") == {"render"}
     assert complete("implicit-decals", "render", "--ca") == {"--camera"}
-    assert complete("implicit-decals", "render", "--contact", "") == {"product", "min", "radial"}
+    assert complete("implicit-decals", "render", "--contact", "") == {"product", "min", "radial", "elastic"}
     assert complete("implicit-decals", "gallery", "sp") == {"sphere", "spanning"}
 
 

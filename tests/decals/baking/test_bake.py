@@ -299,6 +299,7 @@ def textured(size: int, samples: int = 1) -> Array:
         [image.pixels for image in scene.images],
         decals.Contact.PRODUCT,
         decals.ImageMapping.CORRECTED,
+        2.0,
     )
     return bake_texture(
         meshes, unwrap(meshes, size, lambda *_: None), size, samples, colors.at, lambda *_: None

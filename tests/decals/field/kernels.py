@@ -6,7 +6,7 @@ from decals.field.contact import add_push, contact_complement, contact_push, con
 from decals.field.mapping import image_distance, in_image, tangent_coordinates, unroll, unroll_step
 from decals.field.ownership import NO_OWNER, complement_at, owner_at, single_layer_at
 from decals.index.lookup import IndexedDecals
-from decals.record import NO_FIELD, RECORD, RIM_RADIUS, Contact, field_complement, xyz
+from decals.record import NO_FIELD, RECORD, RIM_RADIUS, field_complement, xyz
 
 wp.set_module_options({"enable_backward": False})
 
@@ -35,6 +35,7 @@ def rims_of_points(
 def slopes_of_rays(
     owners: wp.array(dtype=wp.int32),
     rays: wp.array(dtype=wp.vec3),
+    contact: wp.int32,
     index: IndexedDecals,
     least: wp.array(dtype=wp.float32),
     most: wp.array(dtype=wp.float32),
@@ -49,7 +50,7 @@ def slopes_of_rays(
     for step in range(1, STEPS + 1):
         x = float(step) / float(STEPS)
         q = xyz(ball) + (x * RIM_RADIUS * ball[3]) * rays[i]
-        e = complement_at(q, up, owners[i], int(Contact.RADIAL), index)
+        e = complement_at(q, up, owners[i], contact, index)
         r = rim_distance(e)
         slope = (r - last) * float(STEPS)
         if r < 1.0:

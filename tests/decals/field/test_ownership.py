@@ -24,7 +24,7 @@ def flat(
     )
 
 
-@pytest.mark.parametrize("contact", [Contact.PRODUCT, Contact.MIN])
+@pytest.mark.parametrize("contact", [Contact.PRODUCT, Contact.MIN, Contact.ELASTIC])
 @pytest.mark.parametrize(
     ("count", "side", "radii", "copies"),
     [

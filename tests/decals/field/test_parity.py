@@ -23,13 +23,13 @@ DOUBT = 1e-9
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
 def test_the_two_oracles_agree(contact: Contact, layered: bool) -> None:
-    """On 17,000 points in each mode, 100,000 in all; with neighbours within reach, and with all."""
+    """On 17,000 points in each mode; with neighbours within reach, and with all."""
     world = make_world(7, layered=layered)
     chunk = Chunk(world, 17_000, 7 + contact, "cpu")
     points, normals = chunk.points.numpy(), chunk.normals.numpy().astype(float)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     mapping = ImageMapping.CHORD if layered else ImageMapping.CORRECTED
-    reach = 1.0 if contact == Contact.RADIAL else NEIGHBOR_REACH
+    reach = 1.0 if contact in (Contact.RADIAL, Contact.ELASTIC) else NEIGHBOR_REACH
     owner, complement, place, doubt, edge = (a.numpy() for a in chunk.expected(contact, mapping, reach=reach))
     owned = 0
     for number, rows in by_set(chunk.sets.numpy()):

@@ -42,6 +42,7 @@ MODULES = (
     "decals.field.mapping",
     "decals.index.lookup",
     "decals.field.radial",
+    "decals.field.elastic",
     "decals.record",
     "decals.field.ownership",
 )

@@ -51,13 +51,26 @@ def test_every_pixel_of_every_contact_mode(renderer: Renderer, contact: Contact,
     assert compare(view, buffers, ImageMapping.CORRECTED, contact).any()
 
 
+def test_pictures_have_the_stiffness_of_their_options(renderer: Renderer) -> None:
+    shape = torus()
+    view = view_of(scattered(shape, 90, 8, radii=(0.05, 0.4)), shape)
+    for stiffness in (1.0, 6.0):
+        modes: dict[str, Any] = {"contact": Contact.ELASTIC, "stiffness": stiffness}
+        buffers = renderer.buffers(view, RenderOptions(size=SIZE, **modes))
+        seen = buffers.owner >= 0
+        samples = evaluate(view.decals, buffers.position[seen], buffers.normal[seen], **modes)
+        same = samples.owner == buffers.owner[seen]
+        assert same.mean() > 0.99
+        assert np.abs(samples.field - buffers.field[seen])[same].max() < 1e-4
+
+
 @pytest.mark.parametrize("scenes", [18, pytest.param(200, marks=pytest.mark.slow)])
 def test_every_pixel_of_random_scenes(renderer: Renderer, scenes: int) -> None:
     """Sizes over three decades, any interaction, layer, contact and mapping, on one torus."""
     shape = torus()
     for seed in range(scenes):
         rng = np.random.default_rng(seed)
-        contact, mapping = list(Contact)[seed % 3], list(ImageMapping)[seed // 3 % 2]
+        contact, mapping = list(Contact)[seed % 4], list(ImageMapping)[seed // 4 % 2]
         radii = (0.001, 1.0) if seed % 4 == 0 else (0.05, 0.5)
         decals = scattered(shape, int(rng.integers(1, 70)), seed, radii=radii)
         view = view_of(in_layers(decals, seed) if seed % 2 else decals, shape)

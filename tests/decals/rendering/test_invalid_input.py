@@ -77,7 +77,7 @@ def test_a_picture_after_a_refused_one_is_as_before(renderer: Renderer) -> None:
     np.testing.assert_array_equal(renderer.render(view, RenderOptions(size=SIZE)), before)
 
 
-@pytest.mark.parametrize("wrong", [{"mapping": 7}, {"mapping": "cord"}, {"contact": None}, {"contact": 3}])
+@pytest.mark.parametrize("wrong", [{"mapping": 7}, {"mapping": "cord"}, {"contact": None}, {"contact": 4}])
 def test_modes_that_are_none_are_refused(renderer: Renderer, wrong: dict[str, Any]) -> None:
     (name,) = wrong
     for draw in (renderer.render, renderer.buffers):

@@ -53,8 +53,8 @@ def test_every_argument_is_checked_by_every_picture(renderer: Renderer, wrong: A
     for name in ("size", "samples", "background", "mapping", "contact", "viewpoint", "lights"):
         if wrong is None and name in ("viewpoint", "lights"):
             continue  # these may be left out
-        if name in ("mapping", "contact") and type(wrong) in (int, bool) and 0 <= wrong < 3:
-            continue  # the numbers of two modes
+        if name in ("mapping", "contact") and type(wrong) in (int, bool) and 0 <= wrong < 4:
+            continue  # the numbers of modes
         if name == "samples" and wrong is True:
             pass  # no number of samples
         refused(lambda name=name: drawn(renderer, shown, **{"size": SIZE, name: wrong}))
@@ -115,6 +115,6 @@ def test_modes_and_colours_by_name() -> None:
     )
     assert Background("white", "#00000000") == Background((1, 1, 1, 1), (0, 0, 0, 0))
     assert Light("red", (0, 0, -1)) == Light((1, 0, 0), (0, 0, -1))
-    for wrong in ("round", 3, None):
-        with pytest.raises(InvalidScene, match="contact: expected one of 'product', 'min', 'radial', got"):
+    for wrong in ("round", 4, None):
+        with pytest.raises(InvalidScene, match=r"contact: expected one of 'product', .*, 'elastic', got"):
             RenderOptions(contact=wrong)  # type: ignore[arg-type]

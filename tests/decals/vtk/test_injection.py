@@ -88,7 +88,11 @@ LOOKS: dict[str, dict[str, object]] = {
 }
 
 
-CASES = [(look, Contact.PRODUCT) for look in LOOKS] + [("flat", Contact.MIN), ("flat", Contact.RADIAL)]
+CASES = [(look, Contact.PRODUCT) for look in LOOKS] + [
+    ("flat", Contact.MIN),
+    ("flat", Contact.RADIAL),
+    ("flat", Contact.ELASTIC),
+]
 
 
 @pytest.mark.parametrize(("look", "contact"), CASES)

@@ -135,6 +135,8 @@ def test_p_and_u_change_how_the_window_draws_and_picks(driver: Driver) -> None:
     driver.key("u")
     assert subplot.mapping is ImageMapping.CHORD
     assert (driver.shot() != first).any()
+    driver.key("P", shift=True)
+    assert subplot.stiffness == modes.stiffness == 3.0
     driver.key("p")
     driver.key("p")
     assert subplot.contact is modes.contact is Contact.RADIAL

@@ -1,0 +1,219 @@
+"""Elastic contact: images are compressed towards contact lines, along rays from their centres. None folds.
+
+Owners, cells and nested decals are those of radial contact (`decals.field.radial`). Lengths are in visible
+radii of the owner. On a ray from its centre, t is the distance of a point, and R_j < 1 the distance of the
+radical plane of neighbour j. Alone, this neighbour moves the image outward by
+
+    δ_j = (1 − R_j) x_j^P,   x_j = max(1 − (1 − t/R_j)/y_j, 0),   P = stiffness + ROUNDING/(1 − R_j).
+
+So the rim of the image lies on the plane, the slope along the ray is at least 1, and nothing moves nearer to
+the centre than (1 − y_j) R_j. With the width y_j (`push_width`), every point that a neighbour moves lies in
+its reach: the candidates of the point itself suffice. Several neighbours act together as
+
+    r = t + (1 − t) Z/(1 + Z),   Z = √(Σ z_j²),   z_j = δ_j/(1 − t − δ_j).
+
+For one neighbour that is t + δ_j. r is 1 on the rim and on every plane, and nowhere else. Inside the cell it
+is smooth, also between rays to both sides of a corner, where planes meet each other or the rim. With m planes
+on a ray the slope is at least 1/√m, so no image folds, whatever the sizes.
+"""
+
+# ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+import warp as wp
+
+from decals.field.radial import (
+    NO_OWNER,
+    RIM_SQUARED,
+    balls_nested,
+    cell_owner,
+    is_above,
+    power,
+)
+from decals.index.lookup import IndexedDecals, cell_range, rank_range
+from decals.record import (
+    NO_FIELD,
+    REACH_SQUARED,
+    RECORD,
+    RIM_RADIUS,
+    apart,
+    complement_of,
+    faces,
+    field_complement,
+    rank_of,
+    visible_radius,
+    xyz,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+ROUNDING = 0.1
+"""Part of the exponent that makes the push of a plane fade in smoothly where the plane enters the rim."""
+
+REACH_MARGIN = 0.6
+"""A little less than REACH_SQUARED/RIM_SQUARED − 1 = 0.6027, by which the squared reach exceeds the rim's."""
+
+MIN_SPARE = 1.0e-6
+"""Smallest divisor 1 − R; larger exponents would not be finite."""
+
+MIN_REMAINDER = 1.0e-12
+"""Smallest divisor 1 − t − δ, which is 0 on contact lines; z² stays finite."""
+
+MIN_DISTANCE = 1.0e-30
+"""Smallest divisor of the direction of a ray."""
+
+MAX_KEPT = 8
+"""Number of decals or complements that are kept. Where more act, the index is traversed a second time."""
+
+
+# -- geometry of two balls ------------------------------------------------------------------------------
+
+
+@wp.func
+def push_width(squared: wp.float32, radius: wp.float32, other: wp.float32) -> wp.float32:
+    """Return the part y of the way to its plane on which a neighbour pushes, from 0 to 1.
+
+    `squared` is the squared distance D² of the centres. On every ray that meets the plane before the rim, the
+    squared distance to the neighbour at the share 1 − y of the way is at most
+    ρ_j² + y (D² − ρ_j² − (1 − y) ρ²). This is (1 + REACH_MARGIN) ρ_j², which the neighbour reaches.
+    """
+    gap = squared - other * other - radius * radius
+    margin = 2.0 * REACH_MARGIN * other * other
+    return wp.min(margin / (gap + wp.sqrt(gap * gap + 2.0 * margin * radius * radius)), 1.0)
+
+
+@wp.func
+def plane_push(
+    ray: wp.vec3,
+    distance: wp.float32,
+    apart: wp.vec3,
+    radius: wp.float32,
+    other: wp.float32,
+    stiffness: wp.float32,
+) -> wp.float32:
+    """Return the push δ of one neighbour at a distance in visible radii on a unit ray; 0 for none."""
+    squared = wp.dot(apart, apart)
+    between = squared + (radius - other) * (radius + other)
+    ahead = 2.0 * radius * wp.dot(ray, apart)
+    if between >= ahead:  # the ray meets the rim before the plane
+        return 0.0
+    end = between / ahead
+    x = 1.0 - (1.0 - distance / end) / push_width(squared, radius, other)
+    if x <= 0.0 or between <= 0.0:
+        return 0.0
+    if balls_nested(apart, radius, other):
+        return 0.0
+    spare = 1.0 - end
+    return spare * wp.pow(wp.min(x, 1.0), stiffness + ROUNDING / wp.max(spare, MIN_SPARE))
+
+
+@wp.func
+def square_of_push(distance: wp.float32, push: wp.float32) -> wp.float32:
+    """Return z² of a push δ, which adds to those of other neighbours."""
+    z = push / wp.max(1.0 - distance - push, MIN_REMAINDER)
+    return z * z
+
+
+@wp.func
+def pushed_along_ray(distance: wp.float32, squares: wp.float32) -> wp.float32:
+    """Return E = 1 − F at a distance in visible radii, under the sum of squares of all pushes z."""
+    z = wp.sqrt(squares)
+    r = distance + (1.0 - distance) * (z / (1.0 + z))
+    if z > 1.0:  # the same, exact towards contact lines
+        r = 1.0 - (1.0 - distance) / (1.0 + z)
+    return field_complement(r * r * RIM_SQUARED)
+
+
+# -- the same of decals ---------------------------------------------------------------------------------
+
+
+@wp.func
+def elastic_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.float32:
+    """Return E = 1 − F of a contact decal at q, compressed along its ray by all neighbours."""
+    rank = wp.int32(0)
+    if index.layered:
+        rank = rank_of(owner, index.records)
+    radius = visible_radius(owner, index.records)
+    w = (q - xyz(index.records[RECORD * owner])) / radius
+    distance = wp.length(w)
+    if distance == 0.0:
+        return 0.0
+    ray = w / distance
+    squares = wp.float32(0.0)
+    for level in range(index.level_count):
+        span = rank_range(q, rank, level, index)
+        for j in range(span[0], span[1]):
+            if index.ids[j] != owner and complement_of(q, n_q, index.ids[j], index.records) < NO_FIELD:
+                push = plane_push(
+                    ray,
+                    distance,
+                    apart(owner, index.ids[j], index.records),
+                    radius,
+                    visible_radius(index.ids[j], index.records),
+                    index.stiffness,
+                )
+                squares += square_of_push(distance, push)
+    return pushed_along_ray(wp.min(distance, 1.0), squares)
+
+
+@wp.func
+def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
+    """Return (owner, E) at q in one traversal of the index; (NO_OWNER, 0) outside all rims.
+
+    They are those of `cell_owner` and `elastic_complement`. The decals must not be layered.
+    """
+    owner = wp.int32(NO_OWNER)
+    least = wp.float32(0.0)
+    count = wp.int32(0)
+    a = wp.vec4i(NO_OWNER, NO_OWNER, NO_OWNER, NO_OWNER)
+    b = wp.vec4i(NO_OWNER, NO_OWNER, NO_OWNER, NO_OWNER)
+    for level in range(index.level_count):
+        span = cell_range(q, level, index)
+        for j in range(span[0], span[1]):
+            decal = index.ids[j]
+            ball = index.records[RECORD * decal]
+            offset = q - xyz(ball)
+            squared = wp.dot(offset, offset)
+            size = ball[3] * ball[3]
+            if squared < REACH_SQUARED * size:
+                if faces(n_q, decal, index.records):
+                    b = wp.vec4i(a[3], b[0], b[1], b[2])
+                    a = wp.vec4i(decal, a[0], a[1], a[2])
+                    count += 1
+                    if field_complement(squared / size) <= 0.5:
+                        own = power(offset, RIM_RADIUS * ball[3])
+                        if (
+                            owner < 0
+                            or own < least
+                            or (own == least and is_above(decal, owner, index.records))
+                        ):
+                            least = own
+                            owner = decal
+    if owner < 0:
+        return wp.vec2(float(NO_OWNER), 0.0)
+    own_ball = index.records[RECORD * owner]
+    radius = RIM_RADIUS * own_ball[3]
+    w = (q - xyz(own_ball)) / radius
+    distance = wp.length(w)
+    ray = w / wp.max(distance, MIN_DISTANCE)
+    squares = wp.float32(0.0)
+    again = bool(count > MAX_KEPT)
+    for _kept in range(wp.min(count, MAX_KEPT)):
+        other = a[0]
+        a = wp.vec4i(a[1], a[2], a[3], b[0])
+        b = wp.vec4i(b[1], b[2], b[3], NO_OWNER)
+        if other != owner:
+            ball = index.records[RECORD * other]
+            between = xyz(ball) - xyz(own_ball)
+            push = plane_push(ray, distance, between, radius, RIM_RADIUS * ball[3], index.stiffness)
+            if push > 0.0:
+                squares += square_of_push(distance, push)
+            if ball[3] < own_ball[3] or (ball[3] == own_ball[3] and other < owner):
+                offset = q - xyz(ball)
+                if field_complement(wp.dot(offset, offset) / (ball[3] * ball[3])) <= 0.5:
+                    again = again or balls_nested(between, radius, RIM_RADIUS * ball[3])
+    if again:
+        owner = cell_owner(q, n_q, rank_of(owner, index.records), index)
+        return wp.vec2(float(owner), elastic_complement(q, n_q, owner, index))
+    return wp.vec2(float(owner), pushed_along_ray(wp.min(distance, 1.0), squares))
