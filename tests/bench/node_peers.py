@@ -64,7 +64,7 @@ def models() -> dict[str, Node]:
     """Return the models by name."""
     beam = Box((0, 0, 1), (0.4, 0.6, 2), radius=0.1)
     bar = Segment((-1, 0, 0), (1, 0, 0), radius=0.3)
-    stroke = ConvolutionStroke([(-1, 0, 0), (-0.4, 0, 1), (0.4, 0, 0), (1, 0, 1)], [0.1, 0.25, 0.25, 0.1])
+    stroke = ConvolutionStroke(((-1, 0, 0), (-0.4, 0, 1), (0.4, 0, 0), (1, 0, 1)), (0.1, 0.25, 0.25, 0.1))
     pair = (Point((-0.5, 0, 0), radius=0.8), Point((0.6, 0, 0), radius=0.6))
     arms = (bar, bar.rotate((0, 0, 1), 90), bar.translate((0, 0, 0.5)))
     return {
@@ -74,7 +74,7 @@ def models() -> dict[str, Node]:
         "convolution stroke": stroke,
         "bent box": beam.bend(40, (0, 2)),
         "two solids in contact": Contact(pair, stiffness=(1, 3), height=0.05),
-        "blend graph": BlendGraph(arms, names=("a", "b", "c"), pairs=[("a", "b")]),
+        "blend graph": BlendGraph(arms, names=("a", "b", "c"), pairs=(("a", "b"),)),
     }
 
 
