@@ -98,18 +98,18 @@ def covering_radii(
     owned = _find_owners(tree, samples)
     limits = _max_radii(owned, len(decals))
     radii = np.zeros(len(decals))
-    _grow(radii, owned, limits)
+    _grow(radii, owned, decals, limits)
     rng = np.random.default_rng(seed)
     sample_distance = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
     owned = owned.peaks(PEAK_FRACTION * radii)
     owned = owned.joined(_find_owners(tree, project(_circumcenters(owned, decals))))
-    _grow(radii, owned, limits)
+    _grow(radii, owned, decals, limits)
     for spread in TRIAL_SPREADS:
         least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
         owned = owned.peaks(least)
         trials = _random_points_around(owned.points, spread * sample_distance, rng)
         owned = owned.joined(_find_owners(tree, project(trials)))
-        _grow(radii, owned, limits)
+        _grow(radii, owned, decals, limits)
     return (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
 
 
@@ -179,6 +179,22 @@ def _find_owners(tree: FacingTree, points: OrientedPoints) -> _OwnedPoints:
     return _OwnedPoints(points, *tree.nearest(points.positions, points.normals, count=3))
 
 
+def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
+    """Return the lengths along the surface at which the corrected mapping draws offsets w, ``float64[n]``.
+
+    `decals.field.mapping.unroll` states the formula.
+    """
+    a, b = -np.einsum("ni,ni->n", w, n_p), np.einsum("ni,ni->n", w, n_q)
+    squared = np.einsum("ni,ni->n", w, w)
+    arc = (a * b > 0.0) & (squared > 0.0)
+    sine = np.clip(0.5 * np.linalg.norm(n_q - n_p, axis=1), 1e-6, 1.0)
+    stretch = np.arcsin(sine) / sine
+    y = (b - a) / np.where(arc, a + b, 1.0)
+    longer = squared + a * b * (1.0 + 2.0 * y * y) * (stretch**2 - 1.0) / sine**2
+    lengths: Float64Array = np.sqrt(np.where(arc, longer, squared))
+    return lengths
+
+
 def _circumcenters(peaks: _OwnedPoints, decals: OrientedPoints) -> OrientedPoints:
     """Return the centre of the circle through the three decals of each peak, as a guess of its corner."""
     whole = np.flatnonzero((peaks.decals >= 0).all(axis=1))
@@ -211,12 +227,17 @@ def _max_radii(owned: _OwnedPoints, count: int) -> Float64Array:
     return MAX_RADIUS_RATIO * np.maximum(trimmed, median)
 
 
-def _grow(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array) -> None:
-    """Grow the radius of every decal, up to its limit, to all points that it owns or nearly owns."""
+def _grow(radii: Float64Array, owned: _OwnedPoints, decals: OrientedPoints, limits: Float64Array) -> None:
+    """Grow the radius of every decal, up to its limit, to all points that it owns or nearly owns.
+
+    Images end at their radius along the surface, so the length of the arc counts, not that of the chord.
+    """
     close = (owned.decals >= 0) & (owned.distances <= CORNER_TOLERANCE * owned.distances[:, :1])
-    distances, owners = owned.distances[close], owned.decals[close]
-    within = distances <= limits[owners]
-    np.maximum.at(radii, owners[within], distances[within])
+    close &= owned.distances <= limits[owned.decals]
+    points, owners = np.nonzero(close)[0], owned.decals[close]
+    offsets = owned.points.positions[points].astype(np.float64) - decals.positions[owners]
+    normals = decals.normals[owners].astype(np.float64), owned.points.normals[points].astype(np.float64)
+    np.maximum.at(radii, owners, _arc_lengths(offsets, *normals))
 
 
 def _random_points_around(points: OrientedPoints, spread: float, rng: np.random.Generator) -> OrientedPoints:

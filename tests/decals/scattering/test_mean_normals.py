@@ -11,7 +11,7 @@ from decals.editing.queries import mean_normal
 from decals.scenes.objects import as_objects
 from tests.decals.distortion import distortion
 from tests.decals.fault_models import FAULT_MODELS
-from tests.decals.meshes import box, sphere
+from tests.decals.meshes import box, icosphere, sphere
 
 
 @pytest.mark.parametrize(
@@ -58,3 +58,9 @@ def test_images_bend_over_the_edges_of_parts(name: str) -> None:
     found = distortion(decals.scatter(mesh, count=300, seed=1), mesh, 20_000)
     assert found.stretched <= 0.003
     assert found.folded <= 5e-4
+    assert found.bare < 1e-4  # images end at the arc, which is longer than the chord
+
+
+def test_few_large_decals_leave_no_pinhole() -> None:
+    ball = icosphere(4)
+    assert distortion(decals.scatter(ball, count=8, seed=1), ball, 20_000).bare == 0.0
