@@ -34,7 +34,8 @@ def panels() -> Sequence[Panel]:
 
 
 def _panel(name: str, mesh: Mesh) -> Panel:
-    item = MeshObject(name, mesh.vertices, mesh.faces, color=CLAY)
+    smooth_angle = 180.0  # edges show only where the mesh itself has several vertices
+    item = MeshObject(name, mesh.vertices, mesh.faces, color=CLAY, crease_angle=smooth_angle)
     return Panel(Scene(objects=(item,), camera=camera_at((5.2, -4.2, 3.4))))
 
 
