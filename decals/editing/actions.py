@@ -46,8 +46,10 @@ class Actions:
         Actions on objects and primitives.
     files : FileActions
         Actions on the scene's file.
-    help_visible
-        True while the window shows the help.
+    help_page
+        Page of the help that the window shows, from 1; 0 for none.
+    help_pages
+        Number of pages, which depends on the window's size.
 
     Examples
     --------
@@ -73,7 +75,7 @@ class Actions:
         self.decals = DecalActions(self.state)
         self.trees = TreeActions(self.state)
         self.files = FileActions(self.state, path)
-        self.help_visible = False
+        self.help_page, self.help_pages = 0, 1
         self._actions = {
             name: (binding, method.__get__(owner))
             for owner in (self, self.files, self.decals, self.trees)
@@ -239,10 +241,15 @@ class Actions:
         modes.mapping = ImageMapping((modes.mapping + 1) % len(ImageMapping))
         self.state.message = f"image mapping: {modes.mapping.name.lower()}"
 
-    @action("help", "h", "F1", summary="show or hide this help", group=Group.SCENE)
-    def toggle_help(self, _cursor: Cursor) -> None:
-        """Show or hide the help."""
-        self.help_visible = not self.help_visible
+    @action("help", "h", "F1", summary="show this help, its next page, or hide it", group=Group.SCENE)
+    def turn_help(self, _cursor: Cursor) -> None:
+        """Show the help or its next page; after the last page hide it."""
+        self.help_page = (self.help_page + 1) % (self.help_pages + 1)
+
+    @property
+    def help_visible(self) -> bool:
+        """True while the window shows the help."""
+        return self.help_page > 0
 
 
 def _undo(session: EditSession, entry: UndoEntry) -> str:

@@ -178,6 +178,7 @@ class FileActions:
             self.recovery.remove()
         else:
             self.recovery.keep()
+            self.recovery.release()
 
     def _discard_changes(self) -> None:
         """Note that the present changes may be lost; later ones count again."""

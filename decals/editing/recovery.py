@@ -1,7 +1,7 @@
 """The recovery file: unsaved changes beside the scene's file, for the next window after a crash."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import datetime
 from os import PathLike
@@ -9,6 +9,7 @@ from pathlib import Path
 
 from decals.editing.background import BackgroundJobs
 from decals.editing.commands import ReplaceScene
+from decals.editing.file_lock import FileLock
 from decals.editing.session import EditSession
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.scenes.camera import Camera
@@ -24,20 +25,34 @@ SUFFIX = ".recovery.json"
 """End of the name of a recovery file."""
 
 
-def recovery_path(path: str | PathLike[str]) -> Path:
+MAX_WINDOWS = 100
+"""Number of windows that may edit one file at the same time."""
+
+
+def recovery_path(path: str | PathLike[str], *, number: int = 1) -> Path:
     """Return the path of the recovery file of a scene file, in the same folder.
+
+    Parameters
+    ----------
+    path
+        The scene file.
+    number
+        Number of the window, where several edit the same file.
 
     Examples
     --------
     >>> from decals.editing import recovery_path
     >>> recovery_path("scenes/knot.json").name
     'knot.recovery.json'
+    >>> recovery_path("scenes/knot.json", number=2).name
+    'knot-2.recovery.json'
     """
-    return Path(path).with_name(Path(path).stem + SUFFIX)
+    ending = "" if number == 1 else f"-{number}"
+    return Path(path).with_name(f"{Path(path).stem}{ending}{SUFFIX}")
 
 
 class RecoveryFile:
-    """Keeps a recovery file while a session has unsaved changes.
+    """Keeps a recovery file while a session has unsaved changes; each window of a scene has its own.
 
     Parameters
     ----------
@@ -61,6 +76,8 @@ class RecoveryFile:
         self._session, self._background = session, background
         self._camera, self._end_stroke = camera, end_stroke
         self._scene_path: Path | None = None
+        self._path: Path | None = None
+        self._lock: FileLock | None = None
         self._exists = False
         self._written: object = None
         self._changed_at: float | None = None
@@ -69,7 +86,7 @@ class RecoveryFile:
     @property
     def path(self) -> Path | None:
         """Path of the recovery file; None if the scene has no file."""
-        return None if self._scene_path is None else recovery_path(self._scene_path)
+        return self._path
 
     @property
     def exists(self) -> bool:
@@ -80,6 +97,29 @@ class RecoveryFile:
         """Remove the recovery file, and keep the next one beside this scene file."""
         self.remove()
         self._scene_path = None if scene_path is None else Path(scene_path)
+        self._path = None if scene_path is None else recovery_path(scene_path)
+
+    def _candidates(self) -> Iterator[Path]:
+        """Yield the paths of the recovery files of all windows."""
+        assert self._scene_path is not None
+        for number in range(1, MAX_WINDOWS + 1):
+            yield recovery_path(self._scene_path, number=number)
+
+    def _acquire(self, path: Path) -> bool:
+        """Take a recovery file for this window, unless another one has it."""
+        try:
+            self._lock = FileLock.acquire(path.with_name(f".{path.name}.lock"))
+        except OSError:  # nor can the recovery file be written there
+            self._path = path
+            return True
+        if self._lock is not None:
+            self._path = path
+        return self._lock is not None
+
+    def _acquire_new(self) -> None:
+        """Take the first recovery file that no window has, before it is written for the first time."""
+        if self._lock is None:
+            next((path for path in self._candidates() if not path.exists() and self._acquire(path)), None)
 
     def recover(self, load: Callable[[Path], Scene]) -> str:
         """Take over the recovery file of an earlier window, as one entry that undo takes back.
@@ -99,13 +139,16 @@ class RecoveryFile:
         InvalidScene
             The file cannot be read.
         """
-        path = self.path
-        if path is None or not path.is_file():
+        if self._scene_path is None or self._exists:
+            return ""
+        path = next((path for path in self._candidates() if path.is_file() and self._acquire(path)), None)
+        if path is None:
             return ""
         when = datetime.fromtimestamp(path.stat().st_mtime).astimezone()
         try:
             scene = load(path)
         except ImplicitDecalsError as error:
+            self.release()
             raise InvalidScene(
                 f"could not read the unsaved changes in {str(path)!r} ({error}); move or delete this file"
             ) from error
@@ -130,8 +173,7 @@ class RecoveryFile:
 
     def update(self) -> None:
         """Write or remove the file if it is time to; the owner calls this regularly, but not in a drag."""
-        path = self.path
-        if path is None or not self.pending:
+        if self.path is None or not self.pending:
             self._changed_at = None
             return
         if self._background.writing:
@@ -150,17 +192,18 @@ class RecoveryFile:
         def written() -> None:
             self._wait = max(AUTOSAVE_SECONDS, (time.monotonic() - now) / MAX_WRITING_SHARE)
 
+        self._acquire_new()
         self._written, self._exists, self._changed_at = self._session.next_undo, True, None
-        self._background.write_copy(path, self._camera(), written)
+        self._background.write_copy(self.path, self._camera(), written)
 
     def keep(self) -> Path | None:
         """Write all unsaved changes now, and return the file; None if there are none, or no path."""
-        path = self.path
-        if path is None or not self._session.modified:
+        if self.path is None or not self._session.modified:
             return None
-        self._session.begin_save(path, camera=self._camera()).write()
+        self._acquire_new()
+        self._session.begin_save(self.path, camera=self._camera()).write()
         self._exists = True
-        return path
+        return self.path
 
     def remove(self) -> None:
         """Remove the file, if this session wrote or recovered it."""
@@ -168,4 +211,11 @@ class RecoveryFile:
         if self._exists and path is not None:
             with suppress(OSError):
                 path.unlink(missing_ok=True)
+        self.release()
         self._exists, self._written, self._changed_at = False, None, None
+
+    def release(self) -> None:
+        """Leave the recovery file to the next window."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None

@@ -1,5 +1,6 @@
 """Overlay of the editing window: outlines, the handle of a primitive, a status line, and the help."""
 
+import math
 import textwrap
 from collections.abc import Callable
 from typing import Any
@@ -31,6 +32,12 @@ LINE_HEIGHT, LETTER_WIDTH = 1.3, 0.62
 
 MIN_HELP_SIZE, MAX_HELP_SIZE = 6, 18
 """Size of the help's font, in pixels."""
+
+HELP_BORDER = 60
+"""Space above and below the help, in pixels."""
+
+MAX_HELP_PAGES = 2
+"""Pages of the help, at most: so many are needed in a window of 400 × 300 pixels."""
 
 TEXT_MARGIN = 12
 """Space beside text, in pixels."""
@@ -118,16 +125,30 @@ class Overlay:
             wrapped = textwrap.wrap(text, letters, max_lines=lines, placeholder=ELLIPSIS)
             self._status.SetInput("\n".join(wrapped))
 
-    def show_help(self, visible: bool) -> None:
-        """Show the help as large as the window allows, or hide it."""
-        self._help.SetVisibility(visible)
-        if not visible:
-            return
+    def show_help(self, page: int) -> int:
+        """Show a page of the help, from 1, as large as the window allows, or hide it for 0.
+
+        Returns
+        -------
+        int
+            Number of pages: several in a low window.
+        """
         width, height = self._renderer.GetSize()
         lines = KEYS.help_lines()
-        by_height = (height - 60) / (LINE_HEIGHT * len(lines))
-        by_width = (width - 2 * TEXT_MARGIN) / (LETTER_WIDTH * max(map(len, lines)))
-        self._help.prop.SetFontSize(max(MIN_HELP_SIZE, min(MAX_HELP_SIZE, int(min(by_height, by_width)))))
+        fitting = (height - HELP_BORDER) / (LINE_HEIGHT * MIN_HELP_SIZE)
+        pages = min(max(math.ceil(len(lines) / max(fitting - 1.0, 1.0)), 1), MAX_HELP_PAGES)
+        self._help.SetVisibility(page > 0)
+        if page > 0:
+            count = math.ceil(len(lines) / pages)
+            first = (min(page, pages) - 1) * count
+            shown = lines[first : first + count]
+            if pages > 1:
+                shown.append("h: next page" if page < pages else "h: hide the help")
+            by_height = (height - HELP_BORDER) / (LINE_HEIGHT * (count + (pages > 1)))
+            by_width = (width - 2 * TEXT_MARGIN) / (LETTER_WIDTH * max(map(len, lines)))
+            self._help.SetInput("\n".join(shown))
+            self._help.prop.SetFontSize(max(MIN_HELP_SIZE, min(MAX_HELP_SIZE, int(min(by_height, by_width)))))
+        return pages
 
     def release(self) -> None:
         """Remove everything from the plotter."""

@@ -259,7 +259,7 @@ class EditWindow:
             self.handle.update()
         outlined = () if dragging else self.actions.state.selection  # outlines take longer than the drag
         self.overlay.outline(self.document, outlined, self.subplot.contact, self.subplot.mapping)
-        self.overlay.show_help(self.actions.help_visible)
+        self.actions.help_pages = self.overlay.show_help(self.actions.help_page)
         self.overlay.show_status(self._status())
         self._host.set_title(self.actions.files.title)
 

@@ -186,7 +186,7 @@ def measure(user: User, action: str, gesture: str, selected: str) -> Times:
         if user.window.actions.state.primitive:
             user.blocks(lambda: user.gesture("m"))
         if action == "help" and run == RUNS:
-            user.window.actions.help_visible = False
+            user.window.actions.help_page = 0
     return Times(*np.median(results[1:] or results, axis=0).tolist())
 
 

@@ -1,11 +1,14 @@
 """Unsaved changes: the recovery file keeps them, and the next session takes them over."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import decals.editing.file_lock as file_lock
 from decals.editing import Actions, EditSession, ScaleDecals, recovery_path
+from decals.editing.file_lock import FileLock
 from decals.errors import InvalidScene
 from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import finish, hold_writing, press, threaded
@@ -108,6 +111,7 @@ def test_the_next_session_takes_the_changes_over_and_undo_goes_back(tmp_path: Pa
     save_scene(scene(), path)
     before = edited(path)
     assert before.files.recovery.keep() == recovery_path(path)
+    before.files.recovery.release()  # as the system does when a process ends
 
     session = EditSession(load_scene(path))
     first = digest(session.document)
@@ -156,3 +160,57 @@ def test_a_folder_that_cannot_be_written_is_said_once(
     finish(actions)
     assert "existing folder" in actions.state.message
     assert not actions.files.recovery.pending
+
+
+@pytest.mark.usefixtures("at_once")
+def test_windows_of_one_file_keep_their_changes_apart(tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    first, second = edited(path), edited(path)
+    second.state.session.do(ScaleDecals([2], 3.0))
+    for actions in (first, second):
+        actions.files.update()
+    assert first.files.recovery.path == recovery_path(path)
+    assert second.files.recovery.path == recovery_path(path, number=2)
+    for actions in (first, second):
+        kept = load_scene(actions.files.recovery.path).decals.packed().tobytes()
+        assert kept == actions.state.session.document.decals.decals.packed().tobytes()
+    third = Actions(EditSession(scene()), path=path)
+    third.files.recover(load_scene)
+    assert not third.state.session.modified  # both belong to windows that are open
+    second.files.recovery.release()
+    third.files.recover(load_scene)
+    assert third.files.recovery.path == recovery_path(path, number=2)
+    assert third.state.session.document.decals.decals.packed().tobytes() == kept
+    for actions in (first, third):
+        press(actions, "save")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_lock_is_held_once_and_leaves_no_file(tmp_path: Path) -> None:
+    file = tmp_path / "lock"
+    lock = FileLock.acquire(file)
+    assert lock is not None
+    assert FileLock.acquire(file) is None
+    lock.release()
+    assert not file.exists()
+    again = FileLock.acquire(file)
+    assert again is not None
+    again.release()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows removes no open files")
+def test_a_lock_whose_file_was_removed_is_taken_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its holder releases it after another process has opened the file."""
+    file, locked = tmp_path / "lock", file_lock._locked
+
+    def late(descriptor: int) -> bool:
+        monkeypatch.setattr(file_lock, "_locked", locked)
+        file.unlink()
+        return locked(descriptor)
+
+    monkeypatch.setattr(file_lock, "_locked", late)
+    lock = FileLock.acquire(file)
+    assert lock is not None
+    assert file.exists()
+    assert FileLock.acquire(file) is None
+    lock.release()

@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+from decals.editing.actions import KEYS
+
 LONG = "expected an existing folder for the scene, found none at 'a/folder/that/is/not/there'; make it first"
 
 
@@ -42,3 +44,23 @@ def test_a_line_that_fits_is_left_as_it_is(opened: Any) -> None:
     window = opened().window
     window.overlay.show_status("h: help")
     assert window.overlay._status.GetInput() == "h: help"
+
+
+@pytest.mark.parametrize(("size", "pages"), [((400, 300), 2), ((1200, 800), 1)])
+def test_the_help_fits_into_the_window(opened: Any, size: tuple[int, int], pages: int) -> None:
+    driver = opened()
+    window, overlay = driver.window, driver.window.overlay
+    window.plotter.window_size = size
+    window.plotter.render()
+    read = []
+    for page in range(1, pages + 1):
+        driver.key("h")
+        assert window.actions.help_page == page
+        left, right, bottom, top = box(overlay._help, window.plotter.renderer)
+        assert 0 <= left < right <= size[0]
+        assert 0 <= bottom < top <= size[1]
+        read += overlay._help.GetInput().splitlines()
+    assert window.actions.help_pages == pages
+    assert set(KEYS.help_lines()) <= set(read)
+    driver.key("h")
+    assert not overlay.help_visible

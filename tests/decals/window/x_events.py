@@ -100,6 +100,8 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
     place = window.plotter.iren.interactor.GetEventPosition
     yield "point", lambda: user.move(at), lambda: tuple(place()) == at
     yield "help", lambda: user.key("h"), lambda: window.overlay.help_visible
+    for page in range(actions.help_pages - 1):
+        yield "next page", lambda: user.key("h"), lambda page=page: actions.help_page == page + 2
     yield "no help", lambda: user.key("F1"), lambda: not window.overlay.help_visible
     yield "click", lambda: user.click(at), lambda: actions.state.selection == (number,)
     yield "one more", lambda: user.click(there, "Shift_L"), lambda: actions.state.selection == (number, other)
