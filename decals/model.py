@@ -19,6 +19,7 @@ from decals.validation import (
     describe,
     finite_array,
     member_array,
+    one_or_each,
     orthogonal_vectors,
     row_selection,
     unit_interval,
@@ -90,7 +91,8 @@ class Decals:
     tangents : float32[n, 3]
         Direction of the image's u axis; the v axis is normal × tangent.
     radii : float32[n]
-        Visible radius in model units: distance of the rim of an undeformed decal from its centre.
+        Visible radius in model units: distance of the rim of an undeformed decal from its centre. One number
+        stands for all decals.
     images : int32[n], optional
         Index into the scene's list of images, or NO_IMAGE (-1) for the tint alone. Default 0.
     spill : bool[n], optional
@@ -105,7 +107,7 @@ class Decals:
         sRGB colour from 0 to 1 by which the image is multiplied in linear light; or the name of a colour
         each, or one for all. Default white.
     opacities : float32[n], optional
-        From 0 (invisible) to 1, the default.
+        From 0 (invisible) to 1, the default. One number stands for all decals.
 
     Raises
     ------
@@ -170,7 +172,7 @@ class Decals:
         count = len(positions)
         normals = finite_array("normals", self.normals, (count, 3))
         tangents = finite_array("tangents", self.tangents, (count, 3))
-        radii = finite_array("radii", self.radii, (count,))
+        radii = finite_array("radii", one_or_each(self.radii, count), (count,))
         check_range("radii", radii, MIN_RADIUS, MAX_COORDINATE)
         check_range("positions", positions, -MAX_COORDINATE, MAX_COORDINATE)
         normals = unit_vectors("normals", normals)
@@ -188,7 +190,9 @@ class Decals:
                 "layers", self.layers, count, low=-LAYER_LIMIT, high=LAYER_LIMIT - 1, default=0
             ),
             "tints": color_array("tints", self.tints, count).astype(np.float32),
-            "opacities": unit_interval("opacities", self.opacities, (count,)).astype(np.float32),
+            "opacities": unit_interval("opacities", one_or_each(self.opacities, count), (count,)).astype(
+                np.float32
+            ),
         }
         for name, array in arrays.items():
             array.flags.writeable = False

@@ -299,6 +299,12 @@ def _items(values: Any) -> Any:
     return values.tolist() if isinstance(values, np.ndarray) and values.dtype.kind in "UO" else values
 
 
+def one_or_each(values: Any, count: int) -> Any:
+    """Return a single number as an array of so many equal numbers, and anything else as it is."""
+    single = isinstance(values, int | float | np.number) or getattr(values, "ndim", None) == 0
+    return np.full(count, values) if single else values
+
+
 def unit_interval(name: str, values: Any, shape: tuple[int, ...]) -> Float64Array:
     """Return numbers from 0 to 1 as a new array; ones for None."""
     array = finite_array(name, np.ones(shape) if values is None else values, shape)

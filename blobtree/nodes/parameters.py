@@ -16,12 +16,12 @@ from enum import Enum
 from functools import partial
 from itertools import chain
 from operator import attrgetter
-from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.colors import color_rgb
+from blobtree.colors import ColorLike, color_rgb
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
@@ -241,9 +241,19 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
 """Functions (name, value) that return the checked value of each quantity."""
 
 Radius: TypeAlias = Annotated[float, Parameter(Quantity.RADIUS, "visible radius around the skeleton")]
-Color: TypeAlias = Annotated[
-    Vector, Parameter(Quantity.COLOR, "red, green and blue from 0 to 1, or the name of a colour")
-]
+if TYPE_CHECKING:
+
+    class Color:
+        """For type checkers: a field that takes any colour and holds numbers from 0 to 1."""
+
+        def __get__(self, instance: object, owner: Any) -> Vector: ...
+
+        def __set__(self, instance: object, value: ColorLike) -> None: ...
+
+else:
+    Color = Annotated[
+        Vector, Parameter(Quantity.COLOR, "red, green and blue from 0 to 1, or the name of a colour")
+    ]
 
 
 _PARAMETERS: dict[type, dict[str, Parameter]] = {}

@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import product
-from typing import Annotated, ClassVar, cast
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from blobtree.nodes.values import OPTIONAL
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
 
-DEFAULT_COLOR: Vector = (0.8, 0.8, 0.8)
+DEFAULT_COLOR: Any = (0.8, 0.8, 0.8)
 
 SHORTEST_AXIS = 1e-12
 """Squared length of an axis, over squared influence radius, below which a segment is a point."""
@@ -100,7 +100,7 @@ class Attributed:
 class Leaf(Attributed, Node):
     """A node without operands: a shape of one colour."""
 
-    color: Vector
+    color: Color
 
 
 class Primitive(ProgramPrimitive, Profile, Leaf):

@@ -44,6 +44,6 @@ def test_what_is_no_colour(wrong: Any) -> None:
 
 
 def test_a_named_colour_survives_a_file() -> None:
-    ball = Point((0, 0, 0), radius=1.0, color="tomato")  # type: ignore[arg-type]
+    ball = Point((0, 0, 0), radius=1.0, color="tomato")
     assert from_json(to_json(ball)) == ball
     np.testing.assert_allclose(ball.colors([0, 0, 0]), (1, 99 / 255, 71 / 255), atol=1e-6)

@@ -214,7 +214,7 @@ def test_a_slice_plots_in_one_call(tmp_path: Any) -> None:
 
 @pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp"])
 def test_a_mesh_is_saved(suffix: str, tmp_path: Path) -> None:
-    mesh = polygonize(Point((0, 0, 0), radius=1.0, color="red"), resolution=8)  # type: ignore[arg-type]
+    mesh = polygonize(Point((0, 0, 0), radius=1.0, color="red"), resolution=8)
     path = tmp_path / f"ball.{suffix}"
     mesh.save(path)
     loaded: Any = pv.read(path)
@@ -238,7 +238,7 @@ def test_a_mesh_that_cannot_be_saved(tmp_path: Path) -> None:
 
 
 def test_a_tree_is_plotted_in_its_colours() -> None:
-    ball = Point((0, 0, 0), radius=1.0, color="red")  # type: ignore[arg-type]
+    ball = Point((0, 0, 0), radius=1.0, color="red")
     choices: list[tuple[dict[str, Any], int]] = [({}, 0), ({"color": "blue"}, 2)]
     for options, channel in choices:
         shown = {"off_screen": True, "window_size": (60, 40), "return_img": True, "background": "black"}

@@ -109,6 +109,13 @@ def test_packed_record() -> None:
     assert record[3::4].tolist() == [[1, 1, 1, 1]] * 3
 
 
+@pytest.mark.parametrize("single", [0.25, np.float32(0.25), np.array(0.25)])
+@pytest.mark.parametrize("count", [0, 3])
+def test_one_radius_and_one_opacity_stand_for_all(single: Any, count: int) -> None:
+    decals = some(count, radii=single, opacities=single)
+    assert decals.radii.tolist() == decals.opacities.tolist() == [0.25] * count
+
+
 def test_ranks_order_layers_first_and_interactions_in_them() -> None:
     layers, kinds = np.repeat([-LAYER_LIMIT, -1, 0, LAYER_LIMIT - 1], 3), np.tile(list(Interaction), 4)
     decals = some(12, layers=layers, interactions=kinds, spill=np.ones(12, bool))
@@ -139,7 +146,10 @@ def test_tints_are_packed_as_linear_light() -> None:
         ("radii", [1.0, np.nan], "finite"),
         ("radii", [1e-20, 1.0], "got 1e-20"),
         ("radii", [1.0, 1e20], "got 1e[+]20"),
-        ("radii", 1.0, "shape"),
+        ("radii", [1.0], "shape"),
+        ("radii", 0.0, "in row 0"),
+        ("radii", "nonsense", "expected numbers"),
+        ("opacities", 1.5, "from 0 to 1"),
         ("images", [0, -2], "got -2 in row 1"),
         ("images", [0, 2**24], "row 1"),
         ("images", [0.5, 1.0], "whole numbers"),
