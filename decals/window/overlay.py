@@ -136,7 +136,7 @@ class Overlay:
         width, height = self._renderer.GetSize()
         lines = KEYS.help_lines()
         fitting = (height - HELP_BORDER) / (LINE_HEIGHT * MIN_HELP_SIZE)
-        pages = min(max(math.ceil(len(lines) / max(fitting - 1.0, 1.0)), 1), MAX_HELP_PAGES)
+        pages: int = min(max(math.ceil(len(lines) / max(fitting - 1.0, 1.0)), 1), MAX_HELP_PAGES)
         self._help.SetVisibility(page > 0)
         if page > 0:
             count = math.ceil(len(lines) / pages)

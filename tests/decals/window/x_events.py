@@ -7,6 +7,7 @@ loop, its interactor, ours. DISPLAY names the display; it should have no window 
 import ctypes
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -97,11 +98,14 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
         user.move(at)
         user.key("m")
 
+    def shows_page(page: int) -> bool:
+        return bool(actions.help_page == page)
+
     place = window.plotter.iren.interactor.GetEventPosition
     yield "point", lambda: user.move(at), lambda: tuple(place()) == at
     yield "help", lambda: user.key("h"), lambda: window.overlay.help_visible
-    for page in range(actions.help_pages - 1):
-        yield "next page", lambda: user.key("h"), lambda page=page: actions.help_page == page + 2
+    for page in range(2, actions.help_pages + 1):
+        yield "next page", lambda: user.key("h"), partial(shows_page, page)
     yield "no help", lambda: user.key("F1"), lambda: not window.overlay.help_visible
     yield "click", lambda: user.click(at), lambda: actions.state.selection == (number,)
     yield "one more", lambda: user.click(there, "Shift_L"), lambda: actions.state.selection == (number, other)
