@@ -1,11 +1,13 @@
 """Compile all kernels for processors ahead of time into `blobtree/compiled`, from where the wheel takes them.
 
-    python .ci/compile_kernels.py
+    python .ci/compile_kernels.py [--cuda]
 
 They fit the architecture and the system of this machine. Run it right before the wheel is built: kernels
-whose sources have changed since are carried along, but never loaded.
+whose sources have changed since are carried along, but never loaded. ``--cuda`` adds PTX for graphics cards,
+which takes no card, but minutes.
 """
 
+import argparse
 import importlib
 import os
 import shutil
@@ -15,7 +17,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-KEPT = (".o", ".meta")
+KEPT = (".o", ".ptx", ".meta")
+
+PTX_ARCHITECTURE = 75
+"""Oldest CUDA architecture that Warp supports; drivers make code for later ones from its PTX."""
 
 
 def kernel_files() -> list[str]:
@@ -28,12 +33,13 @@ def kernel_files() -> list[str]:
     ]
 
 
-def compile_all(cache: Path) -> None:
+def compile_all(cache: Path, *, cuda: bool) -> None:
     """Compile every kernel into an empty kernel cache."""
     os.environ["WARP_CACHE_PATH"] = str(cache)
     import warp as wp
 
     from blobtree.device import start_warp
+    from blobtree.kernels import CUDA_BLOCK
     from blobtree.tape.instruction_set import LIBRARY
 
     start_warp()
@@ -47,13 +53,23 @@ def compile_all(cache: Path) -> None:
     modules = list({kernel.module.name: kernel.module for kernel in (*kernels, *instances)}.values())
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         list(threads.map(lambda module: wp.load_module(module, device="cpu"), modules))
+    for module in modules if cuda else ():
+        folder = (
+            cache
+            / wp.config.version
+            / module.get_module_identifier(module.options["block_dim"] or CUDA_BLOCK)
+        )
+        wp.compile_aot_module(module, arch=[PTX_ARCHITECTURE], module_dir=folder, use_ptx=True)
 
 
 def main() -> None:
     """Replace `blobtree/compiled` by the kernels of the present sources."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cuda", action="store_true", help="add PTX for graphics cards")
+    cuda = parser.parse_args().cuda
     target = ROOT / "blobtree" / "compiled"
     with tempfile.TemporaryDirectory() as folder:
-        compile_all(Path(folder))
+        compile_all(Path(folder), cuda=cuda)
         shutil.rmtree(target, ignore_errors=True)
         shutil.copytree(folder, target, ignore=_left_out)
     files = [file for file in target.rglob("*") if file.is_file()]

@@ -377,6 +377,25 @@ SERVING = ("trame_pyvista", "ipywidgets", "nest_asyncio2")
 """Packages that pyvista needs for this backend; the extra ``browser`` installs them."""
 
 
+STILL = {"screenshot", "return_img", "interactive", "auto_close"}
+"""Options of ``Plotter.show`` for pictures, which have all samples at once."""
+
+REFINE_MILLISECONDS = 100
+"""Time after the first picture of a window until the one with all samples."""
+
+
+def _show_one_sample_first(plotter: Any) -> None:
+    """Draw the first picture of a window with one sample a pixel, so that it appears sooner."""
+    subplot: SubplotRenderer = plotter.decals.subplot
+    samples, subplot.samples = subplot.samples, 1
+
+    def refine(_step: int) -> None:
+        subplot.samples = samples
+        plotter.render()
+
+    plotter.add_timer_event(max_steps=1, duration=REFINE_MILLISECONDS, callback=refine)
+
+
 def show(scene: Scene | SceneObject | Model | Sequence[SceneObject | Model], **options: Any) -> Any:
     """Show a scene in a window, or interactively in a notebook; `decals.edit` edits one.
 
@@ -409,6 +428,8 @@ def show(scene: Scene | SceneObject | Model | Sequence[SceneObject | Model], **o
     plotter = pv.Plotter()
     component: DecalsComponent = plotter.decals
     component.add_scene(shown, camera=True)
+    if not plotter.off_screen and not plotter.notebook and not STILL & options.keys():
+        _show_one_sample_first(plotter)
     if plotter.notebook and "jupyter_backend" not in options:
         options["jupyter_backend"] = REMOTE if all(map(find_spec, SERVING)) else "static"
     return plotter.show(**options)

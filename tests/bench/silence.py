@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +28,10 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 LEFT_OUT = ("edit", "--install-completion", "dragon", "--all", "--define", "--trust", "bench")
 """Words of commands that need a window, change the home folder, download models, or repeat others."""
 
-RUN_COMMAND = "import sys; from decals.apps.cli import main; sys.argv[1:] = {words!r}; main()"
+COMPILE = "import pathlib, blobtree.kernels; blobtree.kernels.SHIPPED = pathlib.Path('nowhere')\n"
+"""Start of a process that takes no kernels compiled ahead of time."""
+
+COMMAND = "import sys; from decals.apps.cli import main; sys.argv[1:] = {words!r}; main()"
 OFF_SCREEN = "import pyvista; pyvista.OFF_SCREEN = True\n"
 INPUTS = """
 import decals, pyvista
@@ -142,7 +145,7 @@ def cold_environment(folder: Path) -> dict[str, str]:
     }
 
 
-def cold_runs(start: str, only: Sequence[str] = ()) -> Iterable[tuple[str, Run]]:
+def cold_runs(start: str, only: Sequence[str] = ()) -> Iterator[tuple[str, Run]]:
     """Run all scripts and commands whose names contain one of some words, and yield each result.
 
     Parameters
@@ -154,7 +157,7 @@ def cold_runs(start: str, only: Sequence[str] = ()) -> Iterable[tuple[str, Run]]
     """
     scripts = {name: OFF_SCREEN + script for name, script in page_scripts().items()}
     for line in page_commands():
-        scripts[line] = RUN_COMMAND.format(words=shlex.split(line)[1:])
+        scripts[line] = COMMAND.format(words=shlex.split(line)[1:])
     with tempfile.TemporaryDirectory() as name:
         inputs = Path(name)
         made = watch(
@@ -173,8 +176,6 @@ def cold_runs(start: str, only: Sequence[str] = ()) -> Iterable[tuple[str, Run]]
 
 def main() -> None:
     """Print a table of the longest silences."""
-    from tests.bench.start import COMPILE
-
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--compile", action="store_true", help="do not take kernels compiled ahead of time")
     parser.add_argument("--only", nargs="*", default=(), help="words in names of pages and commands")

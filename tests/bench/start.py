@@ -6,6 +6,7 @@ has them. With ``--compile`` it compiles all of them, as in a checkout.
 
     python -m tests.bench.start
     python -m tests.bench.start --compile --json
+    python -m tests.bench.start --silence   # and the longest time in which the documentation's code is silent
 """
 
 import argparse
@@ -21,12 +22,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.bench.silence import COMMAND, COMPILE, cold_environment, cold_runs
+
 ROOT = Path(__file__).resolve().parents[2]
 
-COMPILE = "import pathlib, blobtree.kernels; blobtree.kernels.SHIPPED = pathlib.Path('nowhere')\n"
-"""Start of a process that takes no kernels compiled ahead of time."""
-
-COMMAND = "import sys; from decals.apps.cli import main; sys.argv[1:] = {words!r}; main()"
 RENDER = ["render", "knot", "--decals", "200", "--output", "knot.png"]
 MODEL = """
 from blobtree import Point, Segment, polygonize
@@ -89,12 +88,7 @@ def measure(*, compiled: bool) -> dict[str, Cost]:
     costs = {}
     for name, script in (FIRST_RESULTS | {"readme": first_script()}).items():
         with tempfile.TemporaryDirectory() as folder:
-            environment = dict(os.environ) | {
-                "PYTHONPATH": os.pathsep.join(sys.path),
-                "WARP_CACHE_PATH": f"{folder}/kernels",
-                "MESA_SHADER_CACHE_DIR": f"{folder}/shaders",
-                "__GL_SHADER_DISK_CACHE_PATH": f"{folder}/shaders",
-            }
+            environment = cold_environment(Path(folder))
             costs[f"{name}_cold"] = run(start + script, Path(folder), environment)
             costs[f"{name}_warm"] = run(start + script, Path(folder), environment)
     with tempfile.TemporaryDirectory() as folder:
@@ -117,8 +111,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--compile", action="store_true", help="do not take kernels compiled ahead of time")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.add_argument("--silence", action="store_true", help="measure the longest silence too; minutes")
     arguments = parser.parse_args()
     costs = measure(compiled=arguments.compile)
+    if arguments.silence:
+        silences = [run.silence for _, run in cold_runs(COMPILE if arguments.compile else "")]
+        costs["silence"] = Cost(max(silences), 0.0)
     if arguments.json:
         figures = {f"{name}_s": round(cost.wall, 3) for name, cost in costs.items()}
         figures |= {f"{name}_processor_s": round(cost.processor, 3) for name, cost in costs.items()}

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.bench.start import COMPILE, FIRST_RESULTS, IMPORTS, TIMED, first_script, run
+from tests.bench.silence import COMPILE, page_commands, page_scripts, watch
+from tests.bench.start import FIRST_RESULTS, IMPORTS, TIMED, first_script, run
 
 ENVIRONMENT = dict(os.environ) | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
@@ -36,3 +37,23 @@ def test_the_first_script_is_that_of_the_readme() -> None:
     assert "decals.cover(" in script
     for name, text in (FIRST_RESULTS | {"readme": script}).items():
         compile(COMPILE + text, name, "exec")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such terminals")
+def test_the_longest_silence_of_a_process_is_found(tmp_path: Path) -> None:
+    script = """
+import sys, time
+print("begun", file=sys.stderr, flush=True)
+time.sleep(2.0)
+print("done" if sys.stdout.isatty() else "no terminal")
+"""
+    ran = watch(script, tmp_path, ENVIRONMENT)
+    assert (ran.code, ran.output.split()) == (0, ["begun", "done"])
+    assert ran.before in ("begun", "")  # a loaded machine may take longer to start Python
+    assert 1.9 < ran.silence < ran.seconds
+
+
+def test_scripts_and_commands_of_the_pages_are_found() -> None:
+    assert {"README.md", "tour.md", "baking.md"} <= set(page_scripts())
+    assert "implicit-decals render knot --decals 800 -o knot.png" in page_commands()
+    assert not any("edit" in line for line in page_commands())

@@ -1,5 +1,6 @@
 """Scenes in notebooks and viewers, and how pyvista finds us."""
 
+import os
 import subprocess
 import sys
 import tomllib
@@ -17,6 +18,9 @@ from decals.errors import NoGraphics
 from decals.vtk import component as viewer
 from tests.decals.vtk.conftest import Factory
 from tests.decals.vtk.scenes import both
+from tests.display import display
+
+__all__ = ["display"]
 
 ROOT = Path(__file__).parents[3]
 
@@ -93,3 +97,32 @@ def test_importing_decals_brings_no_vtk() -> None:
     code = "import sys, decals; print(sorted({'vtkmodules', 'pyvista', 'moderngl'} & sys.modules.keys()))"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
+
+
+REFINED = """
+import os
+import decals
+from decals.vtk.subplot import SubplotRenderer
+from tests.decals.vtk.scenes import both
+
+drawn = []
+draw = SubplotRenderer._draw
+
+def record(self, scene):
+    draw(self, scene)
+    if not drawn or drawn[-1] != self.samples:
+        drawn.append(self.samples)
+    if drawn == [1, 2]:
+        print("one sample, then all", flush=True)
+        os._exit(0)
+
+SubplotRenderer._draw = record
+decals.show(both(), window_size=(80, 60))
+"""
+
+
+def test_a_window_shows_one_sample_first(display: str) -> None:
+    environment = os.environ | {"DISPLAY": display, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", REFINED]
+    ran = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert ran.stdout == "one sample, then all\n", ran.stderr
