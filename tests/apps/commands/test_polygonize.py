@@ -80,6 +80,7 @@ def test_an_interrupted_polygonize_leaves_no_file(
     if stage == "writing":
         monkeypatch.setattr(pv.PolyData, "save", save)
     else:
+        monkeypatch.setenv("TTY_INTERACTIVE", "1")  # as in a terminal
         monkeypatch.setattr("rich.progress.Progress.update", report)
     before = sorted(folder.iterdir())
     assert run(["polygonize", "spheres", "-o", "half.ply"]) == 130
