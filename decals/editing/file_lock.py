@@ -23,7 +23,7 @@ class FileLock:
 
     @classmethod
     def acquire(cls, path: Path) -> Self | None:
-        """Return the lock of a path, or None if somebody holds it.
+        """Return the lock of a path, or None if another window holds it.
 
         Raises
         ------
@@ -63,7 +63,7 @@ class FileLock:
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock an open file and return True, or return False if somebody else has locked it."""
+    """Lock an open file and return True, or return False if another window has locked it."""
     try:
         if sys.platform == "win32":
             import msvcrt
