@@ -93,6 +93,11 @@ def _transform(rng: Rng, operand: Operand) -> Node:
     return operand(rng).rotate((1, 2, 3), 40).scale(triple(rng.uniform(0.6, 1.5, 3)))
 
 
+def _gradient_blend(rng: Rng, operand: Operand) -> Node:
+    start, full = float(rng.uniform(0.0, 40.0)), float(rng.uniform(60.0, 180.0))
+    return blobtree.GradientBlend(operand(rng), operand(rng), start_angle=start, full_angle=full)
+
+
 def _curve_warp(rng: Rng, operand: Operand) -> Node:
     source = rng.uniform(-0.6, 0.6, (3, 3))
     return operand(rng).curve_warp(source, source + rng.uniform(-0.1, 0.1, (3, 3)), 1.0)
@@ -105,6 +110,7 @@ SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "blend_graph": _graph,
     "volume": _volume,
     "curve_warp": _curve_warp,
+    "gradient_blend": _gradient_blend,
 }
 """Makers of classes whose parameters depend on each other."""
 

@@ -292,6 +292,8 @@ class Operator:
     """True if the second operand's colour shows where F depends on it; else F has the first one's."""
     signed: bool = False
     """Operands below 0 act as they are; those of other operators are raised to 0."""
+    gradients: bool = False
+    """`partials` also takes ∇a and ∇b, and `slope` a bound on their turning; see `gradient_blends`."""
     digest: str = ""
     """Digest of the sources of a custom operator."""
 

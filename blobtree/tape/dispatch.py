@@ -141,6 +141,53 @@ def slope(
 
 
 @unrolled
+def reads_gradients(operator: wp.int32) -> wp.bool:
+    """Return `Operator.gradients`."""
+    result = bool(False)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = bool(wp.static(OPERATORS[code].gradients))
+    return result
+
+
+@unrolled
+def directed_partials(
+    operator: wp.int32,
+    a: wp.float32,
+    b: wp.float32,
+    parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    direction_a: wp.vec3,
+    direction_b: wp.vec3,
+) -> wp.vec3:
+    """Do the same as `partials`, also for operators that read gradients."""
+    result = wp.vec3()
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = wp.static(OPERATORS[code].partials)(a, b, parameter, tape, direction_a, direction_b)
+    return result
+
+
+@unrolled
+def directed_slope(
+    operator: wp.int32,
+    slope_a: wp.float32,
+    slope_b: wp.float32,
+    max_a: wp.float32,
+    max_b: wp.float32,
+    parameter: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    turn: wp.float32,
+) -> wp.float32:
+    """Do the same as `slope`, also for operators that read gradients."""
+    result = float(0.0)
+    for code in range(wp.static(len(OPERATORS))):
+        if operator == code:
+            result = wp.static(OPERATORS[code].slope)(slope_a, slope_b, max_a, max_b, parameter, tape, turn)
+    return result
+
+
+@unrolled
 def warp_forward(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """Return T(q) of a warp, whose parameters begin at tape[at]."""
     result = wp.vec3()

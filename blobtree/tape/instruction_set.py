@@ -78,6 +78,11 @@ class InstructionSet:
         return (*self.skeletons, *self.operators, *self.warps, *self.fields, *self.falloffs)
 
     @Lazy
+    def reads_gradients(self) -> bool:
+        """Return True if an operator reads the gradients of its operands; evaluation is then another."""
+        return any(operator.gradients for operator in self.operators)
+
+    @Lazy
     def digest(self) -> str:
         """Return a digest of all rows, the same in every process."""
         names = [f"{row.name}:{row.digest}" for row in self.rows]
@@ -107,7 +112,7 @@ class InstructionSet:
         """Return `function` for this instruction set; itself if it reads no table."""
         if function not in self._functions and (primal := differentiated(function)):
             source_function, varying = primal
-            instance = self._instantiate(source_function)
+            instance = self._instantiate(self._exchanged(source_function))
             self._functions[function] = (
                 function if instance is source_function else directional_derivative(instance, varying)
             )
@@ -134,8 +139,16 @@ class InstructionSet:
         if name in _TABLES and value is _TABLES[name]:
             return getattr(self, name.lower())
         if isinstance(value, wp.Function) and not value.is_builtin():
-            return self._instantiate(value)
+            return self._instantiate(self._exchanged(value))
         return value
+
+    def _exchanged(self, function: wp.Function) -> wp.Function:
+        """Return the evaluation that knows gradients for one that does not, if an operator reads them."""
+        if not self.reads_gradients:
+            return function
+        from blobtree.tape.directed import DIRECTED_EVALUATIONS  # its derivatives are made at the first use
+
+        return DIRECTED_EVALUATIONS.get(function, function)
 
     def _module_of(self, function: FunctionType) -> str:
         name = re.sub(r"\W+", "_", function.__qualname__)
@@ -178,7 +191,11 @@ def instruction_set_for(
     needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps), tuple(fields), tuple(falloffs))
     rows = set(needed.rows)
     with _LOCK:
-        fitting = [existing for existing in _INSTRUCTION_SETS if rows.issubset(existing.rows)]
+        fitting = [
+            existing
+            for existing in _INSTRUCTION_SETS
+            if rows.issubset(existing.rows) and existing.reads_gradients == needed.reads_gradients
+        ]
         if fitting:
             return min(fitting, key=lambda existing: len(existing.rows))
         custom = rows.difference(LIBRARY.rows)

@@ -105,6 +105,32 @@ def masked(a: Floats, b: Floats) -> Floats:
     return shown
 
 
+def opening(towards_a: Floats, towards_b: Floats, start_angle: float, full_angle: float) -> Floats:
+    """tan(π/4 − θ) from gradients (n, 3): the angle by its cosine, faded where one is far shorter."""
+    lengths = np.linalg.norm(towards_a, axis=1), np.linalg.norm(towards_b, axis=1)
+    shorter, longer = np.minimum(*lengths), np.maximum(*lengths)
+    product = np.maximum(lengths[0] * lengths[1], 1e-200)
+    degrees = np.degrees(np.arccos(np.clip((towards_a * towards_b).sum(axis=1) / product, -1.0, 1.0)))
+    theta = 0.25 * np.pi * (1.0 - smoothstep((degrees - start_angle) / (full_angle - start_angle)))
+    faded: Floats = smoothstep(32.0 * shorter / np.maximum(longer, 1e-100)) * np.tan(0.25 * np.pi - theta)
+    return faded
+
+
+def smoothstep(t: Floats) -> Floats:
+    x = np.clip(t, 0.0, 1.0)
+    return x**2 * (3.0 - 2.0 * x)
+
+
+def opened(a: Floats, b: Floats, opening: Floats) -> Floats:
+    """The larger operand and a parabola, which ends at the rays b/a = (1 − o)/(1 + o), inside earlier."""
+    k = opening * (a + b)
+    for f in (a, b):
+        k = k * np.where(f > 0.5, np.maximum(1.0 - (2.0 * f - 1.0) ** 2, 0.0) ** 2 * (f < 1.0), 1.0)
+    depth = np.maximum(1.0 - np.abs(a - b) / np.maximum(k, 1e-300), 0.0)
+    larger: Floats = np.maximum(a, b) + 0.25 * k * depth**2
+    return larger
+
+
 VALUES: dict[str, Callable[..., Floats]] = {
     "superelliptic": superelliptic,
     "r_union": r_union,
@@ -115,12 +141,13 @@ VALUES: dict[str, Callable[..., Floats]] = {
     "clean_union": clean_union,
     "controllable": controllable,
     "masked": masked,
+    "gradient_blend": opened,
 }
 """Blends by the names of their operators."""
 
 
 def partials(
-    name: str, a: Floats, b: Floats, step: float = 1e-6, **parameters: float
+    name: str, a: Floats, b: Floats, step: float = 1e-6, **parameters: Any
 ) -> tuple[Floats, Floats, Floats]:
     """Partial derivatives by a and b, and the largest change of them within a step: large near kinks."""
     value = VALUES[name]
@@ -131,7 +158,7 @@ def partials(
     return 0.5 * (a0 + a1), 0.5 * (b0 + b1), np.maximum(np.abs(a1 - a0), np.abs(b1 - b0))
 
 
-def kink(name: str, a: Floats, b: Floats, reach: float = 2e-3, **parameters: float) -> Floats:
+def kink(name: str, a: Floats, b: Floats, reach: float = 2e-3, **parameters: Any) -> Floats:
     """Infinite where the partial derivatives change little within `reach` of (a, b), and 0 elsewhere."""
     margin = np.full(len(a), np.inf)
     middle = partials(name, a, b, **parameters)[:2]

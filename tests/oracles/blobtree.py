@@ -31,6 +31,7 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    GradientBlend,
     Gyroid,
     HalfSpace,
     Intersection,
@@ -208,8 +209,12 @@ def signed(node: Node, points: ArrayLike) -> Field:
             return reduce(lambda a, b: _choose(a, b, a.value >= b.value), [evaluate(x, q) for x in operands])
         case Intersection(operands=operands):
             return reduce(lambda a, b: _choose(a, b, a.value <= b.value), [evaluate(x, q) for x in operands])
+        case GradientBlend(operands=(first, second)):
+            return _blended(evaluate(first, q), evaluate(second, q), node, opening=opening_of(node, q))
         case AssociativeCombination() if node.operator.name in blends.VALUES:
-            return reduce(lambda a, b: _blended(a, b, node), [evaluate(x, q) for x in node.operands])
+            values = parameter_values(node)
+            operands = [evaluate(x, q) for x in node.operands]
+            return reduce(lambda a, b: _blended(a, b, node, **values), operands)
         case Macro():
             return evaluate(written_out(node), q)
     raise TypeError(type(node))
@@ -227,6 +232,25 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
     values = value(node, (q + shifts[:, None]).reshape(-1, 3)).reshape(2, 3, -1)  # few calls of many points
     sides: Floats = ((values[0] - values[1]) / (2.0 * step)).T
     return sides
+
+
+def opening_of(node: GradientBlend, q: Floats) -> Floats:
+    """The openings (n,) of a gradient blend."""
+    towards = [direction(operand, q) for operand in node.operands]
+    return blends.opening(*towards, node.start_angle, node.full_angle)
+
+
+def direction(node: Node, q: Floats) -> Floats:
+    """The gradient (n, 3), in which the openings of gradient blends, and of sums of them, are held fixed."""
+    match node:
+        case GradientBlend(operands=(first, second)):
+            opening = opening_of(node, q)
+            a, b = value(first, q), value(second, q)
+            by_a, by_b, _ = blends.partials("gradient_blend", a, b, opening=opening)
+            return by_a[:, None] * direction(first, q) + by_b[:, None] * direction(second, q)
+        case Sum(operands=operands):
+            return np.sum([direction(operand, q) for operand in operands], axis=0)
+    return gradient(node, q, step=1e-4)
 
 
 def grown(node: Node, distance: float) -> Node:
@@ -466,9 +490,8 @@ def _custom(a: Field, b: Field, node: CustomCombination) -> Field:
     return Field(value, _mixed(a, b, 1.0 - share, share), margin)
 
 
-def _blended(a: Field, b: Field, node: AssociativeCombination) -> Field:
+def _blended(a: Field, b: Field, node: AssociativeCombination, **values: Any) -> Field:
     """A blend of the library; its partial derivatives are differences."""
-    values = parameter_values(node)
     name = node.operator.name
     value = blends.VALUES[name](a.value, b.value, **values)
     by_a, by_b, _ = blends.partials(name, a.value, b.value, **values)
