@@ -46,9 +46,7 @@ def angle_between(u: wp.vec3, v: wp.vec3) -> wp.float32:
 
 
 @wp.func
-def opening(
-    direction_a: wp.vec3, direction_b: wp.vec3, first: wp.float32, last: wp.float32
-) -> wp.float32:
+def opening(direction_a: wp.vec3, direction_b: wp.vec3, first: wp.float32, last: wp.float32) -> wp.float32:
     """Return the opening o = tan(π/4 − θ): 0 for a union, 1 for a full blend.
 
     It is tan(π w/4), where w rises by a cubic from 0 at the angle `first` between the directions to 1 at

@@ -251,9 +251,7 @@ class GradientBlend(AssociativeCombination):
 
     start_angle: Annotated[
         float,
-        Parameter(
-            Quantity.ANGLE, "angle between gradients up to which it is the union", low=0.0, high=179.0
-        ),
+        Parameter(Quantity.ANGLE, "angle between gradients up to which it is the union", low=0.0, high=179.0),
     ] = field(kw_only=True)
     full_angle: Annotated[
         float,

@@ -13,6 +13,9 @@ class Expression(NamedTuple):
     type: str
 
 
+PAIR = "mat2x4"
+"""GLSL type of a vector of eight floats: it has no such vector, but two of four."""
+
 _TYPES: dict[object, str] = {
     float: "float",
     int: "int",
@@ -27,6 +30,7 @@ _TYPES: dict[object, str] = {
     wp.vec2i: "ivec2",
     wp.vec3i: "ivec3",
     wp.vec4i: "ivec4",
+    wp.types.vector(length=8, dtype=wp.float32): PAIR,
 }
 _ARRAYS: dict[object, str] = {wp.vec4: "sampler2D", wp.int32: "isampler2D", wp.vec4i: "ivec4_sampler"}
 

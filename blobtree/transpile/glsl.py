@@ -17,7 +17,15 @@ from typing import Any, get_args, get_origin
 import warp as wp
 
 from blobtree.errors import UntranslatableFunction
-from blobtree.transpile.builtins import BUILTINS, CASTS, HELPERS, RESERVED_WORDS, Expression, type_name
+from blobtree.transpile.builtins import (
+    BUILTINS,
+    CASTS,
+    HELPERS,
+    PAIR,
+    RESERVED_WORDS,
+    Expression,
+    type_name,
+)
 from blobtree.transpile.specialize import parameter_count
 
 TEXTURE_WIDTH_BITS = 12
@@ -33,6 +41,7 @@ _COMPONENTS = {
     "ivec2": "int",
     "ivec3": "int",
     "ivec4": "int",
+    PAIR: "float",
 }
 _SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x"), "ivec4_sampler": ("ivec4", "")}
 _RESULT = "returned_"
@@ -117,15 +126,20 @@ def translate_choice(chooser: Any, choices: Mapping[int, Any]) -> str:
     translator = _Translator(chooser)
     signature = translator.signature()
     selector, *arguments = (spell(name) for name in translator.types)
+    several = len(translator.returned) > 1
+    results = [f"{_RESULT}{i}" for i in range(len(translator.returned))] if several else []
     calls = {
-        code: f"{choice.key}({', '.join(arguments[: parameter_count(choice)])})"
+        code: f"{choice.key}({', '.join([*arguments[: parameter_count(choice)], *results])})"
         for code, choice in choices.items()
     }
+    form = "{}; return;" if several else "return {};"
     last = list(calls)[-1]
     tests = [
-        f"    if ({selector} == {code}) {{ return {call}; }}" for code, call in calls.items() if code != last
+        f"    if ({selector} == {code}) {{ {form.format(call)} }}"
+        for code, call in calls.items()
+        if code != last
     ]
-    return "\n".join([signature + " {", *tests, f"    return {calls[last]};", "}", ""])
+    return "\n".join([signature + " {", *tests, f"    {form.format(calls[last])}", "}", ""])
 
 
 def _collect(function: wp.Function, translated: dict[str, str], provided: frozenset[str]) -> None:
@@ -420,6 +434,11 @@ class _Translator:
             mask = (1 << TEXTURE_WIDTH_BITS) - 1
             texel = f"ivec2({index.code} & {mask}, {index.code} >> {TEXTURE_WIDTH_BITS})"
             return Expression(f"texelFetch({value.code}, {texel}, 0){swizzle}", element_type)
+        if value.type == PAIR:
+            if not index.code.isdigit():
+                raise self.refusal(node, f"{ast.unparse(node)}: expected a number as the index")
+            half, component = divmod(int(index.code), 4)
+            return Expression(f"{value.code}[{half}][{component}]", "float")
         if value.type in _COMPONENTS:
             return Expression(f"{value.code}[{index.code}]", _COMPONENTS[value.type])
         raise self.refusal(node, f"{value.type} has no elements")

@@ -4,6 +4,7 @@ An unused case of a shader costs as much as a used one on some drivers, and a co
 milliseconds: so one program per set of kinds, none per tree.
 """
 
+import inspect
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,15 +15,27 @@ import numpy as np
 
 from blobtree import Node
 from blobtree._typing import Float64Array
+from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.directed import DIRECTED_BOUND, DIRECTED_COLOR
+from blobtree.tape.directed_along import (
+    combine_along,
+    leaf_along,
+    profiled_leaf_along,
+    pullback_affine_along,
+    pullback_warp_along,
+)
 from blobtree.tape.dispatch import (
     direct_bounds,
     direct_value_gradient,
+    directed_partials,
+    directed_slope,
     falloff_numbers,
     falloff_slope,
     falloff_value,
     is_monotone,
     paints,
     partials,
+    reads_gradients,
     slope,
     warp_forward,
     warp_pullback,
@@ -34,6 +47,7 @@ from blobtree.tape.interpreter import field_bound, field_gradient
 from blobtree.tape.tape import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
 from blobtree.tracing.ray_kernels import trace_ray
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
+from blobtree.transpile.derivative import directional_derivative
 from blobtree.transpile.glsl import translate_choice, translate_library
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
@@ -56,6 +70,22 @@ _EVALUATORS: dict[str, tuple[Evaluator, str]] = {
 }
 """The evaluators that a ray needs, and their types in GLSL."""
 
+_DIRECTED_EVALUATORS: dict[str, tuple[Evaluator, str]] = {
+    "directed_bound": (DIRECTED_BOUND, "mat2x4"),
+    "directed_color": (DIRECTED_COLOR, "mat2x4"),
+}
+"""The same for trees with operators that read gradients; ``directed.glsl`` adds the gradient."""
+
+_ALONG: dict[Any, tuple[str, ...]] = {
+    directed_partials: ("a", "b", "direction_a", "direction_b"),
+    warp_forward: ("q",),
+    warp_pullback: ("q", "g"),
+    direct_value_gradient: ("q",),
+    falloff_value: ("distance",),
+    falloff_slope: ("distance",),
+}
+"""Choices by a code of which their gradient needs derivatives, and the parameters that vary."""
+
 
 @dataclass(frozen=True)
 class Kinds:
@@ -71,6 +101,11 @@ class Kinds:
     instruction_set: InstructionSet = BUILT_IN
     falloffs: tuple[int, ...] = ()
     """Codes of the falloffs of primitives with a profile."""
+
+    @property
+    def directed(self) -> bool:
+        """True if an operator reads the gradients of its operands."""
+        return self.instruction_set.reads_gradients
 
     @classmethod
     def of(cls, tape: Tape) -> "Kinds":
@@ -93,8 +128,10 @@ def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) ->
     """``trace.frag`` or ``trace.comp`` with the cases of `kinds`."""
     evaluators = [
         _interpreter(name, evaluator, glsl_type, kinds)
-        for name, (evaluator, glsl_type) in _EVALUATORS.items()
+        for name, (evaluator, glsl_type) in _evaluators(kinds).items()
     ]
+    if kinds.directed:
+        evaluators += [_interpreter_along(kinds), compose("directed.glsl", version=None)]
     slots: dict[str, str | Source] = {
         "library": _library(kinds),
         "dispatch": _dispatch(kinds),
@@ -105,9 +142,13 @@ def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) ->
     return compose("trace.frag", slots=slots)
 
 
+def _evaluators(kinds: Kinds) -> dict[str, tuple[Evaluator, str]]:
+    return _DIRECTED_EVALUATORS if kinds.directed else _EVALUATORS
+
+
 def _library(kinds: Kinds) -> str:
     """Every typed function that the shader calls, from the sources that Warp runs."""
-    evaluators = [evaluator for evaluator, _ in _EVALUATORS.values()]
+    evaluators = [evaluator for evaluator, _ in _evaluators(kinds).values()]
     skeletons = [kinds.instruction_set.skeletons[code] for code in kinds.skeletons]
     functions = [
         *(f for skeleton in skeletons for f in (skeleton.closest, skeleton.min_influence)),
@@ -120,12 +161,24 @@ def _library(kinds: Kinds) -> str:
         *(evaluator.pullback_warp for evaluator in evaluators if kinds.warps),
         *(evaluator.direct for evaluator in evaluators if kinds.fields),
         *(evaluator.profiled_leaf for evaluator in evaluators if kinds.falloffs),
+        *(_functions_along(kinds, skeletons) if kinds.directed else ()),
         to_local,
         direction_to_local,
         trace_ray,
     ]
-    provided = [*_choices(kinds), is_monotone, paints, falloff_numbers, field_bound, field_gradient]
+    flags = [is_monotone, paints, *([reads_gradients] if kinds.directed else [])]
+    provided = [*_choices(kinds), *flags, falloff_numbers, field_bound, field_gradient]
     return translate_library(functions, provided=provided)
+
+
+def _functions_along(kinds: Kinds, skeletons: list[Skeleton]) -> Iterable[Any]:
+    """Yield the functions of `_interpreter_along`."""
+    yield from (directional_derivative(skeleton.closest, ["q"]) for skeleton in skeletons)
+    yield from (leaf_along, pullback_affine_along, combine_along)
+    if kinds.falloffs:
+        yield profiled_leaf_along
+    if kinds.warps:
+        yield pullback_warp_along
 
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
@@ -134,8 +187,12 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
     fields = kinds.instruction_set.fields
     falloffs = kinds.instruction_set.falloffs
     choices: dict[Any, dict[int, Any]] = {
-        partials: {code: operators[code].partials for code in kinds.operators},
-        slope: {code: operators[code].slope for code in kinds.operators},
+        directed_partials if kinds.directed else partials: {
+            code: operators[code].partials for code in kinds.operators
+        },
+        directed_slope if kinds.directed else slope: {
+            code: operators[code].slope for code in kinds.operators
+        },
         warp_forward: {code: warps[code].forward for code in kinds.warps},
         warp_pullback: {code: warps[code].pullback for code in kinds.warps},
         warp_stretch: {code: warps[code].stretch for code in kinds.warps},
@@ -144,7 +201,27 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
         falloff_value: {code: falloffs[code].value for code in kinds.falloffs},
         falloff_slope: {code: falloffs[code].slope for code in kinds.falloffs},
     }
-    return {chooser: among for chooser, among in choices.items() if among}
+    used = {chooser: among for chooser, among in choices.items() if among}
+    if not kinds.directed:
+        return used
+    derivatives = {
+        directional_derivative(chooser, names): {
+            code: _derivative_like(choice, chooser, names) for code, choice in used[chooser].items()
+        }
+        for chooser, names in _ALONG.items()
+        if chooser in used
+    }
+    return used | derivatives
+
+
+def _derivative_like(choice: Any, chooser: Any, names: tuple[str, ...]) -> Any:
+    """Return the derivative of a choice by the parameters at the places of the chooser's own.
+
+    A choice may have other names, and fewer parameters. It has none for the chooser's code.
+    """
+    places = list(inspect.signature(chooser.func).parameters)[1:]
+    own = dict(zip(places, inspect.signature(choice.func).parameters, strict=False))
+    return directional_derivative(choice, [own[name] for name in names if name in own])
 
 
 def _dispatch(kinds: Kinds) -> str:
@@ -154,6 +231,8 @@ def _dispatch(kinds: Kinds) -> str:
         "is_monotone": [code for code, row in rows.items() if row.monotone],
         "paints": [code for code, row in rows.items() if row.paints],
     }
+    if kinds.directed:
+        flags["reads_gradients"] = [code for code, row in rows.items() if row.gradients]
     choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
     return "\n".join(
         [*choices, *(_flag(name, among, len(rows)) for name, among in flags.items()), _falloff_numbers(kinds)]
@@ -190,7 +269,9 @@ def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) 
             "PULLBACK_AFFINE": evaluator.pullback_affine.key,
             "PULLBACK_WARP": evaluator.pullback_warp.key,
             "COMBINE": evaluator.combine.key,
-            "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)" if evaluator is COLOR else "vec4(0.0)",
+            "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)"
+            if evaluator in (COLOR, DIRECTED_COLOR)
+            else "vec4(0.0)",
         },
         slots={
             "registers": "".join(
@@ -229,6 +310,112 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
         stride = kinds.instruction_set.fields[code].parameters + PREFIX + 1
         yield _DIRECT_RUN.format(code=code + FIELD, kind=code, stride=stride, prefix=PREFIX)
 
+
+def _interpreter_along(kinds: Kinds) -> Source:
+    """Return the loop of ``interpreter.glsl`` for the derivative of (value, direction) along `direction`."""
+    return compose(
+        "interpreter.glsl",
+        version=None,
+        defines={
+            "INTERPRET": "interpret_along",
+            "FIELD": "mat2x4",
+            "PULLBACK_AFFINE": pullback_affine_along.key,
+            "PULLBACK_WARP": pullback_warp_along.key,
+            "COMBINE": combine_along.key,
+        },
+        slots={
+            "registers": "".join(
+                [
+                    *(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
+                    *(
+                        f"vec3 w{i} = vec3(0.0); vec3 v{i} = vec3(0.0);\n"
+                        for i in range(kinds.warp_registers)
+                    ),
+                ]
+            ),
+            "runs": "".join(_run_cases_along(kinds)),
+            "stack": _stack_cases(kinds.registers) if kinds.registers else "",
+            "warps": _warp_cases_along(kinds.warp_registers) if kinds.warps else "",
+        },
+    )
+
+
+def _run_cases_along(kinds: Kinds) -> Iterable[str]:
+    """Return the cases of `_run_cases` for derivatives; `local_direction` is the velocity of the point."""
+    for code in kinds.skeletons:
+        skeleton = kinds.instruction_set.skeletons[code]
+        closest = directional_derivative(skeleton.closest, ["q"]).key
+        yield _RUN_ALONG.format(
+            code=code, stride=skeleton.parameters + 1, closest=closest, leaf=leaf_along.key
+        )
+        if kinds.stretched:
+            field = f"{leaf_along.key}(local, velocity, c, drift)"
+            if kinds.falloffs:
+                profiled = f"{profiled_leaf_along.key}(local, velocity, c, drift, profile)"
+                field = f"profile.z == 0.0 ? {field} : {profiled}"
+            yield _STRETCHED_RUN_ALONG.format(
+                code=code + STRETCHED,
+                stride=skeleton.parameters + PREFIX + 1,
+                prefix=PREFIX,
+                closest=closest,
+                field=field,
+            )
+    for code in kinds.fields:
+        yield _DIRECT_RUN_ALONG.format(
+            code=code + FIELD,
+            kind=code,
+            stride=kinds.instruction_set.fields[code].parameters + PREFIX + 1,
+            prefix=PREFIX,
+            direct=directional_derivative(direct_value_gradient, ["q"]).key,
+        )
+
+
+_RUN_ALONG = """\
+case {code}:
+    for (int i = 0; i < count; i++) {{
+        vec4 c;
+        vec4 drift;
+        {closest}(point, local_direction, tape, at, c, drift);
+        at += {stride};
+        FIELD field = {leaf}(point, local_direction, c, drift);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
+    }}
+    break;
+"""
+
+_STRETCHED_RUN_ALONG = """\
+case {code}:
+    for (int i = 0; i < count; i++) {{
+        int map = at;
+        vec3 local = to_local(point, tape, map);
+        vec3 velocity = direction_to_local(local_direction, tape, map);
+        vec4 profile = tape_texel(tape, map + {prefix} - 1);
+        vec4 c;
+        vec4 drift;
+        {closest}(local, velocity, tape, map + {prefix}, c, drift);
+        at += {stride};
+        FIELD field = {field};
+        field = PULLBACK_AFFINE(field, tape, map);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
+    }}
+    break;
+"""
+
+_DIRECT_RUN_ALONG = """\
+case {code}:
+    for (int i = 0; i < count; i++) {{
+        int map = at;
+        vec3 local = to_local(point, tape, map);
+        vec3 velocity = direction_to_local(local_direction, tape, map);
+        vec4 f;
+        vec4 change_of_f;
+        {direct}({kind}, local, velocity, tape, map + {prefix}, f, change_of_f);
+        at += {stride};
+        FIELD field = PULLBACK_AFFINE(FIELD(f, change_of_f), tape, map);
+        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
+    }}
+    break;
+"""
 
 _RUN = """\
 case {code}:
@@ -326,6 +513,29 @@ case {UNWARP}: {{
     speed = kept.w;
     local_direction = count == 0 ? direction : vec3(0.0);
     accumulator = PULLBACK_WARP(operator_, accumulator, point, tape, at);
+    at += {PREFIX} + int(header.w);
+    break;
+}}
+"""
+
+
+def _warp_cases_along(registers: int) -> str:
+    """Do the same for derivatives: entering keeps the velocity of the point too."""
+    store = " ".join(f"case {i}: w{i} = point; v{i} = local_direction; break;" for i in range(registers))
+    load = " ".join(f"case {i}: point = w{i}; local_direction = v{i}; break;" for i in range(registers))
+    forward = directional_derivative(warp_forward, ["q"]).key
+    return f"""\
+case {WARP}: {{
+    switch (count) {{ {store} }}
+    vec3 local = to_local(point, tape, at);
+    vec3 velocity = direction_to_local(local_direction, tape, at);
+    {forward}(operator_, local, velocity, tape, at + 3, point, local_direction);
+    at += {PREFIX} + int(header.w);
+    break;
+}}
+case {UNWARP}: {{
+    switch (count) {{ {load} }}
+    accumulator = PULLBACK_WARP(operator_, accumulator, point, local_direction, tape, at);
     at += {PREFIX} + int(header.w);
     break;
 }}
