@@ -43,6 +43,9 @@ SETTINGS = 6
 """Number of values of the parameter that are sampled."""
 
 SAMPLES = 150
+LARGEST_JUMP = 1e-3
+"""Change of an operator, relative to its operands, that counts as a jump where gradients hardly turn."""
+
 STEP = 1e-5
 """Step of the operands in finite differences."""
 
@@ -244,6 +247,8 @@ class _Trial:
     parameters: tuple[float, ...]
     steepest: Callable[..., Any]
     precision: Precision = np.float64
+    gradients: tuple[Floats, ...] = ()
+    """The gradients of both operands, if the operator reads them."""
 
     @cached_property
     def function(self) -> Callable[..., Any]:
@@ -251,7 +256,9 @@ class _Trial:
 
     def at(self, a: float, b: float) -> Floats:
         """Return (F, ∂F/∂a, ∂F/∂b)."""
-        arguments = [self.precision(x) for x in (a, b, *self.parameters)]
+        directions = [vector(*gradient, precision=self.precision) for gradient in self.gradients]
+        parameters = map(self.precision, self.parameters)
+        arguments = [self.precision(a), self.precision(b), *directions, *parameters]
         return result_of(self.source, self.function, arguments, self.call(a, b), 3)
 
     def value(self, a: float, b: float) -> float:
@@ -264,7 +271,8 @@ class _Trial:
         return result_of(self.source, self.steepest, arguments, where, 2)
 
     def call(self, *operands: float) -> str:
-        return f"F({', '.join(f'{float(x):.6g}' for x in (*operands, *self.parameters))})"
+        numbers = [f"{float(x):.6g}" for x in operands]
+        return f"F({', '.join([*numbers, *map(_format, (*self.gradients, *self.parameters))])})"
 
     def require(self, holds: bool, reason: str) -> None:
         if not holds:
@@ -287,6 +295,75 @@ def check_operator(source: CustomSource, parameters: tuple[Parameter, ...], clai
             _try_monotone(trial, rng, falls_with_b=claims.like == "difference")
         if claims.order_free:
             _try_order(trial, rng)
+
+
+def check_directed_operator(source: CustomSource, parameters: tuple[Parameter, ...], claims: Claims) -> None:
+    """Raise `InvalidDefinition` if samples contradict a claim about an operator that reads gradients."""
+    rng = np.random.default_rng(SEED)
+    assert isinstance(claims.steepest, CustomSource)
+    envelope = claims.steepest.reference()
+    for setting, gradients in enumerate(_gradient_pairs(rng)):
+        values = tuple(float(trial_value(parameter, rng, setting)) for parameter in parameters)
+        trial = _Trial(source, values, lambda *_operands: (1e30, 1e30), gradients=gradients)
+        operands = _operands(rng)
+        _try_values(trial, operands, claims)
+        _try_partials(trial, operands)
+        _try_tiny_operands(trial)
+        _try_envelope(trial, envelope, operands, rng, falls_with_b=claims.like == "difference")
+        _try_turned(trial, operands, rng)
+
+
+def _gradient_pairs(rng: np.random.Generator) -> list[tuple[Floats, Floats]]:
+    """Return pairs of gradients: equal, opposed, absent, of any lengths."""
+    first, second = rng.normal(size=(2, 3)), rng.normal(size=(2, 3)) * 10.0 ** rng.uniform(-3.0, 1.0, (2, 1))
+    none = np.zeros(3)
+    return [
+        (first[0], second[0]), (first[1], second[1]), (first[0], first[0]), (first[0], -0.5 * first[0]),
+        (none, second[0]), (none, none),
+    ]  # fmt: skip
+
+
+def _try_envelope(
+    trial: _Trial,
+    envelope: Callable[..., Any],
+    operands: Floats,
+    rng: np.random.Generator,
+    *,
+    falls_with_b: bool,
+) -> None:
+    """Check that F lies in its envelope, which is monotone."""
+
+    def bounds(a: float, b: float) -> Floats:
+        arguments = [np.float64(x) for x in (a, b, *trial.parameters)]
+        return result_of(trial.source, envelope, arguments, f"the envelope at ({a:.6g}, {b:.6g})", 2)
+
+    for a, b in operands.tolist():
+        value, (low, high) = trial.value(a, b), bounds(a, b)
+        slack = VALUE_TOLERANCE * (1.0 + abs(value))
+        trial.require(
+            low - slack <= value <= high + slack,
+            f"{trial.call(a, b)} = {value:.6g}, outside its envelope [{low:.6g}, {high:.6g}]",
+        )
+        more = float(rng.uniform(0.0, 1.0))
+        with_b = (a, b - min(more, b)) if falls_with_b else (a, b + more)
+        for pair in ((a + more, b), with_b):
+            trial.require(
+                bool((bounds(*pair) >= [low - slack, high - slack]).all()),
+                f"envelope: it is {_format(bounds(*pair))} at {_format(pair)}, and {_format((low, high))} at "
+                f"{_format((a, b))}; it must be monotone",
+            )
+
+
+def _try_turned(trial: _Trial, operands: Floats, rng: np.random.Generator) -> None:
+    """Check that F does not jump where gradients turn a little."""
+    turned = tuple(g + 1e-7 * np.linalg.norm(g) * rng.normal(size=3) for g in trial.gradients)
+    other = replace(trial, gradients=turned)
+    for a, b in operands[:10].tolist():
+        change = abs(other.value(a, b) - trial.value(a, b))
+        trial.require(
+            change <= LARGEST_JUMP * (1.0 + a + b),
+            f"{trial.call(a, b)} changes by {change:.6g} where gradients turn by 1e-7; it must be continuous",
+        )
 
 
 def _operands(rng: np.random.Generator) -> Floats:

@@ -18,9 +18,10 @@ from typing import Annotated, Any, ClassVar, Literal, cast, get_args
 
 import warp as wp
 
-from blobtree.custom.checks import Claims, check_operator
+from blobtree.custom.checks import Claims, check_directed_operator, check_operator
 from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.formulas.gradient_blends import UNBOUNDED
 from blobtree.formulas.operators import (
     Operator,
     Support,
@@ -33,6 +34,7 @@ from blobtree.formulas.operators import (
 from blobtree.nodes.parameters import Parameter
 from blobtree.nodes.tree import AssociativeCombination
 from blobtree.tape.data_region import TEXEL
+from blobtree.transpile.derivative import directional_derivative
 from blobtree.validation import finite_number
 
 Like = Literal["blend", "intersection", "difference"]
@@ -68,12 +70,14 @@ class CustomCombination(AssociativeCombination, metaclass=CustomKind):
 def define_operator(
     function: Any,
     *,
-    steepest: Any,
+    steepest: Any = None,
     like: Like | None = None,
     monotone: bool = False,
     order_free: bool = False,
     name: str | None = None,
     limits: Mapping[str, Limits] | None = None,
+    gradients: bool = False,
+    envelope: Any = None,
 ) -> type[CustomCombination]:
     """Return a class of combinations from a function that returns F(a, b), ∂F/∂a and ∂F/∂b.
 
@@ -96,6 +100,16 @@ def define_operator(
         Name of the kind in files; by default the function's name. The class has the same name in CamelCase.
     limits
         ``{parameter: (smallest or None, largest or None)}``.
+    gradients
+        The function reads the gradients of its operands: its parameters are ``(a: wp.float32, b: wp.float32,
+        gradient_a: wp.vec3, gradient_b: wp.vec3, ...)``, and it returns F, and ∂F/∂a and ∂F/∂b for fixed
+        gradients. The gradient of the field also takes the change of the operands' gradients into account,
+        exactly. F should be continuous in the gradients too. Give `envelope` in place of `steepest`;
+        `monotone` and `order_free` cannot be claimed. Where rays cross such a blend, they take small steps.
+    envelope
+        With `gradients`: a typed function ``(a, b, parameters if any) -> wp.vec2`` of the smallest and the
+        largest F for any gradients. Neither falls as an operand grows; with ``like="difference"`` neither
+        falls with a nor rises with b.
 
     Returns
     -------
@@ -120,41 +134,80 @@ def define_operator(
     >>> Average = define_operator(average, steepest=0.5)  # doctest: +SKIP
     """
     source = custom_source(function, returns=wp.vec3)
-    parameters = _parameters(source, limits)
+    parameters = _parameters(source, limits, gradients)
     if like is not None and like not in get_args(Like):
         known_likes = ", ".join(map(repr, get_args(Like)))
         raise source.refusal(f"like: expected one of {known_likes} or None, got {like!r}")
     if order_free and like == "difference":
         raise source.refusal("order_free: a difference depends on the order of its operands")
-    bound = _steepness(source, steepest)
+    bound = _bound(source, parameters, steepest, envelope, gradients)
+    if gradients and (monotone or order_free):
+        raise source.refusal("gradients: expected neither monotone nor order_free, which it cannot claim")
     kind = kind_name(source, name)
     bound_digest = bound if isinstance(bound, float) else bound.digest
-    digest = source.digest_with(kind, parameters, bound_digest, like, monotone, order_free)
+    digest = source.digest_with(
+        kind, parameters, bound_digest, like, monotone, order_free, *(["gradients"] * gradients)
+    )
     known = registered(kind)
     if known is not None and issubclass(known, CustomCombination) and known.digest == digest:
         return known
     claims = Claims(bound, like, monotone, order_free)
-    check_operator(source, parameters, claims)
+    if gradients:
+        directional_derivative(source.function, _operands_of(source, gradients=True))  # or refuse it here
+        check_directed_operator(source, parameters, claims)
+    else:
+        check_operator(source, parameters, claims)
     fields: list[Any] = [(parameter.name, Annotated[float, parameter]) for parameter in parameters]
     namespace = {
         "__doc__": source.python.__doc__ or f"A combination by the operator {kind!r}.",
         "kind": kind,
         "digest": digest,
         "parameters": parameters,
-        "operator": _row(kind, digest, source, claims),
+        "operator": (_directed_row if gradients else _row)(kind, digest, source, claims),
     }
     node: type[CustomCombination] = node_class(kind, source, fields, CustomCombination, namespace)
     register(node)
     return node
 
 
-def _parameters(source: CustomSource, limits: Mapping[str, Limits] | None) -> tuple[Parameter, ...]:
-    """Return the parameters beside the two operands."""
-    names = list(source.parameters)
-    floats = all(hint in (wp.float32, float) for hint in source.parameters.values())
-    if not floats or len(names) < 2:
-        raise source.refusal("expected (a: wp.float32, b: wp.float32), and parameters of type wp.float32")
-    return custom_parameters(source, names[2:], limits, CustomCombination)
+def _operands_of(source: CustomSource, gradients: bool) -> list[str]:
+    """Return the names of the operands, and of their gradients if the operator reads them."""
+    return list(source.parameters)[: 4 if gradients else 2]
+
+
+def _parameters(
+    source: CustomSource, limits: Mapping[str, Limits] | None, gradients: bool
+) -> tuple[Parameter, ...]:
+    """Return the parameters beside the operands."""
+    operands = _operands_of(source, gradients)
+    hints = list(source.parameters.values())
+    floats = all(hint in (wp.float32, float) for hint in (*hints[:2], *hints[len(operands) :]))
+    if not floats or len(hints) < 2 or (gradients and hints[2:4] != [wp.vec3, wp.vec3]):
+        several = ", gradient_a: wp.vec3, gradient_b: wp.vec3" if gradients else ""
+        raise source.refusal(
+            f"expected (a: wp.float32, b: wp.float32{several}), and parameters of type wp.float32"
+        )
+    return custom_parameters(source, list(source.parameters)[len(operands) :], limits, CustomCombination)
+
+
+def _bound(
+    source: CustomSource, parameters: tuple[Parameter, ...], steepest: Any, envelope: Any, gradients: bool
+) -> "float | CustomSource":
+    """Return the bound that a definition needs: its envelope if it reads gradients, else `steepest`."""
+    if not gradients:
+        if envelope is not None:
+            raise source.refusal("envelope: it is for operators with gradients=True; give steepest")
+        if steepest is None:
+            raise source.refusal("steepest: expected a bound on the partial derivatives, got none")
+        return _steepness(source, steepest)
+    if steepest is not None or not callable(envelope):
+        raise source.refusal(
+            f"gradients: expected envelope, a typed function, and no steepest; got envelope={envelope!r}"
+        )
+    bound = custom_source(envelope, returns=wp.vec2)
+    if list(bound.parameters.values()) != [wp.float32] * (2 + len(parameters)):
+        raise bound.refusal(f"expected (a, b, ...) with the {len(parameters)} parameters of {source.name}")
+    return bound
 
 
 def _steepness(source: CustomSource, steepest: Any) -> "float | CustomSource":
@@ -178,6 +231,8 @@ class _Shape:
     """Lines that return the exact result where an operand is absent."""
     choice: Any
     support: Support
+    alone: str
+    """Lines that return the slope where the result does not depend on the gradient of an absent operand."""
     corners: tuple[str, str] = ("a[0], b[0]", "a[1], b[1]")
     """Operands of the smallest and of the largest F, where it is monotone."""
 
@@ -185,16 +240,33 @@ class _Shape:
 _KEEP_A = "    if b <= 0.0:\n        return wp.vec3(a, 1.0, 0.0)\n"
 _KEEP_B = "    if a <= 0.0:\n        return wp.vec3(b, 0.0, 1.0)\n"
 _NOTHING = "    if {}:\n        return wp.vec3(0.0, 0.0, 0.0)\n"
+_SLOPE_ALONE = "    if {}:\n        return {}\n"
 _SHAPES: dict[str | None, _Shape] = {
-    "blend": _Shape(_KEEP_A + _KEEP_B, blend_choice, Support.EITHER),
-    "intersection": _Shape(_NOTHING.format("a <= 0.0 or b <= 0.0"), intersection_like_choice, Support.COMMON),
+    "blend": _Shape(
+        _KEEP_A + _KEEP_B,
+        blend_choice,
+        Support.EITHER,
+        _SLOPE_ALONE.format("max_b <= 0.0", "slope_a") + _SLOPE_ALONE.format("max_a <= 0.0", "slope_b"),
+    ),
+    "intersection": _Shape(
+        _NOTHING.format("a <= 0.0 or b <= 0.0"),
+        intersection_like_choice,
+        Support.COMMON,
+        _SLOPE_ALONE.format("max_a <= 0.0 or max_b <= 0.0", "0.0"),
+    ),
     "difference": _Shape(
         _NOTHING.format("a <= 0.0") + _KEEP_A,
         difference_like_choice,
         Support.LEFT,
+        _SLOPE_ALONE.format("max_a <= 0.0", "0.0") + _SLOPE_ALONE.format("max_b <= 0.0", "slope_a"),
         ("a[0], b[1]", "a[1], b[0]"),
     ),
-    None: _Shape(_NOTHING.format("a <= 0.0 and b <= 0.0"), unclaimed_choice, Support.EITHER),
+    None: _Shape(
+        _NOTHING.format("a <= 0.0 and b <= 0.0"),
+        unclaimed_choice,
+        Support.EITHER,
+        _SLOPE_ALONE.format("max_a <= 0.0 and max_b <= 0.0", "0.0"),
+    ),
 }
 
 _PARTIALS = '''\
@@ -229,6 +301,62 @@ def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32{tape}) -> wp.vec2:
     change = 0.5 * (k[0] * (a[1] - a[0]) + k[1] * (b[1] - b[0]))
     return widened_range(middle - change, middle + change)
 '''
+
+_DIRECTED_PARTIALS = '''\
+def {name}(
+    a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4),
+    direction_a: wp.vec3, direction_b: wp.vec3
+) -> wp.vec3:
+    """The user's operator, exact where an operand is absent."""
+{absent}    return {function}(a, b, direction_a, direction_b{extra})
+'''
+
+_DIRECTED_SLOPE = '''\
+def {name}(
+    slope_a: wp.float32, slope_b: wp.float32, max_a: wp.float32, max_b: wp.float32
+) -> wp.float32:
+    """No bound is known where F depends on gradients."""
+{alone}    return UNBOUNDED
+'''
+
+_DIRECTED_RANGE = '''\
+def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec2:
+    """The user's envelope is monotone, so its extremes lie at corners."""
+    if a[1] <= 0.0 and b[1] <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    return widened_range({envelope}({low}{extra})[0], {envelope}({high}{extra})[1])
+'''
+
+
+def _directed_row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operator:
+    """Return the row of an operator that reads gradients."""
+    shape, envelope, function = _SHAPES[claims.like], claims.steepest, source.function
+    assert isinstance(envelope, CustomSource)
+    extra = _slots(len(source.parameters) - 4)["extra"]
+    names = {part: f"custom_{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
+    text = _DIRECTED_PARTIALS.format(
+        name=names["partials"], absent=shape.absent, function=function.key, extra=extra
+    )
+    partials = generated(names["partials"], text, {function.key: function})
+    text = _DIRECTED_SLOPE.format(name=names["slope"], alone=shape.alone)
+    slope = generated(names["slope"], text, {"UNBOUNDED": UNBOUNDED})
+    low, high = shape.corners
+    text = _DIRECTED_RANGE.format(
+        name=names["range"], envelope=envelope.function.key, low=low, high=high, extra=extra
+    )
+    scope = {envelope.function.key: envelope.function, "widened_range": widened_range}
+    return Operator(
+        kind,
+        partials,
+        slope,
+        generated(names["range"], text, scope),
+        cast("wp.Function", shape.choice),
+        commutes=False,
+        starts_from_zero=claims.like == "blend",
+        support=shape.support,
+        gradients=True,
+        digest=digest,
+    )
 
 
 def _slots(count: int) -> dict[str, str]:

@@ -88,7 +88,7 @@ def gradient_blend_partials(
     direction_a: wp.vec3,
     direction_b: wp.vec3,
 ) -> wp.vec3:
-    """F = (a + b)/2 + k/4 + (a − b)²/(4k) where |a − b| < k, and max(a, b) elsewhere; k = o (a + b) c(a) c(b).
+    """F = (a + b)/2 + k/4 + (a − b)²/(4k) where |a − b| < k = o (a + b) c(a) c(b), and else max(a, b).
 
     The opening o is that of the angle between the gradients. In the plane of a and b the blend lies between
     the rays b = a tan θ and a = b tan θ (Gourmel et al. 2013, whose boundary functions are these rays up to

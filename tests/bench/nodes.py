@@ -14,6 +14,8 @@
 * contact, convolution: see `tests.bench.contact` and `tests.bench.convolution_surfaces`.
 * meshes: `mesh_error_cells`, the distance of a sampled mesh's surface from the mesh in cells, and the times
   of a blend and of 10,000 rays with a mesh of 100,352 triangles.
+* blends: `gradient_bulge` and `sum_bulge`, heights of a bar in a cube of its own width above both, over its
+  radius.
 * fits: see `tests.bench.fitting`.
 * costs: `mixed_over_sum` is the cost per crossing cell of a tree with a clean union, solids in contact and a
   bend, over that of a pure sum. `sum_regression` is the time of a pure sum here over that in the other
@@ -32,8 +34,21 @@ from pathlib import Path
 import numpy as np
 import pyvista as pv
 import warp as wp
+from numpy.typing import NDArray
 
-from blobtree import CleanUnion, Contact, Node, Point, Segment, Sum, define_skeleton, from_mesh, polygonize
+from blobtree import (
+    Box,
+    CleanUnion,
+    Contact,
+    GradientBlend,
+    Node,
+    Point,
+    Segment,
+    Sum,
+    define_skeleton,
+    from_mesh,
+    polygonize,
+)
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.bench import contact, convolution_surfaces, fitting
 from tests.bench.blobtree import blobs, median_time
@@ -203,6 +218,23 @@ def costs(options: argparse.Namespace) -> Figures:
     return figures
 
 
+def bulges(_: argparse.Namespace) -> Figures:
+    """Compare the tops of a bar in a cube of its own width, in a gradient blend and a sum, with a union."""
+    cube, bar = Box((-1, 0, 0), (1.2, 0.8, 0.8), radius=0.1), Segment((-1, 0, 0), (2, 0, 0), radius=0.5)
+    z = np.linspace(0.4, 0.8, 4001)
+    x = np.linspace(-1.6, 1.2, 57)
+    points = np.stack(np.broadcast_arrays(x[:, None], 0.0, z), axis=-1).reshape(-1, 3)
+
+    def tops(tree: Node) -> NDArray[np.float64]:
+        inside = tree(points).reshape(len(x), len(z)) >= 0.5
+        return np.asarray(np.where(inside, z, 0.0).max(axis=1))
+
+    blended = GradientBlend(cube, bar, start_angle=15, full_angle=75)
+    union = tops(cube | bar)
+    rises = {"gradient_bulge": tops(blended) - union, "sum_bulge": tops(cube + bar) - union}
+    return {name: float(rise.max()) / bar.radius for name, rise in rises.items()}
+
+
 @wp.func
 def fresh(q: wp.vec3, half: wp.float32) -> wp.vec3:
     """Return the closest point on a rod along x."""
@@ -237,6 +269,7 @@ GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
     "contact": lambda options: contact.figures(quick=options.quick),
     "convolution": lambda _: convolution_surfaces.figures(),
     "meshes": meshes,
+    "blends": bulges,
     "costs": costs,
     "fits": fits,
 }

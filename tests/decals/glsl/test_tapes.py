@@ -17,6 +17,8 @@ from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
 from tests.blobtree.nodes.test_blends import NODES as BLEND_NODES
 from tests.blobtree.nodes.test_deformations import STRONG
+from tests.blobtree.nodes.test_gradient_blends import CORE as GRADIENT_BLENDS
+from tests.blobtree.nodes.test_gradient_blends import LIBRARY as LIBRARY_GRADIENT_BLENDS
 from tests.blobtree.trees import (
     BLENDED,
     CONTACTS,
@@ -117,6 +119,14 @@ def test_deformations_are_the_same_in_both_languages(context: Context) -> None:
     kinds = replace(ALL_KINDS, warps=tuple(range(len(used.warps))), warp_registers=5, instruction_set=used)
     assert {code for tree in trees for code in tree.tape.warps} == set(range(1, len(used.warps)))
     assert_same_in_both_languages(context, trees, kinds, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*GRADIENT_BLENDS, *LIBRARY_GRADIENT_BLENDS])
+def test_gradient_blends_are_the_same_in_both_languages(context: Context, name: str) -> None:
+    tree = (GRADIENT_BLENDS | LIBRARY_GRADIENT_BLENDS)[name]
+    # Second derivatives, and bounds that divide by short gradients, magnify rounding.
+    assert_same_in_both_languages(context, [tree] * 2, Kinds.of(tree.tape), 0, agreement=1e-3)
 
 
 @pytest.mark.parametrize("more", [PROFILED, SIGNED], ids=["profiled", "signed"])
