@@ -32,8 +32,11 @@ def sharpened(mesh: DeviceMesh, report: Progress) -> tuple[DeviceMesh, NDArray[n
     """Return `mesh` with vertices on creases, and the number of smooth sheets that meet in each (n,).
 
     The number is 1 on a smooth part, 2 on a crease, 3 or 4 in a corner. It is 0 if the sheets of a patch do
-    not meet nearby; the vertex then keeps its position.
+    not meet nearby; the vertex then keeps its position. A tree with operators that read gradients has no
+    creases here: its branches are not followed.
     """
+    if mesh.cells.tape.instruction_set.reads_gradients:
+        return mesh, np.ones(len(mesh.vertices), np.uint8)
     # Imported here, because all imported kernels of a package compile together; these are the largest.
     from blobtree.meshing.crease_kernels import (
         SMOOTH_VERTEX,

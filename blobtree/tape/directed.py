@@ -411,7 +411,7 @@ def directed_rest(
     return wp.vec4(f[0], f[1], f[2], f[3])
 
 
-DIRECTED_EVALUATIONS: dict[wp.Function, wp.Function] = {
+DIRECTED_EVALUATIONS: dict[Any, Any] = {
     field_value: directed_value,
     field_gradient: directed_gradient,
     field_bound: directed_bound,

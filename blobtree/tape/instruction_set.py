@@ -148,7 +148,8 @@ class InstructionSet:
             return function
         from blobtree.tape.directed import DIRECTED_EVALUATIONS  # its derivatives are made at the first use
 
-        return DIRECTED_EVALUATIONS.get(function, function)
+        exchanged: wp.Function = DIRECTED_EVALUATIONS.get(function, function)
+        return exchanged
 
     def _module_of(self, function: FunctionType) -> str:
         name = re.sub(r"\W+", "_", function.__qualname__)

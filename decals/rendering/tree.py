@@ -319,9 +319,9 @@ def _interpreter_along(kinds: Kinds) -> Source:
         defines={
             "INTERPRET": "interpret_along",
             "FIELD": "mat2x4",
-            "PULLBACK_AFFINE": pullback_affine_along.key,
-            "PULLBACK_WARP": pullback_warp_along.key,
-            "COMBINE": combine_along.key,
+            "PULLBACK_AFFINE": _key(pullback_affine_along),
+            "PULLBACK_WARP": _key(pullback_warp_along),
+            "COMBINE": _key(combine_along),
         },
         slots={
             "registers": "".join(
@@ -340,18 +340,23 @@ def _interpreter_along(kinds: Kinds) -> Source:
     )
 
 
+def _key(function: Any) -> str:
+    """Return the name of a typed function in shaders."""
+    return str(function.key)
+
+
 def _run_cases_along(kinds: Kinds) -> Iterable[str]:
     """Return the cases of `_run_cases` for derivatives; `local_direction` is the velocity of the point."""
     for code in kinds.skeletons:
         skeleton = kinds.instruction_set.skeletons[code]
         closest = directional_derivative(skeleton.closest, ["q"]).key
         yield _RUN_ALONG.format(
-            code=code, stride=skeleton.parameters + 1, closest=closest, leaf=leaf_along.key
+            code=code, stride=skeleton.parameters + 1, closest=closest, leaf=_key(leaf_along)
         )
         if kinds.stretched:
-            field = f"{leaf_along.key}(local, velocity, c, drift)"
+            field = f"{_key(leaf_along)}(local, velocity, c, drift)"
             if kinds.falloffs:
-                profiled = f"{profiled_leaf_along.key}(local, velocity, c, drift, profile)"
+                profiled = f"{_key(profiled_leaf_along)}(local, velocity, c, drift, profile)"
                 field = f"profile.z == 0.0 ? {field} : {profiled}"
             yield _STRETCHED_RUN_ALONG.format(
                 code=code + STRETCHED,

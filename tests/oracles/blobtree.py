@@ -213,8 +213,8 @@ def signed(node: Node, points: ArrayLike) -> Field:
             return _blended(evaluate(first, q), evaluate(second, q), node, opening=opening_of(node, q))
         case AssociativeCombination() if node.operator.name in blends.VALUES:
             values = parameter_values(node)
-            operands = [evaluate(x, q) for x in node.operands]
-            return reduce(lambda a, b: _blended(a, b, node, **values), operands)
+            fields = [evaluate(x, q) for x in node.operands]
+            return reduce(lambda a, b: _blended(a, b, node, **values), fields)
         case Macro():
             return evaluate(written_out(node), q)
     raise TypeError(type(node))
@@ -236,8 +236,8 @@ def gradient(node: Node, points: ArrayLike, step: float = 1e-6) -> Floats:
 
 def opening_of(node: GradientBlend, q: Floats) -> Floats:
     """The openings (n,) of a gradient blend."""
-    towards = [direction(operand, q) for operand in node.operands]
-    return blends.opening(*towards, node.start_angle, node.full_angle)
+    first, second = (direction(operand, q) for operand in node.operands)
+    return blends.opening(first, second, node.start_angle, node.full_angle)
 
 
 def direction(node: Node, q: Floats) -> Floats:
@@ -247,9 +247,10 @@ def direction(node: Node, q: Floats) -> Floats:
             opening = opening_of(node, q)
             a, b = value(first, q), value(second, q)
             by_a, by_b, _ = blends.partials("gradient_blend", a, b, opening=opening)
-            return by_a[:, None] * direction(first, q) + by_b[:, None] * direction(second, q)
+            towards: Floats = by_a[:, None] * direction(first, q) + by_b[:, None] * direction(second, q)
+            return towards
         case Sum(operands=operands):
-            return np.sum([direction(operand, q) for operand in operands], axis=0)
+            return np.asarray(np.sum([direction(operand, q) for operand in operands], axis=0))
     return gradient(node, q, step=1e-4)
 
 

@@ -14,12 +14,14 @@ from blobtree import (
     GradientBlend,
     InvalidDefinition,
     InvalidNode,
+    Mesh,
     Node,
     Point,
     Segment,
     Superquadric,
     define_operator,
     from_json,
+    polygonize,
     to_json,
 )
 from blobtree.tape.model import colors_at, gradients_at
@@ -236,3 +238,10 @@ def test_a_gradient_blend_of_library_kinds_is_that_of_the_oracle(name: str) -> N
 @pytest.mark.parametrize("name", CORE)
 def test_meshes_and_rays_of_gradient_blends_are_sound(name: str) -> None:
     assert failures_of(CORE[name], np.random.default_rng(5)) == []
+    assert_equal_meshes(*(polygonize(CORE[name], resolution=16, creases=sharp) for sharp in (False, True)))
+
+
+def assert_equal_meshes(plain: Mesh, sharp: Mesh) -> None:
+    np.testing.assert_array_equal(plain.vertices, sharp.vertices)
+    assert sharp.sheet_counts is not None
+    assert (sharp.sheet_counts == 1).all()
