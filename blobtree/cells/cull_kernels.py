@@ -13,7 +13,7 @@ from blobtree.cells.prune_kernels import absent, direct_range, primitive_range, 
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE, write_block
 from blobtree.formulas.skeletons import HALF_DIAGONAL
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.tape import FIELD, STRETCHED
+from blobtree.tape.codes import FIELD, STRETCHED
 
 wp.set_module_options(KERNEL_OPTIONS)
 

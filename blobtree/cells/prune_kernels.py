@@ -12,17 +12,7 @@ from blobtree.formulas.falloff import falloff_range
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
 from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.dispatch import (
-    closest,
-    direct_bounds,
-    direct_stride,
-    min_influence,
-    stride,
-    warp_forward,
-    warp_stretch,
-)
-from blobtree.tape.evaluators import profile_value, to_local
-from blobtree.tape.tape import (
+from blobtree.tape.codes import (
     FIELD,
     POP_SWAPPED,
     PREFIX,
@@ -33,6 +23,16 @@ from blobtree.tape.tape import (
     WARP,
     WARP_REGISTERS,
 )
+from blobtree.tape.dispatch import (
+    closest,
+    direct_bounds,
+    direct_stride,
+    min_influence,
+    stride,
+    warp_forward,
+    warp_stretch,
+)
+from blobtree.tape.evaluators import profile_value, to_local
 from blobtree.transpile.specialize import unrolled
 
 wp.set_module_options(KERNEL_OPTIONS)

@@ -33,7 +33,8 @@ from blobtree.device import demand_memory, known_device, launch
 from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.formulas.operators import DIFFERENCE, RICCI, SUM, UNION
 from blobtree.progress import Progress
-from blobtree.tape.tape import UNWARP, WARP, Tape
+from blobtree.tape.codes import UNWARP, WARP
+from blobtree.tape.tape import Tape
 
 MAX_BLOCKS = 1 << 21
 """Most blocks of a level: those of a ball 3000 cells wide, whose mesh takes a few gigabytes."""

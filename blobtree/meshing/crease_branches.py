@@ -13,6 +13,18 @@ import warp as wp
 
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.tape.codes import (
+    FIELD,
+    POP,
+    POP_SWAPPED,
+    PREFIX,
+    PUSH,
+    REGISTERS,
+    STRETCHED,
+    UNWARP,
+    WARP,
+    WARP_REGISTERS,
+)
 from blobtree.tape.dispatch import (
     closest,
     direct_stride,
@@ -28,18 +40,6 @@ from blobtree.tape.evaluators import (
     gradient_pullback_affine,
     to_local,
     value_leaf,
-)
-from blobtree.tape.tape import (
-    FIELD,
-    POP,
-    POP_SWAPPED,
-    PREFIX,
-    PUSH,
-    REGISTERS,
-    STRETCHED,
-    UNWARP,
-    WARP,
-    WARP_REGISTERS,
 )
 
 wp.set_module_options(KERNEL_OPTIONS)

@@ -21,6 +21,7 @@ import warp as wp
 from blobtree.formulas.gradient_blends import UNBOUNDED
 from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.tape.codes import REGISTERS
 from blobtree.tape.dispatch import (
     direct_value_gradient,
     directed_partials,
@@ -49,7 +50,6 @@ from blobtree.tape.interpreter import (
     make_interpreter,
 )
 from blobtree.tape.rest_kernels import interpret_rest_coordinates
-from blobtree.tape.tape import REGISTERS
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)

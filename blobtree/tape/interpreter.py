@@ -8,17 +8,7 @@ from typing import Any
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.dispatch import closest, direct_stride, is_convex, min_influence, stride, warp_forward
-from blobtree.tape.evaluators import (
-    BOUND,
-    COLOR,
-    GRADIENT,
-    VALUE,
-    Evaluator,
-    direction_to_local,
-    to_local,
-)
-from blobtree.tape.tape import (
+from blobtree.tape.codes import (
     FIELD,
     POP,
     POP_SWAPPED,
@@ -29,6 +19,16 @@ from blobtree.tape.tape import (
     UNWARP,
     WARP,
     WARP_REGISTERS,
+)
+from blobtree.tape.dispatch import closest, direct_stride, is_convex, min_influence, stride, warp_forward
+from blobtree.tape.evaluators import (
+    BOUND,
+    COLOR,
+    GRADIENT,
+    VALUE,
+    Evaluator,
+    direction_to_local,
+    to_local,
 )
 
 wp.set_module_options(KERNEL_OPTIONS)

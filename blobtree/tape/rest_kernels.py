@@ -6,10 +6,10 @@ import warp as wp
 
 from blobtree.formulas.falloff import falloff
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.tape.codes import REGISTERS
 from blobtree.tape.dispatch import direct_value_gradient
 from blobtree.tape.evaluators import COLOR, squared_distance
 from blobtree.tape.interpreter import make_interpreter
-from blobtree.tape.tape import REGISTERS
 
 wp.set_module_options(KERNEL_OPTIONS)
 

@@ -47,6 +47,17 @@ from blobtree.device import known_device
 from blobtree.errors import InvalidNode
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.codes import (
+    FIELD,
+    POP,
+    POP_SWAPPED,
+    PUSH,
+    REGISTERS,
+    STRETCHED,
+    UNWARP,
+    WARP,
+    WARP_REGISTERS,
+)
 from blobtree.tape.data_region import DataRegion
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, instruction_set_for
 from blobtree.tape.program import (
@@ -69,20 +80,6 @@ from blobtree.tape.program import (
 )
 
 Precision = type[np.float32] | type[np.float64]
-
-PUSH = -1
-POP = -2
-POP_SWAPPED = -3
-WARP = -4
-UNWARP = -5
-STRETCHED = 1024
-FIELD = 2048
-PREFIX = 4
-REGISTERS = 24
-"""Registers that the interpreters hold: enough for any tree of 2²⁴ leaves."""
-
-WARP_REGISTERS = 8
-"""How deep warps may nest."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 from blobtree import Node
 from blobtree._typing import Float64Array
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.codes import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.directed import DIRECTED_BOUND, DIRECTED_COLOR
 from blobtree.tape.directed_along import (
     combine_along,
@@ -44,7 +45,7 @@ from blobtree.tape.dispatch import (
 from blobtree.tape.evaluators import BOUND, COLOR, GRADIENT, Evaluator, direction_to_local, to_local
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
-from blobtree.tape.tape import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
+from blobtree.tape.tape import Tape
 from blobtree.tracing.ray_kernels import trace_ray
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from blobtree.transpile.derivative import directional_derivative

@@ -27,9 +27,9 @@ from blobtree import (
 )
 from blobtree._typing import Float64Array
 from blobtree.formulas.deformations import CURVE, curve_forward
+from blobtree.tape.codes import WARP_REGISTERS
 from blobtree.tape.model import bounds_along, gradients_at
 from blobtree.tape.program import postorder
-from blobtree.tape.tape import WARP_REGISTERS
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance
 from tests.blobtree.transpile.warp_functions import call

@@ -7,7 +7,8 @@ import warp as wp
 from blobtree import RIM, InvalidNode, Node, Point, Segment, polygonize
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
 from blobtree.formulas.skeletons import POINT, SEGMENT, SKELETONS
-from blobtree.tape.tape import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP, Tape
+from blobtree.tape.codes import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
+from blobtree.tape.tape import Tape
 from tests.blobtree.trees import random_trees
 
 CODES = {skeleton: code for code, skeleton in enumerate(SKELETONS)}
