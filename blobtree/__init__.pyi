@@ -63,6 +63,7 @@ from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
+from .nodes.tree_volumes import sample
 from .nodes.volumes import Volume, from_mesh, from_sdf
 from .progress import Cancel, Progress
 from .sampling.tree_distances import SignedDistances, to_sdf
@@ -178,6 +179,7 @@ __all__ = [
     "numeric_parameters",
     "numeric_values",
     "polygonize",
+    "sample",
     "save",
     "split_creases",
     "to_json",

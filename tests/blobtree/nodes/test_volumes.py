@@ -21,6 +21,7 @@ from blobtree import (
     from_mesh,
     from_sdf,
     polygonize,
+    sample,
     to_json,
     to_sdf,
 )
@@ -323,3 +324,28 @@ def test_samples_are_values() -> None:
     assert len({one, other}) == 1
     assert not one.array.flags.writeable
     np.testing.assert_allclose(one.array, GRID, rtol=1e-6)
+
+
+def test_a_sampled_tree_has_the_surface_of_the_tree() -> None:
+    tree = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0.3, 0), radius=0.4)
+    volume = sample(tree, spacing=0.1, color=(1.0, 0.0, 0.0))
+    mesh = polygonize(tree, resolution=16)
+    normals = 0.1 * mesh.normals
+    assert (volume(mesh.vertices + normals) < ISO).all()
+    assert (volume(mesh.vertices - normals) > ISO).all()
+    assert volume.width == pytest.approx(0.4)
+    assert volume.color == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("tree", "spacing", "message"),
+    [
+        (Point((0, 0, 0), radius=1.0), 0.0, "spacing"),
+        (Point((0, 0, 0), radius=1.0), 1e-4, "take a larger one"),
+        (Point((0, 0, 0), radius=1.0) & Point((9, 0, 0), radius=1.0), 0.1, "surface"),
+        ("no tree", 0.1, "tree"),
+    ],
+)
+def test_trees_that_cannot_be_sampled_are_refused(tree: Any, spacing: float, message: str) -> None:
+    with pytest.raises(InvalidNode, match=message):
+        sample(tree, spacing=spacing)
