@@ -46,6 +46,7 @@ class Sandbox:
         self._rows: list[dict[str, Any]] = []
         self._objects: Any = None
         self._images: Any = None
+        self._measured: tuple[object, float] = None, 1.0
 
     # -- values -----------------------------------------------------------------------------------------
 
@@ -102,8 +103,12 @@ class Sandbox:
         }
 
     def _size(self) -> float:
-        low, high = bounds_of(self._window.document.objects)
-        return float((high - low).max())
+        """Return the size of the scene when the node was selected: sliders keep their ends."""
+        selected = self._window.actions.state.primitive
+        if self._measured[0] != selected:
+            low, high = bounds_of(self._window.document.objects)
+            self._measured = selected, float((high - low).max())
+        return self._measured[1]
 
     # -- events -----------------------------------------------------------------------------------------
 

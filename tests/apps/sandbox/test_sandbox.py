@@ -78,6 +78,15 @@ def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWind
     assert digest(window.document) == before
 
 
+def test_the_ends_of_a_slider_stay_while_it_moves(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.select("0/1")
+    before = sandbox.values()["panel"]["controls"][1]
+    sandbox.set_value("radius", 1.4, False)
+    after = sandbox.values()["panel"]["controls"][1]
+    assert (after["value"], after["low"], after["high"]) == (1.4, before["low"], before["high"])
+
+
 def test_a_slider_that_rests_ends_its_edit(window: EditWindow, monkeypatch: pytest.MonkeyPatch) -> None:
     sandbox, now = Sandbox(window), time.monotonic()
     sandbox.select("0/1")
