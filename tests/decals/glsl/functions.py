@@ -12,7 +12,6 @@ from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
-from blobtree.tape.instruction_set import LIBRARY
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
 from decals.rendering.context import Context
@@ -32,16 +31,6 @@ ALL_KINDS = Kinds(
     falloffs=tuple(range(len(FALLOFFS))),
 )
 """All that a tape of core kinds can hold, in one program."""
-ALL_LIBRARY_KINDS = Kinds(
-    tuple(range(len(LIBRARY.skeletons))),
-    tuple(range(len(LIBRARY.operators))),
-    6,
-    stretched=True,
-    warps=tuple(range(len(LIBRARY.warps))),
-    warp_registers=4,
-    instruction_set=LIBRARY,
-)
-"""All that a tape with library kinds can hold, in one program."""
 VERTEX = """#version 330 core
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 """
@@ -71,6 +60,21 @@ def rows(array: NDArray[Any]) -> NDArray[Any]:
     return np.pad(columns, ((0, 0), (0, 4 - columns.shape[1])))
 
 
+_last_program: tuple[Context, str, moderngl.Program] | None = None
+"""The program of the last call: to compile a program takes a driver longer than to run it."""
+
+
+def program_of(context: Context, fragment: str) -> moderngl.Program:
+    """The compiled program of a fragment shader: that of the last call if the text is the same."""
+    global _last_program
+    if _last_program is None or _last_program[0] is not context or _last_program[1] != fragment:
+        if _last_program is not None and _last_program[0] is context:
+            _last_program[2].release()
+        program = context.gl.program(vertex_shader=VERTEX, fragment_shader=fragment)
+        _last_program = (context, fragment, program)
+    return _last_program[2]
+
+
 def run_program(
     context: Context,
     fragment: str,
@@ -82,7 +86,7 @@ def run_program(
 ) -> NDArray[Any]:
     """What `fragment` writes for rows 0 to count − 1: float32[count, 4] or int32[count, 4]."""
     gl = context.gl
-    program = gl.program(vertex_shader=VERTEX, fragment_shader=fragment)
+    program = program_of(context, fragment)
     held = [DataTexture(context, array) for array in textures.values()]
     for unit, (name, texture) in enumerate(zip(textures, held, strict=True)):
         texture.use(unit)
@@ -94,6 +98,7 @@ def run_program(
     kind = "i4" if whole_numbers else "f4"
     image = gl.texture((ROW_TEXELS, -(-count // ROW_TEXELS)), 4, dtype=kind)
     target = gl.framebuffer([image])
+    target.viewport = (0, 0, min(count, ROW_TEXELS), image.height)  # the rest of a row is not computed
     target.use()
     gl.enable_only(moderngl.NOTHING)
     vertices = gl.vertex_array(program, [])
@@ -101,7 +106,7 @@ def run_program(
     seen = (
         np.frombuffer(image.read(), np.int32 if whole_numbers else np.float32).reshape(-1, 4)[:count].copy()
     )
-    made: list[Any] = [vertices, target, image, program, *held]
+    made: list[Any] = [vertices, target, image, *held]
     for thing in made:
         thing.release()
     return seen

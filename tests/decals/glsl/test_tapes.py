@@ -1,7 +1,5 @@
 """Whole tapes in Warp and GLSL, and pictures of them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -32,7 +30,7 @@ from tests.blobtree.trees import (
     random_trees,
 )
 from tests.decals.glsl.arguments import Array, units
-from tests.decals.glsl.functions import ALL_KINDS, ALL_LIBRARY_KINDS, run_program
+from tests.decals.glsl.functions import ALL_KINDS, run_program
 from tests.decals.glsl.tapes import (
     BOUND_AND_VALUE,
     COLOR,
@@ -75,7 +73,7 @@ def read_tape(
 def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
     assert {code for tree in TREES for code in tree.tape.skeletons} == set(ALL_KINDS.skeletons)
     drawn = {code for tree in (*TREES, *LIBRARY_TREES) for code in tree.tape.skeletons}
-    assert drawn == set(ALL_LIBRARY_KINDS.skeletons)
+    assert drawn == set(range(len(LIBRARY.skeletons)))
     assert {code for tree in TREES for code in tree.tape.operators} == set(ALL_KINDS.operators)
     assert 2 <= max(tree.tape.registers for tree in TREES) <= ALL_KINDS.registers
     assert sum(tree.tape.stretched for tree in TREES) > 5
@@ -87,38 +85,33 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int
 
 
 def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
-    used = FIELD_TREES[0].tape.instruction_set
-    fields = {code for tree in FIELD_TREES for code in tree.tape.fields}
-    assert fields == set(range(len(used.fields)))
-    kinds = replace(ALL_KINDS, fields=tuple(sorted(fields)), instruction_set=used)
+    kinds = kinds_of(FIELD_TREES)
+    assert kinds.fields == tuple(range(len(kinds.instruction_set.fields)))
     # Bounds of arcs depend on where the kernel ends, a square root of a difference that is near 0.
-    assert_same_in_both_languages(context, FIELD_TREES, kinds, 0, bounds_agreement=1e-4)
+    assert_same_in_both_languages(context, FIELD_TREES, kinds, bounds_agreement=1e-4)
 
 
 def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> None:
-    assert_same_in_both_languages(context, LIBRARY_TREES, ALL_LIBRARY_KINDS, 0)
+    assert_same_in_both_languages(context, LIBRARY_TREES, kinds_of(LIBRARY_TREES))
 
 
 def test_contacts_are_the_same_in_both_languages(context: Context) -> None:
     names = {LIBRARY.operators[code].name for tree in CONTACT_TREES for code in tree.tape.operators}
     assert {"press", "rated_union"} <= names
-    kinds = replace(ALL_KINDS, operators=tuple(range(len(LIBRARY.operators))), instruction_set=LIBRARY)
-    assert_same_in_both_languages(context, CONTACT_TREES, kinds, 0)
+    assert_same_in_both_languages(context, CONTACT_TREES, kinds_of(CONTACT_TREES))
 
 
 def test_blends_are_the_same_in_both_languages(context: Context) -> None:
     used = {LIBRARY.operators[code] for tree in BLEND_TREES for code in tree.tape.operators}
     assert set(BLENDS) <= used
-    kinds = replace(ALL_KINDS, operators=tuple(range(len(LIBRARY.operators))), instruction_set=LIBRARY)
-    assert_same_in_both_languages(context, BLEND_TREES, kinds, 0)
+    assert_same_in_both_languages(context, BLEND_TREES, kinds_of(BLEND_TREES))
 
 
 def test_deformations_are_the_same_in_both_languages(context: Context) -> None:
     trees = list(STRONG.values())
-    used = trees[0].tape.instruction_set
-    kinds = replace(ALL_KINDS, warps=tuple(range(len(used.warps))), warp_registers=5, instruction_set=used)
-    assert {code for tree in trees for code in tree.tape.warps} == set(range(1, len(used.warps)))
-    assert_same_in_both_languages(context, trees, kinds, 0)
+    kinds = kinds_of(trees)
+    assert kinds.warps == tuple(range(1, len(kinds.instruction_set.warps)))
+    assert_same_in_both_languages(context, trees, kinds)
 
 
 @pytest.mark.slow
@@ -132,15 +125,37 @@ def test_gradient_blends_are_the_same_in_both_languages(context: Context, name: 
 
 @pytest.mark.parametrize("more", [PROFILED, SIGNED], ids=["profiled", "signed"])
 def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: MoreKinds) -> None:
-    kinds = replace(ALL_LIBRARY_KINDS, falloffs=tuple(range(len(LIBRARY.falloffs))))
-    assert_same_in_both_languages(context, random_trees(seed=35, count=6, more=more), kinds, 0)
+    trees = random_trees(seed=35, count=6, more=more)
+    kinds = kinds_of(trees)
+    assert kinds.falloffs == tuple(range(len(LIBRARY.falloffs)))
+    assert_same_in_both_languages(context, trees, kinds)
+
+
+def kinds_of(trees: list[Node]) -> Kinds:
+    """What the trees use, in one program: a driver compiles one for the whole library in half a minute."""
+    used = [Kinds.of(tree.tape) for tree in trees]
+
+    def codes(name: str) -> tuple[int, ...]:
+        return tuple(sorted({code for kinds in used for code in getattr(kinds, name)}))
+
+    return Kinds(
+        codes("skeletons"),
+        codes("operators"),
+        max(kinds.registers for kinds in used),
+        any(kinds.stretched for kinds in used),
+        codes("warps"),
+        max(kinds.warp_registers for kinds in used),
+        codes("fields"),
+        max((kinds.instruction_set for kinds in used), key=lambda rows: len(rows.rows)),
+        codes("falloffs"),
+    )
 
 
 def assert_same_in_both_languages(
     context: Context,
     trees: list[Node],
     kinds: Kinds,
-    seed: int,
+    seed: int = 0,
     bounds_agreement: float = TAPE_AGREEMENT,
     field_agreement: float = TAPE_AGREEMENT,
 ) -> None:
