@@ -1,9 +1,26 @@
-"""Own skeletons and operators for tests, of every shape that a definition can take."""
+"""Own kinds for tests, of every shape that a definition can take.
+
+They share one instruction set, so that their kernels compile once for all tests.
+"""
+
+from typing import Any
 
 import numpy as np
 
-from blobtree import Node, define_operator, define_skeleton
+from blobtree import (
+    Node,
+    Point,
+    define_falloff,
+    define_field,
+    define_operator,
+    define_skeleton,
+    define_warp,
+)
+from blobtree._typing import Float64Array
+from tests.blobtree.custom.field_kernels import lump, lump_slope, waves, waves_interval, waves_slope
+from tests.blobtree.custom.warp_kernels import sway, sway_pullback, sway_stretch, swirl, swirl_stretch
 from tests.blobtree.kernels import (
+    bar,
     brick,
     carve,
     carve_steepest,
@@ -12,9 +29,13 @@ from tests.blobtree.kernels import (
     ring,
     shared,
     soft,
+    staircase,
+    staircase_slope,
     stew,
     stew_steepest,
     swell,
+    tent,
+    tent_slope,
 )
 from tests.blobtree.trees import MoreKinds, random_trees, triple
 
@@ -34,6 +55,28 @@ Stew = define_operator(
 )
 
 KINDS = (Ring, Brick, Path, Soft, Carve, Shared, Mean, Swell, Stew)
+"""Kinds in `CUSTOM_TREES`."""
+
+Bar = define_skeleton(bar, convex=True)
+Lump = define_field(lump, steepest=lump_slope, limits={"breadth": (0.1, None)})
+Waves = define_field(waves, steepest=waves_slope, interval=waves_interval)
+Staircase = define_falloff(staircase, staircase_slope)
+Tent = define_falloff(tent, tent_slope)
+
+
+def swirl_box(lower: Float64Array, upper: Float64Array, **_parameters: Any) -> tuple[Any, Any]:
+    radius = np.hypot(*np.maximum(np.abs(lower[:2]), np.abs(upper[:2])))
+    return (-radius, -radius, lower[2]), (radius, radius, upper[2])
+
+
+SWAY_LIMITS = {"width": (-0.5, 0.5), "rate": (0.0, 3.0)}
+Sway = define_warp(sway, stretch=sway_stretch, box=0.5, limits=SWAY_LIMITS)
+GivenSway = define_warp(
+    sway, stretch=sway_stretch, box=0.5, pullback=sway_pullback, limits=SWAY_LIMITS, name="given_sway"
+)
+Swirl = define_warp(
+    swirl, stretch=swirl_stretch, box=swirl_box, limits={"axis": (0.0, 2.0), "turns": (-5, 5)}
+)
 
 
 def random_custom_leaf(rng: np.random.Generator) -> Node:
@@ -68,8 +111,16 @@ def everything() -> Node:
     first, second = Ring((0, 0, 0), (0, 0, 1), 0.7, radius=0.2), Brick((1, 0, 0), (1, 1, 1), radius=0.2)
     third = Path((0, 0, 0), (0, 1, 0), (0, 1, 1), radius=0.2)
     stewed = Stew((first, third), 0.9, 0.8, 0.7, 0.6, 0.5)
+    bars = Swirl(Sway(GivenSway(Bar(0.5, radius=0.2), 0.4, 2.0), 0.4, 2.0), (0.1, 0, 0.5), 3)
+    fields = Lump((0, 0, 0), (1, 1, 1), (0, 0, 0), 0.5) + Waves((0, 0, 0), (1, 1, 1), 4.0)
+    balls = Point((0, 0, 0), radius=0.2, falloff=Staircase) + Point((0, 0, 0), radius=0.2, falloff=Tent)
     return Swell(
-        (stewed, Mean((Soft((first, second), 1.0), third)), Carve((second, Shared((first, second)))))
+        (
+            stewed,
+            Mean((Soft((first, second), 1.0), third)),
+            Carve((second, Shared((first, second)))),
+            bars + fields + balls,
+        )
     )
 
 

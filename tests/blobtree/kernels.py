@@ -23,6 +23,11 @@ def ring(q: wp.vec3, center: wp.vec3, axis: wp.vec3, size: wp.float32) -> wp.vec
 
 
 @wp.func
+def bar(q: wp.vec3, half: wp.float32) -> wp.vec3:
+    return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
+
+
+@wp.func
 def brick(q: wp.vec3, middle: wp.vec3, sides: wp.vec3) -> wp.vec3:
     """A solid box."""
     c = wp.vec3(q[0], q[1], q[2])

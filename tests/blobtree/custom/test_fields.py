@@ -23,15 +23,13 @@ from blobtree import (
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.tape.model import bounds_at
 from tests.blobtree.custom import field_kernels as kernels
+from tests.blobtree.custom_kinds import Lump, Waves
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.blobtree.trees import points_around
 from tests.oracles import direct_fields
 
-Lump = define_field(kernels.lump, steepest=kernels.lump_slope, limits={"breadth": (0.1, None)})
-Waves = define_field(kernels.waves, steepest=kernels.waves_slope, interval=kernels.waves_interval)
 LUMP = Lump((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), (0.1, 0.2, 0.0), 0.6, color=(1, 0, 0))
 WAVES = Waves((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), 4.0, fade=0.4)
-(LUMP + WAVES).tape  # noqa: B018  (one set of kernels for both)
 EACH = pytest.mark.parametrize("node", [LUMP, WAVES], ids=["lump", "waves"])
 
 

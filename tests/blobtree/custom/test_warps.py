@@ -25,33 +25,19 @@ from tests.blobtree.custom.warp_kernels import (
     flat,
     folded,
     sway,
-    sway_pullback,
     sway_stretch,
-    swirl,
     swirl_stretch,
     torn,
     wrong_pullback,
 )
+from tests.blobtree.custom_kinds import SWAY_LIMITS as LIMITS
+from tests.blobtree.custom_kinds import GivenSway, Sway, Swirl
 from tests.oracles import blobtree as oracle
 
-
-def swirl_box(lower: Float64Array, upper: Float64Array, **_parameters: Any) -> tuple[Any, Any]:
-    radius = np.hypot(*np.maximum(np.abs(lower[:2]), np.abs(upper[:2])))
-    return (-radius, -radius, lower[2]), (radius, radius, upper[2])
-
-
-LIMITS = {"width": (-0.5, 0.5), "rate": (0.0, 3.0)}
-Sway = define_warp(sway, stretch=sway_stretch, box=0.5, limits=LIMITS)
-GivenSway = define_warp(
-    sway, stretch=sway_stretch, box=0.5, pullback=sway_pullback, limits=LIMITS, name="given_sway"
-)
-Swirl = define_warp(
-    swirl, stretch=swirl_stretch, box=swirl_box, limits={"axis": (0.0, 2.0), "turns": (-5, 5)}
-)
 ROD = Segment((0.2, 0, -2), (0.2, 0, 2), radius=0.3)
 TREES = {
     "sway": Sway(ROD, 0.4, 2.0),
-    "nested": Swirl(Sway(ROD, 0.4, 2.0) + Point((0.5, 0, 0), radius=0.4), (0.1, 0, 0.5), 3).bend(10, (-1, 1)),
+    "nested": Swirl(Sway(ROD, 0.4, 2.0) + Point((0.5, 0, 0), radius=0.4), (0.1, 0, 0.5), 3).twist(20),
 }
 
 

@@ -34,8 +34,8 @@ from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Primitive
 from blobtree.tape.instruction_set import BUILT_IN
-from tests.blobtree.custom_kinds import Ring
-from tests.blobtree.kernels import rising, short, staircase, staircase_slope, tent, tent_slope, vector
+from tests.blobtree.custom_kinds import Ring, Staircase, Tent
+from tests.blobtree.kernels import rising, short, staircase_slope, tent, tent_slope, vector
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.transpile.warp_functions import call
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around
@@ -54,10 +54,6 @@ PRIMITIVES: dict[str, tuple[Any, tuple[float, float, float]]] = {
     "ring": (lambda **p: Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
 }
 """Makers of primitives, and a point on the surface of each, of which x is the direction outwards."""
-
-
-Staircase = define_falloff(staircase, staircase_slope)
-Tent = define_falloff(tent, tent_slope)
 
 
 @EACH_FALLOFF

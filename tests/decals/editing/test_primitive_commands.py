@@ -4,9 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import warp as wp
 
-from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment, define_skeleton
+from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment
 from blobtree.nodes.paths import node_in_world, primitive_at
 from decals.editing import (
     EditSession,
@@ -23,6 +22,7 @@ from decals.scattering.scatter import scatter
 from decals.scenes.camera import Camera
 from decals.scenes.objects import TreeObject
 from decals.scenes.scene import DecalImage, Scene
+from tests.blobtree.custom_kinds import Bar
 from tests.decals.editing.scenes import digest, tree_of
 
 A, B = Point((0, 0, 0), radius=1.0), Segment((1, 0, 0), (2, 0, 0), radius=0.5)
@@ -42,14 +42,8 @@ def session_of(tree: Any, count: int = 80) -> Any:
     )
 
 
-@wp.func
-def rod(q: wp.vec3, half: wp.float32) -> wp.vec3:
-    return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
-
-
 def test_skeletons_of_ones_own_move_again_and_again_by_the_same_path() -> None:
-    own = define_skeleton(rod, convex=True)
-    session = session_of(A + own(0.5, radius=0.4).translate((0.8, 0, 0)) + own(1.0, radius=0.3))
+    session = session_of(A + Bar(0.5, radius=0.4).translate((0.8, 0, 0)) + Bar(1.0, radius=0.3))
     first = digest(session.document)
     for path in ((1,), (2,)):
         before = node_in_world(session.document.objects[0].tree, path)

@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import warp as wp
 
-from blobtree import ISO, Point, Segment, define_skeleton
+from blobtree import ISO, Point, Segment
 from blobtree.nodes.paths import node_in_world, primitive_at, primitive_paths
 from blobtree.nodes.surgery import Join, join_of
 from decals.editing import RemoveObject
 from decals.editing.actions import Actions
 from decals.editing.scatter_commands import decals_on
+from tests.blobtree.custom_kinds import Bar
 from tests.decals.editing.scenes import CARVED, digest, tree_of
 from tests.decals.editing.test_pointer_tools import UserInput
 from tests.decals.editing.test_primitive_commands import session_of
@@ -182,14 +182,8 @@ def test_objects_that_go_take_the_handle_along_only_if_numbers_move(user: Any, g
     assert user.actions.state.primitive == held
 
 
-@wp.func
-def bar(q: wp.vec3, half: wp.float32) -> wp.vec3:
-    return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
-
-
 def test_skeletons_of_ones_own_stay_held_while_they_are_dragged() -> None:
-    own = define_skeleton(bar, convex=True)
-    session = session_of(Point((0, 0, 0), radius=1.0) + own(0.5, radius=0.4).translate((0.8, 0, 0)), 20)
+    session = session_of(Point((0, 0, 0), radius=1.0) + Bar(0.5, radius=0.4).translate((0.8, 0, 0)), 20)
     first = digest(session.document)
     actions = Actions(session)
     for path in ((1, 0), (0,)):
