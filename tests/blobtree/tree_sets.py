@@ -1,6 +1,7 @@
-"""Sets of random trees over which whatever holds of every tree is tested, in batches of forty."""
+"""Sets of random trees over which whatever holds of every tree is tested, in batches of twenty."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -20,8 +21,9 @@ from tests.blobtree.trees import (
     points_around,
     random_trees,
 )
+from tests.oracles.blobtree import Field, evaluate
 
-BATCH = 40
+BATCH = 20
 POINTS = 150
 
 BUILT_IN_TREES = random_trees(seed=1, count=240)
@@ -50,10 +52,16 @@ class Batch:
     color_error: float
     gradient_error: float = 1e-4
 
+    @cached_property
     def cases(self) -> list[tuple[Node, Float32Array]]:
         """The trees, each with points around it."""
         rng = np.random.default_rng(self.start)
         return [(tree, points_around(rng, tree, POINTS)) for tree in self.trees]
+
+    @cached_property
+    def fields(self) -> list[Field]:
+        """The fields of `cases` in float64."""
+        return [evaluate(tree, points) for tree, points in self.cases]
 
 
 def _batches(trees: list[Node], *errors: float) -> list[Batch]:

@@ -56,13 +56,13 @@ SEEDS += [(kinds, seed) for kinds in ("solids", "custom") for seed in range(2)] 
 @pytest.mark.parametrize(("kinds", "seed"), SEEDS)
 def test_sparse_and_dense_give_the_same_quads(kinds: str, seed: int) -> None:
     surfaces = 0
-    for tree in random_trees(seed, 20, more=MORE[kinds]):
+    for tree in random_trees(seed, 10, more=MORE[kinds]):
         assert_same_surface(tree)
         mesh = polygonize(tree, resolution=20)
         assert_valid(mesh)
         assert_closed(mesh)
         surfaces += len(mesh.faces) > 0
-    assert surfaces >= 8
+    assert surfaces >= 4
 
 
 @pytest.mark.slow
@@ -73,7 +73,7 @@ def test_sparse_and_dense_give_the_same_quads_over_many_trees(kinds: str, count:
 
 
 def test_every_edge_has_two_triangles_in_opposite_directions() -> None:
-    for tree in random_trees(7, 120):
+    for tree in random_trees(7, 60):
         faces = polygonize(tree, resolution=CELLS_ALONG).faces.astype(np.int64)
         edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         forward = np.unique(edges, axis=0)
