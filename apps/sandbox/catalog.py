@@ -36,6 +36,8 @@ SHARES: dict[Quantity, float | tuple[float, ...]] = {
 ANGLE = 30.0
 """Degrees; per size where a class counts them per unit."""
 
+NAMED_ANGLES = {"full_angle": 90.0}
+
 NATURAL = {
     "exponent": 3.0,
     "factor": 1.5,
@@ -57,11 +59,15 @@ NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1}
 """Lengths by the name of their parameter: the ends of a deformation, the thickness of a wall."""
 
 
+def built_in_kinds() -> dict[str, type[Node]]:
+    """Return the built-in classes of nodes that a scene can get, by name."""
+    return {kind.__name__: kind for tag, kind in NODE_KINDS.items() if tag not in NOT_OFFERED}
+
+
 def kinds() -> dict[str, type[Node]]:
     """Return all classes of nodes that a scene can get, by name: built-in ones, then custom ones."""
-    built_in = {kind.__name__: kind for tag, kind in NODE_KINDS.items() if tag not in NOT_OFFERED}
     custom: dict[str, Any] = {kind.__name__: kind for kind in custom_kinds()}
-    return built_in | custom
+    return built_in_kinds() | custom
 
 
 def operand_count(kind: type[Node]) -> int:
@@ -155,7 +161,8 @@ def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float,
         case Quantity.DIRECTION:
             return DIRECTIONS[turn % len(DIRECTIONS)]
         case Quantity.ANGLE:
-            return min(ANGLE, parameter.high) if parameter.is_bounded else ANGLE / size
+            angle = NAMED_ANGLES.get(parameter.name, ANGLE)
+            return min(angle, parameter.high) if parameter.is_bounded else angle / size
         case Quantity.FACTOR | Quantity.NUMBERS:
             number = float(np.clip(NATURAL.get(parameter.name, 1.0), parameter.low, parameter.high))
             if parameter.size > 1:

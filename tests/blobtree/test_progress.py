@@ -22,6 +22,7 @@ Reports = list[tuple[str, float]]
 def quick(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The thread looks often, and shows at once; it is not the one of other tests."""
     monkeypatch.setattr(progress, "TICK", 0.005)
+    monkeypatch.setattr(progress, "_displays", [])
     monkeypatch.setattr(progress, "_watcher", progress._Watcher())
     for kind in (progress._Line, progress._TerminalLine, progress._NotebookLine):
         monkeypatch.setattr(kind, "seconds", 0.0)
@@ -36,6 +37,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def no_handlers(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a script that configures no logging: pytest has handlers of its own."""
     monkeypatch.setattr(progress._logger, "hasHandlers", lambda: False)
+    monkeypatch.setattr(progress._PACKAGE_LOGGER, "level", logging.NOTSET)
 
 
 def until_shown(capsys: pytest.CaptureFixture[str], text: str) -> str:

@@ -10,6 +10,7 @@ from decals.errors import InvalidEdit
 from tests.blobtree.custom_kinds import Ring, Soft
 
 OPERANDS = Point((0, 0, 0), radius=0.5), Point((0.5, 0, 0), radius=0.4), Point((0, 0.5, 0), radius=0.4)
+KINDS = [*catalog.built_in_kinds(), "Ring", "Soft"]
 
 
 def test_every_built_in_class_is_offered_once() -> None:
@@ -20,7 +21,7 @@ def test_every_built_in_class_is_offered_once() -> None:
     assert {kind.__name__ for kind in NODE_KINDS.values()} - left_out <= set(names)
 
 
-@pytest.mark.parametrize("name", catalog.kinds())
+@pytest.mark.parametrize("name", KINDS)
 def test_a_new_node_has_a_surface(name: str) -> None:
     count = catalog.operand_count(catalog.kinds()[name])
     low, high = catalog.new_node(name, OPERANDS[:count]).bounds

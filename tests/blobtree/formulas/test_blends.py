@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree.formulas.blends import BLENDS
+from blobtree.formulas.gradient_blends import GRADIENT_BLEND
 from blobtree.formulas.operators import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, Operator, Support
 from tests.blobtree.formulas.test_operators import pairs
 from tests.blobtree.transpile.warp_functions import call, python_function
@@ -49,7 +50,7 @@ def partials(row: Operator, setting: dict[str, float], a: Floats, b: Floats) -> 
 
 
 def test_the_table_is_complete() -> None:
-    assert set(oracle.VALUES) == {row.name for row in BLENDS}
+    assert set(oracle.VALUES) == {row.name for row in (*BLENDS, GRADIENT_BLEND)}
 
 
 @EVERY_ROW

@@ -318,6 +318,6 @@ def test_the_guide_lists_every_primitive_with_its_parameters() -> None:
     for kind in NODE_KINDS.values():
         if issubclass(kind, Leaf):
             shared = {"color", "attributes", *(PROFILE if issubclass(kind, Profile) else ())}
-            declared = [p for name, p in parameters_of(kind).items() if name not in shared]
-            arguments = [p.name + "=…" * (p.quantity is Quantity.RADIUS) for p in declared]
+            passed = [p for name, p in inspect.signature(kind).parameters.items() if name not in shared]
+            arguments = [p.name + "=…" * (p.kind is p.KEYWORD_ONLY) for p in passed]
             assert f"`{kind.__name__}({', '.join(arguments)})`" in guide

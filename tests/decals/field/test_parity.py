@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from decals.field.mapping import ImageMapping
 from decals.record import NEIGHBOR_REACH, Contact
-from tests.bench.parity import LIMITS, Chunk, make_world, parity, worst_points
+from tests.bench.parity import Chunk, limits_of, make_world, parity, worst_points
 from tests.oracles.contact import rim_distance
 from tests.oracles.decals import decals_at
 
@@ -60,26 +60,26 @@ def by_set(sets: NDArray[np.integer]) -> Iterable[tuple[int, NDArray[np.intp]]]:
     return zip(sets[order][starts], np.split(order, starts[1:]), strict=True)
 
 
-def check(found: Any, samples: int) -> None:
+def check(contact: Contact, found: Any, samples: int) -> None:
     print(found)
     assert found["points"] == samples
     assert found["owned"] > 0.8 * samples
     assert found["unclear"] < 0.2 * samples
-    for name, most in LIMITS.items():
+    for name, most in limits_of(contact).items():
         assert found[name] <= most, name
 
 
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
 def test_half_a_million_points_in_a_sheet_and_in_layers(contact: Contact, layered: bool) -> None:
-    check(parity(contact, layered=layered, samples=500_000, device="cpu", chunk=125_000), 500_000)
+    check(contact, parity(contact, layered=layered, samples=500_000, device="cpu", chunk=125_000), 500_000)
 
 
 @pytest.mark.gpu
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
 def test_a_hundred_million_points_on_a_cuda_device(contact: Contact, layered: bool) -> None:
-    check(parity(contact, layered=layered, samples=100_000_000, device="cuda:0"), 100_000_000)
+    check(contact, parity(contact, layered=layered, samples=100_000_000, device="cuda:0"), 100_000_000)
 
 
 def test_the_worst_points_are_described() -> None:

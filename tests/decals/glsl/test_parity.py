@@ -63,8 +63,13 @@ OF_LIBRARY_KINDS = {
     "value_direct",
     "bound_direct",
     "gradient_direct",
+    "directed_partials",
+    "directed_slope",
 }
-"""Functions of direct fields; the core tables have none of these, and `test_tapes` compares the library's."""
+"""Functions of direct fields and of operators that read gradients.
+
+The core tables have none of these, and `test_tapes` compares the library's.
+"""
 
 
 def shared(module: str) -> list[TypedFunction]:

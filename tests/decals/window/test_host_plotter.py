@@ -31,6 +31,7 @@ def test_hands_in_a_subplot_that_is_no_longer_the_active_one(plotter: Factory) -
     window.show()
     pl.subplot(0, 0)
     renderer = pl.renderers[1]
+    renderer.ResetCamera()
     driver = Driver(window, renderer)
     first, state = driver.shot(), driver.state
     np.testing.assert_array_equal(first[:, :155], empty[:, :155])
