@@ -58,8 +58,9 @@ LIMITS = {
 ``contact_error_rh``: error of r/r_h by float32 alone, for sizes to 20:1. ``unlike_error_rh``: the same for
 sizes to 1,000:1, where contact in cells subtracts squares of sizes. ``cut_error_rh``: with the effect of
 neighbours beyond NEIGHBOR_REACH, less than 7e-5 each. ``uv_error``: divided by chord over tangent offset, the
-condition number of the direction. Owners are compared where no relative change of 1e-4 decides between two, contact where no
-neighbour lies within 1e-6 of NEIGHBOR_REACH and the owner's centre is farther than 1e-18 influence radii."""
+condition number of the direction. Owners are compared where no relative change of 1e-4 decides between two,
+contact where no neighbour lies within 1e-6 of NEIGHBOR_REACH and the owner's centre is farther than 1e-18
+influence radii."""
 
 ELASTIC_UV_ERROR = 5e-5
 """The limit of ``uv_error`` in ELASTIC contact, which stretches images near contact lines."""
