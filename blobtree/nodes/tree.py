@@ -30,7 +30,6 @@ from blobtree.nodes.numeric_parameters import NumericParameter
 from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradient_of
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
 from blobtree.nodes.values import (
-    OPTIONAL,
     equal,
     fields_of,
     from_records,
@@ -1231,8 +1230,13 @@ def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any], Any]]:
             check = parameters[item.name].check
         else:
             check = _node if hints[item.name] is Node else _nodes
-        checks.append((item.name, check, item.default if OPTIONAL in item.metadata else MISSING))
+        checks.append((item.name, check, item.default if _passes(item.default, check) else MISSING))
     return _CHECKS.setdefault(kind, checks)
+
+
+def _passes(default: Any, check: Callable[[Any], Any]) -> bool:
+    """Return True if a check returns a default as it is."""
+    return default is not MISSING and repr(check(default)) == repr(default)
 
 
 def _numbers(default: Any, size: int) -> NDArray[np.float64]:
