@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from blobtree import InvalidNode
@@ -195,6 +195,7 @@ def test_a_camera_to_save_is_one(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@example(value=-(2**63) - 1)
 @given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(), st.none(), st.lists(st.floats())))
 def test_checks_give_what_fits_or_say_what_came(value: Any) -> None:
     fits = isinstance(value, int | float) and abs(value) <= sys.float_info.max
@@ -209,7 +210,8 @@ def test_checks_give_what_fits_or_say_what_came(value: Any) -> None:
 
 def checked(check: Any, value: Any, fits: Any) -> None:
     if fits:
-        np.testing.assert_array_equal(check("it", value, InvalidEdit), value)
+        wanted = np.asarray(value, np.float64)  # large whole numbers lose digits, as in the check
+        np.testing.assert_array_equal(check("it", value, InvalidEdit), wanted)
     else:
         with pytest.raises(InvalidEdit, match=r"it: expected .*, got "):
             check("it", value, InvalidEdit)
