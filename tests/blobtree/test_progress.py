@@ -18,6 +18,18 @@ from blobtree.progress import displayed, reporting
 Reports = list[tuple[str, float]]
 
 
+@pytest.fixture(autouse=True)
+def unset_levels() -> Iterator[None]:
+    """Ignore levels of loggers that a page of the documentation has set."""
+    loggers = progress._PACKAGE_LOGGER, progress._logger
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.NOTSET)
+    yield
+    for logger, level in zip(loggers, before, strict=True):
+        logger.setLevel(level)
+
+
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The thread looks often, and shows at once; it is not the one of other tests."""
@@ -37,7 +49,6 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def no_handlers(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a script that configures no logging: pytest has handlers of its own."""
     monkeypatch.setattr(progress._logger, "hasHandlers", lambda: False)
-    monkeypatch.setattr(progress._PACKAGE_LOGGER, "level", logging.NOTSET)
 
 
 def until_shown(capsys: pytest.CaptureFixture[str], text: str) -> str:
