@@ -48,7 +48,7 @@ class LeafArrays:
 
 @wp.func
 def base_block(index: wp.vec3i, depth: wp.int32, keys: wp.array(dtype=wp.int64)) -> wp.int32:
-    """Return the block of the base that holds a cell of the finest level, −1 if there is none."""
+    """Return the block of the base that holds a cell of the finest level, or −1."""
     shift = 2 * depth + 2
     return find_block(wp.vec3i(index[0] >> shift, index[1] >> shift, index[2] >> shift), keys)
 
