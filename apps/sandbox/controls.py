@@ -13,7 +13,7 @@ from decals.errors import InvalidEdit
 from decals.validation import describe as describe_value
 
 SLIDER_REACH = 4.0
-"""Largest value of a slider without a range of its own, over the present value or the node's size."""
+"""Largest value of a slider for a number without unit and range, over the present value or 1."""
 
 STEPS = 200
 """Steps of a slider from end to end."""
@@ -23,6 +23,7 @@ SIGNED = (Quantity.DISTANCE, Quantity.ANGLE, Quantity.FACTOR, Quantity.NUMBERS)
 NUMBERS = (Quantity.LENGTH, Quantity.RADIUS, Quantity.WIDTH, *SIGNED)
 LISTS = (Quantity.POINTS, Quantity.RADII, Quantity.FACTORS, Quantity.DISTANCES)
 ANGLE_REACH = 360.0
+"""Largest value of a slider for an angle without a range, in degrees."""
 
 
 @dataclass(frozen=True)
