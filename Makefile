@@ -39,7 +39,7 @@ prose: $(INSTALLED)  ## List words and docstrings that the style rules exclude
 # setuptools installs apps/ and shaders/ as decals.apps and decals.shaders; mypy cannot read that mapping.
 # It checks a tree of links that has the packages where an installed copy has them.
 LINKS := build/types
-MYPY = cd $(LINKS) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml
+MYPY = cd $(LINKS) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache
 $(LINKS): FORCE
 	@rm -rf $@ && mkdir -p $@/decals
 	@ln -s $(CURDIR)/blobtree $(CURDIR)/tests $@/
