@@ -58,17 +58,21 @@ class Page:
         self.sandbox = Sandbox(window)
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
-        server.state.update({"catalog": self.sandbox.catalog(), "theme": "light", **self.sandbox.values()})
+        server.state.update({"catalog": self.sandbox.catalog(), "theme": "light", **self.values()})
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
 
     # -- values -----------------------------------------------------------------------------------------
 
+    def values(self) -> dict[str, Any]:
+        """Return all values that the page shows, by their names there."""
+        return self.sandbox.values()
+
     def refresh(self) -> None:
         """Send the values that have changed since the last look."""
         self.sandbox.settle()
-        values = self.sandbox.values()
+        values = self.values()
         changed = {name: value for name, value in values.items() if self._shown.get(name, self) != value}
         self._shown.update(changed)
         if changed:
@@ -95,15 +99,23 @@ class Page:
             layout.root.theme = ("theme",)
             with vuetify3.VLayout(full_height=True):
                 self._build_toolbar()
-                with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="left"):
-                    self._build_outline()
-                with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="right"):
-                    self._build_panel()
-                    self._build_history()
+                self._build_left_side()
+                self._build_right_side()
                 with vuetify3.VMain(), html.Div(style="height: 100%", **browser_keys(self._window)):
                     self.view = PyVistaRemoteView(self._window.plotter, style="height: 100%")
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status"'])
+
+    def _build_left_side(self) -> None:
+        """Build what stands left of the view."""
+        with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="left"):
+            self._build_outline()
+
+    def _build_right_side(self) -> None:
+        """Build what stands right of the view."""
+        with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="right"):
+            self._build_panel()
+            self._build_history()
 
     def _build_toolbar(self) -> None:
         with vuetify3.VAppBar(density="compact", flat=True, border=True):
