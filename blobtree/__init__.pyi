@@ -42,7 +42,7 @@ from .nodes.blends import (
     SuperellipticBlend,
     SymmetricDifference,
 )
-from .nodes.contact import Bulge, Contact, ContactSurface, Press, RatedUnion
+from .nodes.contact import Bulge, ContactSurface, Press, RatedUnion, SolidContact
 from .nodes.convolution import (
     ConvolutionArc,
     ConvolutionSegment,
@@ -84,7 +84,6 @@ __all__ = [
     "Circle",
     "CleanUnion",
     "Cone",
-    "Contact",
     "ContactSurface",
     "ControllableBlend",
     "ConvolutionArc",
@@ -147,6 +146,7 @@ __all__ = [
     "SignedDistances",
     "SmoothDifference",
     "SmoothIntersection",
+    "SolidContact",
     "Stretch",
     "Stroke",
     "Sum",

@@ -72,7 +72,7 @@ def _polygon(rng: Rng, _: Operand) -> Node:
 
 def _contact(rng: Rng, operand: Operand) -> Node:
     solids = tuple(operand(rng) for _ in range(3))
-    return blobtree.Contact(solids, stiffness=(1.0, 2.0, 1.5), width=0.3, height=0.05)
+    return blobtree.SolidContact(solids, stiffness=(1.0, 2.0, 1.5), width=0.3, height=0.05)
 
 
 def _graph(rng: Rng, operand: Operand) -> Node:

@@ -93,7 +93,9 @@ def corpus(folder: Path) -> list[Path]:
     for suffix in ("png", "jpg", "webp", "tif", "bmp", "gif", "ppm", "tga"):
         Image.fromarray(picture).save(folder / f"a.{suffix}")
     tree = (Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=0.5)).rotate((0, 0, 1), 0.3)
-    pressed = blobtree.Contact((tree, Point((0, 2, 0), radius=1.5)), stiffness=(1.0, 2.0), names=("a", "b"))
+    pressed = blobtree.SolidContact(
+        (tree, Point((0, 2, 0), radius=1.5)), stiffness=(1.0, 2.0), names=("a", "b")
+    )
     blobtree.save(pressed | blobtree.Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.2), folder / "tree.json")
     decals.save_scene(scene(8), folder / "scene.json")
     objects = (decals.MeshObject("ball", ball.points, ball.regular_faces, source=str(folder / "a.ply")),)

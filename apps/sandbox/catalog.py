@@ -53,7 +53,7 @@ DIRECTIONS = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 """Directions of a new primitive in turn."""
 
 NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union")
-"""Kinds that need data or are parts of others: the gizmo moves nodes, and `Contact` makes the last three."""
+"""Kinds that need data or are parts: the gizmo moves nodes, and `SolidContact` makes the last three."""
 
 NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1}
 """Lengths by the name of their parameter: the ends of a deformation, the thickness of a wall."""

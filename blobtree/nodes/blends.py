@@ -25,6 +25,7 @@ from blobtree.nodes.tree import (
     AssociativeCombination,
     Intersection,
     Macro,
+    ManyOperands,
     Node,
     Sum,
     Union,
@@ -384,8 +385,8 @@ class LocalBlend(Macro):
         return Sum(Union(both), Masked(Intersection(both), self.region))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class BlendGraph(Macro):
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class BlendGraph(ManyOperands, Macro):
     """Operands of which only some pairs blend, as edges of a graph (Guy & Wyvill 1995).
 
     F is the largest sum over a group of operands, of which every two blend: F = max over maximal groups Q of
@@ -402,8 +403,8 @@ class BlendGraph(Macro):
     --------
     >>> from blobtree import BlendGraph, Point
     >>> arm, body, hip = (Point((x, 0, 0), radius=1.0) for x in (0, 1, 2))
-    >>> model = BlendGraph((arm, body, hip), names=("arm", "body", "hip"), pairs=[("arm", "body")])
-    >>> model == BlendGraph((arm, body, hip), names=("arm", "body", "hip"), pairs=(("arm", "body"),))
+    >>> model = BlendGraph(arm, body, hip, names=("arm", "body", "hip"), pairs=[("arm", "body")])
+    >>> model == BlendGraph([arm, body, hip], names=("arm", "body", "hip"), pairs=(("arm", "body"),))
     True
     >>> bool(model([[0.5, 0, 0]]) == ((arm + body) | hip)([[0.5, 0, 0]]))
     True
@@ -411,7 +412,6 @@ class BlendGraph(Macro):
 
     file_tag = "blend_graph"
 
-    operands: tuple[Node, ...]
     _: KW_ONLY
     names: Annotated[tuple[str, ...], Parameter(Quantity.NAMES, "names of the operands, in their order")]
     pairs: Annotated[
@@ -431,11 +431,6 @@ class BlendGraph(Macro):
                 if name not in self.names:
                     known = ", ".join(map(repr, self.names))
                     raise InvalidNode(f"pairs: no operand is named {name!r}; the names are {known}")
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The operands."""
-        return self.operands
 
     @Lazy
     def expanded(self) -> Node:

@@ -1,7 +1,7 @@
 """Contact between solids: compression to shared surfaces and bulges around them (Gascuel 1993).
 
-`Press` deforms one solid at an obstacle. `Contact` lets any number of solids deform each other: each one is
-pressed by all others, and their union is the model.
+`Press` deforms one solid at an obstacle. `SolidContact` lets any number of solids deform each other: each one
+is pressed by all others, and their union is the model.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.parameters import Parameter, Quantity
-from blobtree.nodes.tree import Combination, Macro, Node, Union
+from blobtree.nodes.tree import Combination, Macro, ManyOperands, Node, Union
 
 LARGEST_RATIO = 100.0
 """Largest ratio of two stiffnesses; beyond it the stiffer solid is rigid for any purpose."""
@@ -33,10 +33,10 @@ RESOLUTION = 64
 """Cells along the longest side of a solid's support where volumes and contact surfaces are measured."""
 
 STEPS = 12
-"""Largest number of secant steps of `Contact.compensated`."""
+"""Largest number of secant steps of `SolidContact.compensated`."""
 
 LARGEST_STEP, LARGEST_GROWTH = 0.1, 0.5
-"""Largest step and offset in `Contact.compensated`, over the side of a cube of the solid's volume."""
+"""Largest step and offset in `SolidContact.compensated`, over the side of a cube of the solid's volume."""
 
 Width = Annotated[
     float,
@@ -163,7 +163,7 @@ class RatedUnion(Combination):
 
 @dataclass(frozen=True)
 class ContactSurface:
-    """The surface that two solids of a `Contact` share.
+    """The surface that two solids of a `SolidContact` share.
 
     Attributes
     ----------
@@ -182,9 +182,9 @@ class ContactSurface:
 
     Examples
     --------
-    >>> from blobtree import Contact, ContactSurface, Point
+    >>> from blobtree import SolidContact, ContactSurface, Point
     >>> left, right = Point((-0.8, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=1.0)
-    >>> (surface,) = Contact((left, right), names=("left", "right")).contacts(resolution=32)
+    >>> (surface,) = SolidContact((left, right), names=("left", "right")).contacts(resolution=32)
     >>> isinstance(surface, ContactSurface), surface.names, round(surface.area, 1)
     (True, ('left', 'right'), 1.1)
     """
@@ -198,8 +198,8 @@ class ContactSurface:
     faces: Any
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Contact(Macro):
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class SolidContact(ManyOperands, Macro):
     """Solids that deform each other where they touch; the model is the union of the deformed solids.
 
     No two deformed solids overlap, and no void opens between them: a point inside several solids belongs to
@@ -208,13 +208,13 @@ class Contact(Macro):
     surface where they meet. An offset above it grows the deformed solids; to let the solids grow
     before they touch, offset them.
 
-    This is a node. `decals.Contact` is the mode in which decals push each other on a surface.
+    `decals.Contact` is something else: the mode in which decals push each other on a surface.
 
     Examples
     --------
-    >>> from blobtree import Contact, Point
+    >>> from blobtree import SolidContact, Point
     >>> balls = [Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)]
-    >>> model = Contact(balls, stiffness=(1, 4))
+    >>> model = SolidContact(balls, stiffness=(1, 4))
     >>> soft, stiff = model.solids()
     >>> bool(soft([0, 0, 0]) < 0.5 < stiff([0, 0, 0]))
     True
@@ -225,7 +225,6 @@ class Contact(Macro):
 
     file_tag = "contact"
 
-    operands: tuple[Node, ...]
     _: KW_ONLY
     stiffness: Annotated[
         tuple[float, ...],
@@ -273,11 +272,6 @@ class Contact(Macro):
         if len(set(self.names)) < len(self.names):
             raise InvalidNode(f"names: expected a different name for each solid, got {self.names}")
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The solids before they deform."""
-        return self.operands
-
     @Lazy
     def expanded(self) -> Node:
         """Return the union of the deformed solids, without the surfaces between them."""
@@ -291,8 +285,8 @@ class Contact(Macro):
 
         Examples
         --------
-        >>> from blobtree import Contact, Point, polygonize
-        >>> left, right = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)]).solids()
+        >>> from blobtree import SolidContact, Point, polygonize
+        >>> left, right = SolidContact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)]).solids()
         >>> bool(abs(polygonize(left).vertices[:, 0].max()) < 1e-5)
         True
         """
@@ -319,8 +313,8 @@ class Contact(Macro):
 
         Examples
         --------
-        >>> from blobtree import Contact, Point
-        >>> model = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)], names=("left", "right"))
+        >>> from blobtree import SolidContact, Point
+        >>> model = SolidContact([Point((x, 0, 0), radius=1.0) for x in (-0.8, 0.8)], names=("left", "right"))
         >>> (surface,) = model.contacts()
         >>> surface.names, round(surface.area, 2)  # a disc of radius 0.6
         (('left', 'right'), 1.13)
@@ -333,7 +327,7 @@ class Contact(Macro):
                 surfaces += [surface for j in later if (surface := self._shared(mesh, i, j)) is not None]
         return surfaces
 
-    def compensated(self, *, tolerance: float = 0.002, resolution: int = RESOLUTION) -> "Contact":
+    def compensated(self, *, tolerance: float = 0.002, resolution: int = RESOLUTION) -> "SolidContact":
         """Return this contact with offsets of the solids, so that each keeps the volume that it has alone.
 
         Parameters
@@ -345,7 +339,7 @@ class Contact(Macro):
 
         Returns
         -------
-        Contact
+        SolidContact
             The same solids with other `growth`.
 
         Raises
@@ -357,8 +351,8 @@ class Contact(Macro):
 
         Examples
         --------
-        >>> from blobtree import Contact, Point
-        >>> model = Contact([Point((x, 0, 0), radius=1.0) for x in (-0.7, 0.7)], height=0)
+        >>> from blobtree import SolidContact, Point
+        >>> model = SolidContact([Point((x, 0, 0), radius=1.0) for x in (-0.7, 0.7)], height=0)
         >>> [round(distance, 3) for distance in model.compensated(resolution=32).growth]
         [0.023, 0.023]
         """

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import Support
-from blobtree.nodes.contact import Contact
+from blobtree.nodes.contact import SolidContact
 from blobtree.nodes.paths import (
     Path,
     moved,
@@ -243,7 +243,7 @@ def _cuts(node: Node) -> bool:
 
 def _without_child(parent: Node, step: int) -> Node | None:
     """Return a combination without one of its children, None if it had no other."""
-    if isinstance(parent, Contact) and len(parent.operands) > 1:
+    if isinstance(parent, SolidContact) and len(parent.operands) > 1:
         return parent.without(step)
     others = (*parent.children[:step], *parent.children[step + 1 :])
     if len(others) > 1:

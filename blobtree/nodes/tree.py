@@ -1000,10 +1000,10 @@ class Combination(Node):
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class AssociativeCombination(Combination):
-    """A combination of `operands`: any number of them, or two if their order matters to the operator.
+class ManyOperands(Node):
+    """A node with any number of `operands`, which come one by one or as one iterable.
 
-    Operands come one by one or as one iterable. The operator's parameters follow, best by name.
+    Its parameters follow them, best by name.
     """
 
     operands: tuple[Node, ...]
@@ -1013,6 +1013,16 @@ class AssociativeCombination(Combination):
             object.__setattr__(self, name, value)
         self.__post_init__()
 
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The operands, from left to right."""
+        return self.operands
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class AssociativeCombination(ManyOperands, Combination):
+    """A combination of `operands`: any number of them, or two if their order matters to the operator."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.operator.commutes and len(self.operands) != 2:
@@ -1020,11 +1030,6 @@ class AssociativeCombination(Combination):
                 f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
                 "claim that operands may come in any order, so nest it"
             )
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The operands, from left to right."""
-        return self.operands
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)

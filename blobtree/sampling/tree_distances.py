@@ -11,7 +11,7 @@ from blobtree.formulas.falloff import ISO
 from blobtree.meshing.polygonize import polygonize
 from blobtree.sampling.mesh_distances import DistanceMeter, Triangles
 from blobtree.tape.model import ImplicitModel, checked_tree, gradients_at
-from blobtree.validation import point_array
+from blobtree.validation import points_or_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class SignedDistances:
     Attributes
     ----------
     values
-        float32[n], below 0 inside.
+        float32[n], below 0 inside; a number for one point.
     error
         Largest distance, in model units, between the surface and the mesh to which distances were measured,
         estimated at the middles of all triangles. The distances differ from exact ones by about that at most.
@@ -48,7 +48,7 @@ def to_sdf(tree: ImplicitModel, points: ArrayLike, *, resolution: int = 64) -> S
     ----------
     tree : Node
         The tree.
-    points : array-like (n, 3)
+    points : array-like (n, 3), or (3,) for one point
         Points, in model units; those of a grid give distances for `from_sdf`.
     resolution : int
         Cells along the longest side of the tree's support.
@@ -74,7 +74,7 @@ def to_sdf(tree: ImplicitModel, points: ArrayLike, *, resolution: int = 64) -> S
     >>> distances.values.round(2).tolist(), distances.error < 0.01
     ([1.0, -0.5], True)
     """
-    array = point_array(points)
+    array, single = points_or_point(points)
     mesh = polygonize(checked_tree(tree), resolution=resolution)
     if not len(mesh.faces):
         raise InvalidNode(f"tree: expected a surface, got none in {resolution} cells; take smaller cells")
@@ -85,4 +85,4 @@ def to_sdf(tree: ImplicitModel, points: ArrayLike, *, resolution: int = 64) -> S
     found = gradients_at(tree.tape, mesh.vertices[mesh.faces].mean(axis=1)).astype(np.float64)
     slopes = np.linalg.norm(found[:, 1:], axis=1)
     gaps = np.abs(found[:, 0] - ISO)[slopes > 0.0] / slopes[slopes > 0.0]
-    return SignedDistances(values, float(gaps.max(initial=0.0)))
+    return SignedDistances(values[0] if single else values, float(gaps.max(initial=0.0)))

@@ -10,7 +10,7 @@ import argparse
 
 import numpy as np
 
-from blobtree import ISO, Contact, Ellipsoid, Node, Point, Segment, polygonize
+from blobtree import ISO, Ellipsoid, Node, Point, Segment, SolidContact, polygonize
 from blobtree._typing import Float64Array
 from blobtree.meshing.clip import enclosed_volume
 from tests.oracles import blobtree as oracle
@@ -39,7 +39,8 @@ def figures(*, quick: bool = False) -> dict[str, float]:
     `pcm_volume_error`: largest relative error of a volume after compensation.
     """
     count = SAMPLES // 10 if quick else SAMPLES
-    equal, rated = Contact(solids(), height=0.06), Contact(solids(), stiffness=(1, 2, 4), height=0.06)
+    equal = SolidContact(solids(), height=0.06)
+    rated = SolidContact(solids(), stiffness=(1, 2, 4), height=0.06)
     penetrating, voids = _overlaps(rated, count)
     return {
         "pcm_gap": _gap(equal),
@@ -50,7 +51,7 @@ def figures(*, quick: bool = False) -> dict[str, float]:
     }
 
 
-def _gap(model: Contact) -> float:
+def _gap(model: SolidContact) -> float:
     """Largest |f₁ − f₂|, by the kernels, at vertices of the contact surfaces."""
     gaps: list[float] = []
     for number, solid in enumerate(model.solids()):
@@ -61,7 +62,7 @@ def _gap(model: Contact) -> float:
     return max(gaps)
 
 
-def _overlaps(model: Contact, count: int) -> tuple[float, float]:
+def _overlaps(model: SolidContact, count: int) -> tuple[float, float]:
     """Numbers of samples inside two solids, and of samples inside solids that no deformed solid holds."""
     lower, upper = model.support
     points = np.random.default_rng(0).uniform(lower, upper, (count, 3)).astype(np.float32)
@@ -74,7 +75,7 @@ def _normal_jump(count: int) -> float:
     """Largest angle between normals beside the edges where contact begins and where the bulge ends."""
     height, width = 0.05, 0.3
     other = Point((0.8, 0, 0), radius=1.0)
-    left = Contact((Point((-0.8, 0, 0), radius=1.0), other), height=height, width=width).solids()[0]
+    left = SolidContact((Point((-0.8, 0, 0), radius=1.0), other), height=height, width=width).solids()[0]
     rng, worst = np.random.default_rng(0), 0.0
     for level in (ISO, ISO - 2.0 * height, ISO - width):
         angles = rng.uniform(0.0, 2.0 * np.pi, count)
@@ -100,7 +101,7 @@ def _edge(solid: Node, other: Node, level: float) -> tuple[float, float]:
     return float(place[0, 0]), float(place[0, 1])
 
 
-def _volume_error(model: Contact) -> float:
+def _volume_error(model: SolidContact) -> float:
     """Largest relative error of a solid's volume, in finer cells than those of the compensation."""
     errors: list[float] = []
     for solid, free in zip(model.solids(), model.operands, strict=True):

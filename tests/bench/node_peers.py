@@ -26,12 +26,12 @@ from blobtree import (
     RIM,
     BlendGraph,
     Box,
-    Contact,
     ConvolutionStroke,
     Gyroid,
     Node,
     Point,
     Segment,
+    SolidContact,
     Sum,
     Superquadric,
     polygonize,
@@ -73,7 +73,7 @@ def models() -> dict[str, Node]:
         "superquadric": Superquadric((0, 0, 0), (1.2, 0.8, 0.8), 0.3, 1.0),
         "convolution stroke": stroke,
         "bent box": beam.bend(40, (0, 2)),
-        "two solids in contact": Contact(pair, stiffness=(1, 3), height=0.05),
+        "two solids in contact": SolidContact(pair, stiffness=(1, 3), height=0.05),
         "blend graph": BlendGraph(arms, names=("a", "b", "c"), pairs=(("a", "b"),)),
     }
 

@@ -39,11 +39,11 @@ from numpy.typing import NDArray
 from blobtree import (
     Box,
     CleanUnion,
-    Contact,
     GradientBlend,
     Node,
     Point,
     Segment,
+    SolidContact,
     Sum,
     define_skeleton,
     from_mesh,
@@ -198,7 +198,7 @@ def fits(options: argparse.Namespace) -> Figures:
 def mixed() -> Node:
     """Return a tree with a clean union, solids in contact and a bend."""
     parts = [Point((x, y, 0.0), radius=0.35) for x in (-0.5, 0.0, 0.5) for y in (-0.4, 0.0, 0.4)]
-    pressed = Contact((Sum(tuple(parts[:4])), Sum(tuple(parts[4:]))), width=0.3, height=0.03)
+    pressed = SolidContact((Sum(tuple(parts[:4])), Sum(tuple(parts[4:]))), width=0.3, height=0.03)
     return CleanUnion(pressed, Sum(tuple(part.translate((0, 0, 0.5)) for part in parts))).bend(
         30.0, (-0.5, 0.5)
     )

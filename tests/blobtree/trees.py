@@ -19,7 +19,6 @@ from blobtree import (
     Circle,
     CleanUnion,
     Cone,
-    Contact,
     ControllableBlend,
     ConvolutionArc,
     ConvolutionSegment,
@@ -52,6 +51,7 @@ from blobtree import (
     Shell,
     SmoothDifference,
     SmoothIntersection,
+    SolidContact,
     Stroke,
     Sum,
     SuperellipticBlend,
@@ -225,7 +225,7 @@ def random_contact(rng: np.random.Generator, operands: list[Node]) -> Node:
         return deformation(*operands[:2], stiffness_ratio=ratio, width=width, height=float(heights[0]))
     several = operands[:3]
     stiffness = rng.uniform(1.0, 3.0, len(several) ** int(rng.integers(1, 3))) * (rng.random() < 0.7)
-    return Contact(
+    return SolidContact(
         tuple(several),
         stiffness=tuple(stiffness.tolist()) if stiffness.any() else (),
         width=width,

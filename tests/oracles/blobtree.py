@@ -20,7 +20,6 @@ from blobtree import (
     Bulge,
     Circle,
     Cone,
-    Contact,
     ConvolutionArc,
     ConvolutionSegment,
     ConvolutionStroke,
@@ -51,6 +50,7 @@ from blobtree import (
     Segment,
     Shear,
     Shell,
+    SolidContact,
     Stretch,
     Stroke,
     Sum,
@@ -197,7 +197,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
             a, b = evaluate(first, q), evaluate(second, q)
             b = replace(b, value=rated(b.value, ratio))
             return _choose(a, b, a.value >= b.value)
-        case Contact():
+        case SolidContact():
             return evaluate(outside_of(node), q)
         case Sum(operands=operands):
             return reduce(_sum, [signed(operand, q) for operand in operands])
@@ -302,7 +302,7 @@ def grown(node: Node, distance: float) -> Node:
             return replace(node, solid=grown(solid, distance), obstacle=grown(obstacle, -distance))
         case RatedUnion(first=first, second=second):
             return replace(node, first=grown(first, distance), second=grown(second, distance))
-        case Contact():
+        case SolidContact():
             return grown(outside_of(node), distance)
         case Difference(solid=solid, tool=tool):
             return Difference(grown(solid, distance), grown(tool, -distance))
@@ -329,7 +329,7 @@ def written_out(node: Node) -> Node:
     raise TypeError(type(node))
 
 
-def pressed_solids(contact: Contact) -> tuple[Node, ...]:
+def pressed_solids(contact: SolidContact) -> tuple[Node, ...]:
     """The solids of a contact, each pressed by all others at once."""
     solids = contact.operands
     pressed: list[Node] = []
@@ -345,7 +345,7 @@ def pressed_solids(contact: Contact) -> tuple[Node, ...]:
     return tuple(pressed)
 
 
-def outside_of(contact: Contact) -> Union:
+def outside_of(contact: SolidContact) -> Union:
     """The union of the solids of a contact, each with its bulges, but not compressed."""
     return Union(
         tuple(
@@ -357,7 +357,7 @@ def outside_of(contact: Contact) -> Union:
     )
 
 
-def bulge_height(contact: Contact, number: int) -> float:
+def bulge_height(contact: SolidContact, number: int) -> float:
     """Height as given for a solid; a single one is that of the softest, others divide it by stiffness."""
     count = len(contact.operands)
     heights = np.atleast_1d(contact.height).tolist()

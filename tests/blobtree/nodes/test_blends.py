@@ -178,7 +178,7 @@ def test_a_graph_with_too_many_groups_is_refused() -> None:
     names = tuple(map(str, range(24)))
     pairs = [pair for pair in combinations(names, 2) if int(pair[0]) // 3 != int(pair[1]) // 3]
     with pytest.raises(InvalidNode, match="groups"):
-        _ = BlendGraph([A] * 24, names=names, pairs=pairs).tape  # type: ignore[arg-type]
+        _ = BlendGraph([A] * 24, names=names, pairs=pairs).tape
 
 
 def test_a_local_blend_is_a_sum_inside_its_region_and_a_union_where_that_ends() -> None:

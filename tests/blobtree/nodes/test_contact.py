@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from blobtree import (
     ISO,
-    Contact,
     Ellipsoid,
     InvalidNode,
     Node,
     Point,
     Press,
     Segment,
+    SolidContact,
     Torus,
     from_json,
     polygonize,
@@ -37,16 +37,16 @@ THREE = (
     Ellipsoid((-0.4, -0.65, 0), (0.9, 0.8, 0.7), color=BLUE),
 )
 MODELS = {
-    "two": Contact(PAIR),
-    "two of different stiffness": Contact(PAIR, stiffness=(1.0, 4.0), height=(0.1, 0.02), width=0.4),
-    "three": Contact(THREE, height=(0.08,), width=0.35),
-    "three of different stiffness": Contact(THREE, stiffness=(1.0, 2.0, 5.0)),
-    "three by pairs": Contact(THREE, stiffness=((1, 1, 2), (1, 1, 3), (1, 1, 1)), height=0.0),  # type: ignore[arg-type]
+    "two": SolidContact(PAIR),
+    "two of different stiffness": SolidContact(PAIR, stiffness=(1.0, 4.0), height=(0.1, 0.02), width=0.4),
+    "three": SolidContact(THREE, height=(0.08,), width=0.35),
+    "three of different stiffness": SolidContact(THREE, stiffness=(1.0, 2.0, 5.0)),
+    "three by pairs": SolidContact(THREE, stiffness=((1, 1, 2), (1, 1, 3), (1, 1, 1)), height=0.0),
 }
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
-def fields(model: Contact, points: NDArray[Any]) -> NDArray[np.float64]:
+def fields(model: SolidContact, points: NDArray[Any]) -> NDArray[np.float64]:
     """The deformed fields (n, count) in float64, by the definition: the strongest other solid presses."""
     plain = [oracle.value(solid, points) for solid in model.operands]
     result = []
@@ -60,7 +60,7 @@ def fields(model: Contact, points: NDArray[Any]) -> NDArray[np.float64]:
 
 
 @EVERY_MODEL
-def test_the_deformed_fields_are_those_of_the_definition(model: Contact) -> None:
+def test_the_deformed_fields_are_those_of_the_definition(model: SolidContact) -> None:
     points = np.random.default_rng(0).uniform(-2.2, 2.2, (4000, 3))
     expected = fields(model, points)
     for solid, values in zip(model.solids(), expected, strict=True):
@@ -71,14 +71,14 @@ def test_the_deformed_fields_are_those_of_the_definition(model: Contact) -> None
 
 
 def test_stiffer_solids_bulge_less() -> None:
-    soft, stiff = Contact(PAIR, stiffness=(1, 4), height=0.08, width=0.4).solids()
+    soft, stiff = SolidContact(PAIR, stiffness=(1, 4), height=0.08, width=0.4).solids()
     assert isinstance(soft, Press)
     assert isinstance(stiff, Press)
     assert (soft.height, stiff.height) == (0.08, 0.02)
 
 
 @EVERY_MODEL
-def test_no_sample_lies_inside_two_solids_and_no_void_opens(model: Contact) -> None:
+def test_no_sample_lies_inside_two_solids_and_no_void_opens(model: SolidContact) -> None:
     lower, upper = model.support
     points = np.random.default_rng(1).uniform(lower, upper, (200_000, 3)).astype(np.float32)
     inside = [solid(points) - np.float32(ISO) for solid in model.solids()]
@@ -89,7 +89,7 @@ def test_no_sample_lies_inside_two_solids_and_no_void_opens(model: Contact) -> N
 
 
 @EVERY_MODEL
-def test_each_solid_is_one_closed_surface_and_neighbours_share_theirs(model: Contact) -> None:
+def test_each_solid_is_one_closed_surface_and_neighbours_share_theirs(model: SolidContact) -> None:
     for number, solid in enumerate(model.solids()):
         mesh = polygonize(solid, resolution=40)
         assert_valid(mesh)
@@ -106,7 +106,7 @@ def test_each_solid_is_one_closed_surface_and_neighbours_share_theirs(model: Con
 
 
 def test_the_contact_of_two_balls_is_a_disc() -> None:
-    (surface,) = Contact(PAIR, names=("left", "right")).contacts()
+    (surface,) = SolidContact(PAIR, names=("left", "right")).contacts()
     assert surface.pair == (0, 1)
     assert surface.names == ("left", "right")
     assert surface.area == pytest.approx(math.pi * 0.36, rel=0.005)
@@ -132,15 +132,15 @@ def test_three_solids_meet_in_one_line() -> None:
 
 def test_a_ring_of_contact_has_two_outlines_and_apart_solids_none() -> None:
     ring, ball = Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.3), Point((0, 0, 0.75), radius=1.05)
-    (surface,) = Contact((ring, ball)).contacts()
+    (surface,) = SolidContact((ring, ball)).contacts()
     assert len(surface.outlines) == 2
-    assert Contact((ball, ball.translate((2.2, 0, 0)))).contacts() == []
-    assert Contact((ball,)).contacts() == []
+    assert SolidContact((ball, ball.translate((2.2, 0, 0)))).contacts() == []
+    assert SolidContact((ball,)).contacts() == []
 
 
 def test_a_solid_far_from_all_others_stays_as_it_is() -> None:
     far = Point((9, 0, 0), radius=1.0)
-    model = Contact((*PAIR, far))
+    model = SolidContact((*PAIR, far))
     assert model.solids()[2] is far
     assert isinstance(model.solids()[0], Press)
     assert model.solids()[0].children == PAIR
@@ -149,7 +149,7 @@ def test_a_solid_far_from_all_others_stays_as_it_is() -> None:
 @pytest.mark.parametrize("height", [0.02, 0.06])
 def test_normals_are_continuous_where_contact_and_bulge_begin_and_end(height: float) -> None:
     """Points of the surface a little on both sides of m = ½, of the top and of the far edge, along it."""
-    model = Contact(PAIR, height=height, width=0.3)
+    model = SolidContact(PAIR, height=height, width=0.3)
     left = model.solids()[0]
     mesh = polygonize(left, resolution=60)
     points = mesh.vertices[np.random.default_rng(0).permutation(len(mesh.vertices))[:4000]]
@@ -185,7 +185,7 @@ def test_compensated_solids_keep_their_volumes(name: str) -> None:
 def test_volumes_that_cannot_be_kept_are_refused() -> None:
     ball = Point((0, 0, 0), radius=1.0)
     with pytest.raises(InvalidNode, match="keep their volumes"):
-        Contact((ball, ball, Point((0, 0, 0), radius=0.9))).compensated(resolution=24)
+        SolidContact((ball, ball, Point((0, 0, 0), radius=0.9))).compensated(resolution=24)
 
 
 # -- the model in pictures, edits and files -------------------------------------------------------------
@@ -215,22 +215,22 @@ def test_files_pickles_and_text() -> None:
         assert from_json(to_json(model)) == model == pickle.loads(pickle.dumps(model))
         for solid in model.solids():
             assert from_json(to_json(solid)) == solid
-    scope = {kind.__name__: kind for kind in (Contact, Point)}
+    scope = {kind.__name__: kind for kind in (SolidContact, Point)}
     assert eval(repr(MODELS["two"]), scope) == MODELS["two"]
 
 
 def test_paths_and_surgery() -> None:
     model: Node = (
-        Contact(THREE, stiffness=(1, 2, 3), height=(0.01, 0.02, 0.03), names=("a", "b", "c")) | PAIR[0]
+        SolidContact(THREE, stiffness=(1, 2, 3), height=(0.01, 0.02, 0.03), names=("a", "b", "c")) | PAIR[0]
     )
     assert primitive_paths(model) == [(0, 0), (0, 1), (0, 2), (1,)]
     assert primitive_near(model, (1.5, 0, 0)) == (0, 0)
     smaller = with_node(model, (0, 0), Point((0.7, 0, 0), radius=0.5))
     assert node_at(smaller, (0, 0)) == Point((0.7, 0, 0), radius=0.5)
     rest = node_at(surgery.remove_branch(model, (0, 1)), (0,))
-    assert isinstance(rest, Contact)
+    assert isinstance(rest, SolidContact)
     assert (rest.stiffness, rest.height, rest.names) == ((1, 3), (0.01, 0.03), ("a", "c"))
-    table = Contact(THREE, stiffness=tuple(range(1, 10)))
+    table = SolidContact(THREE, stiffness=tuple(range(1, 10)))
     assert table.without(1).stiffness == (1, 3, 7, 9)
     pressed = Press(*PAIR)
     assert surgery.remove_branch(pressed, (1,)) is PAIR[0]
@@ -260,13 +260,13 @@ def test_paths_and_surgery() -> None:
 )
 def test_wrong_parameters_are_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidNode, match=message):
-        Contact(PAIR, **options)
+        SolidContact(PAIR, **options)
 
 
-@pytest.mark.parametrize("operands", [(), (1,), Point((0, 0, 0), radius=1.0), (PAIR[0], None)])
+@pytest.mark.parametrize("operands", [(), (1,), (PAIR[0], None)])
 def test_wrong_solids_are_refused(operands: Any) -> None:
     with pytest.raises(InvalidNode, match="operands: expected"):
-        Contact(operands)
+        SolidContact(operands)
 
 
 def test_wrong_presses_are_refused() -> None:
@@ -302,3 +302,14 @@ def test_half_of_a_ball_is_clipped_from_its_mesh() -> None:
     )
     for sign, count in ((1.0, len(mesh.faces)), (-1.0, 0)):
         assert len(clipped(mesh.vertices, mesh.faces, np.full(len(mesh.vertices), sign))[1]) == count
+
+
+def test_operands_come_one_by_one_or_as_one_iterable() -> None:
+    options: dict[str, Any] = {"stiffness": (1, 2), "names": ("a", "b")}
+    assert (
+        SolidContact(*PAIR, **options) == SolidContact(PAIR, **options) == SolidContact(iter(PAIR), **options)
+    )
+    with pytest.raises(TypeError, match="stifness unknown"):
+        SolidContact(*PAIR, stifness=(1, 2))
+    with pytest.raises(TypeError, match="expected operands"):
+        SolidContact()

@@ -296,6 +296,8 @@ def test_distances_from_a_tree_are_within_their_error() -> None:
     assert error <= 2.0 * found.error + 1e-6
     assert found.error < 3e-3
     assert (found.values < 0.0).sum() > 20
+    one = to_sdf(Point((0.1, 0.1, 0.1), radius=1.0), points[0], resolution=48)
+    assert one.values == found.values[0]
 
 
 def test_a_tree_through_distances_and_back() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from blobtree import ISO, Contact, Point
+from blobtree import ISO, Point, SolidContact
 from decals.scattering.scatter import scatter
 from decals.surfaces.implicit import ImplicitSurface
 
@@ -10,7 +10,7 @@ BALLS = (Point((-0.8, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=1.0))
 
 
 def test_decals_cover_the_outside_of_a_contact_and_all_of_a_solid() -> None:
-    model = Contact(BALLS, height=0.06)
+    model = SolidContact(BALLS, height=0.06)
     for tree, touching in ((model, False), (model.solids()[0], True)):
         surface = ImplicitSurface(tree)
         decals = scatter(surface, count=120, seed=1)
@@ -21,6 +21,6 @@ def test_decals_cover_the_outside_of_a_contact_and_all_of_a_solid() -> None:
 
 
 def test_rays_hit_the_contact_surface_of_a_single_solid() -> None:
-    left = Contact(BALLS).solids()[0]
+    left = SolidContact(BALLS).solids()[0]
     distances = ImplicitSurface(left).raycast([[3.0, 0.1, 0.0]], [[-1.0, 0.0, 0.0]])
     np.testing.assert_allclose(distances, 3.0, atol=1e-4)
