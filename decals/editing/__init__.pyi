@@ -1,4 +1,5 @@
 from .actions import KEYS, Actions
+from .brushes import BrushDecals, PushDecals
 from .commands import (
     AddDecals,
     AddImage,
@@ -39,6 +40,7 @@ __all__ = [
     "AddImage",
     "AddObject",
     "AddPrimitive",
+    "BrushDecals",
     "DeleteDecals",
     "Document",
     "DuplicateDecals",
@@ -50,6 +52,7 @@ __all__ = [
     "MovePrimitive",
     "PaintPrimitive",
     "PointerTools",
+    "PushDecals",
     "RelaxDecals",
     "RemoveImage",
     "RemoveObject",

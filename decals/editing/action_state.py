@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
+from decals.editing.brushes import BrushSettings
 from decals.editing.document import Edit
 from decals.editing.prompts import PromptLine
 from decals.editing.queries import SurfacePick
@@ -73,6 +74,8 @@ class ActionState:
         The open prompt, if any; it receives all keys.
     modes
         Contact mode, image mapping and stiffness of the window.
+    brush
+        The brush that a drag uses.
     view
         Returns the eye and its target. Default: the document camera's.
     background
@@ -87,6 +90,7 @@ class ActionState:
         self.message = ""
         self.prompt = PromptLine(self.show)
         self.modes: DrawModes = DefaultModes()
+        self.brush = BrushSettings()
         self.view: Callable[[], tuple[ArrayLike, ArrayLike]] = self._document_view
         self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
         self._series: tuple[str, object] | None = None

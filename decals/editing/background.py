@@ -278,8 +278,13 @@ class BackgroundJobs:
         if message:
             self._show(message)
 
-    def compute(self, label: str, work: Callable[[Progress, Cancel], Command]) -> None:
-        """Compute a command in the background without the session, then carry it out.
+    def compute(
+        self,
+        label: str,
+        work: Callable[[Progress, Cancel], Command],
+        done: Callable[[], None] | None = None,
+    ) -> None:
+        """Compute a command in the background without the session, carry it out, then call ``done``.
 
         Raises
         ------
@@ -287,7 +292,7 @@ class BackgroundJobs:
             Another edit is running.
         """
         if not self._threaded:
-            self.edit(label, step_of(work(lambda _stage, _fraction: None, lambda: False)))
+            self.edit(label, step_of(work(lambda _stage, _fraction: None, lambda: False)), done)
             return
 
         def run(progress: Progress, cancel: Cancel) -> Completion:
@@ -296,7 +301,7 @@ class BackgroundJobs:
             def complete() -> Job:
                 self._computing = False
                 self._end_stroke()
-                return self._fork_job(_Request(label, step_of(command)))
+                return self._fork_job(_Request(label, step_of(command), done))
 
             return complete
 

@@ -4,17 +4,21 @@ from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 
-from blobtree.progress import Progress
+from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.editing.action_state import ActionState, Cursor
-from decals.editing.commands import AddImage
+from decals.editing.commands import AddImage, ReplaceScene
 from decals.editing.key_bindings import Group, action
 from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile
+from decals.editing.session import Command
 from decals.errors import InvalidEdit
+from decals.images.builtin import is_builtin
 from decals.scenes.camera import Camera
+from decals.scenes.files import load_scene
 from decals.scenes.meshes import write_mesh
 from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.script import write_script
 
 UNTITLED = "untitled"
 """Title of a scene without a file."""
@@ -41,6 +45,10 @@ class FileActions:
         Returns the camera to save with the scene; None for the document's.
     leave
         Closes the window.
+    show_view
+        Shows the scene from its own camera, after another file was opened.
+    folder
+        Files outside this folder are neither read nor written; None for no limit.
     recovery : RecoveryFile
         Unsaved changes for the next window after a crash.
     """
@@ -50,10 +58,17 @@ class FileActions:
         self.path = path
         self.camera: Callable[[], Camera | None] = lambda: None
         self.leave: Callable[[], None] = lambda: None
-        self.recovery = RecoveryFile(state.session, state.background, lambda: self.camera(), state.end_stroke)
-        self.recovery.belong_to(path)
+        self.show_view: Callable[[Camera], None] = lambda camera: None
+        self.folder: Path | None = None
+        self.recovery = self._recovery_beside(path)
         self._closing = False
         self._discarded: object = NOTHING
+
+    def _recovery_beside(self, path: str | PathLike[str] | None) -> RecoveryFile:
+        state = self._state
+        recovery = RecoveryFile(state.session, state.background, lambda: self.camera(), state.end_stroke)
+        recovery.belong_to(path)
+        return recovery
 
     @property
     def title(self) -> str:
@@ -78,7 +93,7 @@ class FileActions:
 
     def _ask_for_name(self, save: Callable[[Path], None]) -> None:
         def accept(text: str, repeated: bool) -> None:
-            path = _checked_path(text, (".json",))
+            path = self._checked_path(text, (".json",))
             if self.path is None or path.absolute() != Path(self.path).absolute():
                 _refuse_to_replace(path, repeated)
             save(path)
@@ -101,17 +116,81 @@ class FileActions:
             raise InvalidEdit("the scene has no object to export; press N to add one")
 
         def accept(text: str, repeated: bool) -> None:
-            path = _checked_path(text, MESH_SUFFIXES)
-            _refuse_to_replace(path, repeated)
-            objects = self._state.session.document.objects
-
-            def write(progress: Progress) -> None:
-                write_mesh(objects, path, progress=progress)
-
-            self._state.background.write("export", write, f"exported to {path}")
+            self.write(text, repeated, suffixes=MESH_SUFFIXES)
 
         first = Path(self.path or UNTITLED).with_suffix(MESH_SUFFIXES[0])
         self._state.prompt.begin(TextPrompt(f"export to ({', '.join(MESH_SUFFIXES)})", str(first), accept))
+
+    def write(
+        self, text: str, replace: bool, *, suffixes: tuple[str, ...] = (".json", ".py", *MESH_SUFFIXES)
+    ) -> None:
+        """Write the scene to a file whose suffix is the format: a scene, a Python script or a mesh.
+
+        Parameters
+        ----------
+        text
+            Name of the file.
+        replace
+            If False, a file that exists is an error, but for the scene's own.
+        suffixes
+            Suffixes that are accepted.
+        """
+        path = self._checked_path(text, suffixes)
+        own = self.path is not None and path.absolute() == Path(self.path).absolute()
+        if not own:
+            _refuse_to_replace(path, replace)
+        suffix = path.suffix.lower()
+        if suffix == ".json":
+            self._save_to(path)
+            return
+        scene = self._state.session.document.scene
+        camera = self.camera()
+        shown = scene if camera is None else scene.replace(camera=camera)
+
+        def write(progress: Progress) -> None:
+            if suffix == ".py":
+                write_script(shown, path)
+            else:
+                write_mesh(scene.objects, path, progress=progress)
+
+        self._state.background.write("export", write, f"exported to {path}")
+
+    def open(self, load: Callable[[], Scene], path: str | PathLike[str], recover: bool = True) -> None:
+        """Open another scene in the place of the present one, whose unsaved changes are kept for recovery.
+
+        The history begins anew, unless an edit was made while the scene was loaded: then undo leads back.
+
+        Parameters
+        ----------
+        load
+            Returns the scene; it runs in the background.
+        path
+            File to save to, which has to be inside `folder`.
+        recover
+            If True, unsaved changes of an earlier window of this file are taken over.
+        """
+        path = self._inside(Path(path))
+        state, session = self._state, self._state.session
+        state.background.require_idle()
+        state.end_stroke()
+        entries = len(session.labels)
+
+        def compute(_progress: Progress, _cancel: Cancel) -> Command:
+            return ReplaceScene(load(), f"open {path.name}")
+
+        def done() -> None:
+            if len(session.labels) == entries + 1:
+                session.forget_history()
+            self.path = path
+            self.recovery = self._recovery_beside(path)
+            if recover:
+                self.recover(load_scene)
+            self.show_view(session.document.camera)
+
+        if session.modified:
+            self.recovery.keep()
+        self.recovery.release()
+        state.background.compute(f"open {path.name}", compute, done)
 
     @action("add_image", "Ctrl+i", summary="add an image for decals", group=Group.SCENE)
     def add_image(self, _cursor: Cursor) -> None:
@@ -120,11 +199,32 @@ class FileActions:
         def accept(text: str, _repeated: bool) -> None:
             state = self._state
             state.end_stroke()
+            if self.folder is not None and not is_builtin(text):
+                self._inside(Path(text))
             state.run(AddImage(DecalImage.load(text)))
             count = len(state.session.document.images)
             state.show(f"added {text} as image {count - 1}; press I to show it on the selected decals")
 
         self._state.prompt.begin(TextPrompt("image file, or scale, tile, eye, rivet, rock", "", accept))
+
+    def _checked_path(self, text: str, suffixes: tuple[str, ...]) -> Path:
+        """Return the path of a file to write, or raise `InvalidEdit`."""
+        path = Path(text).expanduser()
+        if path.suffix.lower() not in suffixes:
+            raise InvalidEdit(f"expected a name that ends in {', '.join(suffixes)}, got {text!r}")
+        path = self._inside(path)
+        if path.is_dir() or not path.parent.is_dir():
+            raise InvalidEdit(f"expected a file in an existing folder, got {text!r}")
+        return path
+
+    def _inside(self, path: Path) -> Path:
+        """Return a path, or raise `InvalidEdit` if it leads out of the folder."""
+        if self.folder is None:
+            return path
+        inside = self.folder / path
+        if "\0" in str(path) or not inside.resolve().is_relative_to(self.folder.resolve()):
+            raise InvalidEdit(f"expected a file inside {str(self.folder)!r}, got {str(path)!r}")
+        return inside
 
     # -- closing ----------------------------------------------------------------------------------------
 
@@ -200,16 +300,6 @@ class FileActions:
         self._save_to(path)
         self._closing = True
         self.update()
-
-
-def _checked_path(text: str, suffixes: tuple[str, ...]) -> Path:
-    """Return the path of a file to write, or raise `InvalidEdit`."""
-    path = Path(text).expanduser()
-    if path.suffix.lower() not in suffixes:
-        raise InvalidEdit(f"expected a name that ends in {', '.join(suffixes)}, got {text!r}")
-    if path.is_dir() or not path.parent.is_dir():
-        raise InvalidEdit(f"expected a file in an existing folder, got {text!r}")
-    return path
 
 
 def _refuse_to_replace(path: Path, repeated: bool) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
 from decals.editing.actions import KEYS, Actions
+from decals.editing.brushes import Brush, BrushStroke
 from decals.editing.commands import MoveDecals
 from decals.editing.queries import SurfacePick, first_hit, nearest_points, pick, shortest_rotations
 from decals.errors import InvalidEdit
@@ -72,16 +73,17 @@ class PointerTools:
         self._ray, self._occluded = ray, occluded
         self._press, self._press_position = Press.UP, (0.0, 0.0)
         self._drag: DecalDrag | None = None
+        self._brush: BrushStroke | None = None
 
     @property
     def dragging(self) -> bool:
-        """True while decals are dragged."""
-        return self.drags_decals and self._press is Press.DRAG
+        """True while decals are dragged or brushed."""
+        return self._brush is not None or (self._drag is not None and self._press is Press.DRAG)
 
     @property
     def drags_decals(self) -> bool:
-        """True while the button is down on a selected decal."""
-        return self._drag is not None
+        """True while the button is down on a selected decal, or a brush is."""
+        return self._drag is not None or self._brush is not None
 
     def at(self, x: float, y: float) -> SurfacePick | None:
         """Return the surface point at a pixel, or None."""
@@ -116,6 +118,8 @@ class PointerTools:
         self._press_position, self._press, self._drag = _checked_pixel(x, y), Press.DOWN, None
         if ctrl:
             return True
+        if self.actions.state.brush.brush is not Brush.SELECT and not shift:
+            return self._begin_brush(x, y)
         selection = self.actions.state.selection
         surface_pick = None if shift or not selection else self.at(x, y)
         if surface_pick is None or surface_pick.owner not in selection:
@@ -123,11 +127,26 @@ class PointerTools:
         self._drag = DecalDrag(self.actions, surface_pick)
         return True
 
+    def _begin_brush(self, x: float, y: float) -> bool:
+        """Begin a stroke of the brush; where there is no surface, the press belongs to the camera."""
+        surface_pick, state = self.at(x, y), self.actions.state
+        if surface_pick is None:
+            return False
+        self._brush = BrushStroke(lambda: state.session.document, state.brush, state.run_latest)
+        state.begin_stroke(self._brush.label)
+        self._brush.touch(surface_pick.position, surface_pick.normal)
+        return True
+
     def move(self, x: float, y: float) -> bool:
         """Handle a move of the pointer."""
         x, y = _checked_pixel(x, y)
         if self._press is Press.UP:
             return False
+        if self._brush is not None:
+            surface_pick = self.at(x, y)
+            if surface_pick is not None:
+                self._brush.touch(surface_pick.position, surface_pick.normal)
+            return True
         distance = np.hypot(x - self._press_position[0], y - self._press_position[1])
         if self._press is Press.DOWN and distance > CLICK_DISTANCE:
             self._press = Press.DRAG
@@ -145,8 +164,12 @@ class PointerTools:
         """Handle the release of the left button."""
         press, self._press = self._press, Press.UP
         drag, self._drag = self._drag, None
+        brush, self._brush = self._brush, None
         if press is Press.UP:
             return False
+        if brush is not None:
+            self.actions.state.end_stroke()
+            return True
         if press is Press.DOWN:
             self._perform("Click", x, y, ctrl=ctrl, shift=shift)
         elif drag is not None:
@@ -161,7 +184,7 @@ class PointerTools:
         if action is None:
             return False
         if action == "deselect":
-            self._drag = None
+            self._drag = self._brush = None
         if self.dragging:
             self.actions.state.end_stroke()
         self.actions.perform(action, lambda: self.at(x, y))
@@ -174,6 +197,8 @@ class PointerTools:
             self._drag = None
         if self._drag is not None and self._press is Press.DRAG:
             self._drag.begin()
+        if self._brush is not None:
+            self.actions.state.begin_stroke(self._brush.label)
 
 
 def _checked_pixel(x: float, y: float) -> tuple[float, float]:

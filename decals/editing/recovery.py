@@ -1,5 +1,6 @@
 """The recovery file: unsaved changes beside the scene's file, for the next window after a crash."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,8 +16,8 @@ from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 
-AUTOSAVE_SECONDS = 10.0
-"""Unsaved changes are written to the recovery file after this time."""
+AUTOSAVE_SECONDS = 5.0
+"""Time between two writes of the recovery file while a scene changes, and that after which a stroke ends."""
 
 MAX_WRITING_SHARE = 0.1
 """Part of the time that may pass with writing, at most."""
@@ -81,6 +82,7 @@ class RecoveryFile:
         self._exists = False
         self._written: object = None
         self._changed_at: float | None = None
+        self._written_at = -math.inf
         self._wait = AUTOSAVE_SECONDS
 
     @property
@@ -183,7 +185,8 @@ class RecoveryFile:
             return
         now = time.monotonic()
         self._changed_at = now if self._changed_at is None else self._changed_at
-        if now - self._changed_at < self._wait:
+        waits_since = self._changed_at if self._session.stroke_open else self._written_at
+        if now - waits_since < self._wait:
             return
         self._end_stroke()
         if self._session.stroke_open:  # steps of the last drag are not adopted yet
@@ -194,6 +197,7 @@ class RecoveryFile:
 
         self._acquire_new()
         self._written, self._exists, self._changed_at = self._session.next_undo, True, None
+        self._written_at = now
         self._background.write_copy(self.path, self._camera(), written)
 
     def keep(self) -> Path | None:

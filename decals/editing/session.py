@@ -269,6 +269,12 @@ class EditSession:
             self._notify(edit)
         return True
 
+    def forget_history(self) -> None:
+        """Drop all entries, as after another file was opened; the present state counts as saved."""
+        self.end_stroke()
+        self._history, self._saved = History(), None
+        self._revision += 1
+
     # -- listeners and files ----------------------------------------------------------------------------
 
     def subscribe(self, listener: Callable[[Edit], None]) -> Callable[[], None]:

@@ -141,7 +141,10 @@ class EventBindings:
             self._key_used = tools.key(name, *pixel, ctrl=ctrl, shift=shift, text=text)
             used = self._key_used
         elif event == "LeftButtonPressEvent":
-            return tools.press(*pixel, ctrl=ctrl, shift=shift)  # a press alone changes nothing visible
+            pressed = tools.press(*pixel, ctrl=ctrl, shift=shift)
+            if tools.dragging:  # a press alone changes nothing visible, but with a brush
+                window.redraw(whole=False)
+            return pressed
         elif event == "LeftButtonReleaseEvent":
             used = tools.release(*pixel, ctrl=ctrl, shift=shift)
         elif event == "MouseMoveEvent":

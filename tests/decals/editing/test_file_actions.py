@@ -8,9 +8,12 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
+import decals
+from blobtree import Point
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.editing import Actions, EditSession, PointerTools, ScaleDecals
-from decals.scenes.files import load_scene
+from decals.errors import InvalidEdit
+from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
 from tests.decals.editing.scenes import scene
 
@@ -155,3 +158,51 @@ def test_an_export_waits_for_no_save(tmp_path: Path, monkeypatch: pytest.MonkeyP
     typist.key("Return")
     finish(actions)
     assert (tmp_path / "mesh.stl").exists()
+
+
+def test_opening_another_scene_begins_anew_and_keeps_unsaved_changes(tmp_path: Path) -> None:
+    other = decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"])
+    save_scene(other, tmp_path / "other.json")
+    actions = Actions(EditSession(scene()), path=tmp_path / "scene.json")
+    files, session = actions.files, actions.state.session
+    shown: list[decals.Camera] = []
+    files.show_view = shown.append
+    session.do(ScaleDecals([1], 2.0))
+    scaled = session.document.decals[1].radii[0]
+    files.open(lambda: load_scene(tmp_path / "other.json"), tmp_path / "other.json")
+    assert len(session.document.decals) == 3
+    assert (session.labels, session.modified, files.title) == ((), False, "other.json")
+    assert [camera.position for camera in shown] == [other.camera.position]
+    assert load_scene(tmp_path / "scene.recovery.json").decals.radii[1] == scaled
+    files.open(scene, tmp_path / "scene.json")
+    assert session.labels == ("recover unsaved changes",)
+    assert session.document.scene.decals.radii[1] == scaled
+
+
+def test_files_outside_the_folder_are_refused(tmp_path: Path) -> None:
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "link").symlink_to(tmp_path)
+    actions = Actions(EditSession(scene()), path=inside / "scene.json")
+    actions.files.folder = inside
+    for name in ("../a.json", str(tmp_path / "a.json"), "link/a.json", "a\0.json", "~/a.json", "none/a.json"):
+        with pytest.raises(InvalidEdit, match="expected a file in"):
+            actions.files.write(name, False)
+        with pytest.raises(InvalidEdit, match="expected a"):
+            actions.files.open(scene, tmp_path / "a.json")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["inside"]
+    with pytest.raises(InvalidEdit, match="ends in"):
+        actions.files.write("a.txt", False)
+
+
+@pytest.mark.parametrize("name", ["script.py", "mesh.stl"])
+def test_the_suffix_is_the_format(name: str, tmp_path: Path) -> None:
+    actions = Actions(EditSession(scene()), path=tmp_path / "scene.json")
+    actions.files.folder = tmp_path
+    actions.files.write(name, False)
+    assert (tmp_path / name).stat().st_size > 100
+    with pytest.raises(InvalidEdit, match="exists"):
+        actions.files.write(name, False)
+    actions.files.write(name, True)
+    actions.files.write("copy.json", False)
+    assert actions.files.path == tmp_path / "copy.json"

@@ -53,7 +53,9 @@ def test_undoing_all_changes_removes_the_file(tmp_path: Path) -> None:
 def test_the_file_is_not_written_with_every_edit(tmp_path: Path) -> None:
     actions = edited(tmp_path / "scene.json")
     actions.files.update()
-    assert list(tmp_path.iterdir()) == []
+    assert not actions.files.recovery.pending  # the first edit is kept at once
+    actions.state.session.do(ScaleDecals([1], 2.0))
+    actions.files.update()
     assert actions.files.recovery.pending
 
 

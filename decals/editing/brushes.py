@@ -1,0 +1,294 @@
+"""Brushes for decals: scatter, push, erase and relax within a radius around a surface point."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array, Int64Array
+from decals.editing.commands import DeleteDecals
+from decals.editing.document import Document, Edit
+from decals.editing.queries import SurfacePoints, move_decals, nearest_points
+from decals.editing.scatter_commands import SPACING, RelaxDecals
+from decals.editing.session import Command
+from decals.errors import InvalidEdit
+from decals.model import NO_IMAGE, Decals
+from decals.scattering.orientation import tangents
+from decals.scenes.objects import bounds_of
+from decals.validation import finite_number, finite_vector, whole_number
+
+CLOSEST = 0.8
+"""Least distance of new decals in spacings: random discs at full distance would leave two fifths bare."""
+
+CANDIDATES = 30
+"""Random points that the scatter brush tries for each decal that fits into its disc."""
+
+MAX_NEW_DECALS = 400
+"""Decals that one touch of the scatter brush adds, at most."""
+
+
+class Brush(StrEnum):
+    """What a drag with the left button does to decals; SELECT selects and moves them."""
+
+    SELECT = "select"
+    SCATTER = "scatter"
+    PUSH = "push"
+    ERASE = "erase"
+    RELAX = "relax"
+
+
+@dataclass
+class BrushSettings:
+    """The brush of a window.
+
+    Attributes
+    ----------
+    brush
+        The kind of brush.
+    radius
+        Its radius in model units; 0 for a tenth of the scene's size.
+    decal_radius
+        Radius of the decals that the scatter brush adds, in model units; 0 for the median of the scene.
+    density
+        Decals of the scatter brush relative to a tiling without gaps, above 0 and at most 1.
+    images
+        Images that the scatter brush chooses from; empty for all.
+    seed
+        Seed of its next touch.
+    """
+
+    brush: Brush = Brush.SELECT
+    radius: float = 0.0
+    decal_radius: float = 0.0
+    density: float = 1.0
+    images: tuple[int, ...] = ()
+    seed: int = 0
+
+
+def decals_within(document: Document, point: ArrayLike, radius: float) -> Int64Array:
+    """Return the numbers of the decals whose centres lie within a radius around a point, shape (3,)."""
+    center = finite_vector("point", point, InvalidEdit)
+    reach = positive_number("radius", radius)
+    distances = np.linalg.norm(document.decals.decals.positions - center, axis=1)
+    numbers: Int64Array = document.decals.numbers[distances < reach]
+    return numbers
+
+
+def positive_number(name: str, value: float) -> float:
+    """Return a number above 0, or raise `InvalidEdit`."""
+    number = finite_number(name, value, InvalidEdit)
+    if number <= 0.0:
+        raise InvalidEdit(f"{name}: expected a number above 0, got {number:g}")
+    return number
+
+
+@dataclass(frozen=True, eq=False)
+class BrushDecals:
+    """Add decals in a disc on the surface, by dart throwing: none closer to another than their spacing.
+
+    Decals that lie there count too, so a second touch at the same place adds almost none.
+
+    Parameters
+    ----------
+    point, normal
+        Centre of the disc on the surface and unit normal there, shape (3,) each.
+    radius
+        Radius of the disc, in model units.
+    decal_radius
+        Radius of the decals.
+    density
+        1 for decals without gaps; less for wider spacing, which grows with the inverse square root.
+    images
+        Indices of the images to choose from; empty for all.
+    seed
+        Random seed.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import BrushDecals, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=0, images=["eye"]))
+    >>> edit = session.do(BrushDecals((0, 0, 1), (0, 0, 1), 0.5, decal_radius=0.1))
+    >>> len(session.document.decals) > 8
+    True
+    """
+
+    point: ArrayLike
+    normal: ArrayLike
+    radius: float
+    decal_radius: float
+    density: float = 1.0
+    images: tuple[int, ...] = ()
+    seed: int = 0
+    label: ClassVar[str] = "scatter brush"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        reach = positive_number("radius", self.radius)
+        decal_radius = positive_number("decal radius", self.decal_radius)
+        density = positive_number("density", self.density)
+        if density > 1.0:
+            raise InvalidEdit(f"density: expected a number above 0 and at most 1, got {density:g}")
+        images = self.images or tuple(range(len(document.images)))
+        for image in images:
+            whole_number("image", image, 0, len(document.images) - 1, InvalidEdit)
+        if not document.objects:
+            return Edit()
+        spacing = CLOSEST * SPACING * decal_radius / density**0.5
+        points = self._thrown(document, reach, spacing)
+        if not len(points.objects):
+            return Edit()
+        rng = np.random.default_rng([self.seed, 1])
+        frames = tangents(points.positions, points.normals, (1.0, 0.0, 0.0), self.seed)
+        return document.compute_addition(
+            Decals(
+                points.positions,
+                points.normals,
+                frames,
+                decal_radius,
+                images=rng.choice(images or (NO_IMAGE,), len(points.objects)),
+            )
+        )
+
+    def _thrown(self, document: Document, reach: float, spacing: float) -> SurfacePoints:
+        """Return random points of the disc that keep their distance from decals and from each other."""
+        center = finite_vector("point", self.point, InvalidEdit)
+        normal = finite_vector("normal", self.normal, InvalidEdit)
+        rng = np.random.default_rng(self.seed)
+        count = int(min(CANDIDATES * (1.0 + (reach / spacing) ** 2), CANDIDATES * MAX_NEW_DECALS))
+        helper = np.eye(3)[np.abs(normal).argmin()]
+        along = np.cross(normal, helper)
+        along /= np.linalg.norm(along)
+        lengths = reach * np.sqrt(rng.uniform(size=count))
+        turns = rng.uniform(0.0, 2.0 * np.pi, count)
+        offsets = np.cos(turns)[:, None] * along + np.sin(turns)[:, None] * np.cross(normal, along)
+        points = nearest_points(document.objects, center + lengths[:, None] * offsets)
+        near = document.decals.decals.positions[
+            np.linalg.norm(document.decals.decals.positions - center, axis=1) < 2.0 * reach + spacing
+        ]
+        kept: list[int] = []
+        taken = [*near.astype(np.float64)]
+        for row in np.flatnonzero(np.linalg.norm(points.positions - center, axis=1) <= reach).tolist():
+            position = points.positions[row].astype(np.float64)
+            if not taken or (np.linalg.norm(np.array(taken) - position, axis=1) >= spacing).all():
+                kept.append(row)
+                taken.append(position)
+            if len(kept) == MAX_NEW_DECALS:
+                break
+        return SurfacePoints(points.positions[kept], points.normals[kept], points.objects[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class PushDecals:
+    """Push the decals around a point; those farther away yield less, and those outside the brush stay.
+
+    A decal at distance d of the point moves by the offset times (1 − (d/r)²)³, the paper's kernel (eq. 2), so
+    the order of neighbours stays for offsets below r/2.
+
+    Parameters
+    ----------
+    point
+        Centre of the brush before the push, shape (3,).
+    offset
+        Displacement of the brush, shape (3,).
+    radius
+        Radius of the brush, r.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, PushDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=40, images=["eye"]))
+    >>> edit = session.do(PushDecals((0, 0, 1), (0.1, 0, 0), 0.6))
+    >>> 0 < len(edit.after.numbers) < 40
+    True
+    """
+
+    point: ArrayLike
+    offset: ArrayLike
+    radius: float
+    label: ClassVar[str] = "push brush"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        center = finite_vector("point", self.point, InvalidEdit)
+        offset = finite_vector("offset", self.offset, InvalidEdit)
+        numbers = decals_within(document, center, self.radius)
+        if not len(numbers) or not offset.any():
+            return Edit()
+        before = document.decals.take(numbers)
+        squares = np.square((before.positions - center) / self.radius).sum(axis=1)
+        shares = np.maximum(1.0 - squares, 0.0) ** 3
+        targets = before.positions + shares[:, None] * offset
+        points = nearest_points(document.objects, targets)
+        return document.compute_replacement(numbers, move_decals(before, points))
+
+
+class BrushStroke:
+    """A drag with a brush, of touches that are one undo entry.
+
+    Parameters
+    ----------
+    document
+        Returns the edited document.
+    settings
+        The brush.
+    run
+        Carries out a command.
+    """
+
+    def __init__(
+        self, document: Callable[[], Document], settings: BrushSettings, run: Callable[[Command], None]
+    ) -> None:
+        self._document, self._settings, self._run = document, settings, run
+        self._last: Float32Array | None = None
+
+    @property
+    def label(self) -> str:
+        """Name of the undo entry."""
+        return f"{self._settings.brush} brush"
+
+    def touch(self, position: Float32Array, normal: Float32Array) -> None:
+        """Apply the brush at a surface point, shape (3,) each."""
+        settings, document = self._settings, self._document()
+        radius = settings.radius or default_radius(document)
+        last, self._last = self._last, position
+        match settings.brush:
+            case Brush.SCATTER:
+                size = settings.decal_radius or default_decal_radius(document)
+                settings.seed += 1
+                self._run(
+                    BrushDecals(
+                        position, normal, radius, size, settings.density, settings.images, settings.seed
+                    )
+                )
+            case Brush.PUSH if last is not None:
+                steps = int(np.ceil(np.linalg.norm(position - last) / (radius / 2)))
+                for step in range(steps):
+                    start = last + (position - last) * (step / steps)
+                    self._run(PushDecals(start, (position - last) / steps, radius))
+            case Brush.ERASE:
+                numbers = decals_within(document, position, radius)
+                if len(numbers):
+                    self._run(DeleteDecals(numbers))
+            case Brush.RELAX if last is None or np.linalg.norm(position - last) > radius / 4:
+                self._run(RelaxDecals(position))
+            case Brush.RELAX:
+                self._last = last
+
+
+def default_radius(document: Document) -> float:
+    """Return the radius of a brush: a tenth of the size of the scene."""
+    low, high = bounds_of(document.objects)
+    return 0.1 * float((high - low).max())
+
+
+def default_decal_radius(document: Document) -> float:
+    """Return the radius of new decals: the median of the scene, or a fortieth of its size."""
+    radii = document.decals.column("radii")
+    return float(np.median(radii)) if len(radii) else 0.25 * default_radius(document)

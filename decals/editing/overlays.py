@@ -1,0 +1,123 @@
+"""What the decals do to a surface, sampled on its mesh: owners, stretch, folds and contact lines."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from decals.editing.document import Document
+from decals.field.evaluate import evaluate
+from decals.field.mapping import ImageMapping
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+
+INSIDE = 0.5
+"""Distance of a rim from the middle of its image, in image coordinates."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceSamples:
+    """Decals at the vertices of a mesh, and how its triangles are mapped into their images.
+
+    Attributes
+    ----------
+    owners
+        Number of the decal that shows at each vertex, −1 for none, int32, shape (n,).
+    fields
+        Field of the owner after contact, 0 without one, float32, shape (n,).
+    stretch
+        Of each triangle inside one decal: the larger singular value of the map from the surface to the
+        undeformed image, over the decal's scale; 1 without deformation, NaN elsewhere. Shape (m,).
+    folds
+        True for triangles whose image is turned over, shape (m,).
+    """
+
+    owners: Int32Array
+    fields: Float32Array
+    stretch: Float64Array
+    folds: BoolArray
+
+
+def sample_surface(
+    document: Document,
+    vertices: Float32Array,
+    normals: Float32Array,
+    faces: Int32Array,
+    *,
+    contact: Contact = DEFAULT_CONTACT,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+    stiffness: float = DEFAULT_STIFFNESS,
+) -> SurfaceSamples:
+    """Evaluate the decals of a document on a triangle mesh of its surface.
+
+    Parameters
+    ----------
+    document
+        The document.
+    vertices, normals
+        Vertices and unit normals, shape (n, 3) each.
+    faces
+        Triangles, counter-clockwise from outside, shape (m, 3).
+    contact, mapping, stiffness
+        Modes, as for `decals.evaluate`.
+    """
+    samples = evaluate(
+        document.decals, vertices, normals, contact=contact, mapping=mapping, stiffness=stiffness
+    )
+    inside = np.linalg.norm(samples.uv - INSIDE, axis=1) <= INSIDE
+    owners = np.where(inside, samples.owner, -1).astype(np.int32)
+    fields = np.where(inside, samples.field, 0.0).astype(np.float32)
+    stretch, folds = np.full(len(faces), np.nan), np.zeros(len(faces), np.bool_)
+    whole = (owners[faces] >= 0).all(axis=1) & (np.ptp(owners[faces], axis=1) == 0)
+    rows = np.flatnonzero(whole)
+    if len(rows):
+        corners = faces[rows]
+        shown, owner_rows = np.unique(owners[corners[:, 0]], return_inverse=True)
+        radii = document.decals.take(shown).radii.astype(np.float64)[owner_rows]
+        jacobians = _jacobians(vertices[corners].astype(np.float64), samples.uv[corners].astype(np.float64))
+        jacobians *= 2.0 * radii[:, None, None]
+        stretch[rows] = np.linalg.svd(jacobians, compute_uv=False)[:, 0]
+        folds[rows] = np.linalg.det(jacobians) < 0.0
+    return SurfaceSamples(owners, fields, stretch, folds)
+
+
+def _jacobians(corners: Float64Array, uv: Float64Array) -> Float64Array:
+    """Return the derivative of image coordinates in an orthonormal frame of each triangle, (k, 2, 2).
+
+    Corners have the shape (k, 3, 3), their image coordinates (k, 3, 2). The frame is right-handed with the
+    normal, as tangent and bitangent of a decal are.
+    """
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    length = np.maximum(np.linalg.norm(first, axis=1), 1e-300)
+    along = first / length[:, None]
+    side = np.einsum("ki,ki->k", second, along)
+    height = np.maximum(np.linalg.norm(second - side[:, None] * along, axis=1), 1e-300)
+    du, dv = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    d_along = du / length[:, None]
+    d_across = (dv - side[:, None] * d_along) / height[:, None]
+    result: Float64Array = np.stack([d_along, d_across], axis=2)
+    return result
+
+
+def contact_lines(vertices: Float32Array, faces: Int32Array, owners: Int32Array) -> Float32Array:
+    """Return the lines between the decals of a mesh as segments, float32, shape (k, 2, 3).
+
+    A triangle with vertices of two decals gets the segment between the middles of the edges that join them;
+    one with three decals gets three segments from its middle. Rims beside bare surface are no contact lines.
+
+    Parameters
+    ----------
+    vertices, faces
+        A triangle mesh, shapes (n, 3) and (m, 3).
+    owners
+        Decal of each vertex; −1 for none.
+    """
+    numbers = owners[faces]
+    faces, numbers = faces[(numbers >= 0).all(axis=1)], numbers[(numbers >= 0).all(axis=1)]
+    points = vertices[faces].astype(np.float64)
+    middles = (points + np.roll(points, -1, axis=1)) / 2
+    crossed = numbers != np.roll(numbers, -1, axis=1)
+    two, three = crossed.sum(axis=1) == 2, crossed.all(axis=1)
+    ends = middles[two][crossed[two]].reshape(-1, 2, 3)
+    centers = np.broadcast_to(points[three].mean(axis=1)[:, None], (int(three.sum()), 3, 3))
+    spokes = np.stack([middles[three], centers], axis=2).reshape(-1, 2, 3)
+    return np.concatenate([ends, spokes]).astype(np.float32)

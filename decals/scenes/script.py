@@ -1,0 +1,222 @@
+"""Scenes as Python scripts that rebuild them with the public API."""
+
+import io
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import blobtree
+from blobtree import Node
+from blobtree.files import write_atomically
+from blobtree.nodes.parameters import Quantity, parameters_of
+from blobtree.nodes.values import fields_of, left_out
+from decals.errors import InvalidScene
+from decals.images.builtin import is_builtin
+from decals.model import Decals
+from decals.scenes.objects import MeshObject, SceneObject
+from decals.scenes.scene import DecalImage, Scene
+from decals.validation import instance
+
+MAX_ROWS = 2000
+"""Decals that a script lists as text; more stand in the file of arrays."""
+
+COLUMNS = (
+    "positions",
+    "normals",
+    "tangents",
+    "radii",
+    "images",
+    "spill",
+    "interactions",
+    "layers",
+    "tints",
+    "opacities",
+)
+
+
+def write_script(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a Python script whose ``scene`` equals a scene: nodes and decals one by one, with their values.
+
+    Meshes, pictures of files, and more than 2,000 decals stand beside it, in a file of arrays with the suffix
+    ".npz".
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    path : str or path
+        The script, which ends in ".py".
+
+    Raises
+    ------
+    InvalidScene
+        The scene holds a `Volume`, whose samples are no text; or the file cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, runpy, tempfile, decals
+    >>> from blobtree import Point
+    >>> from decals.scenes.script import write_script
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"])
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "ball.py"
+    >>> write_script(scene, path)
+    >>> rebuilt = runpy.run_path(path)["scene"]
+    >>> bool((rebuilt.decals.positions == scene.decals.positions).all())
+    True
+    """
+    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    path = Path(path)
+    script = _Script(path.with_suffix(".npz").name)
+    text = script.text_of(scene)
+    try:
+        if script.arrays:
+            buffer = io.BytesIO()
+            np.savez_compressed(buffer, **script.arrays)  # type: ignore[arg-type]  # arrays by name
+            write_atomically(path.with_suffix(".npz"), buffer.getvalue())
+        write_atomically(path, text.encode())
+    except OSError as error:
+        raise InvalidScene(f"could not write {str(path)!r}: {error}") from error
+
+
+class _Script:
+    """The lines of a script, the modules that it imports, and its arrays."""
+
+    def __init__(self, arrays_file: str) -> None:
+        self.arrays: dict[str, NDArray[Any]] = {}
+        self._file = arrays_file
+        self._lines: list[str] = []
+        self._imports: set[str] = set()
+        self._names: dict[int, str] = {}
+
+    def text_of(self, scene: Scene) -> str:
+        """Return the text of the script."""
+        objects = [self._object(item) for item in scene.objects]
+        images = [self._image(image) for image in scene.images]
+        decals = self._decals(scene.decals)
+        camera = scene.camera
+        view = ", ".join(repr(getattr(camera, name)) for name in ("position", "target", "up", "fov"))
+        head = ['"""A scene of Implicit Decals; run this file to see it, or import ``scene``."""', ""]
+        if self.arrays:
+            head += ["from pathlib import Path", ""]
+        if self.arrays or len(scene.decals):
+            head += ["import numpy as np", ""]
+        head += ["import blobtree", "import decals", *sorted(self._imports), ""]
+        if self.arrays:
+            head.append(f"arrays = np.load(Path(__file__).with_name({self._file!r}))")
+        body = [
+            *self._lines,
+            "",
+            f"camera = decals.Camera({view})",
+            "scene = decals.Scene(",
+            f"    objects=[{', '.join(objects)}],",
+            f"    images=[{', '.join(images)}],",
+            "    camera=camera,",
+            f"    decals={decals},",
+            ")",
+            "",
+            'if __name__ == "__main__":',
+            "    decals.show(scene)",
+            "",
+        ]
+        return "\n".join(head + body)
+
+    def _array(self, name: str, array: NDArray[Any]) -> str:
+        """Put an array into the file of arrays, and return the expression that reads it."""
+        self.arrays[name] = array
+        return f"arrays[{name!r}]"
+
+    def _object(self, item: SceneObject) -> str:
+        number = len(self._names)
+        if isinstance(item, MeshObject):
+            vertices = self._array(f"vertices_{number}_{item.name}", item.vertices)
+            faces = self._array(f"faces_{number}_{item.name}", item.faces)
+            self._names[id(item)] = item.name
+            return (
+                f"decals.MeshObject({item.name!r}, {vertices}, {faces}, {item.color!r}, "
+                f"source={item.source!r}, crease_angle={item.crease_angle!r})"
+            )
+        return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)})"
+
+    def _tree(self, tree: Node) -> str:
+        """Write one line for each node, operands first, and return the name of the last one."""
+        pending: list[tuple[Node, bool]] = [(tree, False)]
+        while pending:
+            node, operands_written = pending.pop()
+            if id(node) in self._names:
+                continue
+            if not operands_written:
+                pending += [(node, True), *((child, False) for child in reversed(node.children))]
+                continue
+            name = f"{type(node).__name__.lower()}_{len(self._names) + 1}"
+            self._names[id(node)] = name
+            self._lines.append(f"{name} = {self._node(node)}")
+        return self._names[id(tree)]
+
+    def _node(self, node: Node) -> str:
+        kind, declared = type(node), parameters_of(type(node))
+        if any(parameter.quantity is Quantity.SAMPLES for parameter in declared.values()):
+            raise InvalidScene(
+                f"a {kind.__name__} holds samples, which no script lists; save the scene as JSON"
+            )
+        values = []
+        for field in fields_of(kind):
+            value = getattr(node, field.name)
+            if not left_out(field, value):
+                text = repr(value) if field.name in declared else self._operands(value)
+                values.append(f"{field.name}={text}")
+        if getattr(blobtree, kind.__name__, None) is kind:
+            return f"blobtree.{kind.__name__}({', '.join(values)})"
+        self._imports.add(f"from {_module_of(kind)} import {kind.__name__}")
+        return f"{kind.__name__}({', '.join(values)})"
+
+    def _operands(self, value: Any) -> str:
+        if isinstance(value, tuple):
+            names = [self._names[id(node)] for node in value]
+            return f"({', '.join(names)}{',' if len(names) == 1 else ''})"
+        return self._names[id(value)]
+
+    def _image(self, image: DecalImage) -> str:
+        if is_builtin(image.source):
+            return repr(image.source)
+        pixels = self._array(f"image_{len(self.arrays)}", image.pixels)
+        return f"decals.DecalImage({image.source!r}, {pixels})"
+
+    def _decals(self, decals: Decals) -> str:
+        if not len(decals):
+            return "decals.Decals.empty()"
+        lines = ["decals.Decals("]
+        for name in COLUMNS:
+            column = getattr(decals, name)
+            if len(decals) > MAX_ROWS:
+                value = self._array(f"decals_{name}", column)
+            elif (column == column[:1]).all() and name not in COLUMNS[:4]:
+                value = f"np.full({column.shape!r}, {_number_text(column[0])}, {column.dtype.name!r})"
+            else:
+                rows = ",\n".join(f"            {_number_text(row)}" for row in column)
+                listed = f"            [\n{rows},\n            ],"
+                value = f"np.array(\n{listed}\n            {column.dtype.name!r},\n        )"
+            lines.append(f"        {name}={value},")
+        return "\n".join([*lines, "    )"])
+
+
+def _module_of(kind: type[Node]) -> str:
+    """Return the name of a module that has a custom class, or raise `InvalidScene`."""
+    modules = {name: module for name, module in [*sys.modules.items()] if name != "__main__"}
+    found = [name for name, module in modules.items() if vars(module).get(kind.__name__) is kind]
+    if not found:
+        raise InvalidScene(
+            f"a script can import {kind.__name__} from no module; define it in a file that is imported"
+        )
+    return min(found, key=len)
+
+
+def _number_text(values: Any) -> str:
+    """Return numbers as text that reads back to the same bits; float32 needs at most nine digits."""
+    array = np.asarray(values)
+    if array.ndim:
+        return f"[{', '.join(map(_number_text, array))}]"
+    return str(array.item()) if array.dtype != np.float32 else repr(float(str(array[()])))

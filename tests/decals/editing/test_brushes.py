@@ -1,0 +1,95 @@
+"""Brushes: what they add, push and remove, and a stroke with the pointer as one undo entry."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import decals
+from blobtree import Point
+from decals.editing import Actions, EditSession, PointerTools
+from decals.editing.brushes import CLOSEST, Brush, BrushDecals, PushDecals
+from decals.editing.scatter_commands import SPACING
+from decals.errors import InvalidEdit
+from tests.decals.editing.scenes import digest
+
+TOP, UP = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+
+
+def covered_ball(count: int) -> EditSession:
+    return EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=count, images=["eye", "scale"]))
+
+
+def distances(points: np.ndarray) -> np.ndarray:
+    gaps: np.ndarray = np.linalg.norm(points[:, None].astype(float) - points[None], axis=2)
+    return gaps + 10.0 * np.eye(len(points))
+
+
+def test_the_scatter_brush_fills_its_disc_and_keeps_distances() -> None:
+    session = covered_ball(0)
+    session.do(BrushDecals(TOP, UP, 0.5, 0.05, images=(1,), seed=3))
+    added = session.document.decals.decals
+    assert distances(added.positions).min() >= 0.999 * CLOSEST * SPACING * 0.05
+    assert (np.linalg.norm(added.positions - TOP, axis=1) <= 0.5).all()
+    np.testing.assert_allclose(np.linalg.norm(added.positions, axis=1), 1.0, atol=1e-4)
+    assert set(added.images.tolist()) == {1}
+    tiling = np.pi * 0.5**2 / (np.sqrt(3) / 2 * (SPACING * 0.05) ** 2)
+    assert 0.7 * tiling < len(added) < 1.1 * tiling
+    session.do(BrushDecals(TOP, UP, 0.5, 0.05, seed=4))
+    assert len(session.document.decals) < 1.25 * len(added)
+    thin = covered_ball(0)
+    thin.do(BrushDecals(TOP, UP, 0.5, 0.05, density=0.25, seed=3))
+    assert 0.15 * len(added) < len(thin.document.decals) < 0.4 * len(added)
+
+
+def test_the_push_brush_moves_by_the_kernel_and_leaves_the_rest() -> None:
+    session = covered_ball(300)
+    before = session.document.decals.decals.positions.astype(float)
+    session.do(PushDecals(TOP, (0.1, 0, 0), 0.5))
+    moved = np.linalg.norm(session.document.decals.decals.positions - before, axis=1)
+    d = np.linalg.norm(before - TOP, axis=1) / 0.5
+    expected = np.where(d < 1, 0.1 * (1 - d**2) ** 3, 0.0)
+    assert (moved[d >= 1] == 0).all()
+    np.testing.assert_allclose(moved, expected, atol=0.012)  # projected back onto the ball
+    assert distances(session.document.decals.decals.positions).min() > 0.4 * distances(before).min()
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (BrushDecals(TOP, UP, 0.0, 0.1), "radius"),
+        (BrushDecals(TOP, UP, 1.0, -1.0), "decal radius"),
+        (BrushDecals(TOP, UP, 1.0, 0.1, density=2.0), "density"),
+        (BrushDecals(TOP, UP, 1.0, 0.1, images=(9,)), "image"),
+        (BrushDecals((0, 0), UP, 1.0, 0.1), "point"),
+        (PushDecals(TOP, (np.nan, 0, 0), 1.0), "offset"),
+        (PushDecals(TOP, UP, "x"), "radius"),  # type: ignore[arg-type]
+    ],
+)
+def test_wrong_values_are_refused(command: Any, message: str) -> None:
+    with pytest.raises(InvalidEdit, match=f"{message}.*expected"):
+        covered_ball(3).do(command)
+
+
+@pytest.mark.parametrize("brush", [Brush.SCATTER, Brush.PUSH, Brush.ERASE, Brush.RELAX])
+def test_a_stroke_with_the_pointer_is_one_entry(brush: Brush) -> None:
+    session = covered_ball(0 if brush is Brush.SCATTER else 60)
+    before, count = digest(session.document), len(session.document.decals)
+    actions, rays = Actions(session), session.document.camera.rays(200, 200)
+    tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
+    actions.state.brush.brush = brush
+    assert not tools.press(1, 1)  # beside the model the drag turns the camera
+    tools.release(1, 1)
+    assert tools.press(90, 100)
+    assert tools.dragging
+    for x in (95, 100, 110):
+        assert tools.move(x, 100)
+    assert tools.release(110, 100)
+    assert not tools.dragging
+    assert session.labels == (f"{brush} brush",)
+    after = len(session.document.decals)
+    assert (
+        after > count if brush is Brush.SCATTER else after < count if brush is Brush.ERASE else after == count
+    )
+    session.undo()
+    assert digest(session.document) == before

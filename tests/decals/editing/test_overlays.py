@@ -1,0 +1,63 @@
+"""Overlays on planes and balls, where owners, stretch and contact lines are known."""
+
+import numpy as np
+
+import decals
+from blobtree import Point
+from decals.editing.document import Document
+from decals.editing.overlays import contact_lines, sample_surface
+from decals.scenes.camera import Camera
+from decals.scenes.objects import TreeObject
+from decals.scenes.scene import Scene
+
+
+def plane(count: int = 81) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a square of side 4 as vertices, normals and faces."""
+    x, y = np.meshgrid(np.linspace(-2, 2, count), np.linspace(-2, 2, count))
+    vertices = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3).astype(np.float32)
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    quads = [(0, 1, count + 1), (0, count + 1, count)]
+    faces = np.concatenate([corner[:, None] + np.array(quad) for quad in quads]).astype(np.int32)
+    return vertices, np.tile(np.array([0, 0, 1], np.float32), (len(vertices), 1)), faces
+
+
+def document(positions: object, turn: float = 0.0) -> Document:
+    count = len(np.asarray(positions))
+    tangents = [[np.cos(turn), np.sin(turn), 0.0]] * count
+    disks = decals.Decals(positions, [[0, 0, 1]] * count, tangents, [1.0] * count)  # type: ignore[arg-type]
+    ball = TreeObject("ball", Point((0, 0, -9), radius=1.0))
+    return Document.from_scene(Scene(objects=[ball], camera=Camera((0, 0, 5)), decals=disks, images=["eye"]))
+
+
+def test_a_decal_alone_is_not_stretched() -> None:
+    vertices, normals, faces = plane()
+    samples = sample_surface(document([[0, 0, 0]], turn=0.7), vertices, normals, faces)
+    distances = np.linalg.norm(vertices, axis=1)
+    inside = samples.owners == 0
+    assert inside[distances < 0.999].all()
+    assert not inside[distances > 1.001].any()
+    stretch = samples.stretch[np.isfinite(samples.stretch)]
+    np.testing.assert_allclose(stretch, 1.0, atol=1e-3)
+    assert len(stretch) == inside[faces].all(axis=1).sum()
+    assert not samples.folds.any()
+    backwards = sample_surface(document([[0, 0, 0]]), vertices, normals, faces[:, ::-1])
+    np.testing.assert_array_equal(backwards.folds, np.isfinite(backwards.stretch))  # seen from below
+
+
+def test_two_decals_meet_on_their_bisector_and_stretch_there() -> None:
+    vertices, normals, faces = plane()
+    samples = sample_surface(document([[-0.6125, 0, 0], [0.6125, 0, 0]]), vertices, normals, faces)
+    lines = contact_lines(vertices, faces, samples.owners)
+    assert len(lines) > 20
+    np.testing.assert_allclose(lines[..., 0], 0.0, atol=0.05)  # the size of a square
+    assert np.abs(lines[..., 1]).max() < np.sqrt(1 - 0.6125**2) + 0.05
+    middles = vertices[faces].mean(axis=1)
+    near = (np.abs(middles[:, 0]) < 0.1) & np.isfinite(samples.stretch)
+    assert np.median(samples.stretch[near]) > 1.5
+
+
+def test_three_decals_in_one_triangle_give_three_spokes() -> None:
+    corners, face = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0]], np.float32), np.array([[0, 1, 2]], np.int32)
+    lines = contact_lines(corners, face, np.array([4, 5, 6], np.int32))
+    np.testing.assert_allclose(lines[:, 1], [[1, 1, 0]] * 3)
+    assert len(contact_lines(corners, face, np.array([4, 4, -1], np.int32))) == 0
