@@ -1,4 +1,4 @@
-"""Scripts that use the public API write nothing to stderr, also where there is no CUDA driver."""
+"""Scripts that use the public API import little and write nothing to stderr, also without a CUDA driver."""
 
 import subprocess
 import sys
@@ -18,7 +18,26 @@ decals.scatter(decals.surfaces.MeshSurface(vertices, np.array([[0, 1, 2]], np.in
 }
 
 
+WITHOUT_PROGRESS = "import logging; logging.getLogger('blobtree.progress').setLevel(logging.WARNING)\n"
+"""Start of a script on a busy machine, where progress would be shown."""
+
+
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_warp_starts_without_a_warning(name: str) -> None:
-    run = subprocess.run([sys.executable, "-c", SCRIPTS[name]], capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [sys.executable, "-c", WITHOUT_PROGRESS + SCRIPTS[name]], capture_output=True, text=True, check=False
+    )
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+
+
+def test_imports_leave_slow_packages_and_the_collector_alone() -> None:
+    script = """
+import gc, sys
+from decals import cover
+print(gc.isenabled(), sorted({name.partition(".")[0] for name in sys.modules} & {"scipy", "pyvista", "vtk"}))
+gc.disable()
+from decals import render
+print(gc.isenabled())
+"""
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines() == ["True []", "False"]

@@ -82,9 +82,11 @@ def draw(paint: Painter, size: int) -> NDArray[np.uint8]:
     layers = np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)
     mean = layers.reshape(size, factor, size, factor, 4).mean(axis=(1, 3))
     opacity = mean[..., 3:]
-    # A fully transparent pixel keeps the unweighted colour, so that filters read no black behind the edge.
-    plain = color.reshape(size, factor, size, factor, 3).mean(axis=(1, 3))
-    straight = np.where(opacity > 1e-3, mean[..., :3] / np.maximum(opacity, 1e-3), plain)
+    straight = mean[..., :3] / np.maximum(opacity, 1e-3)
+    if opacity.min() <= 1e-3:
+        # A fully transparent pixel keeps the unweighted colour, so that filters read no black at the edge.
+        plain = color.reshape(size, factor, size, factor, 3).mean(axis=(1, 3))
+        straight = np.where(opacity > 1e-3, straight, plain)
     pixels = np.concatenate([straight, opacity], axis=-1)
     return np.asarray(np.rint(np.clip(pixels, 0.0, 1.0) * 255.0), dtype=np.uint8)
 
@@ -151,12 +153,19 @@ def _hash(ix: NDArray[np.int32], iy: NDArray[np.int32], seed: int) -> Field:
 
 def value_noise(x: Field, y: Field, *, seed: int) -> Field:
     """Return smooth noise in [0, 1] with features one unit wide."""
-    ix, iy = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
-    fx, fy = x - np.floor(x), y - np.floor(y)
+    left, below = np.floor(x), np.floor(y)
+    fx, fy = x - left, y - below
     fx, fy = fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy)
-    low = _hash(ix, iy, seed) * (1.0 - fx) + _hash(ix + 1, iy, seed) * fx
-    high = _hash(ix, iy + 1, seed) * (1.0 - fx) + _hash(ix + 1, iy + 1, seed) * fx
-    return np.asarray(low * (1.0 - fy) + high * fy, dtype=np.float32)
+    rest_x, rest_y = 1.0 - fx, 1.0 - fy
+    # Many samples share a lattice point, so each of these is hashed once.
+    origin, end = (np.array([f(left), f(below)], np.int32) for f in (np.min, np.max))
+    width, height = (end - origin + 2).tolist()
+    ix, iy = np.meshgrid(*(np.arange(n, dtype=np.int32) for n in (width, height)))
+    lattice = _hash(ix + origin[0], iy + origin[1], seed).reshape(-1)
+    at = (below - below.min()).astype(np.intp) * width + (left - left.min()).astype(np.intp)
+    low = lattice.take(at) * rest_x + lattice[1:].take(at) * fx
+    high = lattice[width:].take(at) * rest_x + lattice[width + 1 :].take(at) * fx
+    return np.asarray(low * rest_y + high * fy, dtype=np.float32)
 
 
 def fractal_noise(x: Field, y: Field, *, octaves: int, seed: int) -> Field:

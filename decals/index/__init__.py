@@ -3,6 +3,6 @@
 The public names are listed in `__init__.pyi` and are loaded at first use.
 """
 
-import lazy_loader
+from blobtree.lazy import attach_stub
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -4,10 +4,10 @@ from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.validation import point_array
@@ -15,6 +15,9 @@ from decals.errors import InvalidScattering
 from decals.scattering.domain import MAX_PARTICLES
 from decals.surfaces.mesh import MeshSurface, edges_of
 from decals.validation import instance, real_number
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 MIN_LINE_SAMPLES = 4000
 """Least number of samples along all lines, by which the nearest segment is searched."""
@@ -135,6 +138,8 @@ class Creases:
 
     @cached_property
     def _samples(self) -> "_Samples":
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
         offsets = self.segments[:, 1] - self.segments[:, 0]
         lengths = np.linalg.norm(offsets, axis=1)
         counts = 1 + np.ceil(lengths * (MIN_LINE_SAMPLES / self.length)).astype(np.int64)
@@ -148,7 +153,7 @@ class Creases:
 class _Samples:
     """Points along segments, and the segment of each."""
 
-    tree: cKDTree
+    tree: "cKDTree"
     owners: Int64Array
 
 

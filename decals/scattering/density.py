@@ -5,7 +5,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.validation import point_array
@@ -133,6 +132,8 @@ def _blended_from_vertices(
     vertices: Float32Array, values: Float64Array
 ) -> Callable[[Float32Array], Float64Array]:
     """Return means of the nearest vertices' values, weighted by inverse distance."""
+    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
     tree = cKDTree(vertices)
     columns = np.arange(1, min(BLENDED_VERTICES, len(vertices)) + 1)
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.device import launch
@@ -146,6 +145,8 @@ class FacingTree:
     """
 
     def __init__(self, positions: Float32Array, normals: Float32Array) -> None:
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
         self._tree = cKDTree(positions)
         self._normals = normals
 

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from decals.surfaces.topology import components
 
 CREASE_ANGLE = 35.0
 """Default crease angle, in degrees."""
@@ -74,8 +73,7 @@ def split_at_creases(
     at_crease[corners[joined[sharp]]] = True
     kept = joined[~sharp]
     kept = kept[at_crease[corners[kept[:, 0]]]]
-    links = coo_array((np.ones(len(kept), np.int8), kept.T), shape=(len(corners), len(corners)))
-    groups = connected_components(links, directed=False)[1]
+    groups = components(kept, len(corners))
     crowded = np.flatnonzero(at_crease[corners])
     pairs = np.stack([corners[crowded].astype(np.int64), groups[crowded]], axis=1)
     distinct, of_corner = np.unique(pairs, axis=0, return_inverse=True)

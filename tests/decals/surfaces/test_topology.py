@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 import decals
 from decals.scattering.domain import Domain
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.topology import welded
+from decals.surfaces.topology import components, welded
 from tests.decals.fault_models import FAULT_MODELS, Arrays, joined
 from tests.decals.meshes import box, icosphere
 
@@ -86,6 +88,16 @@ def test_copies_count_once(name: str) -> None:
 def test_vertices_at_one_position_are_one() -> None:
     points = np.array([[0, 0, 0], [1, 2, 3], [-0.0, 0, 0], [1, 2, 3.0000002]], np.float32)
     assert welded(points).tolist() == [0, 1, 0, 3]
+
+
+@pytest.mark.parametrize("links", [0, 7, 120, 300])
+def test_components_are_those_of_scipy(links: int) -> None:
+    rng, count = np.random.default_rng(links), 150
+    order = rng.permutation(count)
+    pairs = rng.integers(0, count, (links, 2)) if links < 300 else np.stack([order[:-1], order[1:]], axis=1)
+    graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(count, count))
+    expected = connected_components(graph, directed=False)[1]
+    np.testing.assert_array_equal(components(pairs, count), expected)
 
 
 def test_no_seeds_on_inner_shells() -> None:
