@@ -27,7 +27,8 @@ def reaches(
     if code >= FIELD:
         r = direct_range(code - FIELD, center, half * HALF_DIAGONAL, tape, at)
     elif code >= STRETCHED:
-        r = stretched_range(code - STRETCHED, center, half * HALF_DIAGONAL, tape, at)
+        cube = wp.vec3(half, half, half)
+        r = stretched_range(code - STRETCHED, center, cube, half * HALF_DIAGONAL, tape, at)
     else:
         r = primitive_range(code, center, half, tape, at)
     return not absent(r)

@@ -10,7 +10,7 @@ import warp as wp
 
 from blobtree.formulas.falloff import falloff_range
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
-from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS, squared_distances_to_ball
+from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import (
     FIELD,
@@ -27,8 +27,10 @@ from blobtree.tape.dispatch import (
     closest,
     direct_bounds,
     direct_stride,
+    is_convex,
     min_influence,
     stride,
+    warp_extent,
     warp_forward,
     warp_stretch,
 )
@@ -70,13 +72,27 @@ def primitive_range(
 
 
 @wp.func
-def range_in_ball(
-    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+def distances_in_box(
+    kind: wp.int32,
+    center: wp.vec3,
+    half: wp.vec3,
+    radius: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
 ) -> wp.vec2:
-    """Return the range of a primitive over a ball."""
+    """Bounds on |x − skeleton| / influence over what a ball and the box center ± half have in common.
+
+    A convex skeleton lies behind the plane through its closest point across the way to it.
+    """
     c = closest(kind, center, tape, at)
-    distances = squared_distances_to_ball(center, radius, c, min_influence(kind, tape, at))
-    return widened(falloff_range(distances[0], distances[1]))
+    smallest = min_influence(kind, tape, at)
+    away = wp.abs(center - wp.vec3(c[0], c[1], c[2]))
+    distance = wp.length(away)
+    toward = radius
+    if is_convex(kind) and distance > 0.0:
+        toward = wp.min(radius, wp.dot(away, half) / distance)
+    farthest = wp.min(distance / c[3] + radius / smallest, wp.length(away + half) / c[3])
+    return wp.vec2(wp.max(distance / c[3] - toward / smallest, 0.0), farthest)
 
 
 @wp.func
@@ -97,25 +113,41 @@ def absent(r: wp.vec2) -> wp.bool:
 
 @wp.func
 def stretched_range(
-    kind: wp.int32, point: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+    kind: wp.int32,
+    point: wp.vec3,
+    extent: wp.vec3,
+    radius: wp.float32,
+    tape: wp.array(dtype=wp.vec4),
+    at: wp.int32,
 ) -> wp.vec2:
-    """Return the range over a ball of a primitive with a map, and maybe a profile, at tape[at]."""
+    """Return the range of a primitive with a map, and maybe a profile, at tape[at]; see `range_anywhere`."""
     profile = tape[at + 3]
     center = to_local(point, tape, at)
-    ball = radius * profile[0]
+    half = extent_to_local(extent, tape, at)
+    distances = distances_in_box(kind, center, half, radius * profile[0], tape, at + PREFIX)
     if profile[2] == 0.0:
-        return range_in_ball(kind, center, ball, tape, at + PREFIX)
-    c = closest(kind, center, tape, at + PREFIX)
-    distances = squared_distances_to_ball(center, ball, c, min_influence(kind, tape, at + PREFIX))
-    largest = profile_value(wp.sqrt(distances[0]), profile)
+        return widened(falloff_range(distances[0] * distances[0], distances[1] * distances[1]))
+    largest = profile_value(distances[0], profile)
     if largest <= 0.0:
         return wp.vec2(0.0, 0.0)
     margin = RANGE_MARGIN * (1.0 + profile[2])
-    smallest = wp.max(profile_value(wp.sqrt(distances[1]), profile) - margin, 0.0)
+    smallest = wp.max(profile_value(distances[1], profile) - margin, 0.0)
     largest += margin
     if profile[3] < 0.0:
         return wp.vec2(largest, smallest) * profile[3]
     return wp.vec2(smallest, largest) * profile[3]
+
+
+@wp.func
+def extent_to_local(half: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Return half the size of the box around a box behind the map at tape[at]."""
+    return wp.vec3(row_extent(tape[at], half), row_extent(tape[at + 1], half), row_extent(tape[at + 2], half))
+
+
+@wp.func
+def row_extent(row: wp.vec4, half: wp.vec3) -> wp.float32:
+    """Return the largest change of a row of a map over a box of this half size."""
+    return wp.abs(row[0]) * half[0] + wp.abs(row[1]) * half[1] + wp.abs(row[2]) * half[2]
 
 
 @unrolled
@@ -159,18 +191,20 @@ def range_anywhere(
     warped: wp.bool,
     point: wp.vec3,
     half: wp.float32,
+    extent: wp.vec3,
     ball: wp.float32,
     tape: wp.array(dtype=wp.vec4),
     at: wp.int32,
 ) -> wp.vec2:
-    """Return the range of a primitive over the cube point ± half, or over the ball if that is all known.
+    """Return the range of a primitive over the cube point ± half.
 
-    A map or a warp takes the cube to a shape that only the ball around it bounds.
+    A map or a warp takes the cube to a shape that only a ball, and the box point ± extent, bound.
     """
     if stretched:
-        return stretched_range(kind, point, ball, tape, at)
+        return stretched_range(kind, point, extent, ball, tape, at)
     if warped:
-        return range_in_ball(kind, point, ball, tape, at)
+        distances = distances_in_box(kind, point, extent, ball, tape, at)
+        return widened(falloff_range(distances[0] * distances[0], distances[1] * distances[1]))
     return primitive_range(kind, point, half, tape, at)
 
 
@@ -285,8 +319,10 @@ def prune(
     run = wp.vec4()
     point = center
     ball = half * HALF_DIAGONAL  # radius around `point`
+    extent = wp.vec3(half, half, half)  # of a box around `point`
     warped = int(0)
     points = _Points()
+    extents = _Points()
     balls = _Balls()
     outer_starts = _OuterStarts()
     at = span[0]
@@ -314,7 +350,7 @@ def prune(
                 if direct:
                     r = direct_range(kind, point, ball, tape, at)
                 else:
-                    r = range_anywhere(kind, stretched, warped > 0, point, half, ball, tape, at)
+                    r = range_anywhere(kind, stretched, warped > 0, point, half, extent, ball, tape, at)
                 accumulator, end, run_at, run, needed = fold_range(
                     header, r, accumulator, accumulator_start, end, run_at, run, tape
                 )
@@ -341,9 +377,12 @@ def prune(
             size = PREFIX + int(header[3])
             points[count] = point
             balls[count] = ball
+            extents[count] = extent
             outer_starts[count] = accumulator_start
             point = warp_forward(operator, local, tape, at + 3)
             ball = reach * warp_stretch(operator, local, reach, tape, at + 3)
+            extent = warp_extent(operator, local, extent_to_local(extent, tape, at), tape, at + 3)
+            extent = wp.min(extent, wp.vec3(ball, ball, ball))
             warped += 1
             if write:
                 copy_texels(tape, at - 1, size + 1, out, start + end)
@@ -355,6 +394,7 @@ def prune(
         elif code == UNWARP:
             point = points[count]
             ball = balls[count]
+            extent = extents[count]
             warped -= 1
             size = PREFIX + int(header[3])
             accumulator_start = outer_starts[count]

@@ -25,30 +25,55 @@ SURELY_OUTSIDE = -1
 SURELY_INSIDE = -2
 
 
+@wp.func
+def write_block(
+    level: LevelBlocks, slot: wp.int32, block: wp.vec3i, start: wp.int32, length: wp.int32
+) -> None:
+    """Write the coordinates, the key and the span of a block whose tape lies behind texel `start`."""
+    level.blocks[slot] = block
+    level.keys[slot] = block_key(block)
+    level.spans[slot] = wp.vec2i(start + 1, start + 1 + length)
+
+
 @wp.kernel
-def count_child_texels(
+def refine_children(
     first: wp.int32,
     parents: wp.array(dtype=wp.int32),
     above: LevelBlocks,
     grid: ChildGrid,
+    write: wp.bool,
     children: wp.array(dtype=wp.int32),
-    flags: wp.array(dtype=wp.int32),
-    texels: wp.array(dtype=wp.int32),
+    slots: wp.array(dtype=wp.int32),
+    starts: wp.array(dtype=wp.int32),
+    level: LevelBlocks,
 ) -> None:
-    """Flag children that the surface may cross, and count the texels that writing their tapes needs."""
+    """Find the children that the surface may cross; in a second pass, write them to `level`.
+
+    The first pass sets `slots` to 1 for these children, and `starts` to the texels that writing their tapes
+    needs. For the second, both are summed up. `prune` compiles once for both.
+    """
     i = first + wp.tid()
     parent = parents[i // CHILDREN]
-    center = block_center(grid.base + child_block(above.blocks[parent], i % CHILDREN), grid.corner, grid.size)
-    half = 0.5 * grid.size + grid.pad
-    result = prune(center, half, above.tape, above.spans[parent], above.tape, 0, False)
     child = parent * CHILDREN + i % CHILDREN
-    if result[0] > ISO:
+    slot = slots[child]
+    start = starts[child]
+    if write and slots[child + 1] == slot:
+        return
+    block = child_block(above.blocks[parent], i % CHILDREN)
+    center = block_center(grid.base + block, grid.corner, grid.size)
+    half = 0.5 * grid.size + grid.pad
+    result = prune(center, half, above.tape, above.spans[parent], level.tape, start + 1, write)
+    if write:
+        level.tape[start] = wp.vec4(result[3], 0.0, 0.0, 0.0)
+        write_block(level, slot, block, start, int(result[3]))
+        children[child] = slot
+    elif result[0] > ISO:
         children[child] = SURELY_INSIDE
     elif result[1] < ISO:
         children[child] = SURELY_OUTSIDE
     else:
-        flags[child] = 1
-        texels[child] = int(result[2]) + 1
+        slots[child] = 1
+        starts[child] = int(result[2]) + 1
 
 
 @wp.kernel
@@ -62,7 +87,7 @@ def inherit_child_texels(
     flags: wp.array(dtype=wp.int32),
     texels: wp.array(dtype=wp.int32),
 ) -> None:
-    """Do the same as `count_child_texels` for the children of unchanged blocks, from the old level."""
+    """Do the same as the first pass of `refine_children` for unchanged blocks, from the old level."""
     i = first + wp.tid()
     parent = parents[i // CHILDREN]
     child = parent * CHILDREN + i % CHILDREN
@@ -72,44 +97,6 @@ def inherit_child_texels(
     else:
         flags[child] = 1
         texels[child] = old.spans[source][1] - old.spans[source][0] + 1
-
-
-@wp.func
-def write_block(
-    level: LevelBlocks, slot: wp.int32, block: wp.vec3i, start: wp.int32, length: wp.int32
-) -> None:
-    """Write the coordinates, the key and the span of a block whose tape lies behind texel `start`."""
-    level.blocks[slot] = block
-    level.keys[slot] = block_key(block)
-    level.spans[slot] = wp.vec2i(start + 1, start + 1 + length)
-
-
-@wp.kernel
-def write_children(
-    first: wp.int32,
-    parents: wp.array(dtype=wp.int32),
-    above: LevelBlocks,
-    grid: ChildGrid,
-    slots: wp.array(dtype=wp.int32),
-    starts: wp.array(dtype=wp.int32),
-    children: wp.array(dtype=wp.int32),
-    level: LevelBlocks,
-) -> None:
-    """Write the kept children of `parents` with their pruned tapes to `level`."""
-    i = first + wp.tid()
-    parent = parents[i // CHILDREN]
-    child = parent * CHILDREN + i % CHILDREN
-    slot = slots[child]
-    if slots[child + 1] == slot:
-        return
-    block = child_block(above.blocks[parent], i % CHILDREN)
-    start = starts[child]
-    center = block_center(grid.base + block, grid.corner, grid.size)
-    half = 0.5 * grid.size + grid.pad
-    result = prune(center, half, above.tape, above.spans[parent], level.tape, start + 1, True)
-    level.tape[start] = wp.vec4(result[3], 0.0, 0.0, 0.0)
-    write_block(level, slot, block, start, int(result[3]))
-    children[child] = slot
 
 
 @wp.kernel

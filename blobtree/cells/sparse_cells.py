@@ -23,10 +23,9 @@ from blobtree.cells.cull_kernels import count_reaching, write_reached_children, 
 from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
 from blobtree.cells.refine_kernels import (
     copy_children,
-    count_child_texels,
     inherit_child_texels,
     match_children,
-    write_children,
+    refine_children,
 )
 from blobtree.cells.scan import DeviceArray, arange, exclusive_scan, where_negative
 from blobtree.device import demand_memory, known_device, launch
@@ -52,7 +51,7 @@ MIN_CULLED_TEXELS = 4096
 MIN_CULLED_SHARE = 0.9
 """Smallest share of a tape in runs that culling can shorten; all other texels are copied to every block."""
 
-CELL_KERNELS = (count_child_texels, write_children)
+CELL_KERNELS = (refine_children,)
 """Kernels of every refinement that read the instruction set, for `load_together`."""
 
 _NEUTRAL_OPERATORS = (SUM, RICCI, UNION, DIFFERENCE)
@@ -262,9 +261,9 @@ class _Refinement:
 
     def _count_texels(self, outputs: list[DeviceArray]) -> None:
         """Count the texels of each child, and flag the children to keep."""
-        inputs = [self._changed, self._above.arrays, self._grid]
+        inputs = [self._changed, self._above.arrays, self._grid, False]
         count = len(self._changed) * CHILDREN
-        launch(self._kernel(count_child_texels), count, inputs, outputs, self._device)
+        launch(self._kernel(refine_children), count, inputs, [*outputs, self._above.arrays], self._device)
         if self._old is not None and len(self._unchanged):
             inputs = [self._unchanged, self._above.sources, self._old.children, self._old.arrays]
             count = len(self._unchanged) * CHILDREN
@@ -273,9 +272,10 @@ class _Refinement:
     def _write(self, level: Level, slots: DeviceArray, starts: DeviceArray) -> None:
         """Write the blocks that are kept, their tapes and their sources."""
         above, outputs = self._above.arrays, [level.children, level.arrays]
-        inputs = [self._changed, above, self._grid, slots, starts]
+        inputs = [self._changed, above, self._grid, True]
         count = len(self._changed) * CHILDREN
-        launch(self._kernel(write_children), count, inputs, outputs, self._device)
+        written = [level.children, slots, starts, level.arrays]
+        launch(self._kernel(refine_children), count, inputs, written, self._device)
         if self._old is None:
             return
         self._match(level, slots)

@@ -269,7 +269,7 @@ def _row(
         leading = ["q", "reach"] if len(claims.stretch.parameters) > len(parameters) else []
         call = f"{bound.key}({', '.join([*leading, *readings])})"
         stretch = made("stretch", _STRETCH, [bound], call=call)
-    return SpaceWarp(kind, forward, pullback, stretch, claims.box, digest)
+    return SpaceWarp(kind, forward, pullback, stretch, claims.box, digest=digest)
 
 
 _FORWARD = '''\

@@ -17,7 +17,7 @@ import warp as wp
 
 from blobtree._typing import Box, Float64Array
 from blobtree.errors import InvalidNode
-from blobtree.formulas.warps import SpaceWarp
+from blobtree.formulas.warps import UNKNOWN_EXTENT, SpaceWarp
 
 wp.set_module_options({"enable_backward": False})
 
@@ -218,22 +218,32 @@ def limited_twist_box(lower: Float64Array, upper: Float64Array, parameters: tupl
 
 
 @wp.func
-def bend_polar(q: wp.vec3, p: wp.vec4) -> wp.vec3:
-    """Return (distance from the axis over the radius of the bend, angle about it, x toward the axis).
+def bend_place(q: wp.vec3, p: wp.vec4, half: wp.vec4) -> wp.vec4:
+    """Return (x and z from the axis, distance beyond the arc, distance from the axis) over the bend's radius.
 
-    The angle is 0 at the height p₂, and the wedge opposite to the arc is cut in its middle.
+    The middle of the arc is at x = 1, z = 0. The distance beyond the arc is that from the line through the
+    axis and the nearer end of the arc; it is below 0 within the arc. `half` is (·, cosine, sine) of half the
+    angle of the arc.
     """
     k = wp.abs(p[1])
-    x = q[0] * wp.sign(p[1])
-    w = 1.0 - k * x
+    w = 1.0 - k * q[0] * wp.sign(p[1])
     v = k * (q[2] - p[2])
-    rho = wp.sqrt(w * w + v * v)
-    phi = float(0.0)
-    if rho > 0.0:
-        phi = wp.atan2(v, w)
-    if phi < 0.5 * k * (p[3] - p[2]) - PI:
-        phi += 2.0 * PI
-    return wp.vec3(rho, phi, x)
+    x = w * half[1] + v * half[2]
+    z = v * half[1] - w * half[2]
+    return wp.vec4(x, z, wp.abs(z) * half[1] - x * half[2], wp.sqrt(w * w + v * v))
+
+
+@wp.func
+def bend_turn(place: wp.vec4, half: wp.vec4) -> wp.vec2:
+    """Return (cos, sin) of the angle by which a bend turns the tree at a place."""
+    if place[2] < 0.0:
+        rho = wp.max(place[3], 1.0e-6)
+        x = place[0] / rho
+        z = place[1] / rho
+        return wp.vec2(x * half[1] - z * half[2], z * half[1] + x * half[2])
+    if place[1] < 0.0:
+        return wp.vec2(1.0, 0.0)
+    return wp.vec2(half[1] * half[1] - half[2] * half[2], 2.0 * half[1] * half[2])
 
 
 @wp.func
@@ -243,40 +253,44 @@ def bend_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.
     k = wp.abs(p[1])
     if k == 0.0:
         return q
-    polar = bend_polar(q, p)
-    x = polar[2]
+    half = tape[at + 1]
+    place = bend_place(q, p, half)
+    side = wp.sign(p[1])
+    x = q[0] * side
     v = q[2] - p[2]
-    full = k * (p[3] - p[2])
-    if polar[1] <= 0.0:
+    if place[2] < 0.0:
+        inner = (2.0 * x - k * (x * x + v * v)) / (1.0 + place[3])
+        return wp.vec3(side * inner, q[1], 0.5 * (p[2] + p[3]) + wp.atan2(place[1], place[0]) / k)
+    if place[1] < 0.0:
         return q
-    if polar[1] < full:
-        inner = (2.0 * x - k * (x * x + v * v)) / (1.0 + polar[0])
-        return wp.vec3(wp.sign(p[1]) * inner, q[1], p[2] + polar[1] / k)
-    c = wp.cos(full)
-    s = wp.sin(full)
-    h = wp.sin(0.5 * full)
-    inner = 2.0 * h * h / k + x * c - v * s
-    return wp.vec3(wp.sign(p[1]) * inner, q[1], p[3] + v * c - s / k + x * s)
+    turn = bend_turn(place, half)
+    inner = 2.0 * half[2] * half[2] / k + x * turn[0] - v * turn[1]
+    return wp.vec3(side * inner, q[1], p[3] + v * turn[0] - turn[1] / k + x * turn[1])
 
 
 @wp.func
 def bend_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """Turn back; in the arc, heights change faster near the axis."""
     p = tape[at]
-    k = wp.abs(p[1])
-    if k == 0.0:
+    if p[1] == 0.0:
         return g
-    polar = bend_polar(q, p)
-    full = k * (p[3] - p[2])
-    angle = wp.clamp(polar[1], 0.0, full)
-    c = wp.cos(angle)
-    s = wp.sin(angle)
+    half = tape[at + 1]
+    place = bend_place(q, p, half)
+    turn = bend_turn(place, half)
     along = g[2]
-    if polar[1] > 0.0 and polar[1] < full:
-        along = g[2] / wp.max(polar[0], CLEARANCE)
+    if place[2] < 0.0:
+        along = g[2] / wp.max(place[3], CLEARANCE)
     side = wp.sign(p[1])
     across = side * g[0]
-    return wp.vec3(side * (c * across + s * along), g[1], c * along - s * across)
+    return wp.vec3(side * (turn[0] * across + turn[1] * along), g[1], turn[0] * along - turn[1] * across)
+
+
+@wp.func
+def bend_to_cut(place: wp.vec4) -> wp.float32:
+    """Return the distance from the cut over the radius of the bend."""
+    if place[0] < 0.0:
+        return wp.abs(place[1])
+    return place[3]
 
 
 @wp.func
@@ -290,21 +304,45 @@ def bend_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), a
     k = wp.abs(p[1])
     if k == 0.0:
         return 1.0
-    polar = bend_polar(q, p)
-    rho = polar[0]
-    full = k * (p[3] - p[2])
+    half = tape[at + 1]
+    empty = half[0]
+    place = bend_place(q, p, half)
+    rho = place[3]
     e = k * reach
-    near = wp.max(rho - e, 0.7 * CLEARANCE)  # lines between points with a field pass the axis no nearer
+    near = wp.max(rho - e, 0.7 * empty)  # lines between points with a field pass the axis no nearer
     bound = wp.max(1.0, 1.0 / near)
-    if rho + e <= CLEARANCE:
+    if rho + e <= empty:
         return bound
-    angle_to_cut = PI - wp.abs(polar[1] - 0.5 * full)
-    to_cut = rho
-    if angle_to_cut < 0.5 * PI:
-        to_cut = rho * wp.sin(angle_to_cut)
-    if e > rho or e > to_cut + CLEARANCE:
-        bound = wp.max(bound, (2.0 * rho + e + full) / e)
+    if e > rho or e > bend_to_cut(place) + CLEARANCE:
+        bound = wp.max(bound, (2.0 * rho + e + k * (p[3] - p[2])) / e)
     return bound
+
+
+@wp.func
+def bend_extent(q: wp.vec3, half_size: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+    """Bound the image of a box within the arc, or beyond one of its ends, and of no other box.
+
+    At q, a is the extent of the box away from the axis and b across, over the radius of the bend.
+    """
+    p = tape[at]
+    k = wp.abs(p[1])
+    if k == 0.0:
+        return half_size
+    half = tape[at + 1]
+    place = bend_place(q, p, half)
+    turn = bend_turn(place, half)
+    c = wp.abs(turn[0])
+    s = wp.abs(turn[1])
+    rho = place[3]
+    a = k * (c * half_size[0] + s * half_size[2])
+    b = k * (s * half_size[0] + c * half_size[2])
+    e = wp.sqrt(a * a + b * b)
+    if rho > e and place[2] < -e:
+        farthest = wp.sqrt((rho + a) * (rho + a) + b * b) - rho
+        return wp.vec3(wp.max(a, farthest) / k, half_size[1], wp.atan2(b, rho - a) / k)
+    if place[2] > e and bend_to_cut(place) > e:
+        return wp.vec3(a / k, half_size[1], b / k)
+    return wp.vec3(UNKNOWN_EXTENT, UNKNOWN_EXTENT, UNKNOWN_EXTENT)
 
 
 def bend_box(lower: Float64Array, upper: Float64Array, parameters: tuple[float, ...]) -> Box:
@@ -339,6 +377,20 @@ def bend_box(lower: Float64Array, upper: Float64Array, parameters: tuple[float, 
     corners[:, 0] *= math.copysign(1.0, rate)
     (x_low, z_low), (x_high, z_high) = corners.min(axis=0), corners.max(axis=0)
     return np.array([x_low, lower[1], z_low]), np.array([x_high, upper[1], z_high])
+
+
+def bend_room(lower: Float64Array, upper: Float64Array, parameters: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the distance from the axis at which the inner box begins, over the radius of the bend.
+
+    Then follow the cosine and the sine of half the angle of the arc.
+    """
+    rate, low, high = parameters
+    toward = float(upper[0]) if rate >= 0.0 else -float(lower[0])
+    empty = 1.0
+    if rate != 0.0 and toward > 0.0:
+        empty = max(0.999 * (1.0 - abs(rate) * toward), CLEARANCE)
+    half = 0.5 * abs(rate) * (high - low)
+    return empty, math.cos(half), math.sin(half)
 
 
 def _on_arc(x: float, angle: float, k: float, low: float) -> tuple[float, float]:
@@ -510,7 +562,7 @@ LIMITED_TWIST = SpaceWarp(
     limited_twist_stretch,
     limited_twist_box,
 )
-BEND = SpaceWarp("bend", bend_forward, bend_pullback, bend_stretch, bend_box)
+BEND = SpaceWarp("bend", bend_forward, bend_pullback, bend_stretch, bend_box, bend_room, bend_extent)
 NOISE = SpaceWarp("noise", noise_forward, noise_pullback, noise_stretch, noise_box)
 CURVE = SpaceWarp("curve", curve_forward, curve_pullback, curve_stretch, curve_box)
 

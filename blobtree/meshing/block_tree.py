@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from blobtree._typing import Float32Array, IndexArray, Int32Array
 from blobtree.cells.block_kernels import LevelBlocks
 from blobtree.cells.grid import CHILDREN, KEY_DIGITS, MAX_CELL_COORDINATE, Grid
-from blobtree.cells.refine_kernels import count_child_texels, write_children
+from blobtree.cells.refine_kernels import refine_children
 from blobtree.cells.scan import DeviceArray, exclusive_scan
 from blobtree.cells.sparse_cells import MAX_BLOCKS, TEXEL_BYTES, SparseCells, child_grid
 from blobtree.device import demand_memory, launch
@@ -127,9 +127,9 @@ class BlockTree:
         above: Any = self._level_arrays(self._blocks, self._keys, self._spans, self._tape)
         children = on_device(self.children, wp.int32, device)
         flags, texels = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
-        outputs = [children, flags, texels]
-        threads = len(parents) * CHILDREN
-        launch(self._kernel(count_child_texels), threads, [parents, above, lattice], outputs, device)
+        threads, inputs = len(parents) * CHILDREN, [parents, above, lattice]
+        outputs = [children, flags, texels, above]
+        launch(self._kernel(refine_children), threads, [*inputs, False], outputs, device)
         wanted = np.zeros(count + 1, np.int32)
         wanted[cells] = 1
         flags, texels = (on_device(array.numpy() * wanted, wp.int32, device) for array in (flags, texels))
@@ -151,8 +151,8 @@ class BlockTree:
             )
         ]
         level_arrays = self._level_arrays(*grown)
-        inputs = [parents, above, lattice, slots, starts]
-        launch(self._kernel(write_children), threads, inputs, [children, level_arrays], device)
+        outputs = [children, slots, starts, level_arrays]
+        launch(self._kernel(refine_children), threads, [*inputs, True], outputs, device)
         self._blocks, self._keys, self._spans, self._tape = grown
         self.children = np.concatenate(
             [children.numpy(), np.full((blocks - old) * CHILDREN, UNREFINED, np.int32)]

@@ -31,9 +31,39 @@ def support_box(program: list[Instruction]) -> tuple[Float32Array, Float32Array]
     The program runs over boxes in place of numbers. A tree that is empty everywhere has the box of its first
     primitive, without the warps around it, so that views always have a box to frame.
     """
+    box, fallback, _ = _boxes(program)
+    if np.any(box[0] > box[1]) and fallback is not None:
+        box = fallback
+    lower, upper = (corner.astype(np.float32) for corner in box)
+    return np.nextafter(lower, np.float32(-np.inf)), np.nextafter(upper, np.float32(np.inf))
+
+
+def warp_parameters(program: list[Instruction]) -> dict[int, tuple[float, ...]]:
+    """Return the parameters of warps by ``id(entry)`` of their instructions `EnterWarp`.
+
+    A warp with `SpaceWarp.room` has more of them than its node states.
+
+    Raises
+    ------
+    InvalidNode
+        A warp has no room for what it contains.
+    """
+    entries = [step for step in program if isinstance(step, EnterWarp)]
+    boxes = _boxes(program)[2] if any(entry.warp.room for entry in entries) else {}
+    return {
+        id(entry): entry.parameters + entry.warp.room(*boxes[id(entry)], entry.parameters)
+        if entry.warp.room
+        else entry.parameters
+        for entry in entries
+    }
+
+
+def _boxes(program: list[Instruction]) -> tuple[Box, Box | None, dict[int, Box]]:
+    """Return the box of a tree, that of its first primitive, and the boxes within warps by ``id(entry)``."""
     box = EMPTY
     registers: dict[int, Box] = {}
     fallback: Box | None = None
+    inner: dict[int, Box] = {}
     for step in program:
         match step:
             case Push(register):
@@ -47,11 +77,9 @@ def support_box(program: list[Instruction]) -> tuple[Float32Array, Float32Array]
                 fallback = fallback or (boxes[0][0], boxes[1][0])
                 box = _combine_all(operator, box, boxes)
             case LeaveWarp(entry):
+                inner[id(entry)] = box
                 box = _warped(box, entry)
-    if np.any(box[0] > box[1]) and fallback is not None:
-        box = fallback
-    lower, upper = (corner.astype(np.float32) for corner in box)
-    return np.nextafter(lower, np.float32(-np.inf)), np.nextafter(upper, np.float32(np.inf))
+    return box, fallback, inner
 
 
 def primitive_boxes(primitives: list[PlacedPrimitive]) -> Box:

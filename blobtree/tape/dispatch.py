@@ -222,6 +222,18 @@ def warp_stretch(
 
 
 @unrolled
+def warp_extent(
+    kind: wp.int32, q: wp.vec3, half: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Return half the size of a box about T(q) that holds the image of the box q ± half."""
+    result = wp.vec3()
+    for code in range(wp.static(len(WARPS))):
+        if kind == code:
+            result = wp.static(WARPS[code].extent)(q, half, tape, at)
+    return result
+
+
+@unrolled
 def falloff_value(kind: wp.int32, distance: wp.float32) -> wp.float32:
     """Return g(d) of a falloff, 0 ≤ d ≤ 1."""
     result = float(0.0)

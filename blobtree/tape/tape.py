@@ -47,6 +47,7 @@ from blobtree.device import known_device
 from blobtree.errors import InvalidNode
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.bounds import warp_parameters
 from blobtree.tape.codes import (
     FIELD,
     POP,
@@ -172,7 +173,8 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     falloffs = {primitive.profile[0] for primitive in carrying if primitive.profiled}
     instruction_set = instruction_set_for(skeletons, operators, warps, fields, falloffs)
     region = DataRegion(precision)
-    texels = [np.concatenate(list(_texels(step, instruction_set, region))) for step in program]
+    of_warps = warp_parameters(program)
+    texels = [np.concatenate(list(_texels(step, instruction_set, region, of_warps))) for step in program]
     start = len(region.texels)
     ends = start + np.cumsum([len(part) for part in texels])
     return Tape(
@@ -192,9 +194,12 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
 
 
 def _texels(
-    step: Instruction, instruction_set: InstructionSet, region: DataRegion
+    step: Instruction,
+    instruction_set: InstructionSet,
+    region: DataRegion,
+    of_warps: dict[int, tuple[float, ...]],
 ) -> Iterator[NDArray[np.float64]]:
-    """Yield the texels (·, 4) of one instruction."""
+    """Yield the texels (·, 4) of one instruction; `of_warps` is `warp_parameters` of the program."""
     match step:
         case Push(register):
             yield np.array([[PUSH, 0.0, register, 0.0]])
@@ -203,9 +208,9 @@ def _texels(
             parameter = _parameter(parameters, region)
             yield np.array([[code, instruction_set.operators.index(operator), register, parameter]])
         case EnterWarp():
-            yield _warp_texels(WARP, step, instruction_set)
+            yield _warp_texels(WARP, step, of_warps[id(step)], instruction_set)
         case LeaveWarp(entry):
-            yield _warp_texels(UNWARP, entry, instruction_set)
+            yield _warp_texels(UNWARP, entry, of_warps[id(entry)], instruction_set)
         case Run(FieldKind() as kind, _, operator, parameters, primitives):
             code = instruction_set.fields.index(kind) + FIELD
             parameter = _parameter(parameters, region)
@@ -225,10 +230,12 @@ def _parameter(parameters: tuple[float, ...], region: DataRegion) -> float:
     return parameters[0] if parameters else 0.0
 
 
-def _warp_texels(code: int, entry: EnterWarp, instruction_set: InstructionSet) -> NDArray[np.float64]:
+def _warp_texels(
+    code: int, entry: EnterWarp, parameters: tuple[float, ...], instruction_set: InstructionSet
+) -> NDArray[np.float64]:
     """Return header, map and parameters of a warp."""
     prefix = _map_texels(entry.placement.matrix)
-    first, more = entry.parameters[:3], entry.parameters[3:]
+    first, more = parameters[:3], parameters[3:]
     prefix[-1, 1 : 1 + len(first)] = first
     texels = np.zeros((-(-len(more) // 4), 4))
     texels.ravel()[: len(more)] = more
