@@ -7,6 +7,7 @@ cache on disk, under a hash of the source. `loaded` does more than that:
   cache. Their names hold Warp's version and the hash, so kernels of other sources are never taken.
 * Where there are none, all files of kernels that the package of the launched kernel has imported compile at
   the same time, one per core, and report their progress.
+* Processes that start together share the work: each file of kernels is compiled by one of them.
 * A damaged file of the cache is removed, and its kernels are compiled again.
 * Warp's own headers are parsed once per machine, not once per thread of every process (`_kept_headers`).
 """
@@ -17,6 +18,7 @@ import shutil
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager, nullcontext
@@ -26,6 +28,7 @@ from typing import Any
 import warp as wp
 
 from blobtree.errors import UnusableCache
+from blobtree.file_lock import FileLock
 from blobtree.progress import Progress, reporting
 
 KERNEL_OPTIONS: dict[str, Any] = {
@@ -48,6 +51,9 @@ HEADERS = "headers"
 
 CUDA_BLOCK = 256
 """Threads of a block, where a module of kernels sets no other number; Warp's default."""
+
+LOCK_INTERVAL = 0.05
+"""Seconds between looks at kernels that another process compiles."""
 
 COMPILING = "compiling kernels for this machine (once)"
 """Stage of progress reports; the number of compiled files of kernels follows, as in ``": 3 of 11"``."""
@@ -187,7 +193,7 @@ def _load(module: wp.Module, device: wp.Device) -> None:
     """Load a module; remove it from the cache and compile it again if its files are damaged."""
     folder = kernel_cache() / _folder_name(module, device)
     was_cached = folder.is_dir()
-    with _cache_errors(), nullcontext() if was_cached else _kept_headers():
+    with _cache_errors(), nullcontext() if was_cached else _compiling(folder):
         try:
             wp.load_module(module, device=device)
         except Exception as error:  # Warp raises nothing more precise for a damaged file
@@ -198,6 +204,20 @@ def _load(module: wp.Module, device: wp.Device) -> None:
             if device.is_cpu:  # a driver that refused the shipped PTX would refuse it again
                 _copy_shipped(folder)
             wp.load_module(module, device=device)
+
+
+@contextmanager
+def _compiling(folder: Path) -> Iterator[None]:
+    """Within a ``with`` block, no other process fills this folder of the cache; wait for one that does."""
+    lock_file = folder.with_name(f"{folder.name}.lock")
+    lock_file.parent.mkdir(parents=True, exist_ok=True)
+    while (lock := FileLock.acquire(lock_file)) is None:
+        time.sleep(LOCK_INTERVAL)
+    try:
+        with nullcontext() if folder.is_dir() else _kept_headers():
+            yield
+    finally:
+        lock.release()
 
 
 @contextmanager

@@ -2,8 +2,16 @@
 
 import pytest
 
+import blobtree.kernels as kernels
 from blobtree.custom import definition
 from decals.rendering.gl_libraries import missing_gl_libraries
+
+
+def pytest_collection_finish() -> None:
+    """Each worker collects all tests, so modules of tests must not compute when they are imported."""
+    if kernels._state.loaded:
+        names = ", ".join(sorted(name for name, _ in kernels._state.loaded))
+        raise pytest.UsageError(f"the import of a module of tests has launched kernels of {names}")
 
 
 @pytest.fixture(autouse=True)

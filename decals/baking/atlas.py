@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,21 +94,23 @@ def _atlas(arrays: Arrays, texels_per_unit: float, report: Progress) -> Arrays:
     if not can_isolate():
         return atlas(arrays, *options)
     folders = os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path)
-    with subprocess.Popen(
-        [sys.executable, "-P", "-W", "ignore", "-m", atlas.__module__],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": folders},
-    ) as child:
+    with tempfile.TemporaryFile() as request:  # `communicate` may not end if it has input and a timeout
+        request.write(packed([*map(np.asarray, options), *arrays]))
+        request.seek(0)
+        child = subprocess.Popen(
+            [sys.executable, "-P", "-W", "ignore", "-m", atlas.__module__],
+            stdin=request,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": folders},
+        )
+    with child:
         try:
-            request: bytes | None = packed([*map(np.asarray, options), *arrays])
             while True:
                 try:
-                    answer, errors = child.communicate(request, timeout=REPORT_SECONDS)
+                    answer, errors = child.communicate(timeout=REPORT_SECONDS)
                     break
                 except subprocess.TimeoutExpired:
-                    request = None
                     report(UNWRAPPING, 0.0)
         except BaseException:
             child.kill()

@@ -8,9 +8,9 @@ from datetime import datetime
 from os import PathLike
 from pathlib import Path
 
+from blobtree.file_lock import FileLock
 from decals.editing.background import BackgroundJobs
 from decals.editing.commands import ReplaceScene
-from decals.editing.file_lock import FileLock
 from decals.editing.session import EditSession
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.scenes.camera import Camera

@@ -37,7 +37,7 @@ from tests.blobtree.kernels import (
     tent,
     tent_slope,
 )
-from tests.blobtree.trees import MoreKinds, random_trees, triple
+from tests.blobtree.trees import MoreKinds, RandomTrees, triple
 
 SOFTEST = 4.0
 STEW_PARAMETERS = ("left", "right", "both", "less_left", "less_right")
@@ -127,4 +127,4 @@ def everything() -> Node:
 EVERYTHING = everything()
 EVERYTHING.tape  # noqa: B018  (making it is what matters)
 
-CUSTOM_TREES = random_trees(seed=4, count=120, more=CUSTOM)
+CUSTOM_TREES = RandomTrees(seed=4, count=120, more=CUSTOM)

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,6 +13,7 @@ import warp as wp
 import blobtree.kernels as kernels
 from blobtree.device import start_warp
 from blobtree.errors import UnusableCache
+from blobtree.file_lock import FileLock
 from blobtree.kernels import COMPILING, HEADERS, KERNEL_OPTIONS, loaded
 from blobtree.progress import reporting
 
@@ -64,6 +65,24 @@ def test_a_second_process_would_compile_nothing(cache: Path) -> None:
     assert len(stages) == 2
     assert _object_file(cache).stat().st_mtime_ns == written
     assert kernels._state.compiled == before
+
+
+def test_kernels_that_another_process_compiles_are_awaited(cache: Path) -> None:
+    _doubled()
+    _forget()
+    folder, elsewhere = _object_file(cache).parent, cache / "elsewhere"
+    written = _object_file(cache).stat().st_mtime_ns
+    folder.rename(elsewhere)
+    lock = FileLock.acquire(folder.with_name(f"{folder.name}.lock"))
+    assert lock is not None
+    with ThreadPoolExecutor(1) as thread:
+        waiting = thread.submit(_doubled)
+        assert not wait([waiting], timeout=0.3).done
+        elsewhere.rename(folder)
+        lock.release()
+        assert waiting.result() == [2.0, 5.0]
+    assert _object_file(cache).stat().st_mtime_ns == written
+    assert not list(cache.glob("*.lock"))
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.3, 0.9], ids=["empty", "short", "nearly-whole"])

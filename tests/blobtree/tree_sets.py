@@ -1,5 +1,6 @@
 """Sets of random trees over which whatever holds of every tree is tested, in batches of twenty."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,23 +19,23 @@ from tests.blobtree.trees import (
     SHAPES,
     SIGNED,
     SOLIDS,
+    RandomTrees,
     points_around,
-    random_trees,
 )
 from tests.oracles.blobtree import Field, evaluate
 
 BATCH = 20
 POINTS = 150
 
-BUILT_IN_TREES = random_trees(seed=1, count=240)
-DEFORMED_TREES = random_trees(seed=51, count=80, depth=3, more=DEFORMED)
-SOLID_TREES = random_trees(seed=21, count=80, more=SOLIDS)
-FIELD_TREES = random_trees(seed=33, count=40, more=FIELDS)
-SHAPE_TREES = random_trees(seed=41, count=80, more=SHAPES)
-BLEND_TREES = random_trees(seed=51, count=80, depth=3, more=BLENDED)
-CONTACT_TREES = random_trees(seed=31, count=40, depth=2, more=CONTACTS)
-PROFILED_TREES = random_trees(seed=22, count=80, more=PROFILED)
-SIGNED_TREES = random_trees(seed=23, count=80, more=SIGNED)
+BUILT_IN_TREES = RandomTrees(seed=1, count=240)
+DEFORMED_TREES = RandomTrees(seed=51, count=80, depth=3, more=DEFORMED)
+SOLID_TREES = RandomTrees(seed=21, count=80, more=SOLIDS)
+FIELD_TREES = RandomTrees(seed=33, count=40, more=FIELDS)
+SHAPE_TREES = RandomTrees(seed=41, count=80, more=SHAPES)
+BLEND_TREES = RandomTrees(seed=51, count=80, depth=3, more=BLENDED)
+CONTACT_TREES = RandomTrees(seed=31, count=40, depth=2, more=CONTACTS)
+PROFILED_TREES = RandomTrees(seed=22, count=80, more=PROFILED)
+SIGNED_TREES = RandomTrees(seed=23, count=80, more=SIGNED)
 ANY_ORDER = 0.05
 """Superelliptic blends are not homogeneous, so their colours depend a little on the order of the operands."""
 
@@ -47,10 +48,15 @@ class Batch:
     """Some trees of a set, and how exact their fields are."""
 
     start: int
-    trees: list[Node]
+    source: Sequence[Node]
     value_error: float
     color_error: float
     gradient_error: float = 1e-4
+
+    @property
+    def trees(self) -> Sequence[Node]:
+        """The trees themselves, made at the first use."""
+        return self.source[self.start : self.start + BATCH]
 
     @cached_property
     def cases(self) -> list[tuple[Node, Float32Array]]:
@@ -64,9 +70,8 @@ class Batch:
         return [evaluate(tree, points) for tree, points in self.cases]
 
 
-def _batches(trees: list[Node], *errors: float) -> list[Batch]:
-    starts = range(0, len(trees), BATCH)
-    return [Batch(start, trees[start : start + BATCH], *errors) for start in starts]
+def _batches(trees: Sequence[Node], *errors: float) -> list[Batch]:
+    return [Batch(start, trees, *errors) for start in range(0, len(trees), BATCH)]
 
 
 _SETS = {

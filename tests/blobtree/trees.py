@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import combinations
 from operator import add, and_, or_
-from typing import Any, cast
+from typing import Any, cast, overload
 
 import numpy as np
 from hypothesis import strategies as st
@@ -340,15 +340,39 @@ def random_tree(rng: np.random.Generator, depth: int = 4, more: MoreKinds | None
     return reduce(combine, operands)
 
 
+class RandomTrees(Sequence[Node]):
+    """Trees with at least one combination each, made when they are asked for.
+
+    Every kind of node occurs among two dozen of them.
+    """
+
+    def __init__(self, seed: int, count: int, depth: int = 4, more: MoreKinds | None = None) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._count, self._depth, self._more = count, depth, more
+        self._made: list[Node] = []
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, place: int) -> Node: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[Node]: ...
+
+    def __getitem__(self, place: int | slice) -> Node | list[Node]:
+        places = range(self._count)[place]
+        last = places if isinstance(places, int) else max(places, default=-1)
+        while len(self._made) <= last:
+            tree = random_tree(self._rng, self._depth, self._more)
+            if len(tree.children) > 1:
+                self._made.append(tree)
+        return self._made[place]
+
+
 def random_trees(seed: int, count: int, depth: int = 4, more: MoreKinds | None = None) -> list[Node]:
-    """Trees with at least one combination each; every kind of node occurs among two dozen of them."""
-    rng = np.random.default_rng(seed)
-    trees: list[Node] = []
-    while len(trees) < count:
-        tree = random_tree(rng, depth, more)
-        if len(tree.children) > 1:
-            trees.append(tree)
-    return trees
+    """Return `RandomTrees` as a list."""
+    return list(RandomTrees(seed, count, depth, more))
 
 
 def points_around(rng: np.random.Generator, tree: Node, count: int) -> NDArray[np.float32]:

@@ -1,14 +1,11 @@
 """Unsaved changes: the recovery file keeps them, and the next session takes them over."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-import decals.editing.file_lock as file_lock
 from decals.editing import Actions, EditSession, ScaleDecals, recovery_path
-from decals.editing.file_lock import FileLock
 from decals.errors import InvalidScene
 from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import finish, hold_writing, press, threaded
@@ -186,33 +183,3 @@ def test_windows_of_one_file_keep_their_changes_apart(tmp_path: Path) -> None:
     for actions in (first, third):
         press(actions, "save")
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_lock_is_held_once_and_leaves_no_file(tmp_path: Path) -> None:
-    file = tmp_path / "lock"
-    lock = FileLock.acquire(file)
-    assert lock is not None
-    assert FileLock.acquire(file) is None
-    lock.release()
-    assert not file.exists()
-    again = FileLock.acquire(file)
-    assert again is not None
-    again.release()
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows removes no open files")
-def test_a_lock_whose_file_was_removed_is_taken_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its holder releases it after another process has opened the file."""
-    file, locked = tmp_path / "lock", file_lock._locked
-
-    def late(descriptor: int) -> bool:
-        monkeypatch.setattr(file_lock, "_locked", locked)
-        file.unlink()
-        return locked(descriptor)
-
-    monkeypatch.setattr(file_lock, "_locked", late)
-    lock = FileLock.acquire(file)
-    assert lock is not None
-    assert file.exists()
-    assert FileLock.acquire(file) is None
-    lock.release()

@@ -225,13 +225,20 @@ def test_refuses(points: NDArray[Any], normals: NDArray[Any], says: str) -> None
         ({"images": ["skale.png"]}, InvalidImage, "expected an image, found no file 'skale.png'"),
         ({"decals": "scale"}, InvalidDecals, "expected Decals or a DecalEditor, got 'scale'"),
         ({"index": "scale"}, InvalidDecals, "index: expected the index of these 1 decals, got 'scale'"),
-        ({"index": DecalIndex.build(np.zeros((9, 3)), np.ones(9))}, InvalidDecals, "got one of 9"),
     ],
 )
 def test_refuses_what_is_none(wrong: Any, error: Any, says: str) -> None:
     one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
     with pytest.raises(error, match=says):
         evaluate(**{"decals": one, "points": np.zeros((1, 3)), "normals": np.eye(3)[2:]} | wrong)
+
+
+def test_the_index_of_other_decals_is_refused() -> None:
+    other = DecalIndex.build(np.zeros((9, 3)), np.ones(9))
+    with pytest.raises(InvalidDecals, match="index: expected the index of these 1 decals, got one of 9"):
+        evaluate(
+            Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0]), np.zeros((1, 3)), np.eye(3)[2:], index=other
+        )
 
 
 def test_a_normal_without_length_faces_every_decal() -> None:

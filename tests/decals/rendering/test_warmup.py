@@ -1,6 +1,6 @@
 """What a picture takes for the first time, piece by piece."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -42,18 +42,22 @@ def test_tasks_are_counted_by_group() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene", "contact"),
+    ("change", "contact"),
     [
-        (both(), Contact.PRODUCT),
-        (layered(both()), Contact.RADIAL),
-        (both().replace(decals=Decals.empty()), Contact.PRODUCT),
-        (both().replace(objects=both().objects[:1]), Contact.PRODUCT),
+        (lambda scene: scene, Contact.PRODUCT),
+        (layered, Contact.RADIAL),
+        (lambda scene: scene.replace(decals=Decals.empty()), Contact.PRODUCT),
+        (lambda scene: scene.replace(objects=scene.objects[:1]), Contact.PRODUCT),
     ],
+    ids=["both", "layered", "without decals", "one object"],
 )
 def test_after_the_warm_up_a_picture_compiles_nothing(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, scene: Scene, contact: Contact
+    renderer: Renderer,
+    monkeypatch: pytest.MonkeyPatch,
+    change: Callable[[Scene], Scene],
+    contact: Contact,
 ) -> None:
-    context = renderer.context
+    context, scene = renderer.context, change(both())
     compiled: list[str] = []
     for name in ("program", "compute_shader"):
         compiler = getattr(context.gl, name)

@@ -238,10 +238,10 @@ def test_frames_drawn_in_part_are_those_drawn_whole(
 class Edited:
     """A scene whose decals are edited."""
 
-    camera, images, objects = both().camera, both().images, both().objects
-
     def __init__(self) -> None:
-        self.decals = DecalEditor(both().decals)
+        scene = both()
+        self.camera, self.images, self.objects = scene.camera, scene.images, scene.objects
+        self.decals = DecalEditor(scene.decals)
 
 
 def test_a_window_of_another_kind_is_refused(plotter: Factory, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ import pyvista as pv
 from scipy.ndimage import binary_dilation
 
 from blobtree import Point
+from decals.model import Decals
 from decals.rendering.options import RenderOptions
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import TreeObject
@@ -19,7 +21,11 @@ from tests.decals.vtk.scenes import shot
 Prepare = Callable[[Plotter], object]
 
 BLOB = TreeObject("blob", Point((0.7, -0.9, 0.2), radius=0.35))
-DECALS = scatter([BLOB.surface], count=20, seed=1)
+
+
+@cache
+def spots() -> Decals:
+    return scatter([BLOB.surface], count=20, seed=1)
 
 
 def textured(pl: Plotter) -> None:
@@ -124,7 +130,7 @@ def picture(plotter: Factory, mode: str, *, ours: bool) -> tuple[Plotter, np.nda
     prepare(pl)
     if ours:
         pl.decals.add_implicit(BLOB)
-        pl.decals.add(DECALS, images=["scale"])
+        pl.decals.add(spots(), images=["scale"])
     pl.reset_camera_clipping_range()
     for _ in range(2):
         shot(pl)  # VTK's axes take a few frames to find their places

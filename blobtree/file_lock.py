@@ -1,4 +1,4 @@
-"""Locks between windows, also of several processes; the system frees those of a process that ends."""
+"""Locks between processes and threads; the system frees those of a process that ends."""
 
 import os
 import sys
@@ -23,7 +23,7 @@ class FileLock:
 
     @classmethod
     def acquire(cls, path: Path) -> Self | None:
-        """Return the lock of a path, or None if another window holds it.
+        """Return the lock of a path, or None if another one holds it.
 
         Raises
         ------
@@ -63,7 +63,7 @@ class FileLock:
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock an open file and return True, or return False if another window has locked it."""
+    """Lock an open file and return True, or return False if another one has locked it."""
     try:
         if sys.platform == "win32":
             import msvcrt
