@@ -11,6 +11,7 @@ from decals.apps.commands.options import (
     DEFAULT_STIFFNESS,
     MAX_SAMPLES,
     ContactName,
+    CreaseAngle,
     Definitions,
     MappingName,
     OptionalWhole,
@@ -36,6 +37,7 @@ def bake(
     mapping: MappingName = "corrected",
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
+    crease_angle: CreaseAngle = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -63,6 +65,9 @@ def bake(
         Cells along the longest side of each implicit object. Default: 64.
     creases
         Keep the edges that unions, intersections and differences leave.
+    crease_angle
+        Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. Default:
+        35, or that of a saved scene.
     define
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
         repeated.
@@ -74,7 +79,7 @@ def bake(
     import_definitions(define)
     with progress_bars() as progress:
         progress(PREPARING, 0.0)
-        loaded = load_model(scene, trust=trust)
+        loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
         bake_scene(
             loaded,
             output,

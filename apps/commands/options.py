@@ -51,6 +51,9 @@ DEFAULT_STIFFNESS = 2.0
 MappingName = Literal["corrected", "chord"]
 """Image mappings on the command line."""
 
+CreaseAngle = Annotated[float | None, Parameter(show_default=False)]
+"""An optional crease angle of meshes, in degrees, on the command line."""
+
 Trust = Annotated[bool, Parameter(name="--trust", negative=(), show_default=False)]
 """Permission for a scene to read files outside its folder."""
 

@@ -13,6 +13,7 @@ from decals.apps.commands.options import (
     MAX_SAMPLES,
     TILE,
     ContactName,
+    CreaseAngle,
     Definitions,
     MappingName,
     OptionalWhole,
@@ -48,6 +49,7 @@ def render(
     mapping: MappingName = "corrected",
     seed: OptionalWhole = None,
     save: Path | None = None,
+    crease_angle: CreaseAngle = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -87,6 +89,9 @@ def render(
         Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
         Also write the scene to this JSON file, which render and edit can open.
+    crease_angle
+        Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. Default:
+        35, or that of a saved scene.
     define
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
         repeated.
@@ -106,7 +111,7 @@ def render(
     with ExitStack() as stack:
         progress = stack.enter_context(progress_bars())
         progress(PREPARING, 0.0)
-        loaded = load_models(model, trust=trust)
+        loaded = load_models(model, trust=trust, crease_angle=crease_angle)
         if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
             raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
         options = ScatterOptions.from_arguments(decals, image, seed)

@@ -13,6 +13,7 @@ from decals import scatter as scatter_decals
 from decals.apps.commands.options import (
     MAX_DECALS,
     MAX_SEED,
+    CreaseAngle,
     Definitions,
     OptionalWhole,
     Trust,
@@ -52,6 +53,7 @@ def scatter(
     black: float = 0.1,
     regularity: float = 1.0,
     seed: Whole = 0,
+    crease_angle: CreaseAngle = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -90,6 +92,9 @@ def scatter(
         From 0 (random positions) to 1 (as even as possible).
     seed
         Seed of the random numbers: equal seeds give equal decals.
+    crease_angle
+        Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. Default:
+        35, or that of a saved scene.
     define
         A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
         repeated.
@@ -109,7 +114,7 @@ def scatter(
     import_definitions(define)
     with progress_bars() as progress:
         progress(PREPARING, 0.0)
-        loaded = load_models(model, trust=trust)
+        loaded = load_models(model, trust=trust, crease_angle=crease_angle)
         objects = loaded.objects if isinstance(loaded, Scene) else tuple(loaded)
         if not objects:
             raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")

@@ -5,24 +5,29 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh
 from decals.errors import InvalidInput
-from decals.scenes.objects import SceneObject, as_objects
+from decals.scenes.objects import MeshObject, SceneObject, as_crease_angle, as_objects
 from decals.validation import is_file
 
 
-def load_model(model: str, *, trust: bool = False) -> SceneObject | Scene:
+def load_model(model: str, *, trust: bool = False, crease_angle: float | None = None) -> SceneObject | Scene:
     """Load the sample or the file that a MODEL argument names; ``trust`` is that of `decals.load_scene`.
+
+    Meshes get the crease angle, if there is one; by default they keep their own.
 
     Raises
     ------
     InvalidInput
         If it is neither a sample nor a file, or the file cannot be used; the message names it.
     """
+    if crease_angle is not None:
+        return _creased(load_model(model, trust=trust), as_crease_angle(crease_angle))
     if model in SAMPLES:
         return sample(model)
     if not is_file(Path(model)):
@@ -38,8 +43,12 @@ def load_model(model: str, *, trust: bool = False) -> SceneObject | Scene:
         raise InvalidInput(f"{model!r}: {error}") from error
 
 
-def load_models(models: Sequence[str], *, trust: bool = False) -> list[SceneObject] | Scene:
+def load_models(
+    models: Sequence[str], *, trust: bool = False, crease_angle: float | None = None
+) -> list[SceneObject] | Scene:
     """Load one whole scene, or several models, each in its own coordinates and under its own name.
+
+    Other arguments are those of `load_model`.
 
     Raises
     ------
@@ -48,7 +57,7 @@ def load_models(models: Sequence[str], *, trust: bool = False) -> list[SceneObje
     """
     objects: list[SceneObject] = []
     for model in models:
-        loaded = load_model(model, trust=trust)
+        loaded = load_model(model, trust=trust, crease_angle=crease_angle)
         if isinstance(loaded, Scene):
             if len(models) > 1:
                 raise InvalidInput(
@@ -57,6 +66,13 @@ def load_models(models: Sequence[str], *, trust: bool = False) -> list[SceneObje
             return loaded
         objects.append(loaded)
     return as_objects(objects)
+
+
+def _creased(model: SceneObject | Scene, angle: float) -> SceneObject | Scene:
+    """Return a model whose meshes have a crease angle."""
+    if isinstance(model, Scene):
+        return replace(model, objects=tuple(_creased(item, angle) for item in model.objects))
+    return replace(model, crease_angle=angle) if isinstance(model, MeshObject) else model
 
 
 def import_definitions(modules: Sequence[str] | None) -> None:

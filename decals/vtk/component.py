@@ -176,7 +176,7 @@ class DecalsComponent:
         self.scene = scene.replace(decals=together, images=(*scene.images, *added))
         return together
 
-    def apply(self, actor: pv.Actor, *, follow: bool = False) -> pv.Actor:
+    def apply(self, actor: pv.Actor, *, follow: bool = False, crease_angle: float = CREASE_ANGLE) -> pv.Actor:
         """Show the subplot's decals on an actor of pyvista, whose lights, scalars and edges stay.
 
         Parameters
@@ -186,13 +186,16 @@ class DecalsComponent:
         follow
             If True, decals have the actor's coordinates and move with it. If False, they have world
             coordinates.
+        crease_angle
+            Angle between two faces, in degrees, from which their edge is sharp for decals. Two subplots that
+            show one actor share the angle of the first.
 
         Raises
         ------
         InvalidScene
-            VTK does not draw the actor as polygons.
+            VTK does not draw the actor as polygons, or the crease angle is out of range.
         """
-        self.subplot.apply(actor, follow=follow)
+        self.subplot.apply(actor, follow=follow, crease_angle=crease_angle)
         return actor
 
     def remove(self, actor: pv.Actor) -> None:

@@ -22,6 +22,7 @@ from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.uploads import DecalData, ImageArray
 from decals.rendering.viewpoint import PictureView, Rectangle
 from decals.shaders import compose
+from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe
 from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper
@@ -95,16 +96,24 @@ class Injection:
         An actor of polygons.
     follow
         If True, decals are in the actor's coordinates and move with it.
+    crease_angle
+        Angle in degrees from which edges are sharp.
     paint
         GLSL that changes VTK's colours. Default: PAINT; tests use others.
     """
 
     def __init__(
-        self, subplot: InjectionTarget, actor: Any, *, follow: bool = False, paint: str = PAINT
+        self,
+        subplot: InjectionTarget,
+        actor: Any,
+        *,
+        follow: bool = False,
+        crease_angle: float = CREASE_ANGLE,
+        paint: str = PAINT,
     ) -> None:
         self.actor, self._follow, self._paint = actor, follow, paint
         self._mapper = polygon_mapper(actor)
-        self._normals = SmoothNormals()
+        self._normals = SmoothNormals(crease_angle)
         self._add_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
@@ -250,10 +259,10 @@ class InjectedDecals:
         self._units: list[int] = []
         self.in_frame = False
 
-    def apply(self, actor: Any, *, follow: bool) -> None:
+    def apply(self, actor: Any, *, follow: bool, crease_angle: float) -> None:
         """Show the decals on an actor."""
         self._release(self._of(actor))
-        self._injections.append(Injection(self._subplot, actor, follow=follow))
+        self._injections.append(Injection(self._subplot, actor, follow=follow, crease_angle=crease_angle))
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor.

@@ -135,10 +135,16 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
 
     The output has its own points. VTK uploads an array of points once for all mappers of a window, shifted
     and scaled as its first mapper asks, but decals need the unchanged points.
+
+    Parameters
+    ----------
+    crease_angle
+        Angle in degrees from which edges are sharp.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, crease_angle: float = CREASE_ANGLE) -> None:
         super().__init__(nInputPorts=1, inputType="vtkDataSet", nOutputPorts=1, outputType="vtkDataSet")
+        self._crease_angle = crease_angle
         self._output: pv.DataSet | None = None
 
     def insert_before(self, mapper: Any) -> bool:
@@ -170,7 +176,7 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
     def RequestData(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
         """Copy the input, split polygons at creases, and add the normals."""
         out = pv.wrap(self.GetOutputData(outputs, 0))
-        out.ShallowCopy(split_polygons(pv.wrap(self.GetInputData(inputs, 0, 0))))
+        out.ShallowCopy(split_polygons(pv.wrap(self.GetInputData(inputs, 0, 0)), self._crease_angle))
         if isinstance(out, vtkPointSet) and out.GetPoints() is not None:
             points = vtkPoints()
             points.DeepCopy(out.GetPoints())
@@ -181,12 +187,12 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
         return 1
 
 
-def split_polygons(dataset: pv.DataSet) -> pv.DataSet:
+def split_polygons(dataset: pv.DataSet, crease_angle: float = CREASE_ANGLE) -> pv.DataSet:
     """Return polygons with a point for each side of a crease; any other dataset as it is."""
     if not isinstance(dataset, pv.PolyData) or dataset.GetNumberOfPolys() == 0:
         return dataset
     triangles = np.ascontiguousarray(dataset.triangulate().regular_faces, np.int32)
-    split = split_at_creases(np.asarray(dataset.points, np.float32), triangles)
+    split = split_at_creases(np.asarray(dataset.points, np.float32), triangles, crease_angle)
     if len(split.rows) == dataset.n_points:
         return dataset
     copy = dataset.copy(deep=False)
@@ -199,7 +205,7 @@ def split_polygons(dataset: pv.DataSet) -> pv.DataSet:
         copy.GetPointData().AddArray(kept)
     sides = vtkPolyDataNormals()
     sides.SetInputData(copy)
-    sides.SetFeatureAngle(CREASE_ANGLE)
+    sides.SetFeatureAngle(crease_angle)
     sides.SplittingOn()
     sides.ConsistencyOff()
     sides.Update()

@@ -27,7 +27,8 @@ from decals.rendering.options import check_scene
 from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
-from decals.scenes.objects import Box, SceneObject, bounds_of
+from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
+from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import finite_number, member, stiffness_number, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
@@ -219,9 +220,9 @@ class SubplotRenderer:
         self._enclosed = objects
         self._proxy_actor.enclose(box(cast(Sequence[SceneObject], objects)) if objects else None)
 
-    def apply(self, actor: Any, *, follow: bool = False) -> None:
+    def apply(self, actor: Any, *, follow: bool = False, crease_angle: float = CREASE_ANGLE) -> None:
         """Show the decals on an actor of VTK; see `DecalsComponent.apply`."""
-        self.applied.apply(actor, follow=follow)
+        self.applied.apply(actor, follow=follow, crease_angle=as_crease_angle(crease_angle))
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor; see `DecalsComponent.remove`."""

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from decals import save_scene
@@ -22,8 +23,13 @@ def saved(folder: Path) -> Path:
 
 def test_a_scene_becomes_a_textured_file(saved: Path) -> None:
     command = ["bake", "scene.json", "--size", "64", "--samples", "1", "--contact", "radial"]
+    assert run([*command, "--crease-angle", "180", "-o", "smooth.glb"]) == 0
+    smooth = read_glb(saved / "smooth.glb")["cube"]
+    (saved / "smooth.glb").unlink()
     assert run([*command, "-o", "model.glb"]) == 0
     nodes = read_glb(saved / "model.glb")
+    assert np.abs(nodes["cube"].normals).max(axis=1).min() > 0.999  # those of its faces
+    assert np.abs(smooth.normals).max(axis=1).max() < 0.95
     assert set(nodes) == {"ball", "cube"}
     texture = nodes["ball"].texture
     assert texture is not None

@@ -11,7 +11,7 @@ from PIL import Image
 
 import blobtree
 from blobtree import Point
-from decals import Camera, Contact, ImageMapping, Scene, TreeObject, load_scene, save_scene
+from decals import Camera, Contact, ImageMapping, MeshObject, Scene, TreeObject, load_scene, save_scene
 from decals.apps.cli import run
 from decals.rendering import Renderer, RenderOptions
 from tests.apps.commands.pictures import picture, small
@@ -69,6 +69,22 @@ def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:
                 assert np.array_equal(picture(folder / "out.png"), drawn)
                 default = (contact, mapping) == (Contact.PRODUCT, ImageMapping.CORRECTED)
                 assert default == np.array_equal(drawn, picture(folder / "product.png"))
+
+
+def test_the_crease_angle_of_meshes(folder: Path, capsys: Capture) -> None:
+    pv.Cube().triangulate().clean().save(folder / "cube.ply")
+    draw = ["--size", "64x48", "--samples", "1"]
+    for name, angle in (("smooth", ["--crease-angle", "120"]), ("sharp", [])):
+        assert run(["scatter", "cube.ply", "--count", "9", *angle, "-o", f"{name}.json"]) == 0
+        assert run(["render", f"{name}.json", *draw, "-o", f"{name}.png"]) == 0
+    (cube,) = load_scene(folder / "smooth.json").objects
+    assert isinstance(cube, MeshObject)
+    assert cube.crease_angle == 120.0
+    assert run(["render", "sharp.json", *draw, "--crease-angle", "120", "-o", "same.png"]) == 0
+    assert np.array_equal(picture(folder / "same.png"), picture(folder / "smooth.png"))
+    assert not np.array_equal(picture(folder / "sharp.png"), picture(folder / "smooth.png"))
+    assert run(["render", "sharp.json", *draw, "--crease-angle", "200", "-o", "same.png"]) == 2
+    assert "crease_angle: expected degrees from 0 to 180" in capsys.readouterr().err
 
 
 def test_a_camera_for_a_saved_scene(folder: Path) -> None:

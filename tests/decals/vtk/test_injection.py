@@ -1,6 +1,7 @@
 """Decals in VTK's own shaders: the same owners and places in images as our renderer finds, VTK's light."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from decals.rendering import Buffers
 from decals.rendering.options import RenderOptions
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
+from decals.surfaces.normals import CREASE_ANGLE
 from decals.vtk import injection
 from tests.decals.rendering.pictures import in_layers, scattered
 from tests.decals.vtk.conftest import Factory, Plotter
@@ -50,24 +52,32 @@ def decals_over(mesh: pv.PolyData, count: int = 90, *, seed: int = 4) -> Decals:
 
 
 def subplot_with(
-    plotter: Factory, mesh: pv.DataSet, decals: Decals, *, paint: str = injection.PAINT, **look: Any
+    plotter: Factory,
+    mesh: pv.DataSet,
+    decals: Decals,
+    *,
+    paint: str = injection.PAINT,
+    crease_angle: float = CREASE_ANGLE,
+    **look: Any,
 ) -> tuple[Plotter, pv.Actor]:
     pl = plotter(window_size=SIZE)
     pl.disable_anti_aliasing()
     actor = pl.add_mesh(mesh, **look)
     pl.decals.add(decals, images=["scale"])
     subplot = pl.decals.subplot
-    subplot.applied._injections.append(injection.Injection(subplot, actor, paint=paint))
+    subplot.applied._injections.append(
+        injection.Injection(subplot, actor, crease_angle=crease_angle, paint=paint)
+    )
     pl.camera_position = [(2.0, -2.6, 2.4), (0, 0, 0), (0, 0, 1)]
     pl.reset_camera_clipping_range()
     return pl, actor
 
 
-def found_by_us(pl: Plotter, mesh: pv.DataSet) -> Buffers:
+def found_by_us(pl: Plotter, mesh: pv.DataSet, crease_angle: float = CREASE_ANGLE) -> Buffers:
     """The batch renderer's, of the same mesh from the same camera."""
     subplot = pl.decals.subplot
     scene = Scene(
-        objects=(mesh_object("mesh", mesh),),
+        objects=(replace(mesh_object("mesh", mesh), crease_angle=crease_angle),),
         camera=Camera((0, 0, 1)),
         decals=pl.decals.scene.decals,
         images=pl.decals.scene.images,
@@ -123,15 +133,30 @@ def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, con
         assert np.quantile(error, 0.995) < 0.01
 
 
-def test_creases_are_those_of_the_renderer(plotter: Factory) -> None:
+@pytest.mark.parametrize("angle", [35.0, 120.0])
+def test_creases_are_those_of_the_renderer(plotter: Factory, angle: float) -> None:
     cube = pv.Cube(x_length=1.6, y_length=1.6, z_length=1.6)
-    pl, _ = subplot_with(plotter, cube, decals_over(cube), paint=OWNER, lighting=False)
-    seen, ours = shot(pl), found_by_us(pl, cube)
+    look = {"paint": OWNER, "crease_angle": angle, "lighting": False}
+    pl, _ = subplot_with(plotter, cube, decals_over(cube), **look)
+    seen, ours = shot(pl), found_by_us(pl, cube, angle)
     sure = (ours.object_id == 0) & ~edges(ours.object_id)
     owner = seen[..., 0] + 256 * seen[..., 1] - 1
     assert (owner == ours.owner)[sure].mean() > 0.998
     assert cube.n_points == 8  # the plotter's own mesh stays
     assert "Normals" in cube.point_data
+
+
+@pytest.mark.parametrize(("angle", "points"), [(35.0, 24), (120.0, 8)])
+def test_apply_takes_a_crease_angle(plotter: Factory, angle: float, points: int) -> None:
+    pl = plotter(window_size=SIZE)
+    cube = pv.Cube()
+    actor = pl.add_mesh(cube)
+    pl.decals.add(decals_over(cube))
+    pl.decals.apply(actor, crease_angle=angle)
+    shot(pl)
+    assert actor.GetMapper().GetInput().GetNumberOfPoints() == points
+    with pytest.raises(InvalidScene, match="crease_angle: expected degrees from 0 to 180"):
+        pl.decals.apply(actor, crease_angle=200.0)
 
 
 def test_light_is_vtks(plotter: Factory) -> None:
