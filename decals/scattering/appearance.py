@@ -12,7 +12,7 @@ from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.mean_normals import mean_normals
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
-from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii
+from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii, turned_normals
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
 from decals.validation import member, real_number
 
@@ -108,9 +108,8 @@ class Appearance:
         points = jitter.move(domain, points, spacings, movable, _stream(seed, _POSITION_JITTER_STREAM))
         images_at = points
         points = self._with_mean_normals(domain, points, spacings)
-        radii = jitter.scale(
-            self.factor * self._radii(domain, points, seed), _stream(seed, _SIZE_JITTER_STREAM)
-        )
+        points, radii = self._with_radii(domain, points, images_at.normals, spacings, seed)
+        radii = jitter.scale(self.factor * radii, _stream(seed, _SIZE_JITTER_STREAM))
         directions = tangents(points.positions, points.normals, self.direction, _stream(seed, _ANGLE_STREAM))
         if jitter.angle:
             directions = jitter.turn(directions, points.normals, _stream(seed, _ANGLE_JITTER_STREAM))
@@ -134,21 +133,29 @@ class Appearance:
         normals = mean_normals(points.positions, points.normals, radii, near)
         return OrientedPoints(points.positions, normals, points.surface_ids)
 
-    def _radii(self, domain: Domain, points: OrientedPoints, seed: int) -> Float64Array:
-        """Return radii by the sizing; a surface without particles is not sampled."""
+    def _with_radii(
+        self, domain: Domain, points: OrientedPoints, own: Float32Array, spacings: Float32Array, seed: int
+    ) -> tuple[OrientedPoints, Float64Array]:
+        """Return the points, some turned by `turned_normals`, and radii by the sizing.
+
+        A surface without particles is not sampled.
+        """
         if self.sizing is Sizing.TOUCHING:
-            return touching_radii(points)
+            return points, touching_radii(points)
         counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
         samples_per_decal = max(SAMPLES_PER_DECAL, MIN_SAMPLES // max(len(points), 1))
         samples = domain.sample(counts * samples_per_decal, stream=_SAMPLE_STREAM)
         if self.sizing is Sizing.DELAUNAY:
-            return delaunay_radii(points, samples)
+            return points, delaunay_radii(points, samples)
 
         def project(trials: OrientedPoints) -> OrientedPoints:
             projected, allowed = domain.project(trials)
             return projected[np.flatnonzero(allowed)]
 
-        return covering_radii(points, samples, project, _stream(seed, _TRIAL_STREAM))
+        expected = EXPECTED_RADIUS * spacings.astype(np.float64)
+        normals = turned_normals(points, own, samples, expected)
+        points = OrientedPoints(points.positions, normals, points.surface_ids)
+        return points, covering_radii(points, samples, project, _stream(seed, _TRIAL_STREAM))
 
     def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
         if self.choice is ImageChoice.SIZE:

@@ -21,6 +21,7 @@ from decals.scattering.domain import (
     particle_count,
     remaining_counts,
 )
+from decals.scattering.gap_filling import fill_gaps
 from decals.scattering.neighbors import NeighborQuery, Spacing, ideal_spacing, spacing_of_points
 from decals.scattering.orientation import Direction
 from decals.scattering.particle_state import ParticleState
@@ -270,6 +271,15 @@ class Relaxation:
             polish(state, rounds=rounds, seed=self._seed, close=close, sizes_at=self.sizes_at)
             self._anchors.set(state, np.arange(self.count))
             self._points = None
+            if rounds:
+                self._fill_gaps()
+
+    def _fill_gaps(self) -> None:
+        """Move particles beside wide gaps, and begin again with the others' state."""
+        before = self.points
+        points = fill_gaps(self.domain, before, ~self._fixed, self.sizes_at(before.positions), CLOSE_DISTANCE)
+        if points is not before:
+            self._restart(points)
 
     def _advance(self) -> None:
         self.steps += 1

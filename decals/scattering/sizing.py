@@ -6,11 +6,14 @@ from enum import Enum
 from typing import TypeAlias
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from blobtree._typing import Float64Array, Int64Array
+from blobtree._typing import Float32Array, Float64Array, Int64Array
 from blobtree.formulas.falloff import RIM
+from decals.model import FACING_LIMIT
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import FacingTree
+from decals.surfaces.surface import unit_rows
 
 RADIUS_MARGIN = 0.03
 """Margin of covering radii, as a share: an allowance for farthest points that the search missed."""
@@ -26,6 +29,25 @@ MAX_BARE_SHARE = 0.05
 
 MAX_RADIUS_RATIO = 1.5
 """Ratio of an outsized radius to the larger of the radius without bare points and the median of those."""
+
+LIP_RATIO = 1.2
+"""Distance of the nearest facing decal, in expected radii, from which a point may lie at a lip."""
+
+LIP_NEARNESS = 0.95
+"""Share of that distance within which a decal that faces away must lie, or the point lies at no lip."""
+
+ON_EDGE = 0.7
+"""Least cosine between the normal of a decal turned to a lip and that of the surface at its centre."""
+
+MAX_BEHIND, BEHIND = 0.25, 0.02
+"""Largest cosine between the normals of a decal and of surface behind a wall, and least product of the
+heights of the centre above that surface and of that surface above the decal's, in squared distances."""
+
+TURN_MARGIN = 0.03
+"""Amount by which a decal turns beyond the facing limit, as a cosine."""
+
+MAX_TURN = 20.0
+"""Largest angle in degrees by which a decal turns away from surface behind a wall."""
 
 CORNER_TOLERANCE = 1.02
 """Ratio of the distances from two decals up to which a point is a corner of both Voronoi cells."""
@@ -63,8 +85,77 @@ Project: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 """Project points onto their own surfaces, and drop those that are hidden there."""
 
 
+def turned_normals(
+    decals: OrientedPoints, own: Float32Array, samples: OrientedPoints, radii: Float64Array
+) -> Float32Array:
+    """Return the normals of decals, turned toward lips and away from surface behind walls, ``float32[n, 3]``.
+
+    At the edge of a thin wall, a ledge or an ear, the decals next to a point may all face away from it. The
+    next that faces it would need an outsized radius, and cover its neighbours. A decal on the edge itself
+    that is next to such points gets the mean of their normals and its own; its image bends over the edge.
+
+    The floor of a thin cup, seen through the wall from a decal outside, may face that decal, as their normals
+    are nearly perpendicular. The decal turns away, by at most `MAX_TURN` degrees.
+
+    Parameters
+    ----------
+    decals
+        Centres and normals of the decals.
+    own
+        Normals of the surfaces at the centres, ``float32[n, 3]``.
+    samples
+        Points spread evenly over the area to cover.
+    radii
+        Expected radius of each decal, ``float64[n]``.
+    """
+    normals = decals.normals.astype(np.float64)
+    changed = np.zeros(len(decals), np.bool_)
+    facing, owners = (
+        array[:, 0]
+        for array in FacingTree(decals.positions, decals.normals).nearest(samples.positions, samples.normals)
+    )
+    owned = owners >= 0
+    lips = np.flatnonzero(owned & (facing > LIP_RATIO * radii[owners]))
+    if len(lips):
+        nearest, rows = cKDTree(decals.positions).query(samples.positions[lips])
+        close = nearest < LIP_NEARNESS * facing[lips]
+        lips, rows = lips[close], rows[close]
+        toward = unit_rows(_sums(samples.normals[lips], rows, len(decals))).astype(np.float64)
+        turned = unit_rows(toward + normals).astype(np.float64)
+        on_edge = toward.any(axis=1) & (np.einsum("ni,ni->n", turned, own) > ON_EDGE)
+        normals[on_edge] = turned[on_edge]
+        changed |= on_edge
+    offsets = samples.positions.astype(np.float64) - decals.positions[owners]
+    depths = np.einsum("ni,ni->n", offsets, normals[owners])
+    heights = np.einsum("ni,ni->n", offsets, samples.normals.astype(np.float64))
+    cosines = np.einsum("ni,ni->n", normals[owners], samples.normals.astype(np.float64))
+    squared = np.einsum("ni,ni->n", offsets, offsets)
+    behind = owned & (cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)
+    rows = owners[behind]
+    away = unit_rows(_sums(samples.normals[behind], rows, len(decals))).astype(np.float64)
+    worst = np.full(len(decals), -1.0)
+    np.maximum.at(worst, rows, cosines[behind])
+    angles = np.arccos(FACING_LIMIT - TURN_MARGIN) - np.arccos(np.clip(worst, -1.0, 1.0))
+    turn = np.flatnonzero(away.any(axis=1) & (angles > 0) & (angles <= np.radians(MAX_TURN)))
+    across = away[turn] - np.einsum("ni,ni->n", away[turn], normals[turn])[:, None] * normals[turn]
+    angle = angles[turn, None]
+    normals[turn] = np.cos(angle) * normals[turn] - np.sin(angle) * unit_rows(across)
+    changed[turn] = True
+    result = decals.normals.copy()
+    result[changed] = unit_rows(normals[changed])
+    return result
+
+
+def _sums(vectors: Float32Array, rows: Int64Array, count: int) -> Float64Array:
+    """Return the sum of the vectors of each row, ``float64[count, 3]``."""
+    return np.stack([np.bincount(rows, vectors[:, k], count) for k in range(3)], axis=1)
+
+
 def covering_radii(
-    decals: OrientedPoints, samples: OrientedPoints, project: Project, seed: int
+    decals: OrientedPoints,
+    samples: OrientedPoints,
+    project: Project,
+    seed: int,
 ) -> Float64Array:
     """Return the least radii, up to a small margin, at which decals cover the surfaces they lie on.
 
@@ -95,20 +186,20 @@ def covering_radii(
     float64[n], above zero.
     """
     tree = FacingTree(decals.positions, decals.normals)
-    owned = _find_owners(tree, samples)
+    owned = _find_owners(tree, samples, decals)
     limits = _max_radii(owned, len(decals))
     radii = np.zeros(len(decals))
     _grow(radii, owned, decals, limits)
     rng = np.random.default_rng(seed)
     sample_distance = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
     owned = owned.peaks(PEAK_FRACTION * radii)
-    owned = owned.joined(_find_owners(tree, project(_circumcenters(owned, decals))))
+    owned = owned.joined(_find_owners(tree, project(_circumcenters(owned, decals)), decals))
     _grow(radii, owned, decals, limits)
     for spread in TRIAL_SPREADS:
         least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
         owned = owned.peaks(least)
         trials = _random_points_around(owned.points, spread * sample_distance, rng)
-        owned = owned.joined(_find_owners(tree, project(trials)))
+        owned = owned.joined(_find_owners(tree, project(trials), decals))
         _grow(radii, owned, decals, limits)
     return (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
 
@@ -126,7 +217,7 @@ def delaunay_radii(decals: OrientedPoints, samples: OrientedPoints) -> Float64Ar
     Two decals are neighbours in the surface's own Delaunay triangulation if their Voronoi cells meet: if a
     sample is nearest to the one and next nearest to the other.
     """
-    owned = _find_owners(FacingTree(decals.positions, decals.normals), samples)
+    owned = _find_owners(FacingTree(decals.positions, decals.normals), samples, decals)
     pairs = owned.decals[(owned.decals[:, :2] >= 0).all(axis=1), :2]
     starts, ends = decals.positions[pairs[:, 0]], decals.positions[pairs[:, 1]]
     lengths = np.linalg.norm(starts.astype(np.float64) - ends, axis=1)
@@ -144,9 +235,13 @@ def _with_median(radii: Float64Array) -> Float64Array:
 
 @dataclass(frozen=True)
 class _OwnedPoints:
-    """Points, and the three nearest decals that face each, ``[n, 3]``: distances and indices, -1 for none."""
+    """Points, and the three nearest decals that face each, ``[n, 3]``: distances and indices, -1 for none.
+
+    `lengths` are the distances along the surface from the nearest decal, ``[n]``.
+    """
 
     points: OrientedPoints
+    lengths: Float64Array
     distances: Float64Array
     decals: Int64Array
 
@@ -154,6 +249,7 @@ class _OwnedPoints:
         """Return the points of both."""
         return _OwnedPoints(
             OrientedPoints.joined([self.points, other.points]),
+            np.concatenate([self.lengths, other.lengths]),
             np.concatenate([self.distances, other.distances]),
             np.concatenate([self.decals, other.decals]),
         )
@@ -165,18 +261,26 @@ class _OwnedPoints:
         holds a distance for each decal.
         """
         owners = self.decals[:, 0]
-        outer = np.flatnonzero((owners >= 0) & (self.distances[:, 0] > least[owners]))
+        outer = np.flatnonzero((owners >= 0) & (self.lengths > least[owners]))
         corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:], axis=1)])
-        order = np.lexsort((-self.distances[outer, 0], *corners.T))
+        order = np.lexsort((-self.lengths[outer], *corners.T))
         sorted_corners = corners[order]
         is_first = np.ones(len(order), np.bool_)
         is_first[1:] = (sorted_corners[1:] != sorted_corners[:-1]).any(axis=1)
         rows = outer[order[is_first]]
-        return _OwnedPoints(self.points[rows], self.distances[rows], self.decals[rows])
+        return _OwnedPoints(self.points[rows], self.lengths[rows], self.distances[rows], self.decals[rows])
 
 
-def _find_owners(tree: FacingTree, points: OrientedPoints) -> _OwnedPoints:
-    return _OwnedPoints(points, *tree.nearest(points.positions, points.normals, count=3))
+def _find_owners(tree: FacingTree, points: OrientedPoints, decals: OrientedPoints) -> _OwnedPoints:
+    distances, indices = tree.nearest(points.positions, points.normals, count=3)
+    lengths = _lengths_to(decals, indices[:, 0], points)
+    return _OwnedPoints(points, np.where(indices[:, 0] >= 0, lengths, np.inf), distances, indices)
+
+
+def _lengths_to(decals: OrientedPoints, rows: Int64Array, points: OrientedPoints) -> Float64Array:
+    """Return the length along the surface from a decal to each point, at which images end."""
+    offsets = points.positions.astype(np.float64) - decals.positions[rows]
+    return _arc_lengths(offsets, decals.normals[rows].astype(np.float64), points.normals.astype(np.float64))
 
 
 def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
@@ -235,9 +339,7 @@ def _grow(radii: Float64Array, owned: _OwnedPoints, decals: OrientedPoints, limi
     close = (owned.decals >= 0) & (owned.distances <= CORNER_TOLERANCE * owned.distances[:, :1])
     close &= owned.distances <= limits[owned.decals]
     points, owners = np.nonzero(close)[0], owned.decals[close]
-    offsets = owned.points.positions[points].astype(np.float64) - decals.positions[owners]
-    normals = decals.normals[owners].astype(np.float64), owned.points.normals[points].astype(np.float64)
-    np.maximum.at(radii, owners, _arc_lengths(offsets, *normals))
+    np.maximum.at(radii, owners, _lengths_to(decals, owners, owned.points[points]))
 
 
 def _random_points_around(points: OrientedPoints, spread: float, rng: np.random.Generator) -> OrientedPoints:

@@ -61,6 +61,20 @@ def test_images_bend_over_the_edges_of_parts(name: str) -> None:
     assert found.bare < 1e-4  # images end at the arc, which is longer than the chord
 
 
+@pytest.mark.parametrize(("name", "largest"), [("cup", 1.56), ("bowl", 1.5)])
+def test_lips_and_ragged_borders_get_no_outsized_decals(name: str, largest: float) -> None:
+    """A cup's wall is thinner than the spacing: its floor faces decals outside, its lip few decals."""
+    mesh = FAULT_MODELS[name]()
+    relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*mesh), count=300, seed=1)
+    relaxation.run()
+    layout = relaxation.to_decals(seed=1)
+    assert layout.radii.max() <= largest * np.median(layout.radii)
+    assert relaxation.statistics().rho >= 0.87
+    found = distortion(layout, mesh, 30_000)
+    assert found.stretched <= 0.003
+    assert found.folded <= 5e-4
+
+
 def test_few_large_decals_leave_no_pinhole() -> None:
     ball = icosphere(4)
     assert distortion(decals.scatter(ball, count=8, seed=1), ball, 20_000).bare == 0.0

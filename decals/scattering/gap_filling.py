@@ -1,0 +1,120 @@
+"""Last moves of a relaxation: particles beside wide gaps move toward the middle of their cells."""
+
+import numpy as np
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.neighbors import FacingTree
+
+SAMPLES_PER_PARTICLE = 24
+"""Samples for each particle among which gaps are looked for."""
+
+WIDE_GAP = 0.74
+"""Distance from the nearest particle, in spacings, from which a sample lies in a wide gap. In a hexagonal
+tiling no point is farther than 0.577."""
+
+MIN_SAMPLES = 2
+"""Least number of samples of a wide gap; the corner of a square has fewer."""
+
+ROUNDS = 8
+"""Largest number of rounds of moves."""
+
+MOVE = 0.5
+"""Length of a move, as a share of the way to the middle."""
+
+ENCLOSING_STEPS = 24
+"""Steps toward the centre of the least ball around points (Bădoiu and Clarkson 2003)."""
+
+_SAMPLE_STREAM = 11
+
+
+def fill_gaps(
+    domain: Domain, points: OrientedPoints, movable: BoolArray, sizes: Float32Array, least: float
+) -> OrientedPoints:
+    """Return particles, those beside wide gaps moved; gaps remain along lips and ragged boundaries.
+
+    A particle beside a wide gap moves toward the centre of the least ball around the samples nearest to it.
+    It stays if another particle would be nearer than before, and nearer than `least`.
+
+    Parameters
+    ----------
+    domain
+        The surfaces.
+    points
+        The particles, sorted by surface.
+    movable
+        True for particles that may move, ``bool[n]``.
+    sizes
+        Spacing at each particle, ``float32[n]``.
+    least
+        Least distance of particles, in spacings.
+    """
+    counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
+    samples = domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
+    for _ in range(ROUNDS):
+        tree = FacingTree(points.positions, points.normals)
+        distances, owners = (array[:, 0] for array in tree.nearest(samples.positions, samples.normals))
+        in_gap = (owners >= 0) & (distances > WIDE_GAP * sizes[owners]) & movable[owners]
+        found, counts = np.unique(owners[in_gap], return_counts=True)
+        rows = found[counts >= MIN_SAMPLES]
+        if len(rows) == 0:
+            break
+        moved = _moved(domain, points, rows, samples.positions, owners)
+        keep = _far_enough(tree, points, moved, rows, sizes, least)
+        rows, moved = rows[keep], moved[np.flatnonzero(keep)]
+        if len(rows) == 0:
+            break
+        positions, normals = points.positions.copy(), points.normals.copy()
+        positions[rows], normals[rows] = moved.positions, moved.normals
+        points = OrientedPoints(positions, normals, points.surface_ids)
+    return points
+
+
+def _moved(
+    domain: Domain, points: OrientedPoints, rows: Int64Array, samples: Float32Array, owners: Int64Array
+) -> OrientedPoints:
+    """Return some particles after their moves, the others' place where these would be hidden."""
+    targets = points.positions[rows].astype(np.float64)
+    order = np.argsort(owners, kind="stable")
+    starts = np.searchsorted(owners[order], rows)
+    ends = np.searchsorted(owners[order], rows, side="right")
+    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        targets[k] += MOVE * (_center(samples[order[start:end]].astype(np.float64), targets[k]) - targets[k])
+    before = points[rows]
+    after, allowed = domain.project(
+        OrientedPoints(targets.astype(np.float32), before.normals, before.surface_ids)
+    )
+    positions = np.where(allowed[:, None], after.positions, before.positions)
+    normals = np.where(allowed[:, None], after.normals, before.normals)
+    return OrientedPoints(positions, normals, before.surface_ids)
+
+
+def _center(points: Float64Array, start: Float64Array) -> Float64Array:
+    """Return about the centre of the least ball around points."""
+    center = start.copy()
+    for step in range(1, ENCLOSING_STEPS):
+        far = points[np.einsum("ni,ni->n", points - center, points - center).argmax()]
+        center += (far - center) / (step + 1)
+    return center
+
+
+def _far_enough(
+    tree: FacingTree,
+    points: OrientedPoints,
+    moved: OrientedPoints,
+    rows: Int64Array,
+    sizes: Float32Array,
+    least: float,
+) -> BoolArray:
+    """Return True for moves after which no particle is too near, also none that moves at the same time."""
+    before = points[rows]
+    distances, others = tree.nearest(before.positions, before.normals, count=2)
+    now = np.where(others[:, 0] == rows, distances[:, 1], distances[:, 0])
+    near, which = tree.nearest(moved.positions, moved.normals, count=2)
+    fixed = np.where(which == rows[:, None], np.inf, near).min(axis=1)
+    apart = np.linalg.norm(moved.positions[:, None].astype(np.float64) - moved.positions, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    apart[moved.normals @ moved.normals.T < 0] = np.inf
+    limit = np.minimum(least * sizes[rows], now)
+    enough: BoolArray = (fixed >= limit) & (apart.min(axis=1, initial=np.inf) >= limit)
+    return enough
