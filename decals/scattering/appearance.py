@@ -119,6 +119,7 @@ class Appearance:
             tangents=directions,
             radii=radii.astype(np.float32),
             images=self._chosen_images(images_at, radii, seed),
+            spill=domain.one_sided(points),
         )
 
     def _with_mean_normals(

@@ -14,6 +14,7 @@ from blobtree.validation import point_array
 from decals.errors import InvalidScattering
 from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
+from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Surface, vectors
 from decals.validation import function_or_none, function_values, real_number, whole_number
 
@@ -198,6 +199,15 @@ class Domain:
                 parts.append((found[np.flatnonzero(allowed)], rows[allowed]))
         joined = OrientedPoints.joined([found for found, _ in parts])
         return joined.positions, joined.normals, np.concatenate([rows for _, rows in parts])
+
+    def one_sided(self, points: OrientedPoints) -> BoolArray:
+        """Return True for points on parts of meshes that have one side only; decals there should spill."""
+        result = np.zeros(len(points), np.bool_)
+        for index, surface in enumerate(self.surfaces):
+            if isinstance(surface, MeshSurface):
+                rows = np.flatnonzero(points.surface_ids == index)
+                result[rows] = surface.one_sided(points.positions[rows])
+        return result
 
     def project_fixed(self, fixed: ArrayLike | None) -> OrientedPoints:
         """Project fixed particles onto the surfaces that they are closest to."""

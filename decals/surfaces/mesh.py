@@ -89,8 +89,9 @@ class MeshSurface:
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
         self._welded = welded(self.vertices)
-        copies = _wind_alike(self.vertices, self.faces, self._welded)
+        copies, one_sided = _wind_alike(self.vertices, self.faces, self._welded)
         self.sound, normals, areas = _sound_faces(self.vertices, self.faces, copies)
+        self._one_sided = one_sided[self.sound]
         self._corners = corners = np.ascontiguousarray(self.faces[self.sound])
         self._cumulative = np.cumsum(areas)
         self._normals = normals
@@ -203,6 +204,13 @@ class MeshSurface:
         """Return the closest points of the mesh, and the normals of their faces."""
         return project_host(self.on(self.device), points, within, self.device)
 
+    def one_sided(self, points: ArrayLike) -> BoolArray:
+        """Return True for points closest to a part that has one side only, such as a Möbius strip."""
+        if not self._one_sided.any():
+            return np.zeros(len(point_array(points)), np.bool_)
+        rows = np.searchsorted(self.sound, self.locate(points)[0])
+        return self._one_sided[rows]
+
     def locate(self, points: ArrayLike) -> tuple[Int64Array, Float64Array]:
         """Return rows of the closest faces, ``int64[n]``, and barycentric weights, ``float64[n, 3]``."""
         queries = point_array(points)
@@ -257,12 +265,15 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
     return np.array(indices, dtype=np.int32, order="C")
 
 
-def _wind_alike(vertices: Float32Array, faces: Int32Array, same: Int64Array) -> BoolArray:
-    """Turn faces that wind differently from their neighbours; return True for copies of other faces."""
+def _wind_alike(vertices: Float32Array, faces: Int32Array, same: Int64Array) -> tuple[BoolArray, BoolArray]:
+    """Turn faces that wind differently from their neighbours.
+
+    Return True for copies of other faces, and for faces of parts that have one side only.
+    """
     corners = same[faces]
     edges = shared_edges(corners)
     if not edges.differ.any() and not edges.branching:
-        return np.zeros(len(faces), np.bool_)
+        return np.zeros(len(faces), np.bool_), np.zeros(len(faces), np.bool_)
     first = first_copies(corners)
     rows = np.flatnonzero(first)
     edges = shared_edges(corners[rows])
@@ -276,10 +287,12 @@ def _wind_alike(vertices: Float32Array, faces: Int32Array, same: Int64Array) -> 
         )
     if winding.inconsistent:
         _logger.warning(
-            "The mesh has one side only: %d edges join faces that wind differently; decals may end there",
+            "The mesh has one side only: %d edges join faces that wind differently; decals show on all of it",
             winding.inconsistent,
         )
-    return ~first
+    one_sided = np.zeros(len(faces), np.bool_)
+    one_sided[rows] = winding.one_sided
+    return ~first, one_sided
 
 
 def _sound_faces(

@@ -78,10 +78,13 @@ class Winding:
         True for each face to turn.
     inconsistent : int
         Edges of two faces that wind differently even then: the surface there has one side only.
+    one_sided : bool[m]
+        True for the faces of connected parts with such edges.
     """
 
     turned: BoolArray
     inconsistent: int
+    one_sided: BoolArray
 
 
 def consistent_winding(edges: SharedEdges, areas: Float64Array) -> Winding:
@@ -98,14 +101,15 @@ def consistent_winding(edges: SharedEdges, areas: Float64Array) -> Winding:
         Area of each face, ``float64[m]``.
     """
     count = len(areas)
-    turned = np.zeros(count, np.bool_)
+    turned, one_sided = np.zeros((2, count), np.bool_)
     if edges.differ.any():
         turned = _turned(edges, count)
         parts = components(edges.faces, count)
         balance = np.bincount(parts, np.where(turned, areas, -areas))
-        turned ^= (balance > 0)[parts] & ~_one_sided(edges, turned, parts)
+        one_sided = _one_sided(edges, turned, parts)
+        turned ^= (balance > 0)[parts] & ~one_sided
     left = edges.differ ^ turned[edges.faces[:, 0]] ^ turned[edges.faces[:, 1]]
-    return Winding(turned, int(left.sum()))
+    return Winding(turned, int(left.sum()), one_sided)
 
 
 def _one_sided(edges: SharedEdges, turned: BoolArray, parts: Int64Array) -> BoolArray:

@@ -66,6 +66,22 @@ def test_one_sided_surfaces_stay_and_are_reported(caplog: pytest.LogCaptureFixtu
     assert "has one side only" in caplog.text
 
 
+def test_decals_cross_the_seam_of_a_one_sided_surface() -> None:
+    """The winding turns over at the seam, but a decal covers both of its sides."""
+    vertices, faces = mobius()
+    ball = icosphere(1)
+    layout = decals.scatter(joined((vertices, faces), (ball[0] + 5.0, ball[1])), count=80, seed=1)
+    np.testing.assert_array_equal(layout.spill, layout.positions.max(axis=1) < 3.0)
+    along = np.linspace(-0.25, 0.25, 50)[:, None]
+    seam = vertices[:2].mean(axis=0) + along * (vertices[1] - vertices[0]) / 0.6
+    corners = vertices[faces[[0, -1]]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert normals[0] @ normals[1] < 0
+    one, other = (decals.evaluate(layout, seam, np.tile(normal, (50, 1))) for normal in normals)
+    assert (one.owner >= 0).all()
+    np.testing.assert_array_equal(one.owner, other.owner)
+
+
 def test_sound_meshes_are_kept_without_a_word(caplog: pytest.LogCaptureFixture) -> None:
     two_sides = joined(icosphere(0), (icosphere(0)[0], icosphere(0)[1][:, ::-1]))
     for vertices, faces in (icosphere(2), two_sides, FAULT_MODELS["bowl"]()):
