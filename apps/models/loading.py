@@ -27,7 +27,10 @@ def load_model(model: str, *, trust: bool = False, crease_angle: float | None = 
         If it is neither a sample nor a file, or the file cannot be used; the message names it.
     """
     if crease_angle is not None:
-        return _creased(load_model(model, trust=trust), as_crease_angle(crease_angle))
+        loaded, angle = load_model(model, trust=trust), as_crease_angle(crease_angle)
+        if isinstance(loaded, Scene):
+            return loaded.replace(objects=tuple(_creased(item, angle) for item in loaded.objects))
+        return _creased(loaded, angle)
     if model in SAMPLES:
         return sample(model)
     if not is_file(Path(model)):
@@ -68,11 +71,9 @@ def load_models(
     return as_objects(objects)
 
 
-def _creased(model: SceneObject | Scene, angle: float) -> SceneObject | Scene:
-    """Return a model whose meshes have a crease angle."""
-    if isinstance(model, Scene):
-        return replace(model, objects=tuple(_creased(item, angle) for item in model.objects))
-    return replace(model, crease_angle=angle) if isinstance(model, MeshObject) else model
+def _creased(item: SceneObject, angle: float) -> SceneObject:
+    """Return an object that has a crease angle if it is a mesh."""
+    return replace(item, crease_angle=angle) if isinstance(item, MeshObject) else item
 
 
 def import_definitions(modules: Sequence[str] | None) -> None:

@@ -53,8 +53,9 @@ def fill_gaps(
     samples = domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
     for _ in range(ROUNDS):
         tree = FacingTree(points.positions, points.normals)
-        distances, owners = (array[:, 0] for array in tree.nearest(samples.positions, samples.normals))
-        in_gap = (owners >= 0) & (distances > WIDE_GAP * sizes[owners]) & movable[owners]
+        distances, indices = tree.nearest(samples.positions, samples.normals)
+        gaps, owners = distances[:, 0], indices[:, 0]
+        in_gap = (owners >= 0) & (gaps > WIDE_GAP * sizes[owners]) & movable[owners]
         found, counts = np.unique(owners[in_gap], return_counts=True)
         rows = found[counts >= MIN_SAMPLES]
         if len(rows) == 0:

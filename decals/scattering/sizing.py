@@ -110,10 +110,9 @@ def turned_normals(
     """
     normals = decals.normals.astype(np.float64)
     changed = np.zeros(len(decals), np.bool_)
-    facing, owners = (
-        array[:, 0]
-        for array in FacingTree(decals.positions, decals.normals).nearest(samples.positions, samples.normals)
-    )
+    tree = FacingTree(decals.positions, decals.normals)
+    distances, indices = tree.nearest(samples.positions, samples.normals)
+    facing, owners = distances[:, 0], indices[:, 0]
     owned = owners >= 0
     lips = np.flatnonzero(owned & (facing > LIP_RATIO * radii[owners]))
     if len(lips):

@@ -89,7 +89,7 @@ def found_by_us(pl: Plotter, mesh: pv.DataSet, crease_angle: float = CREASE_ANGL
     return buffers
 
 
-LOOKS: dict[str, dict[str, object]] = {
+LOOKS: dict[str, dict[str, Any]] = {
     "flat": {},
     "smooth": {"smooth_shading": True},
     "scalars": {"scalars": "height"},
@@ -111,7 +111,7 @@ def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, con
     mesh["height"] = mesh.points[:, 2]
     mesh.cell_data["number"] = np.arange(mesh.n_cells)
     decals = decals_over(mesh)
-    options = {"lighting": False, "show_scalar_bar": False, **LOOKS[look]}
+    options: dict[str, Any] = {"lighting": False, "show_scalar_bar": False, **LOOKS[look]}
     for paint, layered in ((OWNER, False), (OWNER, True), (UV, False)):
         pl, _ = subplot_with(
             plotter, mesh, in_layers(decals, 1) if layered else decals, paint=paint, **options
@@ -136,7 +136,7 @@ def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, con
 @pytest.mark.parametrize("angle", [35.0, 120.0])
 def test_creases_are_those_of_the_renderer(plotter: Factory, angle: float) -> None:
     cube = pv.Cube(x_length=1.6, y_length=1.6, z_length=1.6)
-    look = {"paint": OWNER, "crease_angle": angle, "lighting": False}
+    look: dict[str, Any] = {"paint": OWNER, "crease_angle": angle, "lighting": False}
     pl, _ = subplot_with(plotter, cube, decals_over(cube), **look)
     seen, ours = shot(pl), found_by_us(pl, cube, angle)
     sure = (ours.object_id == 0) & ~edges(ours.object_id)
