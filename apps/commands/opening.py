@@ -82,7 +82,7 @@ def opened(
     if not model or _is_unsaved(model):
         if decals is not None or seed is not None:
             raise InvalidInput("an empty scene has no decals; name a model, or leave out --decals and --seed")
-        scene = _empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
+        scene = empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
         path = path or (Path(model[0]) if model else new_file(Path(), "scene"))
     else:
         with progress_bars() as progress:
@@ -116,7 +116,7 @@ def _is_unsaved(models: list[str]) -> bool:
     )
 
 
-def _empty_scene(images: Sequence[str], axes: Axes) -> Scene:
+def empty_scene(images: Sequence[str], axes: Axes) -> Scene:
     """Return a scene without objects, whose camera looks at the origin."""
     where = parse_view(None, axes)
     corner = np.ones(3, np.float32)

@@ -44,7 +44,7 @@ def sandbox(
     Parameters
     ----------
     model
-        Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: an empty scene.
+        Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: a start page.
     decals
         Number of decals scattered at the start. Default: 500.
     image
@@ -81,7 +81,7 @@ def sandbox(
         with window:
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
-            page(server, window)
+            page(server, window, start=not model)
             server.controller.on_server_ready.add(lambda **_: _announce(server.port))
             server.start(host=HOST, port=port, open_browser=browser, show_connection_info=False, timeout=0)
     finally:

@@ -8,6 +8,9 @@ from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import html, vuetify3
 from trame_pyvista.widgets import PyVistaRemoteView
 
+from decals.apps.sandbox import panels
+from decals.apps.sandbox.folder import thumbnails
+from decals.apps.sandbox.panels import DROP, FIELD, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.key_bindings import format_gestures
@@ -21,10 +24,9 @@ TOOLBAR = {
     "undo": "mdi-undo",
     "redo": "mdi-redo",
     "save": "mdi-content-save-outline",
-    "export": "mdi-export",
+    "deselect": "mdi-cancel",
     "duplicate": "mdi-content-duplicate",
     "delete": "mdi-delete-outline",
-    "next_contact": "mdi-arrow-collapse-horizontal",
     "help": "mdi-help-circle-outline",
 }
 """Icons of the actions in the toolbar."""
@@ -33,13 +35,6 @@ ROW_ICONS = (
     "({object: 'mdi-cube-outline', mesh: 'mdi-vector-triangle', combination: 'mdi-set-center', "
     "modifier: 'mdi-tune-variant', primitive: 'mdi-circle-medium', image: 'mdi-image-outline'})[row.kind]"
 )
-FIELD = {"density": "compact", "variant": "outlined", "hide_details": True}
-COMPACT = {"density": "compact", "hide_details": True}
-
-
-def _label(expression: str) -> list[str]:
-    """Return the attribute that tells screen readers what an element is, from an expression of the page."""
-    return [f':aria-label="{expression}"']
 
 
 class Page:
@@ -51,17 +46,34 @@ class Page:
         The trame server.
     window
         The edited window; its plotter is drawn off screen.
+    options
+        Options of the `Sandbox`.
     """
 
-    def __init__(self, server: Any, window: EditWindow) -> None:
+    def __init__(self, server: Any, window: EditWindow, **options: Any) -> None:
         self._server, self._window = server, window
-        self.sandbox = Sandbox(window)
+        self.sandbox = Sandbox(window, **options)
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
-        server.state.update({"catalog": self.sandbox.catalog(), "theme": "light", **self.values()})
+        constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
+        renamed, dropped = {"key": "", "name": ""}, None
+        server.state.update({**constants, **self.values(), "renamed": renamed, "dropped": dropped})
+        server.state.change("dropped")(self._take_dropped)
+        server.controller.trigger("rename")(lambda key, name: self.sandbox.change_row(key, "rename", name))
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
+
+    def _take_dropped(self, dropped: Any, **_: Any) -> None:
+        """Take files that the browser sent."""
+        if dropped:
+            self._server.state.dropped = None
+            self.sandbox.upload(dropped)
+
+    def _rename(self, key: str, name: str, kind: str) -> None:
+        """Open the field for the name of an object."""
+        if kind in ("object", "mesh"):
+            self._server.state.renamed = {"key": key, "name": name}
 
     # -- values -----------------------------------------------------------------------------------------
 
@@ -101,8 +113,18 @@ class Page:
                 self._build_toolbar()
                 self._build_left_side()
                 self._build_right_side()
-                with vuetify3.VMain(), html.Div(style="height: 100%", **browser_keys(self._window)):
+                with (
+                    vuetify3.VMain(),
+                    html.Div(
+                        style="height: 100%",
+                        dragover="$event.preventDefault()",
+                        drop=f"$event.preventDefault(); {DROP.format('dataTransfer')}",
+                        __events=["dragover", "drop"],
+                        **browser_keys(self._window),
+                    ),
+                ):
                     self.view = PyVistaRemoteView(self._window.plotter, style="height: 100%")
+                panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status"'])
 
@@ -114,33 +136,29 @@ class Page:
     def _build_right_side(self) -> None:
         """Build what stands right of the view."""
         with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="right"):
+            panels.build_decal_panel(self.sandbox)
             self._build_panel()
+            panels.build_pick()
             self._build_history()
 
     def _build_toolbar(self) -> None:
         with vuetify3.VAppBar(density="compact", flat=True, border=True):
             vuetify3.VAppBarTitle("{{ title }}")
+            panels.build_files(self.sandbox)
+            panels.build_view_menu(self.sandbox)
             self._build_menu("Add", "mdi-plus", "primitives", self.sandbox.add)
             self._build_menu("Modify", "mdi-tune-variant", "modifiers", self.sandbox.wrap)
             self._build_menu("Combine", "mdi-set-center", "combinations", self.sandbox.combine)
             vuetify3.VDivider(vertical=True, classes="mx-2")
+            panels.build_actions(self.sandbox)
+            panels.build_brushes(self.sandbox)
+            vuetify3.VDivider(vertical=True, classes="mx-2")
             gestures = {binding.action: binding for binding in KEYS.bindings}
             for action, icon in TOOLBAR.items():
                 text = f"{gestures[action].summary} ({format_gestures(gestures[action])})"
-                vuetify3.VBtn(
-                    icon=icon,
-                    title=text,
-                    raw_attrs=_label(f"'{text}'"),
-                    size="small",
-                    click=(self.sandbox.perform, f"['{action}']"),
-                )
-            vuetify3.VBtn(
-                icon="mdi-theme-light-dark",
-                title="light or dark",
-                raw_attrs=_label("'light or dark'"),
-                size="small",
-                click="theme = theme === 'light' ? 'dark' : 'light'",
-            )
+                panels.icon_button(icon, text, (self.sandbox.perform, f"['{action}']"))
+            theme = "theme = theme === 'light' ? 'dark' : 'light'"
+            panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
 
     @staticmethod
     def _build_menu(label: str, icon: str, family: str, event: Any) -> None:
@@ -166,19 +184,40 @@ class Page:
                 active=("row.key === selected",),
                 style=("`padding-left: ${8 + 14 * row.depth}px`",),
                 click=(self.sandbox.select, "[row.key === selected ? '' : row.key]"),
+                draggable=True,
+                dragstart="$event.dataTransfer.setData('text/plain', row.key)",
+                dragover="$event.preventDefault()",
+                drop=(
+                    self.sandbox.change_row,
+                    "[($event.preventDefault(), $event.dataTransfer.getData('text/plain')), 'move', row.key]",
+                ),
+                dblclick=(self._rename, "[row.key, row.label, row.kind]"),
+                __events=["dragstart", "dragover", "drop", "dblclick"],
+                __properties=["draggable"],
             )
+        with html.Div(v_if="renamed.key", classes="d-flex ga-2 pa-2"):
+            vuetify3.VTextField(v_model="renamed.name", raw_attrs=named("'new name'"), **FIELD)
+            vuetify3.VBtn(
+                "Rename",
+                size="small",
+                click="trigger('rename', [renamed.key, renamed.name]); renamed = {key: '', name: ''}",
+            )
+        with html.Div(v_if="selected", classes="d-flex ga-1 px-2"):
+            for change, icon in (("duplicate", "mdi-content-duplicate"), ("remove", "mdi-delete-outline")):
+                panels.icon_button(
+                    icon,
+                    f"{change} the selected row",
+                    (self.sandbox.change_row, f"[selected, '{change}']"),
+                    variant="text",
+                )
 
     def _build_panel(self) -> None:
         with html.Div(v_if="panel.kind", classes="pa-3"):
             html.H2("{{ panel.kind }}", classes="text-subtitle-1")
             html.P("{{ panel.doc }}", classes="text-caption mb-3")
             with html.Div(v_for="c in panel.controls", key="selected + c.name", classes="mb-3"):
-                html.Label(
-                    "{{ c.name.replaceAll('_', ' ') }}{{ c.unit ? ', ' + c.unit : '' }}",
-                    title=("c.doc",),
-                    classes="text-caption",
-                )
-                self._build_number()
+                panels.build_label()
+                panels.build_number(self.sandbox.set_value)
                 self._build_other_controls()
             vuetify3.VBtn(
                 "Remove this modifier",
@@ -189,33 +228,13 @@ class Page:
             )
         html.P("Select a node in the outline.", v_if="!panel.kind", classes="pa-3 text-caption")
 
-    def _build_number(self) -> None:
-        with html.Div(v_if="c.kind === 'number'", classes="d-flex align-center"):
-            vuetify3.VSlider(
-                model_value=("c.value",),
-                min=("c.low",),
-                max=("c.high",),
-                step=("c.step",),
-                name=("c.name.replaceAll('_', ' ')",),
-                update_modelValue=(self.sandbox.set_value, "[c.name, $event, false]"),
-                end=(self.sandbox.set_value, "[c.name, $event, true]"),
-                **COMPACT,
-            )
-            vuetify3.VTextField(
-                model_value=("c.value === null ? '' : Number(c.value.toPrecision(5))",),
-                raw_attrs=_label("c.name.replaceAll('_', ' ')"),
-                style="max-width: 92px",
-                change=(self.sandbox.set_value, "[c.name, $event.target.value, true]"),
-                **FIELD,
-            )
-
     def _build_other_controls(self) -> None:
         with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
             vuetify3.VTextField(
                 v_for="(number, i) in c.value",
                 key="i",
                 model_value=("Number(number.toPrecision(5))",),
-                raw_attrs=_label("`${c.name} ${i + 1}`"),
+                raw_attrs=named("`${c.name} ${i + 1}`"),
                 change=(self.sandbox.set_component, "[c.name, [i], $event.target.value]"),
                 **FIELD,
             )
@@ -227,30 +246,14 @@ class Page:
                 v_for="(number, j) in [].concat(row)",
                 key="j",
                 model_value=("Number(number.toPrecision(5))",),
-                raw_attrs=_label("`${c.name} ${i + 1} ${j + 1}`"),
+                raw_attrs=named("`${c.name} ${i + 1} ${j + 1}`"),
                 change=(
                     self.sandbox.set_component,
                     "[c.name, Array.isArray(row) ? [i, j] : [i], $event.target.value]",
                 ),
                 **FIELD,
             )
-        html.Input(
-            v_if="c.kind === 'color'",
-            type="color",
-            value=("c.value",),
-            raw_attrs=_label("c.name.replaceAll('_', ' ')"),
-            style="width: 100%; height: 28px",
-            change=(self.sandbox.set_value, "[c.name, $event.target.value, true]"),
-        )
-        vuetify3.VSelect(
-            v_if="c.kind === 'choice'",
-            model_value=("c.value",),
-            items=("c.choices",),
-            raw_attrs=_label("c.name.replaceAll('_', ' ')"),
-            update_modelValue=(self.sandbox.set_value, "[c.name, $event, true]"),
-            **FIELD,
-        )
-        html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
+        panels.build_choices(self.sandbox.set_value)
 
     def _build_history(self) -> None:
         vuetify3.VDivider()

@@ -6,16 +6,44 @@ window's session and its actions.
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
 from blobtree.custom.definition import custom_kinds
+from blobtree.nodes.paths import Path as TreePath
+from blobtree.progress import Cancel, Progress
+from decals.apps.commands.opening import empty_scene, new_file
+from decals.apps.commands.options import DEFAULT_IMAGES
+from decals.apps.commands.scatter_options import ScatterOptions
+from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.sandbox import catalog
 from decals.apps.sandbox.controls import controls_of, parsed
+from decals.apps.sandbox.decal_panel import (
+    brush_values,
+    decal_controls,
+    mode_values,
+    set_brush,
+    set_decal_value,
+    set_mode,
+)
+from decals.apps.sandbox.display import Display
+from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, values_of_start
 from decals.apps.sandbox.outline import key_of, outline, parse_key
+from decals.apps.views import UPRIGHT, parse_view
+from decals.editing.commands import AddImage
+from decals.editing.recovery import recovery_path
+from decals.editing.scatter_commands import AddObject, RemoveObject
+from decals.editing.tree_commands import RenameObject
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.scenes.objects import bounds_of
+from decals.scenes.camera import Camera
+from decals.scenes.files import is_scene_file, load_model
+from decals.scenes.objects import MeshObject, SceneObject, bounds_of
+from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe
 from decals.window import EditWindow
 
@@ -33,6 +61,17 @@ class Sandbox:
     ----------
     window
         The edited window. Its plotter is the view of the page.
+    folder
+        Files are read and written only inside this folder. Default: the working folder.
+    start
+        Show the start page first.
+    lessons
+        Lessons that the start page lists.
+
+    Attributes
+    ----------
+    display : Display
+        How the view shows the scene.
 
     Notes
     -----
@@ -40,13 +79,28 @@ class Sandbox:
     a mistake of the page and raises.
     """
 
-    def __init__(self, window: EditWindow) -> None:
+    def __init__(
+        self,
+        window: EditWindow,
+        *,
+        folder: Path | None = None,
+        start: bool = False,
+        lessons: list[dict[str, Any]] | None = None,
+    ) -> None:
         self._window = window
+        self._folder = (Path() if folder is None else folder).resolve()
+        self.display = Display(window)
+        files = window.actions.files
+        files.folder, files.show_view = self._folder, self.display.show_from
+        self._lessons = lessons or []
+        self._start: dict[str, Any] = {}
+        self.show_start(start)
         self._last_step = math.inf
         self._rows: list[dict[str, Any]] = []
         self._objects: Any = None
         self._images: Any = None
         self._measured: tuple[object, float] = None, 1.0
+        self._reported_pick: tuple[object, dict[str, str]] = None, {}
 
     # -- values -----------------------------------------------------------------------------------------
 
@@ -63,13 +117,38 @@ class Sandbox:
             "panel": self._panel(),
             "done": list(session.labels[-MAX_HISTORY:]),
             "undone": list(session.undone_labels[:MAX_HISTORY]),
+            "start": self._start,
+            "display": self.display.values(),
+            "decal": {
+                "count": len(state.selection),
+                "controls": decal_controls(self._window.document, state.selection),
+            },
+            "brush": brush_values(window.document, state.brush),
+            "modes": mode_values(state),
+            "pick": self._pick(),
+            "decals": len(window.document.decals),
         }
+
+    def _pick(self) -> dict[str, str]:
+        """Return what the last click met."""
+        state = self._window.actions.state
+        if state.picked is not self._reported_pick[0]:
+            pick = state.picked
+            facts = {} if pick is None else self._window.actions.trees.report(pick)
+            self._reported_pick = pick, facts
+        return self._reported_pick[1]
 
     @property
     def status(self) -> str:
         """The last message, and the progress of background work."""
         state = self._window.actions.state
-        parts = (self._window.warmup.status, state.background.progress, state.prompt.text, state.message)
+        parts = (
+            self._window.warmup.status,
+            state.background.progress,
+            state.prompt.text,
+            state.message,
+            self.display.message,
+        )
         return "   ".join(filter(None, parts))
 
     @staticmethod
@@ -119,13 +198,7 @@ class Sandbox:
             if key == "":
                 self._window.actions.state.primitive = None
                 return
-            if isinstance(key, str) and key.startswith("object "):
-                key = key.removeprefix("object ")
-            try:
-                number, path = parse_key(key)
-            except (AttributeError, ValueError):
-                raise InvalidEdit(f"row: expected one of a node, got {describe(key)}") from None
-            trees.select_node(number, path)
+            trees.select_node(*self._row(key))
 
     def set_value(self, name: str, raw: Any, last: bool = True) -> None:
         """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`."""
@@ -135,7 +208,9 @@ class Sandbox:
             self._last_step = math.inf if last else time.monotonic()
 
     def settle(self) -> None:
-        """End the edit of a slider that has rested for a while; call this regularly."""
+        """Keep the view up to date, and end the edit of a slider that has rested; call this regularly."""
+        if self.display.update():
+            self._window.redraw(whole=True)
         if time.monotonic() - self._last_step > REST_SECONDS:
             self._last_step = math.inf
             with self._reported():
@@ -201,6 +276,192 @@ class Sandbox:
             while len(session.labels) < entry:
                 session.redo()
 
+    # -- files ------------------------------------------------------------------------------------------
+
+    def show_start(self, shown: bool) -> None:
+        """Show or hide the start page."""
+        self._start = {"open": bool(shown), **values_of_start(self._folder, SAMPLES, self._lessons)}
+
+    def new_model(self) -> None:
+        """Begin an empty scene."""
+        with self._reported():
+            self._open(_given(empty_scene(DEFAULT_IMAGES, UPRIGHT["y"])), self._new_file("scene"))
+
+    def open_sample(self, name: str) -> None:
+        """Open a sample with scattered decals."""
+        with self._reported():
+            if name not in SAMPLES:
+                raise InvalidEdit(f"sample: expected one of {', '.join(SAMPLES)}, got {describe(name)}")
+
+            def load(progress: Progress, _cancel: Cancel) -> Scene:
+                where = parse_view(None, axes_of(name))
+                return ScatterOptions.from_arguments(None, None, None).scene(
+                    [sample(name)], where, tuple(self._window.plotter.window_size), progress
+                )
+
+            self._open(load, self._new_file(f"{name}-decals"))
+
+    def open_file(self, name: str) -> None:
+        """Open a file of the folder: a scene, or a model, to which decals can be added."""
+        with self._reported():
+            if not isinstance(name, str) or Path(name).suffix.lower() not in MODELS:
+                raise InvalidEdit(
+                    f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}"
+                )
+            path = self._window.actions.files.inside(name)
+            if not path.exists() and not recovery_path(path).is_file():
+                raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
+
+            def load(_progress: Progress, _cancel: Cancel) -> Scene:
+                if not path.exists():  # the recovery file has everything
+                    return empty_scene(DEFAULT_IMAGES, UPRIGHT["y"])
+                found = load_model(path)
+                return found if isinstance(found, Scene) else _bare_scene(found)
+
+            is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
+            self._open(load, path if is_scene else self._new_file(f"{path.stem}-decals"))
+
+    def upload(self, files: object) -> None:
+        """Take files that were dropped on the page: images and models are added, a scene is opened."""
+        for file in files if isinstance(files, list | tuple) else [files]:
+            with self._reported():
+                found, window = read_upload(file), self._window
+                name = plain_name(str(file["name"]))  # type: ignore[index]  # read_upload has checked it
+                if isinstance(found, Scene):
+                    self._open(_given(found), self._new_file(name))
+                elif isinstance(found, DecalImage):
+                    window.actions.state.run(AddImage(found))
+                    count = len(window.document.images)
+                    window.actions.state.show(f"added image {count - 1}; choose it for the selected decals")
+                else:
+                    taken = {item.name for item in window.document.objects}
+                    renamed = replace(found, name=unused(name, taken))
+                    if isinstance(renamed, MeshObject):
+                        renamed = replace(renamed, source=None)  # the file that was read exists no more
+                    self._add_object(renamed)
+
+    def _add_object(self, item: SceneObject) -> None:
+        first = not self._window.document.objects
+
+        def added() -> None:
+            if first:
+                self.display.frame_selection()
+
+        self._window.actions.state.run(AddObject(item), added)
+        self._start = {**self._start, "open": False}
+
+    def write_file(self, name: str, replace_existing: bool = False) -> None:
+        """Write a file of the folder whose suffix is the format; see `FileActions.write`."""
+        with self._reported():
+            if not isinstance(name, str) or not name.strip():
+                raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
+            suffix = Path(name).suffix.lower()
+            if suffix in (".png", ".jpg"):
+                self._save_picture(name, bool(replace_existing))
+            else:
+                self._window.actions.files.write(name.strip(), bool(replace_existing))
+
+    def _save_picture(self, name: str, replace_existing: bool) -> None:
+        path = self._window.actions.files.inside(name)
+        if path.exists() and not replace_existing:
+            raise InvalidEdit(f"{path} exists; write it again to replace it")
+        if not path.parent.is_dir():
+            raise InvalidEdit(f"expected a file in an existing folder, got {name!r}")
+        pixels = self._window.plotter.screenshot(None, return_img=True)
+        Image.fromarray(pixels[..., :3]).save(path)
+        self._window.actions.state.show(f"saved the picture to {path.name}")
+
+    def _new_file(self, name: str) -> Path:
+        return new_file(self._folder, name)
+
+    def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
+        self._window.actions.files.open(load, path)
+        self._start = {**self._start, "open": False}
+        self.display.bookmarks.clear()
+
+    # -- view, decals and outline -----------------------------------------------------------------------
+
+    def set_display(self, name: str, value: Any) -> None:
+        """Set how the view shows the scene; see `Display.set_option`."""
+        with self._reported():
+            self.display.set_option(name, value)
+
+    def move_camera(self, name: str, value: Any = None) -> None:
+        """Move the camera: "frame", "look" from a side, "keep" a bookmark, or "go" to one."""
+        with self._reported():
+            moves: dict[str, Callable[[], None]] = {
+                "frame": self.display.frame_selection,
+                "look": lambda: self.display.look_from(value),
+                "keep": self.display.add_bookmark,
+                "go": lambda: self.display.go_to_bookmark(value),
+            }
+            if not isinstance(name, str) or name not in moves:
+                raise InvalidEdit(f"camera: expected one of {', '.join(moves)}, got {describe(name)}")
+            moves[name]()
+
+    def set_decals(self, name: str, raw: Any, last: bool = True) -> None:
+        """Set a value of the selected decals to what a control sent."""
+        with self._reported(whole=bool(last)):
+            set_decal_value(self._window.actions.state, name, raw, last=bool(last))
+            self._last_step = math.inf if last else time.monotonic()
+
+    def set_brush(self, name: str, raw: Any, _last: bool = True) -> None:
+        """Set the brush, or one of its numbers."""
+        with self._reported():
+            set_brush(self._window.actions.state.brush, name, raw)
+
+    def set_mode(self, name: str, raw: Any) -> None:
+        """Set contact mode, stiffness or image mapping of the window."""
+        with self._reported():
+            set_mode(self._window.actions.state, name, raw)
+
+    def change_row(self, key: str, change: str, value: Any = None) -> None:
+        """Change what a row of the outline stands for: "rename", "remove", "duplicate" or "move" it.
+
+        Parameters
+        ----------
+        key
+            Key of the row.
+        change
+            What to do.
+        value
+            New name of an object; or the key of the row to which a node is moved.
+        """
+        with self._reported():
+            actions = self._window.actions
+            is_object = isinstance(key, str) and key.startswith("object ")
+            number, path = self._row(key)
+            match change:
+                case "rename" if is_object:
+                    actions.state.run(RenameObject(number, value))
+                case "remove" if is_object:
+                    actions.state.run(RemoveObject(number))
+                case "remove" | "duplicate" | "move" if not is_object:
+                    actions.trees.select_node(number, path)
+                    if change == "move":
+                        other, target = self._row(value)
+                        if other != number:
+                            raise InvalidEdit("a node can be moved inside its own object only")
+                        actions.trees.move_node(target)
+                    elif change == "remove":
+                        actions.trees.delete_selected()
+                    else:
+                        actions.trees.duplicate_selected()
+                case "duplicate":
+                    item = self._window.document.object(number)
+                    taken = {other.name for other in self._window.document.objects}
+                    actions.state.run(AddObject(replace(item, name=unused(item.name, taken))))
+                case _:
+                    raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")
+
+    @staticmethod
+    def _row(key: object) -> tuple[int, TreePath]:
+        """Return object and path of a row's key, or raise `InvalidEdit`."""
+        try:
+            return parse_key(str(key).removeprefix("object "))
+        except ValueError:
+            raise InvalidEdit(f"row: expected one of an object or a node, got {describe(key)}") from None
+
     @contextmanager
     def _reported(self, *, whole: bool = True) -> Iterator[None]:
         """Turn errors of the event into the message, and draw the result."""
@@ -209,6 +470,16 @@ class Sandbox:
         except ImplicitDecalsError as error:
             self._window.actions.state.show(str(error))
         self._window.redraw(whole=whole)
+
+
+def _bare_scene(item: SceneObject) -> Scene:
+    """Return a scene of one object, without decals."""
+    images = tuple(DecalImage.load(source) for source in DEFAULT_IMAGES)
+    return Scene(objects=[item], camera=Camera.framing(item.bounds), images=images)
+
+
+def _given(scene: Scene) -> Callable[[Progress, Cancel], Scene]:
+    return lambda *_: scene
 
 
 def _exchanged(value: Any, index: object, raw: Any) -> Any:

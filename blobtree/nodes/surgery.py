@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import Support
 from blobtree.nodes.contact import SolidContact
@@ -118,6 +118,84 @@ def remove_branch(tree: Node, path: Path) -> Node:
             if others is not None:
                 return with_node(tree, path, others)
     raise InvalidNode("path: expected a part of a tree, got its last visible part; remove the object instead")
+
+
+def move_branch(tree: Node, path: Path, target: Path) -> tuple[Node, Path]:
+    """Move the branch at a path to another place; it stays where it is in the world, but for warps.
+
+    A combination at the target takes it as its last operand. Another node there gets it as its next sibling,
+    if its parent is a combination, else the two are blended.
+
+    Returns
+    -------
+    tuple[Node, Path]
+        The new tree, and the path of the branch in it.
+
+    Raises
+    ------
+    InvalidNode
+        The target lies in the branch, or nothing but the branch would be left.
+    """
+    if tuple(target[: len(path)]) == tuple(path):
+        raise InvalidNode(f"target: expected a place outside the branch {path}, got {target}")
+    branch = node_at(tree, path)
+    parent = node_at(tree, target)
+    if not (parent.combines and not _cuts(parent)) and target:
+        above = node_at(tree, target[:-1])
+        if above.combines and not _cuts(above):
+            parent, step = above, target[-1] + 1
+            target = target[:-1]
+            return _inserted(tree, path, target, step, branch)
+    if parent.combines and not _cuts(parent):
+        return _inserted(tree, path, target, len(parent.children), branch)
+    placed = _placed(tree, path, target, branch)
+    extended = with_node(tree, target, combine(Join.BLEND, parent, placed))
+    shifted = (*path[: len(target)], 0, *path[len(target) :]) if path[: len(target)] == target else path
+    return _without(extended, shifted, placed)
+
+
+def _inserted(tree: Node, path: Path, parent_path: Path, step: int, branch: Node) -> tuple[Node, Path]:
+    """Insert the branch at a path as an operand of a combination, and remove it from its old place."""
+    parent: Any = node_at(tree, parent_path)
+    placed = _placed(tree, path, (*parent_path, step), branch)
+    operands = (*parent.children[:step], placed, *parent.children[step:])
+    extended = with_node(tree, parent_path, replace(parent, operands=operands))
+    depth = len(parent_path)
+    if path[:depth] == parent_path and len(path) > depth and path[depth] >= step:
+        path = (*path[:depth], path[depth] + 1, *path[depth + 1 :])
+    return _without(extended, path, placed)
+
+
+def _placed(tree: Node, path: Path, target: Path, branch: Node) -> Node:
+    """Return a branch as a node of another place, so that it stays where it is in the world."""
+    old, new = path[:-1], target[:-1]
+    common = next((i for i, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1]), None)
+    shared = 1 + (min(len(old), len(new)) if common is None else common)
+    change = np.linalg.solve(_matrix(tree, new, shared), _matrix(tree, old, shared))
+    return branch if np.allclose(change, np.eye(4)) else branch.transform(change)
+
+
+def _matrix(tree: Node, path: Path, first: int) -> Float64Array:
+    """Return the map, float64[4, 4], of the nodes along a path from the one of this index on."""
+    matrix = np.eye(4)
+    for node in list(nodes_along(tree, path))[first:]:
+        if isinstance(node, Transform):
+            matrix = matrix @ np.vstack([np.asarray(node.matrix, np.float64), (0.0, 0.0, 0.0, 1.0)])
+        elif node.warp is not None:
+            raise InvalidNode(f"the place lies below a {type(node).__name__}; move that as a whole")
+    return matrix
+
+
+def _without(tree: Node, path: Path, placed: Node) -> tuple[Node, Path]:
+    """Remove the branch at a path, and return the path of another node in the rest."""
+    rest = remove_branch(tree, path)
+    pending: list[tuple[Path, Node]] = [((), rest)]
+    while pending:
+        found, node = pending.pop()
+        if node is placed:
+            return rest, found
+        pending.extend(((*found, step), child) for step, child in enumerate(node.children))
+    raise InvalidNode("path: expected a branch that leaves other parts")  # removed with its old place
 
 
 def duplicate_branch(tree: Node, path: Path, offset: ArrayLike) -> tuple[Node, Path]:

@@ -68,6 +68,8 @@ class ActionState:
         Object and path of the selected primitive, if any.
     handle_offset
         Offset of the primitive's handle from the middle of its box, shape (3,).
+    picked
+        The surface point of the last click, if it met one.
     message
         Result of the last action, in plain words.
     prompt
@@ -87,6 +89,7 @@ class ActionState:
         self.selection: tuple[int, ...] = ()
         self.primitive: tuple[int, Path] | None = None
         self.handle_offset: Float32Array = np.zeros(3, np.float32)
+        self.picked: SurfacePick | None = None
         self.message = ""
         self.prompt = PromptLine(self.show)
         self.modes: DrawModes = DefaultModes()

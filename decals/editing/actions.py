@@ -111,7 +111,7 @@ class Actions:
     @action("select", "Click", summary="select the decal under the cursor", group=Group.SELECTION)
     def select(self, cursor: Cursor) -> None:
         """Select the decal under the cursor, or none."""
-        pick = cursor()
+        pick = self.state.picked = cursor()
         self.state.selection = () if pick is None or pick.owner < 0 else (pick.owner,)
         self.state.message = f"decal {pick.owner}" if pick is not None and self.state.selection else ""
 

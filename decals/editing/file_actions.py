@@ -155,7 +155,9 @@ class FileActions:
 
         self._state.background.write("export", write, f"exported to {path}")
 
-    def open(self, load: Callable[[], Scene], path: str | PathLike[str], recover: bool = True) -> None:
+    def open(
+        self, load: Callable[[Progress, Cancel], Scene], path: str | PathLike[str], recover: bool = True
+    ) -> None:
         """Open another scene in the place of the present one, whose unsaved changes are kept for recovery.
 
         The history begins anew, unless an edit was made while the scene was loaded: then undo leads back.
@@ -163,20 +165,20 @@ class FileActions:
         Parameters
         ----------
         load
-            Returns the scene; it runs in the background.
+            Returns the scene, ``load(progress, cancel)``; it runs in the background.
         path
             File to save to, which has to be inside `folder`.
         recover
             If True, unsaved changes of an earlier window of this file are taken over.
         """
-        path = self._inside(Path(path))
+        path = self.inside(path)
         state, session = self._state, self._state.session
         state.background.require_idle()
         state.end_stroke()
         entries = len(session.labels)
 
-        def compute(_progress: Progress, _cancel: Cancel) -> Command:
-            return ReplaceScene(load(), f"open {path.name}")
+        def compute(progress: Progress, cancel: Cancel) -> Command:
+            return ReplaceScene(load(progress, cancel), f"open {path.name}")
 
         def done() -> None:
             if len(session.labels) == entries + 1:
@@ -200,7 +202,7 @@ class FileActions:
             state = self._state
             state.end_stroke()
             if self.folder is not None and not is_builtin(text):
-                self._inside(Path(text))
+                self.inside(text)
             state.run(AddImage(DecalImage.load(text)))
             count = len(state.session.document.images)
             state.show(f"added {text} as image {count - 1}; press I to show it on the selected decals")
@@ -212,13 +214,14 @@ class FileActions:
         path = Path(text).expanduser()
         if path.suffix.lower() not in suffixes:
             raise InvalidEdit(f"expected a name that ends in {', '.join(suffixes)}, got {text!r}")
-        path = self._inside(path)
+        path = self.inside(path)
         if path.is_dir() or not path.parent.is_dir():
             raise InvalidEdit(f"expected a file in an existing folder, got {text!r}")
         return path
 
-    def _inside(self, path: Path) -> Path:
+    def inside(self, path: str | PathLike[str]) -> Path:
         """Return a path, or raise `InvalidEdit` if it leads out of the folder."""
+        path = Path(path)
         if self.folder is None:
             return path
         inside = self.folder / path

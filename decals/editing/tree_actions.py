@@ -21,6 +21,7 @@ from decals.editing.tree_commands import (
     AddPrimitive,
     DuplicatePrimitive,
     JoinPrimitive,
+    MoveBranch,
     MovePrimitive,
     PaintPrimitive,
     RemovePrimitive,
@@ -237,6 +238,29 @@ class TreeActions:
         assert self._state.primitive is not None
         command = ReplaceNode(*self._state.primitive, node)
         self._restructure(command, handle_offset=np.zeros(3, np.float32))
+
+    def move_node(self, target: Path) -> None:
+        """Move the selected node to another place in its tree, and keep it selected; see `MoveBranch`."""
+        self.selected_node  # noqa: B018  # raises without a selected node
+        assert self._state.primitive is not None
+        self._restructure(MoveBranch(*self._state.primitive, target))
+
+    def report(self, pick: SurfacePick) -> dict[str, str]:
+        """Return what is at a surface point, in plain words."""
+        document, position = self._state.session.document, np.asarray(pick.position, np.float32)
+        if not 0 <= pick.object < len(document.objects):
+            return {}
+        item = document.objects[pick.object]
+        facts = {"object": item.name}
+        if isinstance(item, TreeObject):
+            path = dominant_primitive(item.tree, position)
+            where = "/".join(map(str, path)) or "root"
+            facts["primitive"] = f"{type(primitive_at(item.tree, path)).__name__} ({where})"
+            facts["field"] = f"{float(item.tree(position[None])[0]):.4f}"
+        if pick.owner >= 0:
+            facts["decal"] = str(pick.owner)
+        facts["position"] = ", ".join(f"{value:.4g}" for value in position.tolist())
+        return facts
 
     # -- primitives -------------------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit
-from decals.scenes.objects import SceneObject, TreeObject
+from decals.scenes.objects import SceneObject, TreeObject, check_names
 from decals.validation import describe, finite_number, finite_vector, instance, member
 
 
@@ -441,6 +441,74 @@ class DuplicatePrimitive(StructureCommand):
         """Return the new tree, and the path of the copy."""
         offset = finite_vector("offset", self.offset, InvalidEdit)
         return surgery.duplicate_branch(tree, self.path, offset)
+
+
+@dataclass(frozen=True, eq=False)
+class MoveBranch(StructureCommand):
+    """Move a primitive, or branch, to another place in its tree; it stays where it is in the world.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    target
+        Path of a combination, which takes the node as its last operand; or of another node, behind which the
+        node comes to stand.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, MoveBranch
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(MoveBranch(0, (0,), (1,)))
+    >>> session.document.objects[0].tree.children[1].radius
+    1.0
+    """
+
+    target: Path
+    label: ClassVar[str] = "move in the tree"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the node in it."""
+        return surgery.move_branch(tree, tuple(self.path), tuple(self.target))
+
+
+@dataclass(frozen=True, eq=False)
+class RenameObject:
+    """Give an object another name.
+
+    Parameters
+    ----------
+    number
+        Index of the object.
+    name
+        Its new name, unique in the scene.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RenameObject
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(RenameObject(0, "ball"))
+    >>> session.document.objects[0].name
+    'ball'
+    """
+
+    number: int
+    name: str
+    label: ClassVar[str] = "rename"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        renamed = replace(document.object(self.number), name=self.name)
+        objects = (*document.objects[: self.number], renamed, *document.objects[self.number + 1 :])
+        check_names(objects)
+        return document.compute_parts(objects=objects)
 
 
 @dataclass(frozen=True, eq=False)

@@ -335,12 +335,13 @@ def load_model(
     >>> decals.load_model(path).name
     'ball'
     """
-    if _is_scene_file(as_path(path)):
+    if is_scene_file(as_path(path)):
         return load_scene(path, samples=samples, trust=trust)
     return as_object(path, "model")
 
 
-def _is_scene_file(path: Path) -> bool:
+def is_scene_file(path: Path) -> bool:
+    """Return True if a file holds a saved scene, rather than a mesh or a BlobTree."""
     if path.suffix.lower() != ".json" or not is_file(path):
         return False
     try:

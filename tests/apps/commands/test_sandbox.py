@@ -42,7 +42,7 @@ class Server:
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Server, EditWindow]]:
     """Return the list of servers and windows that `sandbox` opens."""
     pages: list[tuple[Server, EditWindow]] = []
-    toolkit = (lambda *_, **__: Server()), lambda server, window: pages.append((server, window))
+    toolkit = (lambda *_, **__: Server()), lambda server, window, **_: pages.append((server, window))
     monkeypatch.setattr(sandbox_module, "_toolkit", lambda: toolkit)
     return pages
 

@@ -169,12 +169,12 @@ def test_opening_another_scene_begins_anew_and_keeps_unsaved_changes(tmp_path: P
     files.show_view = shown.append
     session.do(ScaleDecals([1], 2.0))
     scaled = session.document.decals[1].radii[0]
-    files.open(lambda: load_scene(tmp_path / "other.json"), tmp_path / "other.json")
+    files.open(lambda *_: load_scene(tmp_path / "other.json"), tmp_path / "other.json")
     assert len(session.document.decals) == 3
     assert (session.labels, session.modified, files.title) == ((), False, "other.json")
     assert [camera.position for camera in shown] == [other.camera.position]
     assert load_scene(tmp_path / "scene.recovery.json").decals.radii[1] == scaled
-    files.open(scene, tmp_path / "scene.json")
+    files.open(lambda *_: scene(), tmp_path / "scene.json")
     assert session.labels == ("recover unsaved changes",)
     assert session.document.scene.decals.radii[1] == scaled
 
@@ -189,7 +189,7 @@ def test_files_outside_the_folder_are_refused(tmp_path: Path) -> None:
         with pytest.raises(InvalidEdit, match="expected a file in"):
             actions.files.write(name, False)
         with pytest.raises(InvalidEdit, match="expected a"):
-            actions.files.open(scene, tmp_path / "a.json")
+            actions.files.open(lambda *_: scene(), tmp_path / "a.json")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["inside"]
     with pytest.raises(InvalidEdit, match="ends in"):
         actions.files.write("a.txt", False)

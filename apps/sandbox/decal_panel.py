@@ -1,0 +1,184 @@
+"""The panel of the selected decals, of the brush and of the contact modes."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blobtree.colors import color_rgb
+from decals.apps.sandbox.controls import STEPS, Control, hex_color
+from decals.editing.action_state import ActionState
+from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius
+from decals.editing.commands import SetValues
+from decals.editing.document import Document
+from decals.errors import InvalidEdit
+from decals.field.mapping import ImageMapping
+from decals.model import NO_IMAGE, Interaction
+from decals.record import Contact
+from decals.scenes.objects import bounds_of
+from decals.validation import describe, finite_number
+
+PLAIN = "tint alone"
+"""Choice of an image that stands for none."""
+
+COLUMNS = {
+    "radius": "radii",
+    "opacity": "opacities",
+    "image": "images",
+    "tint": "tints",
+    "interaction": "interactions",
+    "layer": "layers",
+    "spill": "spill",
+}
+"""Arrays of `decals.Decals` by the names of their controls."""
+
+LAYERS = 8
+"""Ends of the slider of layers; the field takes any layer."""
+
+MAX_STIFFNESS = 8.0
+
+
+def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[str, Any]]:
+    """Return the controls of the selected decals, with the values of the last one."""
+    if not selection:
+        return []
+    last = document.decals[selection[-1]]
+    low, high = bounds_of(document.objects) if document.objects else (np.zeros(3), np.ones(3))
+    reach = max(0.25 * float((high - low).max()), float(last.radii[0]))
+    image = int(last.images[0])
+    names = image_names(document)
+    layers = max(LAYERS, abs(int(last.layers[0])))
+    controls = [
+        _slider("radius", float(last.radii[0]), reach / STEPS, reach, "visible radius, in model units"),
+        _slider("opacity", float(last.opacities[0]), 0.0, 1.0, "from invisible to opaque"),
+        Control("image", "choice", names[image + 1], "image", choices=tuple(names)),
+        Control(
+            "tint", "color", hex_color(tuple(last.tints[0].tolist())), "colour that multiplies the image"
+        ),
+        Control(
+            "interaction",
+            "choice",
+            Interaction(int(last.interactions[0])).name.lower(),
+            "push neighbours, lie above them, or below",
+            choices=tuple(one.name.lower() for one in Interaction),
+        ),
+        _slider("layer", int(last.layers[0]), -layers, layers, "drawn from the lowest up", step=1.0),
+        Control("spill", "switch", bool(last.spill[0]), "also colours surface that faces away"),
+    ]
+    return [asdict(control) for control in controls]
+
+
+def _slider(name: str, value: float, low: float, high: float, doc: str, step: float | None = None) -> Control:
+    return Control(name, "number", value, doc, "", low, high, step or (high - low) / STEPS)
+
+
+def image_names(document: Document) -> list[str]:
+    """Return the names of the images, each once, after that of none."""
+    names = [PLAIN]
+    for number, image in enumerate(document.images):
+        name = Path(image.source).name[:40] or f"image {number}"
+        names.append(name if name not in names else f"{name} ({number})")
+    return names
+
+
+def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
+    """Return what a page sent for a value of decals, or raise `InvalidEdit`."""
+    match name:
+        case "radius" | "opacity":
+            return finite_number(name, _as_number(raw), InvalidEdit)
+        case "layer":
+            return round(finite_number(name, _as_number(raw), InvalidEdit))
+        case "image":
+            names = image_names(document)
+            if raw not in names:
+                raise InvalidEdit(f"image: expected one of {', '.join(names)}, got {describe(raw)}")
+            return names.index(raw) + NO_IMAGE
+        case "tint":
+            return color_rgb("tint", raw, InvalidEdit)
+        case "interaction":
+            names = [one.name.lower() for one in Interaction]
+            if raw not in names:
+                raise InvalidEdit(f"interaction: expected one of {', '.join(names)}, got {describe(raw)}")
+            return int(Interaction[raw.upper()])
+        case "spill":
+            return bool(raw)
+    raise InvalidEdit(f"value of decals: expected one of {', '.join(COLUMNS)}, got {describe(name)}")
+
+
+def _as_number(raw: Any) -> float:
+    try:
+        return float(raw)
+    except (TypeError, ValueError):
+        raise InvalidEdit(f"expected a number, got {describe(raw)}") from None
+
+
+def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
+    """Set a value of all selected decals; moves of a slider are one undo entry."""
+    numbers = state.selected_numbers
+    value = parsed_decal_value(state.session.document, name, raw)
+    label = f"set {name}"
+    state.begin_series((label, state.selection), label)
+    state.run_latest(SetValues.each(numbers, label, **{COLUMNS[name]: value}))
+    if last:
+        state.end_stroke()
+
+
+# -- brush and modes ------------------------------------------------------------------------------------
+
+
+def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
+    """Return the brush and its controls."""
+    has_objects = bool(document.objects)
+    radius = brush.radius or (default_radius(document) if has_objects else 1.0)
+    size = brush.decal_radius or (default_decal_radius(document) if has_objects else 0.1)
+    usual = default_radius(document) if has_objects else 1.0
+    reach = max(4.0 * usual, radius)
+    controls = [_slider("radius", radius, reach / STEPS, reach, "radius of the brush, in model units")]
+    if brush.brush is Brush.SCATTER:
+        controls += [
+            _slider("decal_radius", size, usual / STEPS, max(usual, size), "radius of new decals"),
+            _slider("density", brush.density, 0.05, 1.0, "1 leaves no gaps"),
+        ]
+    return {"brush": str(brush.brush), "controls": [asdict(control) for control in controls]}
+
+
+def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
+    """Set the brush, or one of its numbers, to what a page sent."""
+    if name == "brush":
+        if raw not in list(Brush):
+            raise InvalidEdit(f"brush: expected one of {', '.join(Brush)}, got {describe(raw)}")
+        brush.brush = Brush(raw)
+        return
+    if name not in ("radius", "decal_radius", "density"):
+        raise InvalidEdit(f"brush: expected 'radius' or such, got {describe(name)}")
+    number = finite_number(name, _as_number(raw), InvalidEdit)
+    if number <= 0.0 or (name == "density" and number > 1.0):
+        raise InvalidEdit(f"{name}: expected a number above 0{' and at most 1' * (name == 'density')}")
+    setattr(brush, name, number)
+
+
+def mode_values(state: ActionState) -> dict[str, Any]:
+    """Return contact mode, stiffness and image mapping, with their choices."""
+    modes = state.modes
+    return {
+        "contact": modes.contact.name.lower(),
+        "contacts": [mode.name.lower() for mode in Contact],
+        "stiffness": modes.stiffness,
+        "max_stiffness": max(MAX_STIFFNESS, modes.stiffness),
+        "mapping": modes.mapping.name.lower(),
+        "mappings": [mode.name.lower() for mode in ImageMapping],
+    }
+
+
+def set_mode(state: ActionState, name: str, raw: Any) -> None:
+    """Set a mode to what a page sent; errors are those of the window's renderer."""
+    parse: dict[str, Callable[[Any], Any]] = {
+        "contact": lambda text: text,
+        "mapping": lambda text: text,
+        "stiffness": _as_number,
+    }
+    if name not in parse:
+        raise InvalidEdit(f"mode: expected one of {', '.join(parse)}, got {describe(name)}")
+    setattr(state.modes, name, parse[name](raw))

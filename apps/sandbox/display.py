@@ -1,0 +1,404 @@
+"""How the view shows the scene: modes, overlays, a field slice, and cameras."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import pyvista as pv
+
+from blobtree._typing import Float32Array
+from blobtree.nodes.paths import node_in_world
+from decals.apps.views import PRESETS
+from decals.editing.background import Job, Worker
+from decals.editing.document import Document
+from decals.editing.overlays import contact_lines, sample_surface
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.scenes.camera import Camera
+from decals.scenes.meshes import as_polydata
+from decals.scenes.objects import SceneObject, TreeObject, bounds_of
+from decals.surfaces.surface import unit_rows
+from decals.validation import describe, finite_number
+from decals.vtk.subplot import FrameStatus
+from decals.window import EditWindow
+
+MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
+OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
+AXES = "x", "y", "z"
+RESOLUTION = 96
+"""Cells along the longest side of the meshes that modes and overlays use."""
+
+LIFT = 0.003
+"""Distance of overlays above the surface, in sizes of the scene, so that they are not hidden."""
+
+OWNER_COLORS = np.array(
+    [(230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66), (0, 114, 178), (204, 121, 167)], np.uint8
+)
+"""Colours of owners in turn (Okabe and Ito's, which the colour-blind tell apart)."""
+
+NO_OWNER = (150, 150, 150)
+FOLD_COLOR = "#d55e00"
+LINE_COLOR = "#111111"
+MAX_STRETCH = 5.0
+"""Upper end of the colours of stretch."""
+
+MAX_BOOKMARKS = 20
+PREFIX = "sandbox "
+"""First part of the names of the actors of this module."""
+
+
+@dataclass(frozen=True)
+class DisplayOptions:
+    """What the view shows besides the scene itself.
+
+    Attributes
+    ----------
+    mode, overlay
+        One of `MODES`, and of `OVERLAYS`.
+    slice_axis
+        "" for no slice, or the axis that it is perpendicular to.
+    slice_position
+        Place of the slice between the ends of the scene, from 0 to 1.
+    """
+
+    mode: str = MODES[0]
+    overlay: str = OVERLAYS[0]
+    slice_axis: str = ""
+    slice_position: float = 0.5
+
+
+Shown = list[tuple[str, Any, dict[str, Any]]]
+"""Data sets with their names and pyvista's options."""
+
+
+class Sampling(Protocol):
+    """The modes in which decals are sampled for overlays."""
+
+    contact: Any
+    mapping: Any
+    stiffness: float
+
+
+class Display:
+    """Modes, overlays and cameras of a window.
+
+    Meshes are made in a thread. The view shows the former ones meanwhile.
+
+    Parameters
+    ----------
+    window
+        The edited window.
+    """
+
+    def __init__(self, window: EditWindow) -> None:
+        self._window, self._worker = window, Worker()
+        self.options = DisplayOptions()
+        self.bookmarks: list[tuple[str, Any]] = []
+        self.message = ""
+        self._key: tuple[object, ...] = ()
+        self._meshes: tuple[Sequence[SceneObject], list[pv.PolyData]] = (), []
+        self._names: list[str] = []
+        self._axes = False
+
+    def values(self) -> dict[str, Any]:
+        """Return plain values for a page."""
+        options = self.options
+        return {
+            "mode": options.mode,
+            "overlay": options.overlay,
+            "slice_axis": options.slice_axis,
+            "slice_position": options.slice_position,
+            "parallel": bool(self._window.subplot.vtk_renderer.camera.parallel_projection),
+            "axes": self._axes,
+            "bookmarks": [name for name, _ in self.bookmarks],
+            "busy": self._worker.busy,
+            "message": self.message,
+        }
+
+    # -- modes ------------------------------------------------------------------------------------------
+
+    def set_option(self, name: str, value: Any) -> None:
+        """Set an option of `DisplayOptions` by name, or "parallel" or "axes".
+
+        Raises
+        ------
+        InvalidEdit
+            There is no such option or value.
+        """
+        choices = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": ("", *AXES)}
+        if name in choices:
+            if value not in choices[name]:
+                raise InvalidEdit(
+                    f"{name}: expected one of {', '.join(choices[name])}, got {describe(value)}"
+                )
+        elif name == "slice_position":
+            value = min(max(finite_number(name, value, InvalidEdit), 0.0), 1.0)
+        elif name == "parallel":
+            self._window.subplot.vtk_renderer.camera.parallel_projection = bool(value)
+            return
+        elif name == "axes":
+            self._show_axes(bool(value))
+            return
+        else:
+            raise InvalidEdit(f"view: expected an option such as 'mode', got {describe(name)}")
+        self.options = DisplayOptions(**{**vars(self.options), name: value})
+
+    def _show_axes(self, shown: bool) -> None:
+        plotter = self._window.plotter
+        if shown:
+            plotter.add_axes()
+        else:
+            plotter.hide_axes()
+        self._axes = shown
+
+    def update(self) -> bool:
+        """Show what the options ask for, once the scene rests; return True if the view changed."""
+        try:
+            complete = self._worker.poll()
+        except ImplicitDecalsError as error:
+            self.message = str(error)
+            return False
+        if complete is not None:
+            complete()
+            return True
+        window = self._window
+        if self._worker.busy or window.tools.dragging or window.background.following:
+            return False
+        options, document, modes = self.options, window.document, window.subplot
+        if options == DisplayOptions() or not document.objects:
+            return self._clear()
+        content = document.objects, document.decals.version, modes.contact, modes.mapping, modes.stiffness
+        key = options, *content
+        if len(key) == len(self._key) and all(a is b or a == b for a, b in zip(key, self._key, strict=True)):
+            return False
+        self._key = key
+        fork, meshes = document.fork(), self._meshes
+
+        def work(_progress: object, _cancel: object) -> Callable[[], None]:
+            objects = fork.objects
+            parts = meshes[1] if meshes[0] is objects else [_polygonized(item) for item in objects]
+            shown, message = show(fork, parts, options, modes)
+
+            def install() -> None:
+                self._meshes = objects, parts
+                self._install(shown, message, options)
+
+            return install
+
+        return not self._worker.start(Job("view", work))
+
+    def _clear(self) -> bool:
+        had, self._key = bool(self._names), ()
+        if had:
+            self._install([], "", self.options)
+        return had
+
+    def _install(self, shown: Shown, message: str, options: DisplayOptions) -> None:
+        """Exchange the actors, and hide the scene where a mesh stands for it."""
+        plotter, subplot = self._window.plotter, self._window.subplot
+        for name in self._names:
+            plotter.remove_actor(name, render=False, reset_camera=False)
+        plotter.scalar_bars.clear()
+        self._names, self.message = [name for name, _, _ in shown], message
+        replaced = bool(shown) and (options.mode != MODES[0] or bool(options.slice_axis))
+        subplot.actor.SetVisibility(not replaced)
+        if replaced:  # a scene that is not drawn needs no warm-up
+            subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""
+        for name, data, given in shown:
+            keywords = dict(given)
+            decorated = keywords.pop("decals", False)
+            actor = plotter.add_mesh(
+                data, name=name, pickable=False, reset_camera=False, render=False, **keywords
+            )
+            if decorated:
+                subplot.apply(actor)
+
+    # -- cameras ----------------------------------------------------------------------------------------
+
+    def show_from(self, camera: Camera) -> None:
+        """Look from the camera of a scene."""
+        view = self._window.subplot.vtk_renderer.camera
+        view.parallel_projection = False
+        view.position, view.focal_point, view.up = camera.position, camera.target, camera.up
+        view.view_angle = camera.fov
+        self._window.subplot.vtk_renderer.reset_camera_clipping_range()
+
+    def frame_selection(self) -> None:
+        """Show the selected node or decals as large as they fit; without a selection, everything."""
+        state, document = self._window.actions.state, self._window.document
+        if state.selection:
+            chosen = document.decals.take(state.selected_numbers)
+            reach = 3.0 * chosen.radii[:, None]
+            low, high = (chosen.positions - reach).min(axis=0), (chosen.positions + reach).max(axis=0)
+        elif state.primitive is not None:
+            number, path = state.primitive
+            item = document.objects[number]
+            assert isinstance(item, TreeObject)
+            low, high = node_in_world(item.tree, path).bounds
+        elif document.objects:
+            low, high = bounds_of(document.objects)
+        else:
+            return
+        bounds = np.stack([low, high], axis=1).ravel().astype(float).tolist()
+        self._window.subplot.vtk_renderer.ResetCamera(bounds)
+
+    def look_from(self, name: str) -> None:
+        """Look at the present target from a side; see `PRESETS`."""
+        if not isinstance(name, str) or name not in PRESETS:
+            raise InvalidEdit(f"side: expected one of {', '.join(PRESETS)}, got {describe(name)}")
+        view, toward = self._window.subplot.vtk_renderer.camera, np.array(PRESETS[name])
+        target = np.array(view.focal_point)
+        distance = float(np.linalg.norm(np.array(view.position) - target))
+        view.position = tuple((target + distance * toward).tolist())
+        view.up = (0.0, 0.0, -float(toward[1])) if toward[1] else (0.0, 1.0, 0.0)
+        self._window.subplot.vtk_renderer.reset_camera_clipping_range()
+
+    def add_bookmark(self) -> None:
+        """Keep the present camera."""
+        if len(self.bookmarks) == MAX_BOOKMARKS:
+            raise InvalidEdit(f"expected at most {MAX_BOOKMARKS} bookmarks; a new scene begins without")
+        view = self._window.subplot.vtk_renderer.camera
+        kept = view.position, view.focal_point, view.up, view.view_angle, view.parallel_scale
+        self.bookmarks.append((f"view {len(self.bookmarks) + 1}", (kept, bool(view.parallel_projection))))
+
+    def go_to_bookmark(self, number: int) -> None:
+        """Look from a kept camera."""
+        if (
+            isinstance(number, bool)
+            or not isinstance(number, int)
+            or number not in range(len(self.bookmarks))
+        ):
+            raise InvalidEdit(f"bookmark: expected its number, got {describe(number)}")
+        view = self._window.subplot.vtk_renderer.camera
+        kept, view.parallel_projection = self.bookmarks[number][1]
+        view.position, view.focal_point, view.up, view.view_angle, view.parallel_scale = kept
+        self._window.subplot.vtk_renderer.reset_camera_clipping_range()
+
+
+def _polygonized(item: SceneObject) -> pv.PolyData:
+    return as_polydata([item], resolution=RESOLUTION)
+
+
+def show(
+    document: Document, parts: list[pv.PolyData], options: DisplayOptions, modes: Sampling
+) -> tuple[Shown, str]:
+    """Return the data sets that show a document, and a message with what they measure."""
+    low, high = bounds_of(document.objects)
+    size = float((high - low).max())
+    first, *others = parts
+    mesh = first.append_polydata(*others) if others else first
+    shown: Shown = []
+    messages = []
+    if options.slice_axis:
+        shown += _sliced(document, mesh, options, low, high)
+    elif options.mode != MODES[0]:
+        shown.append(_moded(document, mesh, parts, options.mode))
+    if options.overlay != OVERLAYS[0]:
+        overlay, message = _overlay(document, mesh, options.overlay, modes, LIFT * size)
+        shown += overlay
+        messages.append(message)
+    return shown, "".join(messages)
+
+
+def _moded(document: Document, mesh: pv.PolyData, parts: list[pv.PolyData], mode: str) -> Any:
+    """Return the mesh of a mode with its name and options."""
+    name = f"{PREFIX}mesh"
+    if mode == "polygonized":
+        return name, mesh, {"scalars": "RGB", "rgb": True, "smooth_shading": True, "decals": True}
+    if mode == "wireframe":
+        return name, mesh, {"style": "wireframe", "color": "#30506a", "line_width": 1}
+    copy = mesh.copy(deep=False)
+    if mode == "normals":
+        copy["normal colours"] = np.round(127.5 * (np.asarray(mesh["Normals"]) + 1.0)).astype(np.uint8)
+        return name, copy, {"scalars": "normal colours", "rgb": True, "lighting": False}
+    curvatures = [
+        np.asarray(item.tree.curvatures(np.asarray(part.points, np.float32)).mean)
+        if isinstance(item, TreeObject)
+        else np.asarray(part.curvature("mean"))
+        for item, part in zip(document.objects, parts, strict=True)
+    ]
+    copy["mean curvature"] = np.concatenate(curvatures)
+    reach = float(np.nanpercentile(np.abs(copy["mean curvature"]), 95)) or 1.0
+    return name, copy, {"scalars": "mean curvature", "cmap": "PuOr", "clim": (-reach, reach)}
+
+
+def _sliced(
+    document: Document, mesh: pv.PolyData, options: DisplayOptions, low: Float32Array, high: Float32Array
+) -> Shown:
+    """Return the part of the mesh behind a plane, and the fields of the trees on it with iso-lines."""
+    axis = AXES.index(options.slice_axis)
+    origin = ((low + high) / 2).astype(float)
+    origin[axis] = low[axis] + options.slice_position * (high[axis] - low[axis])
+    normal = np.eye(3)[axis]
+    clipped = mesh.clip(normal=normal, origin=origin)
+    shown: Shown = []
+    if clipped.n_points:
+        shown.append((f"{PREFIX}mesh", clipped, {"scalars": "RGB", "rgb": True, "smooth_shading": True}))
+    for number, item in enumerate(document.objects):
+        if not isinstance(item, TreeObject):
+            continue
+        field: Any = item.tree.slice(origin, normal, resolution=RESOLUTION)
+        plane = {"scalars": "field", "cmap": "cividis", "clim": (0.0, 1.0), "lighting": False}
+        shown.append((f"{PREFIX}plane {number}", field["plane"], plane))
+        for part, width in (("lines", 1), ("surface", 4)):
+            if field[part].n_points:
+                shown.append(
+                    (f"{PREFIX}{part} {number}", field[part], {"color": "white", "line_width": width})
+                )
+    return shown
+
+
+def _overlay(
+    document: Document, mesh: pv.PolyData, overlay: str, modes: Sampling, lift: float
+) -> tuple[Shown, str]:
+    """Return the data sets of an overlay, and what it measures."""
+    name = f"{PREFIX}overlay"
+    points, normals = np.asarray(mesh.points, np.float32), np.asarray(mesh["Normals"], np.float32)
+    if overlay == "seeds":
+        chosen = document.decals.decals
+        if not len(chosen):
+            return [], "no decals"
+        lifted = pv.PolyData(chosen.positions + 2.0 * lift * chosen.normals)
+        options = {"color": LINE_COLOR, "point_size": 7, "render_points_as_spheres": True}
+        return [(name, lifted, options)], f"{len(chosen)} seeds"
+    triangles = mesh.regular_faces
+    faces = triangles.astype(np.int32)
+    samples = sample_surface(
+        document,
+        points,
+        unit_rows(normals),
+        faces,
+        contact=modes.contact,
+        mapping=modes.mapping,
+        stiffness=modes.stiffness,
+    )
+    above = points + lift * normals
+    if overlay == "contact lines":
+        lines = contact_lines(above + lift * normals, faces, samples.owners)
+        if not len(lines):
+            return [], "no decals touch"
+        cells = np.column_stack([np.full(len(lines), 2), np.arange(2 * len(lines)).reshape(-1, 2)])
+        drawn = pv.PolyData(lines.reshape(-1, 3), lines=cells.ravel())
+        return [(name, drawn, {"color": LINE_COLOR, "line_width": 3})], ""
+    lifted = pv.PolyData.from_regular_faces(above, triangles)
+    if overlay == "owners":
+        palette = np.vstack([OWNER_COLORS[samples.owners % len(OWNER_COLORS)]])
+        lifted["owners"] = np.where((samples.owners >= 0)[:, None], palette, NO_OWNER).astype(np.uint8)
+        shown_count = len(np.unique(samples.owners[samples.owners >= 0]))
+        return [(name, lifted, {"scalars": "owners", "rgb": True})], f"{shown_count} decals show"
+    folded = int(samples.folds.sum())
+    if overlay == "folds":
+        message = f"{folded} of {len(faces)} triangles folded"
+        if not folded:
+            return [], message
+        return [
+            (name, lifted.extract_cells(samples.folds), {"color": FOLD_COLOR, "lighting": False})
+        ], message
+    known = np.isfinite(samples.stretch)
+    if not known.any():
+        return [], "no decals to measure"
+    lifted.cell_data["stretch"] = samples.stretch
+    part = lifted.extract_cells(known)
+    typical, worst = np.percentile(samples.stretch[known], (50, 95))
+    options = {"scalars": "stretch", "cmap": "cividis", "clim": (1.0, MAX_STRETCH), "lighting": False}
+    return [(name, part, options)], f"stretch: median {typical:.2f}, 95 % below {worst:.2f}"

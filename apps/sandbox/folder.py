@@ -1,0 +1,151 @@
+"""Files of the folder in which the sandbox was started: what the start page lists, and uploads."""
+
+import base64
+import os
+import tempfile
+from collections.abc import Iterator
+from datetime import datetime
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from decals import DecalImage, Scene, load_model
+from decals.editing.recovery import SUFFIX
+from decals.errors import InvalidEdit
+from decals.scenes.objects import SceneObject
+from decals.validation import describe
+
+MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".off")
+IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff")
+
+MAX_RECENT = 12
+MAX_LOOKED_AT = 5000
+"""Most files of a folder that the start page looks at."""
+
+MAX_UPLOAD_BYTES = 100_000_000
+MAX_PIXELS = 8192 * 8192
+
+
+def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
+    """Yield the visible files of a folder, and of the folders in it."""
+    looked = 0
+    for level in (folder, *(Path(entry.path) for entry in _entries(folder) if _is_folder(entry))):
+        for entry in _entries(level):
+            looked += 1
+            if looked > MAX_LOOKED_AT:
+                return
+            if not entry.name.startswith(".") and entry.is_file(follow_symlinks=False):
+                yield entry
+
+
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return list(entries)
+    except OSError:  # not readable, or gone
+        return []
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    return entry.is_dir(follow_symlinks=False) and not entry.name.startswith((".", "_"))
+
+
+def listed(folder: Path) -> dict[str, list[dict[str, str]]]:
+    """Return the files that a start page offers, the latest first: "recent" models and "recovered" ones.
+
+    Each has a "name" relative to the folder and a "when". A recovered one stands for the unsaved changes of
+    the scene of its name.
+    """
+    found: dict[str, list[tuple[float, str]]] = {"recent": [], "recovered": []}
+    for entry in _files(folder):
+        name = os.path.relpath(entry.path, folder)
+        when = entry.stat(follow_symlinks=False).st_mtime
+        if name.endswith(SUFFIX):
+            found["recovered"].append((when, name.removesuffix(SUFFIX) + ".json"))
+        elif Path(name).suffix.lower() in MODELS:
+            found["recent"].append((when, name))
+    return {
+        family: [
+            {"name": name, "when": f"{datetime.fromtimestamp(when).astimezone():%Y-%m-%d %H:%M}"}
+            for when, name in sorted(files, reverse=True)[:MAX_RECENT]
+        ]
+        for family, files in found.items()
+    }
+
+
+def read_upload(file: object) -> Scene | SceneObject | DecalImage:
+    """Return what a file that a page sent holds: a scene, a model, or an image.
+
+    Parameters
+    ----------
+    file
+        A dictionary with the file's "name" and "content" (bytes).
+
+    Raises
+    ------
+    InvalidEdit
+        It is no such file, it is too large, or its suffix is unknown. Errors of its content are those of
+        `decals.load_model`.
+    """
+    name = file.get("name") if isinstance(file, dict) else None
+    content = file.get("content") if isinstance(file, dict) else None
+    if isinstance(content, list) and all(isinstance(part, bytes) for part in content):
+        content = b"".join(content)
+    if not isinstance(name, str) or not isinstance(content, bytes | bytearray | memoryview):
+        raise InvalidEdit(f"upload: expected a file with name and content, got {describe(file)}")
+    if len(content) > MAX_UPLOAD_BYTES:
+        raise InvalidEdit(
+            f"{name}: expected at most {MAX_UPLOAD_BYTES // 1_000_000} MB, got {len(content) // 1_000_000} MB"
+        )
+    suffix = Path(name).suffix.lower()
+    if suffix in IMAGES:
+        return _image(name, bytes(content))
+    if suffix not in MODELS:
+        raise InvalidEdit(f"{name}: expected a name that ends in {', '.join(MODELS + IMAGES)}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{plain_name(name)}{suffix}"
+        path.write_bytes(content)
+        return load_model(path)
+
+
+def plain_name(name: str) -> str:
+    """Return the stem of a file's name without characters that mean something in paths."""
+    stem = Path(name.replace("\\", "/")).stem
+    return "".join(c if c.isalnum() or c in "-_ " else "-" for c in stem)[:60].strip() or "model"
+
+
+def _image(name: str, content: bytes) -> DecalImage:
+    try:
+        with Image.open(BytesIO(content)) as picture:
+            if picture.width * picture.height > MAX_PIXELS:
+                raise InvalidEdit(f"{name}: expected at most {MAX_PIXELS} pixels, got {picture.size}")
+            pixels = np.asarray(picture.convert("RGBA"))
+    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise InvalidEdit(f"{name}: expected a picture, got none ({error})") from error
+    return DecalImage(plain_name(name), pixels)
+
+
+def unused(name: str, taken: set[str]) -> str:
+    """Return a name, with a number behind it if it is taken."""
+    return next(
+        candidate
+        for number in range(1, len(taken) + 2)
+        if (candidate := name if number == 1 else f"{name} {number}") not in taken
+    )
+
+
+def thumbnails() -> dict[str, str]:
+    """Return the pictures of the samples as data of a page, by name."""
+    pictures = sorted((Path(__file__).parent / "thumbnails").glob("*.jpg"))
+    return {
+        path.stem: "data:image/jpeg;base64," + base64.b64encode(path.read_bytes()).decode()
+        for path in pictures
+    }
+
+
+def values_of_start(folder: Path, samples: tuple[str, ...], lessons: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return all that the start page lists."""
+    return {"samples": list(samples), "lessons": lessons, **listed(folder)}

@@ -1,0 +1,341 @@
+"""Parts of the sandbox's page beside outline and history: start, files, view, brushes, decals, actions."""
+
+from typing import Any
+
+from trame.widgets import html, vuetify3
+
+from decals.apps.sandbox.display import AXES, MODES, OVERLAYS
+from decals.apps.sandbox.folder import IMAGES, MODELS
+from decals.apps.sandbox.sandbox import Sandbox
+from decals.apps.views import PRESETS
+from decals.editing.actions import KEYS
+from decals.editing.brushes import Brush
+from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
+
+FIELD = {"density": "compact", "variant": "outlined", "hide_details": True}
+COMPACT = {"density": "compact", "hide_details": True}
+
+BRUSH_ICONS = {
+    Brush.SELECT: "mdi-cursor-default-outline",
+    Brush.SCATTER: "mdi-spray",
+    Brush.PUSH: "mdi-gesture-swipe",
+    Brush.ERASE: "mdi-eraser",
+    Brush.RELAX: "mdi-dots-hexagon",
+}
+BRUSH_TEXTS = {
+    Brush.SELECT: "select and move decals",
+    Brush.SCATTER: "scatter brush: drag to add decals",
+    Brush.PUSH: "push brush: drag to push decals, neighbours yield",
+    Brush.ERASE: "erase brush: drag to delete decals",
+    Brush.RELAX: "relax brush: drag to even decals out",
+}
+DROP = "dropped = Array.from($event.{}.files)"
+"""Send files to the state of the page, which turns them into names and bytes."""
+
+
+def named(expression: str) -> list[str]:
+    """Return the attribute that tells screen readers what an element is, from an expression of the page."""
+    return [f':aria-label="{expression}"']
+
+
+def icon_button(icon: str, text: str, click: Any, **options: Any) -> None:
+    """Build a button with an icon and a tooltip."""
+    vuetify3.VBtn(icon=icon, title=text, raw_attrs=named(f"'{text}'"), size="small", click=click, **options)
+
+
+def build_number(event: Any) -> None:
+    """Build slider and field of the control ``c``; ``event`` receives its name, value and "the last"."""
+    with html.Div(v_if="c.kind === 'number'", classes="d-flex align-center"):
+        vuetify3.VSlider(
+            model_value=("c.value",),
+            min=("c.low",),
+            max=("c.high",),
+            step=("c.step",),
+            name=("c.name.replaceAll('_', ' ')",),
+            update_modelValue=(event, "[c.name, $event, false]"),
+            end=(event, "[c.name, $event, true]"),
+            **COMPACT,
+        )
+        vuetify3.VTextField(
+            model_value=("c.value === null ? '' : Number(c.value.toPrecision(5))",),
+            raw_attrs=named("c.name.replaceAll('_', ' ')"),
+            style="max-width: 92px",
+            change=(event, "[c.name, $event.target.value, true]"),
+            **FIELD,
+        )
+
+
+def build_choices(event: Any) -> None:
+    """Build the colour, choice, switch or text of the control ``c``."""
+    html.Input(
+        v_if="c.kind === 'color'",
+        type="color",
+        value=("c.value",),
+        raw_attrs=named("c.name.replaceAll('_', ' ')"),
+        style="width: 100%; height: 28px",
+        change=(event, "[c.name, $event.target.value, true]"),
+    )
+    vuetify3.VSelect(
+        v_if="c.kind === 'choice'",
+        model_value=("c.value",),
+        items=("c.choices",),
+        raw_attrs=named("c.name.replaceAll('_', ' ')"),
+        update_modelValue=(event, "[c.name, $event, true]"),
+        **FIELD,
+    )
+    vuetify3.VSwitch(
+        v_if="c.kind === 'switch'",
+        model_value=("c.value",),
+        raw_attrs=named("c.name.replaceAll('_', ' ')"),
+        update_modelValue=(event, "[c.name, $event, true]"),
+        color="primary",
+        **COMPACT,
+    )
+    html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
+
+
+def build_label() -> None:
+    """Build the label of the control ``c``."""
+    html.Label(
+        "{{ c.name.replaceAll('_', ' ') }}{{ c.unit ? ', ' + c.unit : '' }}",
+        title=("c.doc",),
+        classes="text-caption",
+    )
+
+
+# -- start page and files -------------------------------------------------------------------------------
+
+
+def build_start(sandbox: Sandbox) -> None:
+    """Build the start page: new model, samples, recent files, recovered sessions and lessons."""
+    with (
+        vuetify3.VDialog(
+            model_value=("start.open",), update_modelValue=(sandbox.show_start, "[$event]"), max_width=860
+        ),
+        vuetify3.VCard(title="Sandbox", subtitle="Model, and cover models with decals."),
+        vuetify3.VCardText(),
+    ):
+        with html.Div(classes="d-flex flex-wrap ga-3 mb-4"):
+            _start_tile("mdi-plus", "New model", sandbox.new_model)
+            with (
+                html.Div(v_for="name in start.samples", key="name"),
+                vuetify3.VCard(
+                    width=140,
+                    variant="outlined",
+                    click=(sandbox.open_sample, "[name]"),
+                    raw_attrs=named("'sample ' + name"),
+                ),
+            ):
+                vuetify3.VImg(src=("thumbnails[name]",), height=88, cover=True, alt="")
+                html.Div("{{ name }}", classes="text-caption text-center pa-1")
+        _build_open_file()
+        for family, title, event in (
+            ("recovered", "Recovered sessions", sandbox.open_file),
+            ("recent", "Files in this folder", sandbox.open_file),
+        ):
+            with html.Div(v_if=f"start.{family}.length", classes="mt-4"):
+                html.H2(title, classes="text-subtitle-2")
+                with vuetify3.VList(density="compact"):
+                    vuetify3.VListItem(
+                        v_for=f"file in start.{family}",
+                        key="file.name",
+                        title=("file.name",),
+                        subtitle=("file.when",),
+                        click=(event, "[file.name]"),
+                    )
+        with html.Div(v_if="start.lessons.length", classes="mt-4"):
+            html.H2("Lessons", classes="text-subtitle-2")
+            with vuetify3.VList(density="compact"):
+                vuetify3.VListItem(
+                    v_for="lesson in start.lessons",
+                    key="lesson.name",
+                    title=("lesson.title",),
+                    href=("lesson.address",),
+                )
+
+
+def _start_tile(icon: str, text: str, click: Any) -> None:
+    with vuetify3.VCard(width=140, variant="outlined", click=click, raw_attrs=named(f"'{text}'")):
+        with html.Div(classes="d-flex align-center justify-center", style="height: 88px"):
+            vuetify3.VIcon(icon, size=40)
+        html.Div(text, classes="text-caption text-center pa-1")
+
+
+def _build_open_file() -> None:
+    html.Label("Open from this computer (or drop files on the view): ", classes="text-caption")
+    html.Input(
+        type="file",
+        multiple=True,
+        accept=",".join(MODELS + IMAGES),
+        raw_attrs=named("'open from this computer'"),
+        change=DROP.format("target"),
+    )
+
+
+def build_files(sandbox: Sandbox) -> None:
+    """Build the menu that writes files: scene, script, mesh and picture by the suffix of the name."""
+    with vuetify3.VMenu(close_on_content_click=False):
+        with vuetify3.Template(v_slot_activator="{ props }"):
+            vuetify3.VBtn("File", v_bind="props", prepend_icon="mdi-file-outline", size="small")
+        with vuetify3.VCard(width=340, classes="pa-3"):
+            vuetify3.VBtn(
+                "Open or new ...", size="small", variant="tonal", click=(sandbox.show_start, "[true]")
+            )
+            html.P(
+                "Save or export. The ending is the format: .json scene, .py script, .ply .stl .obj mesh, "
+                ".png picture.",
+                classes="text-caption mt-3 mb-1",
+            )
+            with html.Div(classes="d-flex ga-2 align-center"):
+                vuetify3.VTextField(v_model=("file_name", ""), raw_attrs=named("'file name'"), **FIELD)
+                vuetify3.VBtn("Write", size="small", click=(sandbox.write_file, "[file_name, replace_file]"))
+            vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists", **COMPACT)
+
+
+# -- view -----------------------------------------------------------------------------------------------
+
+
+def build_view_menu(sandbox: Sandbox) -> None:
+    """Build the menu of modes, overlays, slices and cameras."""
+    with vuetify3.VMenu(close_on_content_click=False):
+        with vuetify3.Template(v_slot_activator="{ props }"):
+            vuetify3.VBtn("View", v_bind="props", prepend_icon="mdi-eye-outline", size="small")
+        with vuetify3.VCard(width=320, classes="pa-3"):
+            for name, items in (
+                ("mode", MODES),
+                ("overlay", OVERLAYS),
+                ("slice_axis", [{"title": "no slice", "value": ""}, *AXES]),
+            ):
+                vuetify3.VSelect(
+                    label=name.replace("_", " "),
+                    model_value=(f"display.{name}",),
+                    items=(f"{name}_items", list(items)),
+                    update_modelValue=(sandbox.set_display, f"['{name}', $event]"),
+                    classes="mb-2",
+                    **FIELD,
+                )
+            vuetify3.VSlider(
+                v_if="display.slice_axis",
+                model_value=("display.slice_position",),
+                min=0,
+                max=1,
+                step=0.01,
+                name="slice position",
+                update_modelValue=(sandbox.set_display, "['slice_position', $event]"),
+                **COMPACT,
+            )
+            with html.Div(classes="d-flex"):
+                for name, label in (("parallel", "orthographic"), ("axes", "axes")):
+                    vuetify3.VSwitch(
+                        model_value=(f"display.{name}",),
+                        label=label,
+                        update_modelValue=(sandbox.set_display, f"['{name}', $event]"),
+                        color="primary",
+                        classes="mr-4",
+                        **COMPACT,
+                    )
+            with html.Div(classes="d-flex flex-wrap ga-1 my-2"):
+                vuetify3.VBtn("Frame selection", size="x-small", click=(sandbox.move_camera, "['frame']"))
+                for name in PRESETS:
+                    vuetify3.VBtn(name, size="x-small", click=(sandbox.move_camera, f"['look', '{name}']"))
+            with html.Div(classes="d-flex flex-wrap ga-1"):
+                vuetify3.VBtn("Keep this view", size="x-small", click=(sandbox.move_camera, "['keep']"))
+                vuetify3.VBtn(
+                    "{{ name }}",
+                    v_for="(name, i) in display.bookmarks",
+                    key="name",
+                    size="x-small",
+                    click=(sandbox.move_camera, "['go', i]"),
+                )
+
+
+# -- decals ---------------------------------------------------------------------------------------------
+
+
+def build_brushes(sandbox: Sandbox) -> None:
+    """Build the choice of brushes."""
+    with vuetify3.VBtnToggle(
+        model_value=("brush.brush",),
+        mandatory=True,
+        density="compact",
+        update_modelValue=(sandbox.set_brush, "['brush', $event]"),
+        raw_attrs=['aria-label="brush"'],
+    ):
+        for brush in Brush:
+            vuetify3.VBtn(
+                value=str(brush),
+                icon=BRUSH_ICONS[brush],
+                size="small",
+                width=36,
+                title=BRUSH_TEXTS[brush],
+                raw_attrs=named(f"'{BRUSH_TEXTS[brush]}'"),
+            )
+
+
+def build_decal_panel(sandbox: Sandbox) -> None:
+    """Build the panels of the brush, the selected decals, and the contact modes."""
+    with html.Div(v_if="brush.brush !== 'select'", classes="pa-3"):
+        html.H2("{{ brush.brush }} brush", classes="text-subtitle-1")
+        with html.Div(v_for="c in brush.controls", key="c.name"):
+            build_label()
+            build_number(sandbox.set_brush)
+    with html.Div(v_if="decal.count", classes="pa-3"):
+        html.H2(
+            "{{ decal.count === 1 ? 'Decal' : decal.count + ' decals' }}",
+            classes="text-subtitle-1",
+        )
+        with html.Div(v_for="c in decal.controls", key="c.name", classes="mb-1"):
+            build_label()
+            build_number(sandbox.set_decals)
+            build_choices(sandbox.set_decals)
+    with html.Div(v_if="decals", classes="pa-3"):
+        html.H2("Contact of {{ decals }} decals", classes="text-subtitle-1")
+        for name, choices in (("contact", "contacts"), ("mapping", "mappings")):
+            vuetify3.VSelect(
+                label=name,
+                classes="mb-2",
+                model_value=(f"modes.{name}",),
+                items=(f"modes.{choices}",),
+                update_modelValue=(sandbox.set_mode, f"['{name}', $event]"),
+                **FIELD,
+            )
+        with html.Div(v_if="modes.contact === 'elastic'"):
+            html.Label("stiffness", classes="text-caption")
+            vuetify3.VSlider(
+                model_value=("modes.stiffness",),
+                min=1,
+                max=("modes.max_stiffness",),
+                step=0.1,
+                name="stiffness",
+                update_modelValue=(sandbox.set_mode, "['stiffness', $event]"),
+                **COMPACT,
+            )
+
+
+def build_pick() -> None:
+    """Build the report of the last click."""
+    with html.Div(v_if="Object.keys(pick).length", classes="pa-3 text-caption"):
+        html.H2("Last click", classes="text-subtitle-1")
+        html.Div("{{ name }}: {{ text }}", v_for="(text, name) in pick", key="name")
+
+
+def build_actions(sandbox: Sandbox) -> None:
+    """Build the menu of all actions, with their keys, by group."""
+    with vuetify3.VMenu(max_height=560):
+        with vuetify3.Template(v_slot_activator="{ props }"):
+            vuetify3.VBtn("Actions", v_bind="props", prepend_icon="mdi-keyboard-outline", size="small")
+        with vuetify3.VList(density="compact"):
+            for group in Group:
+                bindings = [binding for binding in KEYS.bindings if _offered(binding, group)]
+                if bindings:
+                    vuetify3.VListSubheader(group.value)
+                for binding in bindings:
+                    vuetify3.VListItem(
+                        title=binding.summary,
+                        subtitle=format_gestures(binding),
+                        click=(sandbox.perform, f"['{binding.action}']"),
+                    )
+
+
+def _offered(binding: Binding, group: Group) -> bool:
+    return binding.group is group and binding.action not in (CAMERA, "move", "close", "select", "select_also")

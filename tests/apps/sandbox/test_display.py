@@ -1,0 +1,243 @@
+"""View, decal panel and outline changes of the sandbox, without a browser."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import decals
+from blobtree import Point, Transform
+from blobtree.nodes.paths import node_at
+from blobtree.nodes.surgery import move_branch
+from decals.apps.sandbox.display import MODES, OVERLAYS
+from decals.apps.sandbox.sandbox import Sandbox
+from decals.apps.views import PRESETS
+from decals.record import Contact
+from decals.scenes.objects import MeshObject
+from decals.window import EditWindow
+from tests.apps.sandbox.test_sandbox import TREE, finish
+from tests.decals.editing.scenes import box, digest, tree_of
+
+
+@pytest.fixture(scope="module")
+def shared(vtk_display: None) -> Iterator[EditWindow]:
+    vertices, faces = box((-3, -1, -1), (-2, 1, 1))
+    objects: list[Any] = [decals.TreeObject("blob", TREE), MeshObject("crate", vertices, faces)]
+    scene = decals.cover(TREE, count=40, images=["tile"]).replace(objects=objects)
+    with EditWindow(scene, off_screen=True, size=(120, 90)) as window:
+        window.show()
+        yield window
+
+
+@pytest.fixture
+def sandbox(shared: EditWindow) -> Iterator[Sandbox]:
+    sandbox = Sandbox(shared)
+    yield sandbox
+    for name, value in (("mode", "traced"), ("overlay", "none"), ("slice_axis", "")):
+        sandbox.set_display(name, value)
+    settle(sandbox, shared)
+    sandbox.go_to(0)
+    shared.actions.state.selection, shared.actions.state.primitive = (), None
+
+
+def settle(sandbox: Sandbox, window: EditWindow) -> None:
+    """Wait until the view shows what it should."""
+    finish(window)
+    sandbox.settle()
+    while sandbox.values()["display"]["busy"]:
+        sandbox.settle()
+    sandbox.settle()
+
+
+def picture(window: EditWindow) -> np.ndarray:
+    pixels: np.ndarray = np.asarray(window.plotter.screenshot(None, return_img=True)).astype(int)
+    return pixels
+
+
+def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
+    sandbox: Sandbox, shared: EditWindow
+) -> None:
+    pictures = [picture(shared)]
+    choices: list[tuple[str, Any]] = [("mode", mode) for mode in MODES[1:]] + [("mode", MODES[0])]
+    choices += [("overlay", overlay) for overlay in OVERLAYS[1:] if overlay != "folds"]
+    choices += [("overlay", "none"), ("slice_axis", "z"), ("slice_position", 0.3), ("slice_axis", "")]
+    for name, value in choices:
+        sandbox.set_display(name, value)
+        settle(sandbox, shared)
+        drawn = picture(shared)
+        if value in ("traced", "none", ""):
+            np.testing.assert_array_equal(drawn, pictures[0])
+        else:
+            assert all(np.abs(drawn - other).mean() > 0.3 for other in pictures), (name, value)
+            pictures.append(drawn)
+    sandbox.set_display("overlay", "folds")
+    settle(sandbox, shared)
+    assert "triangles folded" in sandbox.status
+
+
+def test_overlays_follow_edits(sandbox: Sandbox, shared: EditWindow) -> None:
+    sandbox.set_display("overlay", "seeds")
+    settle(sandbox, shared)
+    assert "40 seeds" in sandbox.status
+    shared.actions.state.selection = (3,)
+    sandbox.perform("delete")
+    settle(sandbox, shared)
+    assert "39 seeds" in sandbox.status
+
+
+def test_cameras(sandbox: Sandbox, shared: EditWindow) -> None:
+    camera = shared.subplot.vtk_renderer.camera
+    sandbox.move_camera("keep")
+    kept = camera.position
+    for name in PRESETS:
+        sandbox.move_camera("look", name)
+        toward = np.array(camera.position) - camera.focal_point
+        preset = np.array(PRESETS[name])
+        np.testing.assert_allclose(toward / np.linalg.norm(toward), preset / np.linalg.norm(preset))
+    sandbox.set_display("parallel", True)
+    assert sandbox.values()["display"]["parallel"]
+    sandbox.move_camera("go", 0)
+    assert camera.position == kept
+    assert not sandbox.values()["display"]["parallel"]
+    distances = []
+    for choose in ("", "0/1"):
+        sandbox.select(choose)
+        sandbox.move_camera("frame")
+        distances.append(camera.distance)
+    assert distances[1] < distances[0]
+    wrong: list[Any] = [("look", "up"), ("go", 9), ("go", True), ("fly", None), (None, None)]
+    for name, value in wrong:
+        sandbox.move_camera(name, value)
+        assert "expected" in sandbox.status
+    wrong = [("mode", "x"), ("overlay", None), ("slice_position", "x"), (3, 3)]
+    for name, value in wrong:
+        sandbox.set_display(name, value)
+        assert "expected" in sandbox.status
+
+
+def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: EditWindow) -> None:
+    before = digest(shared.document)
+    shared.actions.state.selection = (3, 5)
+    values: dict[str, Any] = {
+        "radius": 0.3,
+        "opacity": 0.5,
+        "layer": 2,
+        "interaction": "overlap",
+        "spill": True,
+        "tint": "#ff0000",
+        "image": "tint alone",
+    }
+    controls = {control["name"]: control for control in sandbox.values()["decal"]["controls"]}
+    assert set(controls) == set(values)
+    for name, value in values.items():
+        sandbox.set_decals(name, value, False)
+        sandbox.set_decals(name, value, True)
+        finish(shared)
+    rows = shared.document.decals.take(np.array([3, 5]))
+    assert rows.radii.tolist() == [np.float32(0.3)] * 2
+    assert rows.images.tolist() == [-1, -1]
+    assert rows.spill.all()
+    controls = {control["name"]: control["value"] for control in sandbox.values()["decal"]["controls"]}
+    assert {name: controls[name] for name in ("layer", "interaction", "tint", "image")} == {
+        "layer": 2,
+        "interaction": "overlap",
+        "tint": "#ff0000",
+        "image": "tint alone",
+    }
+    assert len(sandbox.values()["done"]) == len(values)
+    wrong: list[Any] = [("radius", -1), ("radius", "x"), ("image", "no"), ("tint", 3), ("no", 1), (None, 1)]
+    for name, value in wrong:
+        sandbox.set_decals(name, value)
+        assert "expected" in sandbox.status or "radii" in sandbox.status
+    sandbox.go_to(0)
+    assert digest(shared.document) == before
+
+
+def test_brush_and_modes_are_set(sandbox: Sandbox, shared: EditWindow) -> None:
+    sandbox.set_brush("brush", "scatter")
+    sandbox.set_brush("radius", "0.7")
+    sandbox.set_brush("density", 0.5)
+    values = sandbox.values()["brush"]
+    assert values["brush"] == "scatter"
+    assert {control["name"]: control["value"] for control in values["controls"]}["radius"] == 0.7
+    for name, value in (("brush", "paint"), ("radius", 0), ("density", 2), ("color", 1), ("radius", None)):
+        sandbox.set_brush(name, value)
+        assert "expected" in sandbox.status
+    sandbox.set_brush("brush", "select")
+    sandbox.set_mode("contact", "elastic")
+    sandbox.set_mode("stiffness", 3)
+    assert (shared.subplot.contact, shared.subplot.stiffness) == (Contact.ELASTIC, 3.0)
+    for name, value in (("contact", "x"), ("stiffness", 0), ("stiffness", "x"), ("color", 1)):
+        sandbox.set_mode(name, value)
+        assert "expected" in sandbox.status
+    sandbox.set_mode("stiffness", 1)
+    sandbox.set_mode("contact", "product")
+
+
+def test_a_click_reports_what_it_meets(sandbox: Sandbox, shared: EditWindow) -> None:
+    sandbox.move_camera("frame")
+    x, y = next(
+        (x, y)
+        for y in range(20, 70, 4)
+        for x in range(60, 110, 4)
+        if (p := shared.tools.at(x, y)) and not p.object
+    )
+    shared.tools.press(x, y)
+    shared.tools.release(x, y)
+    facts = sandbox.values()["pick"]
+    assert facts["object"] == "blob"
+    assert facts["primitive"].startswith("Point")
+    assert abs(float(facts["field"]) - 0.5) < 1e-3
+    assert len(facts["position"].split(", ")) == 3
+
+
+def test_rows_are_renamed_duplicated_moved_and_removed(sandbox: Sandbox, shared: EditWindow) -> None:
+    before = digest(shared.document)
+    sandbox.change_row("object 0", "rename", "snail")
+    sandbox.change_row("object 0", "duplicate")
+    finish(shared)
+    assert [item.name for item in shared.document.objects] == ["snail", "crate", "snail 2"]
+    sandbox.change_row("0/0", "move", "0/1")
+    finish(shared)
+    first: Any = tree_of(shared.document)
+    assert [ball.radius for ball in first.children] == [0.6, 1.0]
+    assert sandbox.values()["selected"] == "0/1"
+    sandbox.change_row("0/1", "duplicate")
+    finish(shared)
+    assert len(tree_of(shared.document).children) == 3
+    sandbox.change_row("0/2", "remove")
+    finish(shared)
+    sandbox.change_row("object 2", "remove")
+    finish(shared)
+    changes: list[Any] = [
+        ("object 0", "rename", "crate"),
+        ("object 0", "rename", ""),
+        ("object 0", "rename", None),
+        ("0/0", "rename", "x"),
+        ("0/0", "move", "1"),
+        ("0/0", "move", "0/0"),
+        ("0/0", "move", None),
+        ("0", "remove", None),
+        ("object 7", "remove", None),
+        ("x", "remove", None),
+        (None, "duplicate", None),
+        ("object 0", "explode", None),
+    ]
+    for key, change, value in changes:
+        sandbox.change_row(key, change, value)
+        finish(shared)
+        assert sandbox.status, (key, change)
+    assert len(shared.document.objects) == 2
+    sandbox.go_to(0)
+    assert digest(shared.document) == before
+
+
+def test_a_moved_branch_stays_where_it_is() -> None:
+    group = (Point((0, 0, 0), radius=0.5) + Point((1, 0, 0), radius=0.3)).translate((0, 2, 0))
+    tree = group + Point((0, -1, 0), radius=0.4) + TREE.twist(10.0)
+    points = np.random.default_rng(2).uniform(-2, 3, (500, 3)).astype(np.float32)
+    for path, target in (((1,), (0, 0)), ((0, 0, 1), ()), ((0, 0, 1), (1,)), ((0,), (1,)), ((1,), (0,))):
+        moved, found = move_branch(tree, path, target)
+        np.testing.assert_allclose(moved(points), tree(points), atol=2e-6)
+        assert type(node_at(moved, found)) in (type(node_at(tree, path)), Transform)

@@ -1,0 +1,167 @@
+"""Files of the sandbox without a browser: the start page, opening, uploads, and what is written."""
+
+import io
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import blobtree
+import decals
+from blobtree import Point
+from decals.apps.models.samples import SAMPLES
+from decals.apps.sandbox.folder import listed, read_upload, thumbnails
+from decals.apps.sandbox.sandbox import Sandbox
+from decals.editing.commands import ScaleDecals
+from decals.errors import ImplicitDecalsError
+from decals.scenes.files import load_scene, save_scene
+from decals.scenes.meshes import write_mesh
+from decals.window import EditWindow
+from tests.apps.sandbox.test_sandbox import TREE, finish
+
+BALL = Point((0, 0, 0), radius=1.0)
+
+
+@pytest.fixture
+def window(vtk_display: None, tmp_path: Path) -> Iterator[EditWindow]:
+    scene = decals.cover(TREE, count=20, images=["tile"])
+    with EditWindow(scene, off_screen=True, size=(80, 60), path=tmp_path / "scene.json") as window:
+        window.show()
+        yield window
+
+
+@pytest.fixture
+def sandbox(window: EditWindow, tmp_path: Path) -> Sandbox:
+    return Sandbox(window, folder=tmp_path, start=True)
+
+
+def picture() -> bytes:
+    buffer = io.BytesIO()
+    Image.fromarray(np.full((4, 5, 3), 77, np.uint8)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def test_the_start_page_lists_samples_files_and_recovered_sessions(
+    sandbox: Sandbox, window: EditWindow, tmp_path: Path
+) -> None:
+    blobtree.save(BALL, tmp_path / "ball.json")
+    (tmp_path / "lost.recovery.json").write_text("{}")
+    (tmp_path / ".hidden.json").write_text("{}")
+    (tmp_path / "notes.txt").write_text("")
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "stone.stl").write_text("")
+    start = sandbox.values()["start"]
+    assert start["open"]
+    assert set(start["samples"]) == set(SAMPLES) == set(thumbnails())
+    sandbox.show_start(True)
+    start = sandbox.values()["start"]
+    assert {file["name"] for file in start["recent"]} == {"ball.json", "more/stone.stl"}
+    assert [file["name"] for file in start["recovered"]] == ["lost.json"]
+    sandbox.new_model()
+    finish(window)
+    values = sandbox.values()
+    assert (values["start"]["open"], values["outline"][0]["kind"], values["done"]) == (False, "image", [])
+    assert values["title"] == "scene.json"
+    assert listed(tmp_path / "none") == {"recent": [], "recovered": []}
+
+
+def test_a_model_is_opened_changed_saved_and_opened_again(
+    sandbox: Sandbox, window: EditWindow, tmp_path: Path
+) -> None:
+    blobtree.save(BALL, tmp_path / "ball.json")
+    sandbox.open_file("ball.json")
+    finish(window)
+    assert window.document.objects[0].tree == BALL  # type: ignore[union-attr]
+    assert window.actions.files.path == tmp_path / "ball-decals.json"
+    sandbox.add("Torus")
+    finish(window)
+    sandbox.write_file("mine.json")
+    finish(window)
+    tree = window.document.objects[0].tree  # type: ignore[union-attr]
+    sandbox.new_model()
+    finish(window)
+    sandbox.open_file("mine.json")
+    finish(window)
+    assert window.document.objects[0].tree == tree  # type: ignore[union-attr]
+    assert (sandbox.values()["title"], sandbox.values()["done"]) == ("mine.json", [])
+    for name, ending in (("ball.png", b"\x89PNG"), ("ball.stl", None), ("ball.py", b'"""A scene')):
+        sandbox.write_file(name)
+        finish(window)
+        written = (tmp_path / name).read_bytes()
+        assert ending is None or written.startswith(ending), sandbox.status
+        sandbox.write_file(name)
+        assert "exists" in sandbox.status
+    assert runpy.run_path(str(tmp_path / "ball.py"))["scene"].objects[0].tree == tree
+
+
+def test_a_recovered_session_is_opened(sandbox: Sandbox, window: EditWindow, tmp_path: Path) -> None:
+    lost = decals.cover(BALL, count=3, images=["eye"])
+    save_scene(lost, tmp_path / "lost.recovery.json")
+    sandbox.open_file("lost.json")
+    finish(window)
+    assert len(window.document.decals) == 3
+    assert sandbox.values()["done"] == ["recover unsaved changes"]
+    window.session.do(ScaleDecals([window.document.decals.numbers[0]], 2.0))
+    sandbox.perform("save")
+    finish(window)
+    assert load_scene(tmp_path / "lost.json").decals.radii[0] == 2 * lost.decals.radii[0]
+    assert not (tmp_path / "lost.recovery.json").exists()
+
+
+def test_dropped_files_are_added(sandbox: Sandbox, window: EditWindow, tmp_path: Path) -> None:
+    write_mesh([decals.TreeObject("x", BALL)], tmp_path / "x.ply")
+    blobtree.save(BALL, tmp_path / "ball.json")
+    save_scene(decals.cover(BALL, count=3, images=["eye"]), tmp_path / "all.json")
+    files = [
+        {"name": "moss.png", "content": picture()},
+        {"name": "../../x.ply", "content": (tmp_path / "x.ply").read_bytes()},
+        {"name": "ball.json", "content": (tmp_path / "ball.json").read_bytes()},
+    ]
+    for file in files:
+        sandbox.upload([file])
+        finish(window)
+    assert [item.name for item in window.document.objects][1:] == ["x", "ball"]
+    assert window.document.images[-1].source == "moss"
+    sandbox.upload([{"name": "all.json", "content": [(tmp_path / "all.json").read_bytes()]}])
+    finish(window)
+    assert len(window.document.decals) == 3
+    assert sandbox.values()["title"] == "all-2.json"
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        None,
+        3,
+        {},
+        {"name": "a.ply"},
+        {"name": 3, "content": b""},
+        {"name": "a.exe", "content": b"MZ"},
+        {"name": "a.png", "content": b"no picture"},
+        {"name": "a.json", "content": b"{"},
+        {"name": "a.ply", "content": b"ply\nbroken"},
+        {"name": ".json", "content": b"{}"},
+    ],
+)
+def test_wrong_uploads_say_why(file: Any) -> None:
+    with pytest.raises(ImplicitDecalsError):
+        read_upload(file)
+
+
+def test_files_outside_the_folder_are_neither_read_nor_written(
+    sandbox: Sandbox, window: EditWindow, tmp_path: Path
+) -> None:
+    for name in ("../a.json", "/etc/passwd.json", "none.json", None, 3, "a.txt", ""):
+        sandbox.open_file(name)  # type: ignore[arg-type]
+        assert "expected a" in sandbox.status
+    for name in ("../a.py", "/tmp/a.png", "no/such/a.png", None, "a.exe"):
+        sandbox.write_file(name)  # type: ignore[arg-type]
+        assert "expected a" in sandbox.status
+    sandbox.open_sample("../knot")
+    assert "expected one of" in sandbox.status
+    assert len(window.document.decals) == 20
+    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith(".")] == []
