@@ -27,9 +27,11 @@ from decals.field.radial import (
     NO_OWNER,
     RIM_SQUARED,
     balls_nested,
-    cell_owner,
+    comes_next,
     is_above,
+    nested_owner,
     power,
+    size_above,
 )
 from decals.index.lookup import IndexedDecals, cell_range, rank_range
 from decals.record import (
@@ -129,17 +131,14 @@ def pushed_along_ray(distance: wp.float32, squares: wp.float32) -> wp.float32:
 
 
 @wp.func
-def elastic_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.float32:
-    """Return E = 1 − F of a contact decal at q, compressed along its ray by all neighbours."""
+def sum_of_pushes(
+    q: wp.vec3, n_q: wp.vec3, owner: wp.int32, ray: wp.vec3, distance: wp.float32, index: IndexedDecals
+) -> wp.float32:
+    """Return Σ z² of all neighbours of a contact decal, in a traversal of the index."""
     rank = wp.int32(0)
     if index.layered:
         rank = rank_of(owner, index.records)
     radius = visible_radius(owner, index.records)
-    w = (q - xyz(index.records[RECORD * owner])) / radius
-    distance = wp.length(w)
-    if distance == 0.0:
-        return 0.0
-    ray = w / distance
     squares = wp.float32(0.0)
     for level in range(index.level_count):
         span = rank_range(q, rank, level, index)
@@ -153,18 +152,72 @@ def elastic_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: Indexed
                     visible_radius(index.ids[j], index.records),
                     index.stiffness,
                 )
-                squares += square_of_push(distance, push)
-    return pushed_along_ray(wp.min(distance, 1.0), squares)
+                if push > 0.0:
+                    squares += square_of_push(distance, push)
+    return squares
+
+
+@wp.func
+def elastic_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.float32:
+    """Return E = 1 − F of a contact decal at q, compressed along its ray by all neighbours."""
+    w = (q - xyz(index.records[RECORD * owner])) / visible_radius(owner, index.records)
+    distance = wp.length(w)
+    ray = w / wp.max(distance, MIN_DISTANCE)
+    return pushed_along_ray(wp.min(distance, 1.0), sum_of_pushes(q, n_q, owner, ray, distance, index))
+
+
+@wp.func
+def kept_owner(
+    q: wp.vec3, first: wp.vec4i, last: wp.vec4i, closest: wp.int32, index: IndexedDecals
+) -> wp.int32:
+    """Return the decal of `decals.field.radial.nested_owner`, given all candidates at q."""
+    a = first
+    b = last
+    closest_ball = index.records[RECORD * closest]
+    tried = wp.int32(closest)
+    while True:
+        tried_ball = index.records[RECORD * tried]
+        radius = RIM_RADIUS * tried_ball[3]
+        own = power(q - xyz(tried_ball), radius)
+        inside = bool(tried != closest)
+        lower = wp.int32(NO_OWNER)
+        lower_size = wp.float32(0.0)
+        for _kept in range(MAX_KEPT):
+            decal = a[0]
+            a = wp.vec4i(a[1], a[2], a[3], b[0])
+            b = wp.vec4i(b[1], b[2], b[3], decal)
+            if decal >= 0 and decal != tried:
+                ball = index.records[RECORD * decal]
+                offset = q - xyz(ball)
+                if field_complement(wp.dot(offset, offset) / (ball[3] * ball[3])) <= 0.5:
+                    if inside and power(offset, RIM_RADIUS * ball[3]) < own:
+                        inside = balls_nested(xyz(ball) - xyz(tried_ball), radius, RIM_RADIUS * ball[3])
+                    if comes_next(
+                        ball, decal, lower_size, lower, tried_ball[3], tried, closest_ball, closest
+                    ):
+                        lower = decal
+                        lower_size = ball[3]
+        if inside:
+            return tried
+        if lower < 0:
+            return closest
+        tried = lower
+    return closest
 
 
 @wp.func
 def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
-    """Return (owner, E) at q in one traversal of the index; (NO_OWNER, 0) outside all rims.
+    """Return (owner, E) at q; (NO_OWNER, 0) outside all rims. The decals must not be layered.
 
-    They are those of `cell_owner` and `elastic_complement`. The decals must not be layered.
+    They are those of `cell_owner` and `elastic_complement`. One traversal of the index finds the candidates,
+    and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
+    one is the owner, unless it is nested with another holder above it.
     """
-    owner = wp.int32(NO_OWNER)
+    closest = wp.int32(NO_OWNER)
     least = wp.float32(0.0)
+    topmost = wp.int32(NO_OWNER)
+    topmost_ball = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    holders = wp.int32(0)
     count = wp.int32(0)
     a = wp.vec4i(NO_OWNER, NO_OWNER, NO_OWNER, NO_OWNER)
     b = wp.vec4i(NO_OWNER, NO_OWNER, NO_OWNER, NO_OWNER)
@@ -182,23 +235,37 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
                     a = wp.vec4i(decal, a[0], a[1], a[2])
                     count += 1
                     if field_complement(squared / size) <= 0.5:
+                        holders += 1
+                        if topmost < 0 or size_above(ball[3], decal, topmost_ball[3], topmost):
+                            topmost = decal
+                            topmost_ball = ball
                         own = power(offset, RIM_RADIUS * ball[3])
                         if (
-                            owner < 0
+                            closest < 0
                             or own < least
-                            or (own == least and is_above(decal, owner, index.records))
+                            or (own == least and is_above(decal, closest, index.records))
                         ):
                             least = own
-                            owner = decal
-    if owner < 0:
+                            closest = decal
+    if closest < 0:
         return wp.vec2(float(NO_OWNER), 0.0)
-    own_ball = index.records[RECORD * owner]
+    owner = wp.int32(closest)
+    own_ball = index.records[RECORD * closest]
+    if topmost != closest:
+        if holders == 2:
+            offset = xyz(topmost_ball) - xyz(own_ball)
+            if balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
+                owner = topmost
+        elif count > MAX_KEPT:
+            owner = nested_owner(q, n_q, closest, index)
+        else:
+            owner = kept_owner(q, a, b, closest, index)
+        own_ball = index.records[RECORD * owner]
     radius = RIM_RADIUS * own_ball[3]
     w = (q - xyz(own_ball)) / radius
     distance = wp.length(w)
     ray = w / wp.max(distance, MIN_DISTANCE)
     squares = wp.float32(0.0)
-    again = bool(count > MAX_KEPT)
     for _kept in range(wp.min(count, MAX_KEPT)):
         other = a[0]
         a = wp.vec4i(a[1], a[2], a[3], b[0])
@@ -209,11 +276,6 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
             push = plane_push(ray, distance, between, radius, RIM_RADIUS * ball[3], index.stiffness)
             if push > 0.0:
                 squares += square_of_push(distance, push)
-            if ball[3] < own_ball[3] or (ball[3] == own_ball[3] and other < owner):
-                offset = q - xyz(ball)
-                if field_complement(wp.dot(offset, offset) / (ball[3] * ball[3])) <= 0.5:
-                    again = again or balls_nested(between, radius, RIM_RADIUS * ball[3])
-    if again:
-        owner = cell_owner(q, n_q, rank_of(owner, index.records), index)
-        return wp.vec2(float(owner), elastic_complement(q, n_q, owner, index))
+    if count > MAX_KEPT:
+        squares = sum_of_pushes(q, n_q, owner, ray, distance, index)
     return wp.vec2(float(owner), pushed_along_ray(wp.min(distance, 1.0), squares))

@@ -56,15 +56,22 @@ def power(w: wp.vec3, radius: wp.float32) -> wp.float32:
 
 @wp.func
 def balls_nested(apart: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.bool:
-    """Return True if two decals with these radii, and centres this far apart, are nested."""
+    """Return True if two decals with these radii, and centres this far apart, are nested.
+
+    With the distance D of the centres, and radii a ≤ b, that is D² − (b² − a²) ≤ 2 MIN_KEPT_RADIUS·a·D, or
+    D² + (b² − a²) ≤ 2 MIN_KEPT_RADIUS·b·D. The squares of both sides need no root.
+    """
     smaller = wp.min(radius, other)
     larger = wp.max(radius, other)
     squared = wp.dot(apart, apart)
-    between = squared + (smaller - larger) * (smaller + larger)
-    return between <= 2.0 * MIN_KEPT_RADIUS * smaller * wp.sqrt(
-        squared
-    ) or squared <= 2.0 * MIN_KEPT_RADIUS * larger * wp.sqrt(squared) - (larger - smaller) * (
-        larger + smaller
+    difference = (larger - smaller) * (larger + smaller)
+    from_plane = squared - difference
+    to_plane = squared + difference
+    least = 4.0 * MIN_KEPT_RADIUS * MIN_KEPT_RADIUS * squared
+    return (
+        from_plane <= 0.0
+        or from_plane * from_plane <= least * (smaller * smaller)
+        or to_plane * to_plane <= least * (larger * larger)
     )
 
 
@@ -85,11 +92,15 @@ def power_of(q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp
 
 
 @wp.func
+def size_above(size: wp.float32, decal: wp.int32, other_size: wp.float32, other: wp.int32) -> wp.bool:
+    """Return True if the first of two nested decals with these sizes and numbers is the upper one."""
+    return size < other_size or (size == other_size and decal < other)
+
+
+@wp.func
 def is_above(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
     """Return True if the first of two nested decals is the upper one."""
-    size = decals[RECORD * decal][3]
-    other_size = decals[RECORD * other][3]
-    return size < other_size or (size == other_size and decal < other)
+    return size_above(decals[RECORD * decal][3], decal, decals[RECORD * other][3], other)
 
 
 @wp.func
@@ -100,52 +111,72 @@ def are_nested(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)
     )
 
 
+@wp.func
+def comes_next(
+    ball: wp.vec4,
+    decal: wp.int32,
+    lower_size: wp.float32,
+    lower: wp.int32,
+    tried_size: wp.float32,
+    tried: wp.int32,
+    closest_ball: wp.vec4,
+    closest: wp.int32,
+) -> wp.bool:
+    """Return True if a decal comes before `lower` among those to try after `tried`.
+
+    These are nested with the decal `closest` and above it, in their order from the topmost down. `tried` is
+    `closest` itself before the first of them, and `lower` is negative where none is known yet.
+    """
+    if not size_above(ball[3], decal, closest_ball[3], closest):
+        return False
+    if tried != closest and not size_above(tried_size, tried, ball[3], decal):
+        return False
+    if lower >= 0 and not size_above(ball[3], decal, lower_size, lower):
+        return False
+    return balls_nested(xyz(ball) - xyz(closest_ball), RIM_RADIUS * closest_ball[3], RIM_RADIUS * ball[3])
+
+
 # -- owner ----------------------------------------------------------------------------------------------
 
 
 @wp.func
-def in_cell(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.bool:
-    """Return True if q, inside the rim of a contact decal, lies in its cell."""
-    rank = wp.int32(0)
-    if index.layered:
-        rank = rank_of(decal, index.records)
-    own = power_of(q, decal, index.records)
-    for level in range(index.level_count):
-        span = rank_range(q, rank, level, index)
-        for j in range(span[0], span[1]):
-            if (
-                complement_of(q, n_q, index.ids[j], index.records) <= 0.5
-                and power_of(q, index.ids[j], index.records) < own
-            ):
-                if not are_nested(decal, index.ids[j], index.records):
-                    return False
-    return True
+def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDecals) -> wp.int32:
+    """Return the topmost contact decal whose cell contains q, given the one of least power at q.
 
-
-@wp.func
-def topmost_above(
-    q: wp.vec3, n_q: wp.vec3, decal: wp.int32, limit: wp.int32, index: IndexedDecals
-) -> wp.int32:
-    """Return the topmost decal that is nested with a decal, above it, and has q inside its rim.
-
-    It lies below the decal `limit`, unless that is NO_OWNER. Return NO_OWNER if there is no such decal.
+    Only decals nested with that one can share q with it. Those above it are tried from the topmost down: each
+    traversal finds whether q lies in the cell of one, and the next one.
     """
     rank = wp.int32(0)
     if index.layered:
-        rank = rank_of(decal, index.records)
-    upper = wp.int32(NO_OWNER)
-    for level in range(index.level_count):
-        span = rank_range(q, rank, level, index)
-        for j in range(span[0], span[1]):
-            if (
-                is_above(index.ids[j], decal, index.records)
-                and complement_of(q, n_q, index.ids[j], index.records) <= 0.5
-            ):
-                if upper < 0 or is_above(index.ids[j], upper, index.records):
-                    if limit < 0 or is_above(limit, index.ids[j], index.records):
-                        if are_nested(index.ids[j], decal, index.records):
-                            upper = index.ids[j]
-    return upper
+        rank = rank_of(closest, index.records)
+    closest_ball = index.records[RECORD * closest]
+    tried = wp.int32(closest)
+    while True:
+        tried_ball = index.records[RECORD * tried]
+        radius = RIM_RADIUS * tried_ball[3]
+        own = power(q - xyz(tried_ball), radius)
+        inside = bool(tried != closest)
+        lower = wp.int32(NO_OWNER)
+        lower_size = wp.float32(0.0)
+        for level in range(index.level_count):
+            span = rank_range(q, rank, level, index)
+            for j in range(span[0], span[1]):
+                decal = index.ids[j]
+                if decal != tried and complement_of(q, n_q, decal, index.records) <= 0.5:
+                    ball = index.records[RECORD * decal]
+                    if inside and power(q - xyz(ball), RIM_RADIUS * ball[3]) < own:
+                        inside = balls_nested(xyz(ball) - xyz(tried_ball), radius, RIM_RADIUS * ball[3])
+                    if comes_next(
+                        ball, decal, lower_size, lower, tried_ball[3], tried, closest_ball, closest
+                    ):
+                        lower = decal
+                        lower_size = ball[3]
+        if inside:
+            return tried
+        if lower < 0:
+            return closest
+        tried = lower
+    return closest
 
 
 @wp.func
@@ -169,13 +200,7 @@ def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -
                     owner = index.ids[j]
     if holders < 2:
         return owner
-    # Only decals nested with this owner can share q with it. Try them from the topmost down.
-    upper = topmost_above(q, n_q, owner, NO_OWNER, index)
-    while upper >= 0:
-        if in_cell(q, n_q, upper, index):
-            return upper
-        upper = topmost_above(q, n_q, owner, upper, index)
-    return owner
+    return nested_owner(q, n_q, owner, index)
 
 
 # -- deformation ----------------------------------------------------------------------------------------

@@ -50,6 +50,11 @@ def among(*values: float) -> Draw:
     return lambda rng, count: rng.choice(values, count)
 
 
+def kept(rng: np.random.Generator, count: int) -> Array:
+    """Four numbers of decals; −1 for none."""
+    return rng.integers(-1, DECALS, (count, 4))
+
+
 def units(rng: np.random.Generator, count: int) -> Array:
     vectors = rng.normal(size=(count, 3))
     vectors[:3] = np.eye(3)
@@ -131,6 +136,16 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "apart": {"other": whole(0, DECALS)},
     "is_above": {"other": whole(0, DECALS)},
     "are_nested": {"other": whole(0, DECALS)},
+    "size_above": {
+        **{name: among(0.5, 1, 2) for name in ("size", "other_size")}, "other": whole(0, DECALS),
+    },
+    "comes_next": {
+        "ball": ball, "closest_ball": ball, "lower_size": uniform(0.3, 2.5), "lower": whole(-1, DECALS),
+        "tried_size": uniform(0.3, 2.5), "tried": whole(0, DECALS), "closest": whole(0, DECALS),
+    },
+    "nested_owner": {"closest": whole(0, DECALS)},
+    "kept_owner": {"first": kept, "last": kept, "closest": whole(0, DECALS)},
+    "sum_of_pushes": {"distance": uniform(0.0, 0.2)},  # before all planes, where z is infinite
     "cell_owner": {"rank": among(1)},
     "log_one_minus": {"w": uniform(0.0, 0.999)},
     "cell_coordinate": {"x": uniform(-1000.0, 1000.0)},

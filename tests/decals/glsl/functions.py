@@ -34,7 +34,15 @@ ALL_KINDS = Kinds(
 VERTEX = """#version 330 core
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 """
-_SWIZZLES = {"float": ".x", "vec2": ".xy", "vec3": ".xyz", "vec4": "", "int": ".x", "bool": ".x != 0"}
+_SWIZZLES = {
+    "float": ".x",
+    "vec2": ".xy",
+    "vec3": ".xyz",
+    "vec4": "",
+    "ivec4": "",
+    "int": ".x",
+    "bool": ".x != 0",
+}
 _RESULTS = {
     "float": "vec4({}, 0.0, 0.0, 0.0)",
     "vec2": "vec4({}, 0.0, 0.0)",
@@ -139,7 +147,7 @@ def through_glsl(
             expressions.append(f"x_{name}")
         else:
             uniforms.append(
-                f"uniform {'isampler2D' if glsl_type in ('int', 'bool') else 'sampler2D'} x_{name};"
+                f"uniform {'isampler2D' if glsl_type in ('int', 'ivec4', 'bool') else 'sampler2D'} x_{name};"
             )
             expressions.append(fetch(f"x_{name}", glsl_type))
     returned = str(type_name(typed.returned))
