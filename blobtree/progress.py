@@ -51,7 +51,8 @@ _PACKAGE_LOGGER = logging.getLogger("blobtree")
 _outer: ContextVar["Progress | _Work | None"] = ContextVar("outer", default=None)
 """Where reports of the present work go; each thread has its own."""
 
-_displays: list[Progress] = []
+_displays: list[tuple[Progress, bool]] = []
+"""Displays, and whether each is the only place that shows reports."""
 
 
 @contextmanager
@@ -95,10 +96,17 @@ def reporting(progress: Progress | None = None, cancel: Cancel | None = None) ->
 
 
 @contextmanager
-def displayed(display: Progress) -> Iterator[None]:
+def displayed(display: Progress, *, alone: bool = True) -> Iterator[None]:
     """Within a ``with`` block, show the reports of work without a callback, in all threads, by `display`.
 
     The thread that works calls it, with an empty stage at the end.
+
+    Parameters
+    ----------
+    display
+        Receives the reports.
+    alone
+        False to show them where they are shown by default too.
 
     Examples
     --------
@@ -109,11 +117,12 @@ def displayed(display: Progress) -> Iterator[None]:
     >>> stages[-2:]
     ['connecting vertices', '']
     """
-    _displays.append(display)
+    added = display, alone
+    _displays.append(added)
     try:
         yield
     finally:
-        _displays.remove(display)
+        _displays.remove(added)
 
 
 class _Work:
@@ -128,7 +137,7 @@ class _Work:
     def __call__(self, stage: str, fraction: float) -> None:
         self._stage, self._fraction = stage, fraction
         if _displays:
-            _displays[-1](stage, fraction)
+            _displays[-1][0](stage, fraction)
             self._displayed = True
 
     @contextmanager
@@ -147,11 +156,11 @@ class _Work:
                 _watcher.remove(self)
                 self._line.end()
                 if self._displayed and _displays:
-                    _displays[-1]("", 1.0)
+                    _displays[-1][0]("", 1.0)
 
     def show(self, now: float) -> None:
         """Show the stage, if it is time to."""
-        if not _displays and now - self._shown_at >= self._line.seconds:
+        if not (_displays and _displays[-1][1]) and now - self._shown_at >= self._line.seconds:
             self._shown_at = now
             self._line.show(self._text(now))
 

@@ -34,10 +34,12 @@ import decals
 from blobtree import Point
 from blobtree.errors import ImplicitDecalsError
 from blobtree.files import PREFIX, write_atomically
+from blobtree.nodes.paths import primitive_paths
+from blobtree.progress import reporting
 from blobtree.pyvista_views import write_polydata
-from decals.editing import EditSession, SetValues
+from decals.editing import EditSession, ReplaceNode, SetParameter, SetValues
 from decals.index import DecalIndex
-from decals.rendering import Picture
+from decals.rendering import Picture, RenderOptions
 from decals.scenes.objects import bounds_of
 from decals.surfaces import as_surface
 from tests.decals.editing.fuzz import RandomCommands
@@ -178,10 +180,21 @@ ODD: list[Any] = [
 """Values of no use for most arguments."""
 
 
+def _report(progress: Any, cancel: Any) -> None:
+    with reporting(progress, cancel) as report:
+        report("finding", 0.0)
+
+
 def call_table() -> dict[str, tuple[Callable[..., object], dict[str, Any]]]:
     """Return functions by name, each with arguments that it accepts."""
     tree = Point((0, 0, 0), radius=1.0)
-    spots = scene(8).decals
+    whole = scene(8)
+    spots = whole.decals
+    number, path = next(
+        (number, primitive_paths(item.tree)[0])
+        for number, item in enumerate(whole.objects)
+        if isinstance(item, decals.TreeObject)
+    )
     triangle = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     mesh, implicit = as_surface(triangle), as_surface(tree)
     item = decals.TreeObject("ball", tree)
@@ -235,6 +248,43 @@ def call_table() -> dict[str, tuple[Callable[..., object], dict[str, Any]]]:
         "load_image": (decals.load_image, {"reference": "scale"}),
         "load_model": (decals.load_model, {"path": "x.ply"}),
         "load_scene": (decals.load_scene, {"path": "x.json"}),
+        "polygonize adaptively": (
+            blobtree.polygonize,
+            {"tree": tree, "resolution": 8, "adaptive": True, "creases": False, "max_triangles": 100_000},
+        ),
+        "polygonize to an error": (
+            blobtree.polygonize, {"tree": tree, "chord_error": 0.1, "progress": None, "cancel": None},
+        ),
+        "reporting": (_report, {"progress": None, "cancel": None}),
+        "GradientBlend": (
+            blobtree.GradientBlend, {"operands": (tree, tree), "start_angle": 30.0, "full_angle": 90.0},
+        ),
+        "gradient of a blend": (
+            blobtree.GradientBlend((tree, tree.rotate(axis, 9)), start_angle=30.0, full_angle=90.0).gradient,
+            {"points": points},
+        ),
+        "sample": (blobtree.sample, {"tree": tree, "spacing": 0.25, "width": None, "color": (1, 1, 1)}),
+        "to_sdf": (blobtree.to_sdf, {"tree": tree, "points": points}),
+        "hessian": (tree.hessian, {"points": points}),
+        "set parameter": (
+            lambda **values: EditSession(whole).do(SetParameter(**values)),
+            {"object": number, "path": path, "name": "radius", "value": 0.9, "quick": False},
+        ),
+        "replace node": (
+            lambda **values: EditSession(whole).do(ReplaceNode(**values)),
+            {"object": number, "path": path, "node": tree},
+        ),
+        "elastic": (
+            decals.evaluate,
+            {
+                "decals": spots, "points": points, "normals": directions, "contact": "elastic",
+                "stiffness": 4.0,
+            },
+        ),
+        "RenderOptions": (
+            RenderOptions,
+            {"size": (8, 8), "samples": 1, "contact": "elastic", "stiffness": 4.0, "mapping": "chord"},
+        ),
         "set values": (
             lambda **values: EditSession(scene(8)).do(SetValues.each(**values)),
             {"numbers": [0], "layers": 1, "opacities": 0.5},

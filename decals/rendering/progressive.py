@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -476,11 +477,21 @@ class ProgressiveFrame:
         self.seconds += before - begin
         return self.done
 
-    def complete(self) -> None:
-        """Draw the rest of the frame at once."""
+    def complete(self, *, max_samples: int | None = None) -> None:
+        """Draw the rest of the frame at once.
+
+        With `max_samples`, wait for the GPU after parts of about so many samples. OpenGL holds the
+        interpreter's lock while it draws, so other threads run between the parts only.
+        """
         plan = self._begin(self.targets)
+        width, height = self.targets.gbuffer.size
+        parts = 1 if max_samples is None else max(1, round(plan.work * width * height / max_samples))
         for step in plan.steps[self._step :]:
-            step(Part(self._unit / UNITS))
+            ends = np.linspace(self._unit / UNITS, 1.0, parts + 1)
+            for begin, end in pairwise(ends.tolist()):
+                step(Part(begin, end))
+                if parts > 1:
+                    self._finish()
             self._step, self._unit = self._step + 1, 0
         self._complete_if_done(plan)
 

@@ -28,6 +28,9 @@ VIEWPORT = 0x0BA2
 FRAMEBUFFER = 0x8D40
 """GL_FRAMEBUFFER."""
 
+SOFTWARE_SAMPLES = 1 << 18
+"""Samples after which a drawing without a graphics card waits, so that progress can be shown."""
+
 VTK_VERSION = 320
 """OpenGL version that VTK requests. Some drivers report it although they support more."""
 
@@ -303,7 +306,7 @@ class FrameRenderer:
         """Draw a scene into the renderer's targets; with ``wait``, until the graphics card has finished."""
         frame = self._begin(scene, options, viewpoint, options.slot)
         with self.context.current():
-            frame.complete()
+            frame.complete(max_samples=SOFTWARE_SAMPLES if self.context.software else None)
             self.renderer.sweep()
             if wait and frame.work:
                 self.context.gl.finish()

@@ -346,7 +346,10 @@ class EditWindow:
             raise InvalidEdit("the window was closed; open another EditWindow on its session")
         alive = weakref.ref(self)
         self._opened.enter_context(
-            displayed(lambda *report: None if (window := alive()) is None else window._show_work(*report))
+            displayed(
+                lambda *report: None if (window := alive()) is None else window._show_work(*report),
+                alone=self._title.visible,
+            )
         )
         self.update_overlay()
         if self.ticking:

@@ -28,11 +28,13 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 LEFT_OUT = ("edit", "--install-completion", "dragon", "--all", "--define", "--trust", "bench")
 """Words of commands that need a window, change the home folder, download models, or repeat others."""
 
+SILENCING = re.compile(r"setLevel\(logging.WARNING\)|displayed\(")
+"""Code that turns the output off on purpose, or shows it itself; pages explain how."""
+
 COMPILE = "import pathlib, blobtree.kernels; blobtree.kernels.SHIPPED = pathlib.Path('nowhere')\n"
 """Start of a process that takes no kernels compiled ahead of time."""
 
 COMMAND = "import sys; from decals.apps.cli import main; sys.argv[1:] = {words!r}; main()"
-OFF_SCREEN = "import pyvista; pyvista.OFF_SCREEN = True\n"
 INPUTS = """
 import decals, pyvista
 from blobtree import Point, save
@@ -121,7 +123,7 @@ def page_scripts() -> dict[str, str]:
     for page in PAGES:
         blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
         if blocks:
-            scripts[page.name] = "\n\n".join(blocks)
+            scripts[page.name] = "\n\n".join(block for block in blocks if not SILENCING.search(block))
     return scripts
 
 
@@ -142,6 +144,7 @@ def cold_environment(folder: Path) -> dict[str, str]:
         "WARP_CACHE_PATH": str(folder / "kernels"),
         "MESA_SHADER_CACHE_DIR": str(folder / "shaders"),
         "__GL_SHADER_DISK_CACHE_PATH": str(folder / "shaders"),
+        "PYVISTA_OFF_SCREEN": "true",
     }
 
 
@@ -155,7 +158,7 @@ def cold_runs(start: str, only: Sequence[str] = ()) -> Iterator[tuple[str, Run]]
     only
         The words; none for everything.
     """
-    scripts = {name: OFF_SCREEN + script for name, script in page_scripts().items()}
+    scripts = page_scripts()
     for line in page_commands():
         scripts[line] = COMMAND.format(words=shlex.split(line)[1:])
     with tempfile.TemporaryDirectory() as name:

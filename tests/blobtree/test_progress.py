@@ -112,6 +112,17 @@ def test_a_display_shows_the_work_of_all_threads_and_its_end() -> None:
     assert seen == [("outer", 0.5), ("inner", 0.5), ("", 1.0)]
 
 
+@pytest.mark.usefixtures("quick", "no_handlers")
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_display_that_is_not_alone_leaves_the_line(alone: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    seen: Reports = []
+    with displayed(lambda *report: seen.append(report), alone=alone), reporting() as report:
+        report("finding", 0.0)
+        time.sleep(0.05)
+        assert bool(until_shown(capsys, "Finding") if not alone else capsys.readouterr().err) is not alone
+    assert seen[0] == ("finding", 0.0)
+
+
 def test_cancelled_work_ends_at_its_next_report() -> None:
     seen: Reports = []
     with reporting(lambda *report: seen.append(report), lambda: bool(seen)) as report:
