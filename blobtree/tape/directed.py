@@ -49,7 +49,7 @@ from blobtree.tape.interpreter import (
     field_value,
     make_interpreter,
 )
-from blobtree.tape.rest_kernels import interpret_rest_coordinates
+from blobtree.tape.rest_kernels import interpret_rest_coordinates, own_position
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -374,30 +374,7 @@ def directed_color(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) ->
     return wp.vec4(f[0], f[1], f[2], f[3])
 
 
-@wp.func
-def directed_rest_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> Directed:
-    """Return the point in the primitive's space, and the direction."""
-    return painted(gradient_leaf(q, c, color, direction, reach, rate), q[0], q[1], q[2])
-
-
-@wp.func
-def directed_rest_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
-) -> Directed:
-    """Return the point in the space of a direct field, and the direction."""
-    return painted(direct_value_gradient(kind, q, tape, at), q[0], q[1], q[2])
-
-
-DIRECTED_REST = replace(DIRECTED_COLOR, leaf=directed_rest_leaf, direct=directed_rest_direct)
+DIRECTED_REST = replace(DIRECTED_COLOR, paint=own_position)
 
 interpret_directed_rest = make_interpreter(DIRECTED_REST, _Registers8)
 

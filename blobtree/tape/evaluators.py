@@ -12,7 +12,8 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
   front;
 * `scale_speed(kind, q, speed, reach, tape, at)`: a bound on the speed behind the warp with parameters at
   tape[at] of a point that moves at most at `speed` in front of it;
-* `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field.
+* `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field;
+* `paint(q, color)`: the colour of a leaf at q in its own space, for the three functions of leaves.
 
 Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): along q + u ·
 direction for u from 0 to `reach`, per unit of u. Behind an affine map the ray is still a line, along the
@@ -516,6 +517,12 @@ def color_combine(
     return wp.vec4(p[0], mixed[1], mixed[2], mixed[3])
 
 
+@wp.func
+def own_color(q: wp.vec3, color: wp.vec4) -> wp.vec4:
+    """Return the colour of a leaf."""
+    return color
+
+
 @dataclass(frozen=True)
 class Evaluator:
     """The functions over which the interpreter's loop is closed, and the type of their results."""
@@ -529,6 +536,7 @@ class Evaluator:
     combine: wp.Function
     empty: wp.Function
     type: Any
+    paint: wp.Function = own_color
 
 
 VALUE = Evaluator(

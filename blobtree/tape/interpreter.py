@@ -46,7 +46,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
     leaf, direct, combine, empty = evaluator.leaf, evaluator.direct, evaluator.combine, evaluator.empty
     profiled_leaf = evaluator.profiled_leaf
     pullback_affine, pullback_warp = evaluator.pullback_affine, evaluator.pullback_warp
-    scale_speed = evaluator.scale_speed
+    scale_speed, paint = evaluator.scale_speed, evaluator.paint
     result_type = evaluator.type
 
     @wp.func
@@ -73,7 +73,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             c = closest(code, point, tape, at)
             rate = speed / min_influence(code, tape, at)
             at += texels
-            f = leaf(point, c, tape[at - 1], v, reach, rate)
+            f = leaf(point, c, paint(point, tape[at - 1]), v, reach, rate)
             accumulator = combine(operator, accumulator, f, reach, header[3], tape)
         return accumulator
 
@@ -102,11 +102,12 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             profile = tape[at + 3]
             rate = speed * profile[0] / min_influence(kind, tape, at + PREFIX)
             end = at + PREFIX + stride(kind)
+            color = paint(local, tape[end - 1])
             f = empty()
             if profile[2] == 0.0:
-                f = leaf(local, c, tape[end - 1], v, reach, rate)
+                f = leaf(local, c, color, v, reach, rate)
             else:
-                f = profiled_leaf(local, c, tape[end - 1], v, reach, rate, profile)
+                f = profiled_leaf(local, c, color, v, reach, rate, profile)
             accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator
@@ -131,7 +132,8 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             local = to_local(point, tape, at)
             v = direction_to_local(direction, tape, at)
             end = at + PREFIX + direct_stride(kind)
-            f = direct(kind, local, tape, at + PREFIX, tape[end - 1], v, reach, speed * tape[at + 3][0])
+            color = paint(local, tape[end - 1])
+            f = direct(kind, local, tape, at + PREFIX, color, v, reach, speed * tape[at + 3][0])
             accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator

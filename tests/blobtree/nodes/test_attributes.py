@@ -174,6 +174,11 @@ def test_rest_coordinates_are_those_of_float64(name: str) -> None:
     assert np.isnan(tree.rest_coordinates(points)[tree(points) == 0.0]).all()
 
 
+def test_rest_coordinates_of_a_primitive_with_a_width_are_not_its_color() -> None:
+    tree = Point((0, 0, 0), radius=1.0, width=0.5).scale((1, 2, 1)).translate((1, 2, 3))
+    np.testing.assert_allclose(tree.rest_coordinates([[1.2, 2.6, 3.1]]), [[0.2, 0.3, 0.1]], atol=1e-6)
+
+
 def test_meshes_have_attributes_as_point_data() -> None:
     tree = (A + B).twist(20.0)
     surface = tree.to_pyvista(resolution=12, attributes=["age", "flow"], rest_coordinates=True)
