@@ -29,7 +29,9 @@ for package in map(importlib.import_module, sys.argv[2:]):
 
 FIRST_MESH = """
 import blobtree, blobtree.kernels
-blobtree.polygonize(blobtree.Point((0, 0, 0), radius=1.0), resolution=8)
+ball = blobtree.Point((0, 0, 0), radius=1.0)
+for tree in (ball, blobtree.GradientBlend(ball, ball.translate((1, 0, 0)), start_angle=15, full_angle=75)):
+    blobtree.polygonize(tree, resolution=8)
 assert not blobtree.kernels._state.compiled, "kernels were compiled that the wheel should hold"
 """
 MAX_BYTES = 30_000_000

@@ -19,6 +19,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = (".o", ".ptx", ".meta")
 
+WITHOUT_GRADIENT_BLENDS = ("blobtree.derivatives.", "blobtree.meshing.crease")
+"""Modules whose kernels are left out for gradient blends: they are large, or never used there."""
+
 PTX_ARCHITECTURE = 75
 """Oldest CUDA architecture that Warp supports; drivers make code for later ones from its PTX."""
 
@@ -39,8 +42,9 @@ def compile_all(cache: Path, *, cuda: bool) -> None:
     import warp as wp
 
     from blobtree.device import start_warp
+    from blobtree.formulas.gradient_blends import GRADIENT_BLEND
     from blobtree.kernels import CUDA_BLOCK
-    from blobtree.tape.instruction_set import LIBRARY
+    from blobtree.tape.instruction_set import BUILT_IN, LIBRARY, instruction_set_for
 
     start_warp()
     kernels = [
@@ -49,7 +53,19 @@ def compile_all(cache: Path, *, cuda: bool) -> None:
         for value in vars(importlib.import_module(name)).values()
         if isinstance(value, wp.Kernel) and value.module.name == name
     ]
+    with_gradients = [
+        instruction_set_for(
+            base.skeletons, (*base.operators, GRADIENT_BLEND), base.warps, base.fields, base.falloffs
+        )
+        for base in (BUILT_IN, LIBRARY)
+    ]
     instances = [LIBRARY.kernel_for(kernel) for kernel in kernels]
+    instances += [
+        blends.kernel_for(kernel)
+        for blends in with_gradients
+        for kernel in kernels
+        if not kernel.module.name.startswith(WITHOUT_GRADIENT_BLENDS)
+    ]
     modules = list({kernel.module.name: kernel.module for kernel in (*kernels, *instances)}.values())
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         list(threads.map(lambda module: wp.load_module(module, device="cpu"), modules))
