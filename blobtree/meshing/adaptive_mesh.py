@@ -117,9 +117,8 @@ class AdaptiveMesher:
             self._cells.settle()
             leaves = self._cells.leaves()
             rows, polygons, irregular, pierced = self._polygons(leaves)
-            wrong = np.flatnonzero(irregular & ~SIMPLE[leaves.codes])
-            if len(pierced) or len(wrong):
-                self._divide(leaves, wrong, pierced)
+            if polygons is None:
+                self._divide(leaves, np.flatnonzero(irregular & ~SIMPLE[leaves.codes]), pierced)
                 continue
             counts = PATCH_COUNT[rows].astype(np.int64)
             owners = np.repeat(np.arange(len(leaves)), counts)
@@ -146,8 +145,11 @@ class AdaptiveMesher:
 
     # -- polygons -----------------------------------------------------------------------------------
 
-    def _polygons(self, leaves: Leaves) -> tuple[NDArray[np.int16], Int32Array, BoolArray, IndexArray]:
-        """Return rows and polygons (n, 4), irregular leaves, and cells of empty leaves that are pierced."""
+    def _polygons(self, leaves: Leaves) -> tuple[NDArray[np.int16], Int32Array | None, BoolArray, IndexArray]:
+        """Return rows and polygons (n, 4), irregular leaves, and cells of empty leaves that are pierced.
+
+        If a pierced leaf, or an irregular one without a simple code, is to be divided, there are no polygons.
+        """
         device, count = self._device, len(leaves)
         arrays: Any = LeafArrays()
         merged = ~self._cells.divided[:, OCTANT_OF_CELL].ravel()
@@ -176,12 +178,14 @@ class AdaptiveMesher:
         none = wp.empty(0, dtype=wp.vec4i, device=device)
         inputs = [tables.patch_of_edge, arrays]
         launch(write_polygons, count, [*inputs, False, counts], [counts, irregular, pierced, none], device)
+        flags, holes = irregular.numpy().astype(bool), np.flatnonzero(pierced.numpy())
+        if len(holes) or (flags & ~SIMPLE[leaves.codes]).any():
+            return rows.numpy(), None, flags, holes
         polygon_starts, total = exclusive_scan(counts, "polygons")
         polygons = wp.empty(total, dtype=wp.vec4i, device=device)
         inputs += [True, polygon_starts]
         launch(write_polygons, count, inputs, [counts, irregular, pierced, polygons], device)
-        flags = irregular.numpy().astype(bool)
-        return rows.numpy(), polygons.numpy().reshape(-1, 4), flags, np.flatnonzero(pierced.numpy())
+        return rows.numpy(), polygons.numpy().reshape(-1, 4), flags, holes
 
     # -- vertices -----------------------------------------------------------------------------------
 
