@@ -20,12 +20,12 @@ from blobtree.formulas.convolution import (
     SHEET_RIM,
 )
 from blobtree.lazy import Lazy
-from blobtree.nodes.curves import Arc
+from blobtree.nodes.curves import Arc, Limb
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.flats import triangle_texels
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius, parameters_of
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
-from blobtree.nodes.tree import Macro, Node, Sum
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, beside
+from blobtree.nodes.tree import Node, Sum
 from blobtree.validation import Vector
 
 STEEPEST_TAPER = 0.5
@@ -232,7 +232,7 @@ class ConvolutionTriangle(ConvolutionPrimitive):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ConvolutionStroke(Macro, Leaf):
+class ConvolutionStroke(Limb):
     """A limb along a polyline without bulges at its corners: the sum of convolution segments.
 
     Repeat the first point at the end for a closed one.
@@ -251,27 +251,6 @@ class ConvolutionStroke(Macro, Leaf):
     """
 
     file_tag = "convolution_stroke"
-
-    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
-    radii: Annotated[
-        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
-    ]
-    _: KW_ONLY
-    color: Color = DEFAULT_COLOR
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if len(self.points) < 2 or any(a == b for a, b in pairwise(self.points)):
-            raise InvalidNode(
-                f"points: expected two or more points, each other than the one before, got {self.points}"
-            )
-        if len(self.radii) == 1:
-            object.__setattr__(self, "radii", self.radii * len(self.points))
-        if len(self.radii) != len(self.points):
-            raise InvalidNode(
-                f"radii: expected one for each of {len(self.points)} points, or one for all, "
-                f"got {len(self.radii)}"
-            )
 
     @Lazy
     def expanded(self) -> Node:

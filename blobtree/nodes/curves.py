@@ -282,27 +282,8 @@ class Polyline(Macro, Leaf):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stroke(Macro, Leaf):
-    """A smooth tube through points, with the given radii there: a Catmull–Rom spline of any length.
-
-    The tangents are those of the chordal Catmull–Rom spline (Catmull & Rom 1974; Barry & Goldman 1988). Two
-    parabolas in the four coordinates x, y, z and radius join two points, so curve and radius are C¹. Where
-    radii change steeply, their slope is limited, so that they stay above 0. The pieces join in a union.
-
-    Raises
-    ------
-    InvalidNode
-        There are less than two points, neighbours are equal, or the number of radii is another.
-
-    Examples
-    --------
-    >>> from blobtree import Stroke
-    >>> worm = Stroke([(0, 0, 0), (1, 1, 0), (2, 0, 0)], [0.1, 0.3, 0.1])
-    >>> worm([[1, 1.3, 0], [1, 1, 0.3]]).round(3).tolist()
-    [0.5, 0.5]
-    """
-
-    file_tag = "stroke"
+class Limb(Macro, Leaf):
+    """A tube through points, with a radius at each of them; a macro for what lies between them."""
 
     points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
     radii: Annotated[
@@ -324,6 +305,30 @@ class Stroke(Macro, Leaf):
                 f"radii: expected one for each of {len(self.points)} points, or one for all, "
                 f"got {len(self.radii)}"
             )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stroke(Limb):
+    """A smooth tube through points, with the given radii there: a Catmull–Rom spline of any length.
+
+    The tangents are those of the chordal Catmull–Rom spline (Catmull & Rom 1974; Barry & Goldman 1988). Two
+    parabolas in the four coordinates x, y, z and radius join two points, so curve and radius are C¹. Where
+    radii change steeply, their slope is limited, so that they stay above 0. The pieces join in a union.
+
+    Raises
+    ------
+    InvalidNode
+        There are less than two points, neighbours are equal, or the number of radii is another.
+
+    Examples
+    --------
+    >>> from blobtree import Stroke
+    >>> worm = Stroke([(0, 0, 0), (1, 1, 0), (2, 0, 0)], [0.1, 0.3, 0.1])
+    >>> worm([[1, 1.3, 0], [1, 1, 0.3]]).round(3).tolist()
+    [0.5, 0.5]
+    """
+
+    file_tag = "stroke"
 
     @Lazy
     def expanded(self) -> Node:
