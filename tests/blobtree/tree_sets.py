@@ -25,6 +25,9 @@ from tests.blobtree.trees import (
 from tests.oracles.blobtree import Field, evaluate
 
 BATCH = 20
+ORDINARY_TREES = 10
+"""Number of trees in the first batch of a set, which ordinary runs take; slow runs take the others."""
+
 POINTS = 150
 
 BUILT_IN_TREES = RandomTrees(seed=1, count=240)
@@ -48,6 +51,7 @@ class Batch:
     """Some trees of a set, and how exact their fields are."""
 
     start: int
+    count: int
     source: Sequence[Node]
     value_error: float
     color_error: float
@@ -56,7 +60,7 @@ class Batch:
     @property
     def trees(self) -> Sequence[Node]:
         """The trees themselves, made at the first use."""
-        return self.source[self.start : self.start + BATCH]
+        return self.source[self.start : self.start + self.count]
 
     @cached_property
     def cases(self) -> list[tuple[Node, Float32Array]]:
@@ -71,7 +75,9 @@ class Batch:
 
 
 def _batches(trees: Sequence[Node], *errors: float) -> list[Batch]:
-    return [Batch(start, trees, *errors) for start in range(0, len(trees), BATCH)]
+    starts = (0, ORDINARY_TREES, *range(BATCH, len(trees), BATCH))
+    ends = (*starts[1:], len(trees))
+    return [Batch(start, end - start, trees, *errors) for start, end in zip(starts, ends, strict=True)]
 
 
 _SETS = {
@@ -86,13 +92,10 @@ _SETS = {
     "signed": _batches(SIGNED_TREES, 2e-5, ANY_COLOR, 1e-3),
     "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),
 }
-ORDINARY = 1
-"""Number of batches of a set that ordinary runs take; slow runs take the others."""
-
 EVERY_BATCH = pytest.mark.parametrize(
     "batch",
     [
-        pytest.param(batch, id=f"{name}-{batch.start}", marks=() if place < ORDINARY else pytest.mark.slow)
+        pytest.param(batch, id=f"{name}-{batch.start}", marks=pytest.mark.slow if place else ())
         for name, batches in _SETS.items()
         for place, batch in enumerate(batches)
     ],

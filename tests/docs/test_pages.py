@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.apps.cli import app
 from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from decals.rendering.options import RenderOptions
 from tests.decals.baking.glb import need
 from tests.docs import published
 
@@ -194,6 +196,15 @@ CHECKS: dict[str, Callable[[Session], None]] = {
 """Checks of what is left after a page's code has run, by the page's name."""
 
 
+@pytest.fixture
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of no other size and samples are small and coarse."""
+    _size, _samples, *others = (field.default for field in fields(RenderOptions))
+    monkeypatch.setattr(RenderOptions.__init__, "__defaults__", ((400, 300), 1, *others))
+    assert RenderOptions() == RenderOptions(size=(400, 300), samples=1)
+
+
+@pytest.mark.usefixtures("small_pictures")
 @pytest.mark.parametrize("page", [page for page in PAGES if code(page)], ids=lambda page: page.stem)
 def test_the_python_of_a_page_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -1,6 +1,7 @@
 """``--define``: custom nodes on the command line."""
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -40,12 +41,20 @@ def alone(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
 CLI = ("-c", "import sys; from decals.apps.cli import run; sys.exit(run(sys.argv[1:]))")
 
 
-@pytest.fixture
-def dots(folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a definition, and a tree that uses it."""
+    folder = tmp_path_factory.mktemp("made")
     (folder / "dots.py").write_text(DOTS.format(imports=""), encoding="utf-8")
     process = alone(folder, "dots.py")
     assert process.returncode == 0, process.stderr
+    return folder
+
+
+@pytest.fixture
+def dots(made: Path, folder: Path) -> Path:
+    """Return a copy of that folder, in which the test works."""
+    shutil.copytree(made, folder, dirs_exist_ok=True)
     return folder
 
 

@@ -22,10 +22,11 @@ def cells_of(tree: Node, cell: float) -> SparseCells:
     return build_cells(tree.tape, aligned_grid(*tree.support, cell))
 
 
-def quads(mesh: Mesh, labels: np.ndarray) -> set[tuple[int, ...]]:
-    """Every pair of triangles as the set of its corners, whichever diagonal splits it."""
-    pairs = labels[mesh.faces].reshape(-1, 6)
-    return {tuple(sorted(set(row))) for row in pairs.tolist()}
+def quads(mesh: Mesh, labels: np.ndarray) -> np.ndarray:
+    """Every pair of triangles as the set of its corners, whichever diagonal splits it; sorted."""
+    pairs = np.sort(labels[mesh.faces].reshape(-1, 6), axis=1)
+    pairs[:, 1:][pairs[:, 1:] == pairs[:, :-1]] = -1
+    return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def assert_same_surface(tree: Node) -> None:
@@ -42,27 +43,23 @@ def assert_same_surface(tree: Node) -> None:
     )  # two sheets that meet in one point: told apart by quads alone
     assert distance.max() <= 1e-2 * cell
     if not coincide:
-        assert quads(sparse, label) == quads(dense, np.arange(len(label)))
+        assert np.array_equal(quads(sparse, label), quads(dense, np.arange(len(label))))
 
 
 MORE = {"built_in": None, "solids": SOLIDS, "shapes": SHAPES, "blends": BLENDED, "custom": CUSTOM}
-SEEDS = [("built_in", seed) for seed in range(6)]
-SEEDS += [(kinds, seed) for kinds in ("solids", "custom") for seed in range(2)] + [
-    ("shapes", 0),
-    ("blends", 0),
-]
+SEEDS = [("built_in", 0), ("built_in", 1), *((kinds, 0) for kinds in MORE if MORE[kinds])]
 
 
 @pytest.mark.parametrize(("kinds", "seed"), SEEDS)
 def test_sparse_and_dense_give_the_same_quads(kinds: str, seed: int) -> None:
     surfaces = 0
-    for tree in random_trees(seed, 10, more=MORE[kinds]):
+    for tree in random_trees(seed, 6, more=MORE[kinds]):
         assert_same_surface(tree)
         mesh = polygonize(tree, resolution=20)
         assert_valid(mesh)
         assert_closed(mesh)
         surfaces += len(mesh.faces) > 0
-    assert surfaces >= 4
+    assert surfaces >= 3
 
 
 @pytest.mark.slow
@@ -70,20 +67,17 @@ def test_sparse_and_dense_give_the_same_quads(kinds: str, seed: int) -> None:
 def test_sparse_and_dense_give_the_same_quads_over_many_trees(kinds: str, count: int) -> None:
     for tree in random_trees(99, count, depth=5, more=MORE[kinds]):
         assert_same_surface(tree)
+        assert_closed(polygonize(tree, resolution=20))
 
 
 def test_every_edge_has_two_triangles_in_opposite_directions() -> None:
-    for tree in random_trees(7, 60):
-        faces = polygonize(tree, resolution=CELLS_ALONG).faces.astype(np.int64)
-        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        forward = np.unique(edges, axis=0)
-        assert len(forward) == len(edges), "an edge is used twice in one direction"
-        assert np.array_equal(forward, np.unique(edges[:, ::-1], axis=0)), "an edge lacks its opposite"
+    for tree in random_trees(7, 20):
+        assert_closed(polygonize(tree, resolution=CELLS_ALONG))
 
 
 def test_pruned_tapes_match_the_whole_tape_in_their_blocks() -> None:
     rng = np.random.default_rng(3)
-    for tree in random_trees(3, 25):
+    for tree in random_trees(3, 12):
         lower, upper = tree.support
         cell = float((upper - lower).max()) / 24
         cells = cells_of(tree, cell)
@@ -136,7 +130,7 @@ def cull_always(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("blobtree.cells.sparse_cells.pieces_to_cull", lambda tape, _device: split_tape(tape))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_culling_the_root_changes_no_triangle(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     shapes = [*random_trees(seed, 12), random_blobs(1000)[0], *flat_trees(seed)]
     plain = [polygonize(tree, resolution=24) for tree in shapes]

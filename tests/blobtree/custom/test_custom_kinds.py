@@ -32,7 +32,7 @@ def test_the_random_trees_hold_every_custom_kind_and_maps_among_them() -> None:
 @pytest.mark.parametrize(
     "kinds", [CUSTOM, SOLIDS, SHAPES, BLENDED], ids=["custom", "solids", "shapes", "blends"]
 )
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_ray_passes_through_unseen(seed: int, kinds: MoreKinds) -> None:
     """Against dense marching: never later than the first sample inside, and on the surface."""
     rng = np.random.default_rng(seed)

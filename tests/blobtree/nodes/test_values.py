@@ -18,7 +18,8 @@ from blobtree.tape.program import postorder
 from tests.blobtree.trees import random_trees, trees
 
 NAMES: dict[str, Any] = {name: getattr(blobtree, name) for name in blobtree.__all__}
-DEPTH = 10_000
+DEPTH = 4_000
+"""Several times what Python or C could recurse into; `tests.blobtree.meshing.test_scale` goes deeper."""
 
 A = Point((0, 0, 0), radius=1.0)
 B = Segment((0, 0, 0), (1, 0, 0), radius=0.5)

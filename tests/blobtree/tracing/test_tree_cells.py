@@ -18,6 +18,11 @@ CORNERS = Point((0, 0, 0), radius=0.02) | Point((1, 1, 1), radius=0.02)
 THIN = Point((0, 0, 0), radius=0.1) | Point((5, 0, 0), radius=0.1)
 TREES = {"corners": CORNERS, "thin": THIN} | dict(enumerate(random_trees(seed=51, count=8)))
 
+NAMES = pytest.mark.parametrize(
+    "name",
+    [*list(TREES)[:5], *(pytest.param(name, marks=pytest.mark.slow) for name in list(TREES)[5:])],
+)
+
 
 def table(cells: TracingCells) -> Int32Array:
     return cells.blocks.reshape(cells.counts)
@@ -32,7 +37,7 @@ def pruned(cells: TracingCells, texel: int, whole: Tape) -> Tape:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", TREES)
+@NAMES
 def test_the_table_matches_the_field(name: str | int) -> None:
     tree: Node = TREES[name]
     cells = tracing_cells(tree, device="cpu")
@@ -51,7 +56,7 @@ def test_the_table_matches_the_field(name: str | int) -> None:
         np.testing.assert_allclose(seen, value[here], atol=2e-5 * max(1.0, value.max()))
 
 
-@pytest.mark.parametrize("name", TREES)
+@NAMES
 def test_empty_layers_match_the_chessboard_distance(name: str | int) -> None:
     """Against SciPy's chessboard distance to the nearest block that is not empty."""
     blocks = table(tracing_cells(TREES[name], device="cpu"))

@@ -79,8 +79,18 @@ def parallel(scene: Edited) -> Projection:
     return Projection(matrix)
 
 
+CASES = [(PLAIN_KINDS, Contact.PRODUCT), *((KINDS, contact) for contact in Contact)]
+
+
 @pytest.mark.parametrize(
-    ("kinds", "contact"), [(PLAIN_KINDS, Contact.PRODUCT), *((KINDS, contact) for contact in Contact)]
+    ("drawer", "kinds", "contact"),
+    [
+        # What an edit can reach is found in the same way for both kinds of shaders.
+        pytest.param(backend, *case, marks=pytest.mark.slow if backend == "compute" and number > 1 else ())
+        for backend in ("fragment", "compute")
+        for number, case in enumerate(CASES)
+    ],
+    indirect=["drawer"],
 )
 def test_after_any_edits_the_bits_are_those_of_a_whole_picture(
     drawer: Renderer, edited: Edited, contact: Contact, kinds: tuple[str, ...]

@@ -101,7 +101,7 @@ def test_texture_coordinates(by_corner: bool) -> None:
     assert on(points[:0]).shape == (0, 2)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_counts_follow_a_painted_image(seed: int) -> None:
     """A chessboard of 4 x 2 fields, 16 pixels each, painted around a ball."""
     fields = np.kron(np.indices((2, 4)).sum(axis=0) % 2, np.ones((16, 16)))

@@ -88,7 +88,7 @@ def test_few_particles(count: int) -> None:
     assert relaxation.statistics().cv == 0.0 or count == 2
 
 
-@pytest.mark.parametrize("count", [1000, 3000])
+@pytest.mark.parametrize("count", [1000, pytest.param(3000, marks=pytest.mark.slow)])
 def test_sharp_tips_and_thin_fins(count: int) -> None:
     relaxation = Relaxation([star()], count=count)
     relaxation.run()

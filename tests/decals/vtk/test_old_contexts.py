@@ -17,10 +17,13 @@ import numpy as np
 import pyvista as pv
 import decals.vtk
 from decals.errors import NoGraphics
-from tests.decals.vtk.scenes import both, shot
+from tests.decals.vtk.scenes import TREE, both, shot
 
 pl = pv.Plotter(off_screen=True, window_size=(160, 120))
-pl.decals.add_scene(both(), camera=True)
+if sys.argv[2] == "both":
+    pl.decals.add_scene(both(), camera=True)
+else:
+    pl.decals.add_implicit(TREE)
 try:
     picture = shot(pl)
     with pl.decals.subplot.current():
@@ -32,11 +35,11 @@ np.save(sys.argv[1], picture)
 """
 
 
-def in_a_process(path: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def in_a_process(path: Path, scene: str = "both", **environment: str) -> subprocess.CompletedProcess[str]:
     """Draw a scene in a process of its own: Mesa reads its version when it starts."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("MESA_GL")}
     return subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(path)],
+        [sys.executable, "-c", SCRIPT, str(path), scene],
         env={**inherited, **environment},
         capture_output=True,
         text=True,
@@ -61,7 +64,7 @@ def test_a_context_of_version_3_2_that_can_do_more(plotter: Factory, tmp_path: P
 def test_a_context_that_cannot_take_our_shaders_is_refused(plotter: Factory, tmp_path: Path) -> None:
     plotter()
     done = in_a_process(
-        tmp_path / "old.npy", MESA_GL_VERSION_OVERRIDE="3.2", MESA_GLSL_VERSION_OVERRIDE="150"
+        tmp_path / "old.npy", "a tree", MESA_GL_VERSION_OVERRIDE="3.2", MESA_GLSL_VERSION_OVERRIDE="150"
     )
     if done.returncode == 0 and "Mesa" not in done.stdout:
         pytest.skip(f"not Mesa: {done.stdout}")

@@ -17,6 +17,7 @@ SAYS = "the first picture came back"
 PROGRAM = "tests.decals.window.on_screen"
 
 
+@pytest.mark.slow  # the other tests of the window drive it without a screen, too
 def test_without_a_screen() -> None:
     assert SAYS in run_module(PROGRAM, "off")
 
