@@ -1,5 +1,7 @@
 """Fixtures for all tests."""
 
+import gc
+
 import pytest
 
 import blobtree.kernels as kernels
@@ -12,6 +14,7 @@ def pytest_collection_finish() -> None:
     if kernels._state.loaded:
         names = ", ".join(sorted(name for name, _ in kernels._state.loaded))
         raise pytest.UsageError(f"the import of a module of tests has launched kernels of {names}")
+    gc.freeze()  # Python then looks for garbage among what tests make, not among all tests
 
 
 @pytest.fixture(autouse=True)

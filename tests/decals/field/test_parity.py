@@ -1,4 +1,4 @@
-"""The whole decal function against float64 on adversarial points: up to a million in every mode, 10⁸ on a GPU.
+"""The whole decal function against float64 on adversarial points: a million in every mode, 10⁸ on a GPU.
 
 The float64 kernel that can answer so many is itself held against the NumPy oracle.
 """
