@@ -1,31 +1,23 @@
 """Opening of what `edit` and `sandbox` edit: models with decals, a saved scene, or an empty one."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import chain, count
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 
-from decals import Camera, DecalImage, Scene
+from decals import DecalImage, Scene
 from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
+from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.output import check_output
-from decals.apps.views import UPRIGHT, Axes, parse_view
+from decals.apps.views import UPRIGHT, parse_view
 from decals.editing import AddImage, recovery_path
 from decals.errors import InvalidInput
 from decals.window import EditWindow
-
-
-def new_file(folder: Path, name: str) -> Path:
-    """Return the first path that does not exist: NAME.json, NAME-2.json, ..."""
-    endings = chain([""], (f"-{number}" for number in count(2)))
-    paths = (folder / f"{name}{ending}.json" for ending in endings)
-    return next(path for path in paths if not path.exists())
 
 
 @dataclass(frozen=True)
@@ -114,14 +106,6 @@ def _is_unsaved(models: list[str]) -> bool:
     return (
         len(models) == 1 and first.suffix == ".json" and not first.exists() and recovery_path(first).is_file()
     )
-
-
-def empty_scene(images: Sequence[str], axes: Axes) -> Scene:
-    """Return a scene without objects, whose camera looks at the origin."""
-    where = parse_view(None, axes)
-    corner = np.ones(3, np.float32)
-    camera = Camera.framing((-corner, corner), direction=where.direction, up=where.up)
-    return Scene(objects=(), camera=camera, images=tuple(DecalImage.load(source) for source in images))
 
 
 def report_unsaved(window: EditWindow, command: str) -> None:

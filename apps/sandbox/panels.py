@@ -24,7 +24,7 @@ BRUSH_ICONS = {
 }
 BRUSH_TEXTS = {
     Brush.SELECT: "select and move decals",
-    Brush.SCATTER: "scatter brush: drag to add decals",
+    Brush.SCATTER: "scatter brush: drag to place decals",
     Brush.PUSH: "push brush: drag to push decals, neighbours yield",
     Brush.ERASE: "erase brush: drag to delete decals",
     Brush.RELAX: "relax brush: drag to even decals out",

@@ -17,10 +17,9 @@ from PIL import Image
 from blobtree.custom.definition import custom_kinds
 from blobtree.nodes.paths import Path as TreePath
 from blobtree.progress import Cancel, Progress
-from decals.apps.commands.opening import empty_scene, new_file
-from decals.apps.commands.options import DEFAULT_IMAGES
-from decals.apps.commands.scatter_options import ScatterOptions
+from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
+from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog
 from decals.apps.sandbox.controls import controls_of, parsed
 from decals.apps.sandbox.decal_panel import (
@@ -34,7 +33,7 @@ from decals.apps.sandbox.decal_panel import (
 from decals.apps.sandbox.display import Display
 from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, values_of_start
 from decals.apps.sandbox.outline import key_of, outline, parse_key
-from decals.apps.views import UPRIGHT, parse_view
+from decals.apps.views import THREE_QUARTER, UPRIGHT
 from decals.editing.commands import AddImage
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject, RemoveObject
@@ -49,6 +48,9 @@ from decals.window import EditWindow
 
 REST_SECONDS = 1.0
 """A slider that rests so long has ended its edit: one moved by keys does not tell its end."""
+
+FIRST_IMAGES = ("scale",)
+"""Images of a scene at the beginning."""
 
 MAX_HISTORY = 200
 """Most entries of the history that a page lists."""
@@ -285,7 +287,7 @@ class Sandbox:
     def new_model(self) -> None:
         """Begin an empty scene."""
         with self._reported():
-            self._open(_given(empty_scene(DEFAULT_IMAGES, UPRIGHT["y"])), self._new_file("scene"))
+            self._open(_given(empty_scene(FIRST_IMAGES, UPRIGHT["y"])), self._new_file("scene"))
 
     def open_sample(self, name: str) -> None:
         """Open a sample with scattered decals."""
@@ -294,10 +296,8 @@ class Sandbox:
                 raise InvalidEdit(f"sample: expected one of {', '.join(SAMPLES)}, got {describe(name)}")
 
             def load(progress: Progress, _cancel: Cancel) -> Scene:
-                where = parse_view(None, axes_of(name))
-                return ScatterOptions.from_arguments(None, None, None).scene(
-                    [sample(name)], where, tuple(self._window.plotter.window_size), progress
-                )
+                direction = axes_of(name).preset(THREE_QUARTER)
+                return cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress)
 
             self._open(load, self._new_file(f"{name}-decals"))
 
@@ -314,7 +314,7 @@ class Sandbox:
 
             def load(_progress: Progress, _cancel: Cancel) -> Scene:
                 if not path.exists():  # the recovery file has everything
-                    return empty_scene(DEFAULT_IMAGES, UPRIGHT["y"])
+                    return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
                 found = load_model(path)
                 return found if isinstance(found, Scene) else _bare_scene(found)
 
@@ -474,7 +474,7 @@ class Sandbox:
 
 def _bare_scene(item: SceneObject) -> Scene:
     """Return a scene of one object, without decals."""
-    images = tuple(DecalImage.load(source) for source in DEFAULT_IMAGES)
+    images = tuple(DecalImage.load(source) for source in FIRST_IMAGES)
     return Scene(objects=[item], camera=Camera.framing(item.bounds), images=images)
 
 

@@ -6,6 +6,8 @@
 import asyncio
 import io
 import sys
+import tempfile
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -20,7 +22,9 @@ from trame_server.core import Server
 
 import decals
 from blobtree import Point
+from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
+from decals.apps.views import UPRIGHT
 from decals.editing.scatter_commands import decals_on
 from decals.window import EditWindow
 from tests.decals.editing.scenes import digest, scene
@@ -153,7 +157,7 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: set(window.session.labels) == {"set radius"} and not window.session.stroke_open)
         slid = window.session.labels
         assert np.abs(await shows(browser, plotter) - first).mean() > 0.5
-        await browser.get_by_role("button", name="Add").click()
+        await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add a primitive",))
         field = browser.get_by_role("textbox", name="ring radius")
@@ -176,10 +180,59 @@ async def sandbox(picture: str | None = None) -> None:
     window.close()
 
 
+async def sandbox_start(picture: str | None = None) -> None:
+    """From the start page a user opens a sample, brushes and clicks decals, drops an image and saves."""
+    folder = Path(tempfile.mkdtemp())
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("start", client_type="vue3")
+    window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
+    window.show()
+    sandbox_page = SandboxPage(server, window, folder=folder, start=True)
+    async with served(server, size=(1280, 800)) as browser:
+        await browser.get_by_label("sample creature").click()
+        await until(lambda: len(window.document.decals) == 500)
+        await shows(browser, plotter)
+        middle = plotter.window_size[0] // 2, plotter.window_size[1] // 2
+        path = [(middle[0] + x, middle[1]) for x in (0, 10, 30)]
+        for brush in ("erase", "scatter", "push"):
+            await browser.get_by_label(f"{brush} brush").click()
+            await until(lambda brush=brush: window.actions.state.brush.brush == brush)  # type: ignore[misc]
+            await drag(browser, plotter, *path)
+            await until(lambda brush=brush: window.session.labels[-1:] == (f"{brush} brush",))  # type: ignore[misc]
+            await until(lambda: not window.tools.dragging)
+        await browser.get_by_label("select and move decals").click()
+        await until(lambda: window.actions.state.brush.brush == "select")
+        await shows(browser, plotter)
+        driver = Driver(window)
+        number, at = next(driver.visible())
+        await drag(browser, plotter, at)
+        await until(lambda: window.actions.state.selection == (number,))
+        await browser.get_by_role("slider", name="opacity").press("ArrowLeft")
+        await until(lambda: window.session.labels[-1] == "set opacity")
+        assert sandbox_page.sandbox.values()["pick"]["decal"] == str(number)
+        await shows(browser, plotter)
+        if picture is not None:
+            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+        await browser.get_by_role("button", name="File", exact=True).click()
+        await browser.get_by_label("file name").fill("mine.py")
+        await browser.get_by_role("button", name="Write", exact=True).click()
+        await until((folder / "mine.py").exists)
+        await browser.get_by_text("Open or new").click()
+        Image.new("RGB", (8, 8), "red").save(folder / "dot.png")
+        await browser.get_by_label("open from this computer").set_input_files(str(folder / "dot.png"))
+        await until(lambda: len(window.document.images) == 2)
+    window.close()
+
+
 def main() -> None:
     """Run one of the functions above, by its name."""
     name, *arguments = sys.argv[1:]
-    asyncio.run({"page": page, "user": user, "streamed": streamed, "sandbox": sandbox}[name](*arguments))
+    asyncio.run(
+        {"page": page, "user": user, "streamed": streamed, "sandbox": sandbox, "start": sandbox_start}[name](
+            *arguments
+        )
+    )
     print("done")
 
 
