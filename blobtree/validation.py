@@ -135,6 +135,13 @@ def finite_numbers(name: str, value: object) -> tuple[float, ...]:
     return tuple(numbers)
 
 
+def truth(name: str, value: object, error: type[ImplicitDecalsError]) -> bool:
+    """Return True or False; raise `error` for any other value."""
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{name}: expected True or False, got {shown(value)}")
+    return bool(value)
+
+
 def texts(name: str, value: object) -> tuple[str, ...]:
     """Return several texts; raise `InvalidNode` if one is empty or no text."""
     items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (None,)

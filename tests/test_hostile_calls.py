@@ -10,7 +10,7 @@ import pytest
 import blobtree
 import decals
 from blobtree import Point
-from decals.editing import EditSession, SetValues
+from decals.editing import EditSession, SetParameter, SetValues
 from decals.errors import ImplicitDecalsError
 from decals.index import DecalIndex
 from decals.scenes.objects import bounds_of
@@ -37,6 +37,12 @@ CALLS: dict[str, Callable[[], object]] = {
     "matrix": lambda: BALL.transform([[HUGE] * 4] * 3),
     "resolution": lambda: blobtree.polygonize(BALL, resolution=HUGE),
     "cell size": lambda: blobtree.polygonize(BALL, cell_size=HUGE),
+    "creases": lambda: blobtree.polygonize(BALL, creases=np.zeros(3)),  # type: ignore[arg-type]
+    "creases within an error": lambda: blobtree.polygonize(BALL, chord_error=0.1, creases=WRONG),
+    "adaptive": lambda: blobtree.polygonize(BALL, chord_error=0.1, adaptive=np.zeros(3)),  # type: ignore[arg-type]
+    "endless grid": lambda: blobtree.sample(BALL, spacing=5e-324),
+    "large grid": lambda: blobtree.sample(BALL, spacing=1e-30),
+    "quick": lambda: EditSession(SCENE).do(SetParameter(0, (), "radius", 1.0, quick=WRONG)),
     "device of a tree": lambda: ImplicitSurface(BALL).on("nope"),
     "device of a mesh": lambda: MeshSurface(*TRIANGLE).on("nope"),
     "no device": lambda: MeshSurface(*TRIANGLE).on(WRONG),

@@ -32,17 +32,13 @@ from blobtree.meshing.dual_kernels import (
     sample_blocks,
 )
 from blobtree.meshing.patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
-from blobtree.meshing.reuse_kernels import (
-    copy_counts,
-    copy_faces,
-    copy_vertices,
-    copy_words,
+from blobtree.meshing.vertex_kernels import (
+    VertexArrays,
+    bisect_unconverged,
     count_listed,
-    invert_flags,
-    mark_face_neighbors,
-    mark_vertex_users,
+    list_patches,
+    place_vertices,
 )
-from blobtree.meshing.vertex_kernels import VertexArrays, bisect_unconverged, list_patches, place_vertices
 from blobtree.progress import Progress
 from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
 from blobtree.validation import shown
@@ -202,6 +198,10 @@ class _Extraction:
         self._arrays, self._sources = cells.arrays, cells.leaves.sources
         self._count = len(cells.leaves)
         self._tables = patch_tables(cells.device)
+        if previous is not None:  # imported here, because all imported kernels of a package compile together
+            from blobtree.meshing import reuse_kernels
+
+            self._reuse = reuse_kernels
         self._kernel = cells.tape.instruction_set.kernel_for
 
     def mesh(self, report: Progress) -> DeviceMesh:
@@ -252,19 +252,19 @@ class _Extraction:
         """Return the blocks whose cells or rows may have changed, and the others."""
         if self._old is None:
             return arange(self._count, self._device), arange(0, self._device)
-        return self._marked(mark_face_neighbors, where_negative(self._sources))
+        return self._marked(self._reuse.mark_face_neighbors, where_negative(self._sources))
 
     def _users(self, changed: DeviceArray) -> tuple[DeviceArray, DeviceArray]:
         """Return the blocks whose triangles use vertices of changed blocks, and the others."""
         if self._old is None:
             return changed, arange(0, self._device)
-        return self._marked(mark_vertex_users, changed)
+        return self._marked(self._reuse.mark_vertex_users, changed)
 
     def _marked(self, mark: wp.Kernel, listed: DeviceArray) -> tuple[DeviceArray, DeviceArray]:
         """Return the blocks that the kernel `mark` flags, and the others."""
         flags, others = self._zeros(self._count + 1), self._zeros(self._count + 1)
         self._launch(mark, len(listed), [listed, self._arrays], [flags])
-        self._launch(invert_flags, self._count, [flags], [others])
+        self._launch(self._reuse.invert_flags, self._count, [flags], [others])
         return compact(flags), compact(others)
 
     def _sample(self, changed: DeviceArray, step: Callable[[float], None]) -> DeviceArray:
@@ -299,9 +299,11 @@ class _Extraction:
         for before, after in zip((old.codes, old.rows, old.offsets), arrays, strict=True):
             words = CHILDREN * after.strides[0] // WORD_BYTES
             inputs = [words, unchanged, self._sources, _as_words(before)]
-            self._launch(copy_words, len(unchanged) * words, inputs, [_as_words(after)])
+            self._launch(self._reuse.copy_words, len(unchanged) * words, inputs, [_as_words(after)])
         for starts, numbers in zip((old.vertex_starts, old.quad_starts), counts, strict=True):
-            self._launch(copy_counts, len(unchanged), [unchanged, self._sources, starts], [numbers])
+            self._launch(
+                self._reuse.copy_counts, len(unchanged), [unchanged, self._sources, starts], [numbers]
+            )
 
     def _place(
         self,
@@ -332,7 +334,7 @@ class _Extraction:
         new_index = self._empty(len(old.vertices), wp.int32)
         before = vertex_arrays(old.vertices, old.normals, old.colors)
         inputs = [unchanged, self._sources, old.vertex_starts, starts, before]
-        self._launch(copy_vertices, len(unchanged), inputs, [vertices, new_index])
+        self._launch(self._reuse.copy_vertices, len(unchanged), inputs, [vertices, new_index])
         return new_index
 
     def _copy_faces(
@@ -342,7 +344,7 @@ class _Extraction:
         if self._old is None:
             return
         inputs = [others, self._sources, self._old.quad_starts, starts, self._old.faces, new_index]
-        self._launch(copy_faces, len(others), inputs, [faces])
+        self._launch(self._reuse.copy_faces, len(others), inputs, [faces])
 
 
 def _as_words(array: DeviceArray) -> DeviceArray:

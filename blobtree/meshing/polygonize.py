@@ -31,7 +31,7 @@ from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.validation import LARGEST_NUMBER, shown
+from blobtree.validation import LARGEST_NUMBER, shown, truth
 
 if TYPE_CHECKING:
     pass
@@ -182,6 +182,8 @@ def polygonize(
     chord_error = _chord_error(tree, chord_error)
     if not isinstance(max_triangles, int | np.integer) or max_triangles < 1:
         raise InvalidResolution(f"max_triangles: expected a whole number from 1, got {shown(max_triangles)}")
+    truth("creases", creases, InvalidResolution)
+    adaptive = truth("adaptive", adaptive, InvalidResolution)
     within = _adaptive_within_chord_error if adaptive else _within_chord_error
     with reporting(progress, cancel) as report:
         return within(tree, chord_error, int(max_triangles), creases, device, report)
@@ -382,7 +384,7 @@ class Polygonizer:
     ) -> None:
         checked_tree(tree)
         self._device = device
-        self._creases = creases
+        self._creases = truth("creases", creases, InvalidResolution)
         self._cell_size = _cell_size(tree, resolution, cell_size)
         kernels = (*CELL_KERNELS, sample_blocks, place_vertices)
         with reporting(progress, cancel) as report:

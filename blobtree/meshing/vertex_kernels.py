@@ -48,6 +48,18 @@ class Patch:
 
 
 @wp.kernel
+def count_listed(
+    first: wp.int32,
+    listed: wp.array(dtype=wp.int32),
+    starts: wp.array(dtype=wp.int32),
+    counts: wp.array(dtype=wp.int32),
+) -> None:
+    """Write the number of items of each listed block, in the order of the list."""
+    slot = first + wp.tid()
+    counts[slot] = starts[listed[slot] + 1] - starts[listed[slot]]
+
+
+@wp.kernel
 def list_patches(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),

@@ -51,11 +51,14 @@ def sample(tree: Node, *, spacing: float, width: float | None = None, color: Any
     checked_tree(tree)
     lower, upper = (corner.astype(np.float64) for corner in tree.bounds)
     corner = lower - MARGIN_CELLS * step
-    counts = np.ceil((upper - lower) / step + 2.0 * MARGIN_CELLS).astype(np.int64) + 1
-    if counts.prod() > MAX_NUMBERS:
+    with np.errstate(over="ignore"):  # infinite counts are refused
+        cells = np.ceil((upper - lower) / step + 2.0 * MARGIN_CELLS) + 1.0
+        total = float(cells.prod())
+    if not total <= MAX_NUMBERS:
         raise InvalidNode(
-            f"spacing: expected at most {MAX_NUMBERS:,} grid points, got {counts.prod():,}; take a larger one"
+            f"spacing: expected at most {MAX_NUMBERS:,} grid points, got {total:,.0f}; take a larger one"
         )
+    counts = cells.astype(np.int64)
     axes = [corner[axis] + step * np.arange(counts[axis]) for axis in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     size = tree.support[1] - tree.support[0]

@@ -20,6 +20,7 @@ from blobtree.nodes.paths import (
     world_matrix,
 )
 from blobtree.nodes.surgery import Join
+from blobtree.validation import truth
 from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
@@ -209,7 +210,7 @@ class SetParameter(PrimitiveCommand):
         node = self.changed_node(document)
         if parameters_of(type(node))[self.name].quantity in (Quantity.COLOR, Quantity.ATTRIBUTES):
             return self.compute_repainting(document, node)
-        return self.compute_exchange(document, node, quick=self.quick)
+        return self.compute_exchange(document, node, quick=truth("quick", self.quick, InvalidEdit))
 
     def changed_node(self, document: Document) -> Node:
         """Return the node with the new value; raise `InvalidEdit` or `InvalidNode` if it takes none such."""

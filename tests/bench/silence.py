@@ -9,6 +9,7 @@ and from the last output to the end. Commands that open a window, or download a 
 """
 
 import argparse
+import compileall
 import os
 import pty
 import re
@@ -137,10 +138,20 @@ def page_commands() -> list[str]:
     return [line for line in dict.fromkeys(lines) if not set(shlex.split(line)) & set(LEFT_OUT)]
 
 
+def user_environment() -> dict[str, str]:
+    """Return variables for a process that finds this checkout, and its bytecode as an installation leaves it.
+
+    Bytecode is compiled here and kept, also where the variable of Python says otherwise.
+    """
+    for package in ("blobtree", "decals", "apps", "shaders"):
+        compileall.compile_dir(ROOT / package, quiet=2)
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return kept | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
 def cold_environment(folder: Path) -> dict[str, str]:
     """Return variables for a process that finds no compiled kernels and shaders of earlier processes."""
-    return dict(os.environ) | {
-        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+    return user_environment() | {
         "WARP_CACHE_PATH": str(folder / "kernels"),
         "MESA_SHADER_CACHE_DIR": str(folder / "shaders"),
         "__GL_SHADER_DISK_CACHE_PATH": str(folder / "shaders"),
@@ -163,9 +174,7 @@ def cold_runs(start: str, only: Sequence[str] = ()) -> Iterator[tuple[str, Run]]
         scripts[line] = COMMAND.format(words=shlex.split(line)[1:])
     with tempfile.TemporaryDirectory() as name:
         inputs = Path(name)
-        made = watch(
-            INPUTS, inputs, dict(os.environ) | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        )
+        made = watch(INPUTS, inputs, user_environment())
         assert made.code == 0, made.output
         for name, script in scripts.items():
             if only and not any(word in name for word in only):

@@ -11,7 +11,6 @@ has them. With ``--compile`` it compiles all of them, as in a checkout.
 
 import argparse
 import json
-import os
 import re
 import resource
 import subprocess
@@ -22,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.bench.silence import COMMAND, COMPILE, cold_environment, cold_runs
+from tests.bench.silence import COMMAND, COMPILE, cold_environment, cold_runs, user_environment
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -92,7 +91,7 @@ def measure(*, compiled: bool) -> dict[str, Cost]:
             costs[f"{name}_cold"] = run(start + script, Path(folder), environment)
             costs[f"{name}_warm"] = run(start + script, Path(folder), environment)
     with tempfile.TemporaryDirectory() as folder:
-        environment = dict(os.environ) | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        environment = user_environment()
         for name, statement in IMPORTS.items():
             script = TIMED.format(statement=statement)
             runs = [run(script, Path(folder), environment).output.split() for _ in range(IMPORT_RUNS)]
