@@ -26,25 +26,23 @@ def project_to_surface(
     No step is longer than `longest_step`. A point where the field is flat (its gradient 0) stays there.
     """
     best = p
-    f_best = field_gradient(p, tape, span)
-    gap = ISO - f_best[0]
+    f_best = wp.vec4()
+    gap = float(0.0)
     q = p
-    f = f_best
-    for _step in range(NEWTON_STEPS):
-        g = wp.vec3(f[1], f[2], f[3])
-        steepness = wp.length(g)
-        if wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
-            break
-        q += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
+    for step in range(NEWTON_STEPS + 1):  # one call for all steps: a copy of it compiles as long again
         f = field_gradient(q, tape, span)
-        stalled = wp.abs(gap) <= STALLED * ISO and wp.abs(ISO - f[0]) > 0.5 * wp.abs(gap)
+        before = gap
         gap = ISO - f[0]
-        if stalled and wp.abs(gap) > wp.abs(ISO - f_best[0]):
+        stalled = step > 0 and wp.abs(before) <= STALLED * ISO and wp.abs(gap) > 0.5 * wp.abs(before)
+        if stalled and wp.abs(gap) > wp.abs(before):
             break
         best = q
         f_best = f
-        if stalled:
+        g = wp.vec3(f[1], f[2], f[3])
+        steepness = wp.length(g)
+        if stalled or wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
             break
+        q += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
     return best, f_best
 
 

@@ -52,7 +52,6 @@ from blobtree import (
 )
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.bench import contact, convolution_surfaces, fitting
-from tests.bench.blobtree import median_time
 from tests.blobtree.derivatives import test_curvature
 from tests.blobtree.nodes.test_attributes import REST, rest
 from tests.blobtree.trees import points_around
@@ -160,11 +159,13 @@ def rest_coordinates(options: argparse.Namespace) -> Figures:
     ]
     tree = Sum(tuple(limbs))
     points = points_around(rng, tree, 20_000)
-    times = [
-        median_time(lambda call=call: call(points), ROUNDS, time.process_time)  # type: ignore[misc]
-        for call in (tree.rest_coordinates, tree.colors)
-    ]
-    return {"rest_error": largest, "rest_over_colors": times[0] / times[1]}
+    best = np.full(2, np.inf)
+    for _ in range(5 * ROUNDS):
+        for number, call in enumerate((tree.rest_coordinates, tree.colors)):
+            start = time.process_time()
+            call(points)
+            best[number] = min(best[number], time.process_time() - start)
+    return {"rest_error": largest, "rest_over_colors": float(best[0] / best[1])}
 
 
 def meshes(_: argparse.Namespace) -> Figures:
