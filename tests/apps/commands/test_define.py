@@ -75,17 +75,15 @@ def scattered_distances(folder: Path, module: str) -> NDArray[np.float64]:
     return distances
 
 
-def test_a_file_or_a_module_defines_kinds(dots: Path) -> None:
-    for module in ("dots", str(dots / "dots.py")):
-        assert np.allclose(scattered_distances(dots, module), 0.5, atol=1e-3)
-        (dots / "decals.csv").unlink()
+def test_a_module_defines_kinds(dots: Path) -> None:
+    assert np.allclose(scattered_distances(dots, "dots"), 0.5, atol=1e-3)
 
 
-def test_a_file_imports_its_neighbours(dots: Path) -> None:
+def test_a_file_defines_kinds_and_imports_its_neighbours(dots: Path) -> None:
     (dots / "parts").mkdir()
     (dots / "parts" / "near.py").write_text("REACH = 1\n", encoding="utf-8")
     (dots / "parts" / "more.py").write_text(DOTS.format(imports="import near"), encoding="utf-8")
-    assert np.allclose(scattered_distances(dots, "parts/more.py"), 0.5, atol=1e-3)
+    assert np.allclose(scattered_distances(dots, str(dots / "parts" / "more.py")), 0.5, atol=1e-3)
 
 
 @pytest.mark.parametrize(

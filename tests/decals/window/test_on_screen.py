@@ -66,10 +66,13 @@ def test_ctrl_c_in_the_terminal_closes_the_window(display: str, tmp_path: Path) 
 
 
 CLOSED = """
+from decals import Camera, MeshObject, Scene
 from decals.window import EditWindow
-from tests.decals.editing.scenes import scene
+from tests.decals.editing.scenes import box, one
 
-window = EditWindow(scene(), size=(120, 80))
+cube = MeshObject("cube", *box((-1, -1, -1), (1, 1, 1)))
+decals = one(images=[-1])
+window = EditWindow(Scene(objects=(cube,), decals=decals, camera=Camera((0, 0, 6))), size=(120, 80))
 interactor, ticks = window.plotter.iren.interactor, []
 
 def tick(*_):
