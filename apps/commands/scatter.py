@@ -27,6 +27,7 @@ from decals.apps.output import check_output
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
+from decals.scenes.origin import WORLD, Origin
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
 SUFFIXES = (".json", ".csv")
@@ -139,7 +140,7 @@ def scatter(
             progress=progress,
         )
         if output.suffix.lower() == ".csv":
-            write_table(decals, output)
+            write_table(decals, output, objects[0].origin)
             return
         if isinstance(loaded, Scene):
             camera = loaded.camera
@@ -148,10 +149,13 @@ def scatter(
         save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals), output)
 
 
-def write_table(decals: Decals, path: Path) -> None:
-    """Write decals as comma-separated values: one row per decal, headed by `COLUMNS`."""
+def write_table(decals: Decals, path: Path, origin: Origin = WORLD) -> None:
+    """Write decals as comma-separated values: one row per decal, headed by `COLUMNS`.
+
+    Positions are relative to the origin; they are written as coordinates of the models' files.
+    """
     columns = (
-        decals.positions,
+        decals.positions if origin == WORLD else decals.positions + np.array(origin),
         decals.normals,
         decals.tangents,
         decals.radii[:, None],

@@ -25,6 +25,7 @@ from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering.options import SceneLike
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
+from decals.scenes.origin import WORLD
 from decals.surfaces.convert import Model
 from decals.validation import describe, member, optional_package, stiffness_number, whole_number
 
@@ -130,7 +131,7 @@ def bake(
             texture = bake_texture(meshes, unwrapped, size, samples, colors.at, report)
             nodes = [_textured_node(mesh, part, size) for mesh, part in zip(meshes, unwrapped, strict=True)]
         report("writing the file", 0.0)
-        content = glb_bytes(nodes, texture)
+        content = glb_bytes(nodes, texture, getattr(objects[0], "origin", WORLD))
         report("writing the file", 0.5)
         try:
             write_atomically(path, content)

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
@@ -42,7 +44,9 @@ class Node:
     colors: Float32Array | None = None
 
 
-def glb_bytes(nodes: Sequence[Node], texture: UInt8Array | None = None) -> bytes:
+def glb_bytes(
+    nodes: Sequence[Node], texture: UInt8Array | None = None, origin: ArrayLike = (0.0, 0.0, 0.0)
+) -> bytes:
     """Return a GLB file of nodes that share one material.
 
     Parameters
@@ -51,6 +55,8 @@ def glb_bytes(nodes: Sequence[Node], texture: UInt8Array | None = None) -> bytes
         All with ``uv`` and a texture, or all with ``colors`` and without one.
     texture : uint8[h, w, 3], optional
         sRGB base colour, first row at the top.
+    origin : (x, y, z), optional
+        Point that all vertices are relative to, in float64; it becomes the translation of the nodes.
 
     Raises
     ------
@@ -69,6 +75,8 @@ def glb_bytes(nodes: Sequence[Node], texture: UInt8Array | None = None) -> bytes
     while any(node.name == base for node in nodes):
         base = f"{base}-"
     scene = trimesh.Scene(base_frame=base)
+    transform = np.eye(4)
+    transform[:3, 3] = origin
     for node in nodes:
         mesh = trimesh.Trimesh(
             vertices=node.vertices,
@@ -79,7 +87,7 @@ def glb_bytes(nodes: Sequence[Node], texture: UInt8Array | None = None) -> bytes
         )
         if node.colors is not None:
             mesh.vertex_attributes[COLOR_ATTRIBUTE] = node.colors
-        scene.add_geometry(mesh, node_name=node.name, geom_name=node.name)
+        scene.add_geometry(mesh, node_name=node.name, geom_name=node.name, transform=transform)
     content: bytes = trimesh.exchange.gltf.export_glb(
         scene, include_normals=True, tree_postprocessor=_finish_tree
     )

@@ -15,6 +15,7 @@ from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.objects import SceneObject
+from decals.scenes.origin import WORLD, Origin
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import instance, whole_number
 
@@ -202,6 +203,11 @@ class Document:
     def camera(self) -> Camera:
         """Camera of the scene."""
         return self._camera
+
+    @property
+    def origin(self) -> Origin:
+        """Point that all coordinates are relative to; see `decals.Scene.origin`."""
+        return self.objects[0].origin if self.objects else WORLD
 
     @property
     def decals(self) -> DecalEditor:

@@ -17,7 +17,7 @@ from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names, relative_to
 from decals.validation import describe, finite_vector, whole_number
 
 SPACING = 3.0**0.5 / 1.03
@@ -230,9 +230,10 @@ class AddObject:
         """Return the edit."""
         if not isinstance(self.object, MeshObject | TreeObject):
             raise InvalidEdit(f"expected a MeshObject or a TreeObject to add, got {describe(self.object)}")
-        objects = (*document.objects, self.object)
+        item = relative_to(self.object, document.origin) if document.objects else self.object
+        objects = (*document.objects, item)
         check_names(objects)
-        self.object.surface  # noqa: B018  # raises for a tree without a visible surface
+        item.surface  # noqa: B018  # raises for a tree without a visible surface
         return document.compute_parts(objects=objects)
 
 

@@ -419,7 +419,7 @@ class TreeActions:
             last = len(self._state.session.document.objects) - 1
             self._state.select_primitive(last, (), handle_offset)
 
-        self._state.run(AddObject(TreeObject(name, tree)), select)
+        self._state.run(AddObject(TreeObject(name, tree, self._state.session.document.origin)), select)
 
     @action(
         "remove_object",

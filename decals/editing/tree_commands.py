@@ -69,7 +69,7 @@ class PrimitiveCommand:
         """
         before = self.tree(document)
         after = with_node(before, self.path, node)
-        item = TreeObject(document.objects[self.object].name, after)
+        item = self._exchanged(document, after)
         if not quick:
             item.surface  # noqa: B018  # raises for a tree without a visible surface
         objects = self._with_object(document, item)
@@ -81,8 +81,13 @@ class PrimitiveCommand:
 
     def compute_repainting(self, document: Document, node: Node) -> Edit:
         """Return the edit that puts a node of the same shape at the path."""
-        item = TreeObject(document.objects[self.object].name, with_node(self.tree(document), self.path, node))
+        item = self._exchanged(document, with_node(self.tree(document), self.path, node))
         return document.compute_parts(objects=self._with_object(document, item))
+
+    def _exchanged(self, document: Document, tree: Node) -> TreeObject:
+        """Return the command's object with another tree."""
+        before = document.objects[self.object]
+        return TreeObject(before.name, tree, before.origin)
 
     def _with_object(self, document: Document, item: SceneObject) -> tuple[SceneObject, ...]:
         """Return the document's objects with the command's object exchanged."""

@@ -14,6 +14,7 @@ from blobtree._typing import Float32Array, Int32Array
 from blobtree.colors import ColorLike, color_rgb
 from blobtree.lazy import Lazy
 from decals.errors import InvalidScene
+from decals.scenes.origin import Origin, as_origin, check_distance, local_tree, local_vertices
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
@@ -47,6 +48,9 @@ class MeshObject:
     crease_angle : float
         Least angle between two faces in degrees, from 0 to 180, at which their edge is drawn sharp. Smaller
         angles are smoothed. Default 35.
+    origin : (x, y, z), optional
+        Point that vertices are relative to. By default the zero point; for a model farther from it than
+        1,000 times its size, a point near the model, which is subtracted in float64.
 
     Raises
     ------
@@ -71,6 +75,7 @@ class MeshObject:
     color: Color = CLAY
     source: str | None = None
     crease_angle: float = CREASE_ANGLE
+    origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
     surface: MeshSurface = field(init=False, repr=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
@@ -83,15 +88,19 @@ class MeshObject:
             color: ColorLike = CLAY,
             source: str | None = None,
             crease_angle: float = CREASE_ANGLE,
+            origin: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        surface = MeshSurface(self.vertices, self.faces)
+        given = (self.vertices, as_origin(self.origin)) if self.origin is not None else None
+        vertices, origin = given or local_vertices(self.vertices)
+        surface = MeshSurface(vertices, self.faces)
         checked = {
             "name": _name(self.name),
             "color": color_rgb(f"object {self.name!r}, colour", self.color, InvalidScene),
             "source": _source(self.name, self.source),
             "crease_angle": as_crease_angle(self.crease_angle),
+            "origin": origin,
             "surface": surface,
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -105,7 +114,7 @@ class MeshObject:
 
     @property
     def bounds(self) -> Box:
-        """Lower and upper corner of the mesh, float32[3] each."""
+        """Lower and upper corner of the mesh, float32[3] each, relative to the origin."""
         return self.surface.bounds
 
 
@@ -119,6 +128,9 @@ class TreeObject:
         Name of the object, unique in its scene.
     tree : Node
         The model; its iso surface is drawn.
+    origin : (x, y, z), optional
+        Point that the tree is relative to. By default the zero point; for a model farther from it than
+        1,000 times its size, a point near the model, which is subtracted in float64.
 
     Raises
     ------
@@ -135,11 +147,22 @@ class TreeObject:
 
     name: str
     tree: Node
+    origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
+
+    if TYPE_CHECKING:
+
+        def __init__(self, name: str, tree: Node, origin: ArrayLike | None = None) -> None: ...
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", _name(self.name))
         if not isinstance(self.tree, Node):
             raise InvalidScene(f"object {self.name!r}: expected a BlobTree, got {type(self.tree).__name__}")
+        if self.origin is None:
+            tree, origin = local_tree(self.tree)
+            object.__setattr__(self, "tree", tree)
+        else:
+            origin = as_origin(self.origin)
+        object.__setattr__(self, "origin", origin)
 
     @Lazy
     def surface(self) -> ImplicitSurface:
@@ -194,16 +217,41 @@ def as_object(
     )
 
 
+def relative_to(item: SceneObject, origin: Origin) -> SceneObject:
+    """Return an object relative to another origin.
+
+    Raises
+    ------
+    InvalidScene
+        If it lies so far from the origin that float32 would show steps.
+    """
+    shift = np.subtract(item.origin, origin)
+    if not shift.any():
+        return item
+    box = item.tree.support if isinstance(item, TreeObject) else item.bounds
+    check_distance(item.name, *(corner.astype(np.float64) + shift for corner in box))
+    if isinstance(item, TreeObject):
+        return replace(item, tree=item.tree.translate(tuple(shift)), origin=origin)
+    vertices = (item.vertices + shift).astype(np.float32)
+    return replace(item, vertices=vertices, origin=origin)
+
+
+def with_common_origin(objects: Sequence[SceneObject]) -> tuple[SceneObject, ...]:
+    """Return objects relative to the origin of the first."""
+    return tuple(relative_to(item, objects[0].origin) for item in objects)
+
+
 def as_objects(models: Iterable[object], *, crease_angle: float = CREASE_ANGLE) -> list[SceneObject]:
     """Return models as objects with different names: the second object of a name becomes ``name-2``.
 
-    Kinds of models, the crease angle of meshes and errors are those of `as_object`.
+    Kinds of models, the crease angle of meshes and errors are those of `as_object`. All get the origin of the
+    first.
     """
     objects: list[SceneObject] = []
     for number, model in enumerate(models, 1):
         item = as_object(model, f"model {number}", crease_angle=crease_angle)
         objects.append(_renamed(item, {other.name for other in objects}))
-    return objects
+    return list(with_common_origin(objects))
 
 
 def _renamed(item: SceneObject, taken: set[str]) -> SceneObject:

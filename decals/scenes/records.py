@@ -16,6 +16,7 @@ from decals.images.load import is_embedded
 from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.origin import WORLD
 from decals.surfaces.mesh_file import MeshArrays, read_mesh
 from decals.surfaces.normals import CREASE_ANGLE
 
@@ -43,24 +44,27 @@ class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=Tru
     source: str | None = None
     data: _InlineMesh | None = None
     crease_angle: float = CREASE_ANGLE
+    origin: Vector | None = None
 
 
-class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True):
+class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
     """A tree."""
 
     name: str
     tree: TreeFile
+    origin: Vector | None = None
 
 
 def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     """Describe an object; paths are relative to the folder."""
+    origin = None if item.origin == WORLD else item.origin
     if isinstance(item, TreeObject):
-        return TreeRecord(item.name, to_tree_file(item.tree))
-    angle = item.crease_angle
+        return TreeRecord(item.name, to_tree_file(item.tree), origin)
+    kept: dict[str, Any] = {"crease_angle": item.crease_angle, "origin": origin}
     if item.source is not None:
-        return MeshRecord(item.name, item.color, source=relative(item.source, folder), crease_angle=angle)
+        return MeshRecord(item.name, item.color, source=relative(item.source, folder), **kept)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
-    return MeshRecord(item.name, item.color, data=data, crease_angle=angle)
+    return MeshRecord(item.name, item.color, data=data, **kept)
 
 
 def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoader | None) -> SceneObject:
@@ -72,15 +76,17 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
         If what it names is missing or broken.
     """
     if isinstance(record, TreeRecord):
-        return TreeObject(record.name, from_tree_file(record.tree))
+        return TreeObject(record.name, from_tree_file(record.tree), record.origin or WORLD)
     if (record.source is None) == (record.data is None):
         raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
+    origin, angle = record.origin or WORLD, record.crease_angle
     if record.data is not None:
         vertices, faces = _unpacked(record.name, record.data)
-        return MeshObject(record.name, vertices, faces, record.color, None, record.crease_angle)
+        return MeshObject(record.name, vertices, faces, record.color, None, angle, origin)
     vertices, faces = _mesh(str(record.source), folder, samples)
     source = absolute(str(record.source), folder)
-    return MeshObject(record.name, vertices, faces, record.color, source, record.crease_angle)
+    local = vertices - np.array(origin)
+    return MeshObject(record.name, local, faces, record.color, source, angle, origin)
 
 
 def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshArrays:

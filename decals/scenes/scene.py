@@ -16,7 +16,8 @@ from decals.errors import InvalidScene, NoGraphics
 from decals.images.load import AnyImage, each_image, image_pixels
 from decals.model import Decals
 from decals.scenes.camera import Camera
-from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names
+from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names, with_common_origin
+from decals.scenes.origin import WORLD, Origin
 from decals.surfaces.convert import Model
 from decals.validation import describe, instance, require_rgba
 
@@ -88,6 +89,15 @@ def as_images(images: AnyImage | Iterable[AnyImage]) -> tuple[DecalImage, ...]:
     )
 
 
+def check_camera(camera: Camera, origin: Origin) -> None:
+    """Raise InvalidScene for a camera in the coordinates of a scene's models, whose origin is far away."""
+    if origin != WORLD and np.abs(camera.target).max() > 0.5 * np.abs(origin).max():
+        raise InvalidScene(
+            f"camera: expected one relative to the scene's origin {origin}, got one that looks at "
+            f"{camera.target}; subtract the origin, or use decals.Camera.framing(scene.bounds)"
+        )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
     """Everything that a picture shows.
@@ -95,11 +105,12 @@ class Scene:
     Parameters
     ----------
     objects : sequence of MeshObject, TreeObject or Model
-        Surfaces, each in the scene's own coordinates; names are unique. Other models become objects.
+        Surfaces; names are unique. Other models become objects. All become relative to the `origin` of the
+        first.
     camera : Camera
-        The viewpoint of the picture.
+        The viewpoint of the picture, relative to the origin.
     decals : Decals
-        They lie over all objects; a decal belongs to no object in particular.
+        They lie over all objects, relative to the origin; a decal belongs to no object in particular.
     images : sequence of images
         The images that ``decals.images`` indexes, or a single one; index -1 is a plain tint and needs no
         image.
@@ -107,7 +118,8 @@ class Scene:
     Raises
     ------
     InvalidScene
-        If names repeat or a decal shows an image that the scene lacks.
+        If names repeat, a decal shows an image that the scene lacks, objects are too far apart for float32,
+        or the camera is not relative to the origin of a scene far away.
 
     See Also
     --------
@@ -148,11 +160,12 @@ class Scene:
         if items is None:
             raise InvalidScene(f"objects: expected a list of models, got {describe(self.objects)}")
         objects = tuple(as_object(item, f"model {number}") for number, item in enumerate(items, 1))
-        object.__setattr__(self, "objects", objects)
+        object.__setattr__(self, "objects", with_common_origin(objects))
         object.__setattr__(self, "images", as_images(self.images))
         instance("camera", self.camera, Camera, InvalidScene, "Camera.framing makes one")
         instance("decals", self.decals, Decals, InvalidScene, "decals.scatter makes some")
         check_names(self.objects)
+        check_camera(self.camera, self.origin)
         last = int(self.decals.images.max(initial=-1))
         if last >= len(self.images):
             raise InvalidScene(
@@ -161,8 +174,23 @@ class Scene:
             )
 
     @property
+    def origin(self) -> Origin:
+        """Point that all coordinates of the scene are relative to: zero, or near objects far from zero.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> scene = decals.cover(blobtree.Point((1e6, 0, 0), radius=1), count=3)
+        >>> scene.origin
+        (1000000.0, 0.0, 0.0)
+        >>> bool(abs(scene.decals.positions).max() < 1.1)
+        True
+        """
+        return self.objects[0].origin if self.objects else WORLD
+
+    @property
     def bounds(self) -> Box:
-        """Lower and upper corner of all objects together, float32[3] each."""
+        """Lower and upper corner of all objects together, float32[3] each, relative to the origin."""
         return bounds_of(self.objects)
 
     def save(self, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:

@@ -18,6 +18,7 @@ from decals.errors import InvalidScene
 from decals.images.builtin import is_builtin
 from decals.model import Decals
 from decals.scenes.objects import MeshObject, SceneObject
+from decals.scenes.origin import WORLD
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import instance
 
@@ -137,9 +138,9 @@ class _Script:
             self._names[id(item)] = item.name
             return (
                 f"decals.MeshObject({item.name!r}, {vertices}, {faces}, {item.color!r}, "
-                f"source={item.source!r}, crease_angle={item.crease_angle!r})"
+                f"source={item.source!r}, crease_angle={item.crease_angle!r}{_origin(item)})"
             )
-        return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)})"
+        return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)}{_origin(item)})"
 
     def _tree(self, tree: Node) -> str:
         """Write one line for each node, operands first, and return the name of the last one."""
@@ -220,3 +221,8 @@ def _number_text(values: Any) -> str:
     if array.ndim:
         return f"[{', '.join(map(_number_text, array))}]"
     return str(array.item()) if array.dtype != np.float32 else repr(float(str(array[()])))
+
+
+def _origin(item: SceneObject) -> str:
+    """Return the argument of an object's origin, if it is far away."""
+    return "" if item.origin == WORLD else f", origin={item.origin!r}"

@@ -164,8 +164,8 @@ def _is_array_pair(model: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
 
 
 def _array_triangles(vertices: ArrayLike, faces: ArrayLike | Sequence[Any], name: str) -> MeshArrays:
-    points = point_array(vertices, f"{name}: vertices", InvalidMesh, MAX_COORDINATE)
-    return polygon_triangles(points, _polygons(faces, name), name=name)
+    point_array(vertices, f"{name}: vertices", InvalidMesh, MAX_COORDINATE)
+    return polygon_triangles(np.asarray(vertices).reshape(-1, 3), _polygons(faces, name), name=name)
 
 
 def _polygons(faces: ArrayLike | Sequence[Any], name: str) -> Any:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do 
 MeshArrays = tuple[Float32Array, Int32Array]
 """Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
 
+MIN_PRECISE_RATIO = 500.0
+"""Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
+
 _ROBUST = (".obj", ".stl")
 """Suffixes of formats whose readers in VTK neither crash nor hang on damaged files; see `tests.fuzz`."""
 
@@ -90,10 +93,20 @@ def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> Me
     return polygon_triangles(surface.points, list(surface.irregular_faces), name=name)
 
 
+def precise_points(points: ArrayLike) -> Any:
+    """Return points as float32; keep float64 of points so far from zero that float32 would round them."""
+    given = np.asarray(points)
+    if given.dtype == np.float64 and len(given):
+        extent = np.ptp(given, axis=0).max()
+        if np.isfinite(given).all() and np.abs(given).max() > MIN_PRECISE_RATIO * extent:
+            return given
+    return given.astype(np.float32)
+
+
 def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> MeshArrays:
     """Divide polygons into triangles, concave ones too, after a check of their indices."""
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused by surfaces
-        vertices: Any = np.asarray(points, np.float32)
+        vertices: Any = precise_points(points)
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
     if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:

@@ -229,8 +229,8 @@ class DecalsComponent:
         if camera:
             view = self._plotter.camera
             view.position, view.focal_point, view.up = (
-                shown.camera.position,
-                shown.camera.target,
+                np.add(shown.camera.position, shown.origin),
+                np.add(shown.camera.target, shown.origin),
                 shown.camera.up,
             )
             view.view_angle = shown.camera.fov

@@ -11,6 +11,7 @@ from blobtree._typing import Float64Array
 from blobtree.tracing.tree_cells import tracing_cells
 from decals.rendering.viewpoint import Bounds
 from decals.scenes.objects import Box, SceneObject, TreeObject, bounds_of
+from decals.scenes.origin import WORLD, Origin
 from decals.vtk.adapters import matrix_of
 
 
@@ -59,6 +60,7 @@ class ProxyActor:
 
     def __init__(self, renderer: pv.Renderer, draw: Callable[[], None]) -> None:
         self._renderer = renderer
+        self._origin = WORLD
         faces = [[3, i, i, i] for i in range(8)]
         self._corners = pv.PolyData(np.zeros((8, 3)), faces=np.ravel(faces))
         self._mapper = vtkPolyDataMapper()
@@ -78,6 +80,12 @@ class ProxyActor:
         self._mapper.SetInputData(pv.PolyData() if bounds is None else self._corners)
         if not self.present:
             self._renderer.add_actor(self.actor, name=NAME, pickable=False, render=False)
+
+    def place(self, origin: Origin) -> None:
+        """Move the actor to the origin of its scene, which float32 coordinates are relative to."""
+        if origin != self._origin:
+            self.actor.SetPosition(*np.add(self.actor.GetPosition(), np.subtract(origin, self._origin)))
+            self._origin = origin
 
     @property
     def present(self) -> bool:

@@ -28,6 +28,7 @@ from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
+from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import finite_number, member, stiffness_number, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
@@ -218,6 +219,8 @@ class SubplotRenderer:
         if same_objects(objects, self._enclosed) and self._proxy_actor.present:
             return
         self._enclosed = objects
+        if isinstance(self._scene, Scene):  # a document stays in its own window, at its origin
+            self._proxy_actor.place(self._scene.origin)
         self._proxy_actor.enclose(box(cast(Sequence[SceneObject], objects)) if objects else None)
 
     def apply(self, actor: Any, *, follow: bool = False, crease_angle: float = CREASE_ANGLE) -> None:
