@@ -126,7 +126,7 @@ def new_node(
         The class refuses the values.
     """
     known = kinds()
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise InvalidEdit(f"kind: expected one of {', '.join(known)}, got {describe(name)}")
     kind = known[name]
     least, most = operand_count(kind), most_operands(kind)

@@ -151,7 +151,7 @@ def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
             raise InvalidEdit(f"brush: expected one of {', '.join(Brush)}, got {describe(raw)}")
         brush.brush = Brush(raw)
         return
-    if name not in ("radius", "decal_radius", "density"):
+    if not isinstance(name, str) or name not in ("radius", "decal_radius", "density"):
         raise InvalidEdit(f"brush: expected 'radius' or such, got {describe(name)}")
     number = finite_number(name, _as_number(raw), InvalidEdit)
     if number <= 0.0 or (name == "density" and number > 1.0):
@@ -179,6 +179,6 @@ def set_mode(state: ActionState, name: str, raw: Any) -> None:
         "mapping": lambda text: text,
         "stiffness": _as_number,
     }
-    if name not in parse:
+    if not isinstance(name, str) or name not in parse:
         raise InvalidEdit(f"mode: expected one of {', '.join(parse)}, got {describe(name)}")
     setattr(state.modes, name, parse[name](raw))

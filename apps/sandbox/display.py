@@ -126,6 +126,8 @@ class Display:
             There is no such option or value.
         """
         choices = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": ("", *AXES)}
+        if not isinstance(name, str):
+            raise InvalidEdit(f"view: expected an option such as 'mode', got {describe(name)}")
         if name in choices:
             if value not in choices[name]:
                 raise InvalidEdit(
