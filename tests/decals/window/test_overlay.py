@@ -17,7 +17,9 @@ def box(actor: Any, renderer: Any) -> Any:
     return left + corners[0], left + corners[1], bottom + corners[2], bottom + corners[3]
 
 
-@pytest.mark.parametrize("width", [240, 320, 640])
+@pytest.mark.parametrize(
+    "width", [240, *(pytest.param(width, marks=pytest.mark.slow) for width in (320, 640))]
+)
 def test_a_long_line_is_broken_where_the_window_ends(opened: Any, width: Any) -> None:
     window = opened().window
     window.plotter.window_size = (width, 480)
