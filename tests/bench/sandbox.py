@@ -1,0 +1,117 @@
+"""The sandbox in headless Chromium: milliseconds from a slider or a drag to the next frame in the browser.
+
+    python -m tests.bench.sandbox
+    python -m tests.bench.sandbox --decals 1000 --events 20 --json sandbox.json
+
+Needs playwright and Chromium. Frames are drawn by this process; without a graphics card, on the processor.
+"""
+
+import argparse
+import asyncio
+import json
+import time
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from playwright.async_api import Page
+from trame.app import get_server
+
+import decals
+from blobtree import Point
+from decals.apps.sandbox.page import Page as SandboxPage
+from decals.window import EditWindow
+from tests.decals.window.driver import Driver
+from tests.frontends.browsing import PICTURE, seen, served, until
+
+SIZE = 1200, 800
+REST_SECONDS = 0.5
+"""Time between two events."""
+
+TREE = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6) + Point((-1.0, -0.3, 0.4), radius=0.5)
+
+CHANGED = 24
+"""Levels of 255 by which a pixel of another picture differs: JPEG changes them by less."""
+
+LONGEST = 5.0
+"""Seconds after which an event without a new frame counts as missed."""
+
+
+async def measure(count: int, events: int) -> dict[str, float]:
+    """Return the figures for a number of decals and of events."""
+    began = time.perf_counter()
+    scene = decals.cover(TREE, count=count, images=["scale"])
+    plotter = pv.Plotter(off_screen=True, window_size=list(SIZE))
+    server = get_server("sandbox bench", client_type="vue3")
+    window = EditWindow(scene, plotter=plotter)
+    window.show()
+    SandboxPage(server, window)
+    async with served(server, size=SIZE) as browser:
+        await until(lambda: not window.subplot.warming_up)
+        figures = {"first_picture_warm_s": time.perf_counter() - began}
+        await browser.get_by_text("Point").nth(1).click()
+        slider = browser.get_by_role("slider", name="radius")
+        await slider.focus()
+        times = []
+        for number in range(events):
+            await asyncio.sleep(REST_SECONDS)
+            times.append(await _timed(browser, browser.keyboard.press(("PageUp", "PageDown")[number % 2])))
+        figures |= _summary("slider", times)
+        window.actions.state.primitive = None
+        driver = Driver(window)
+        number, (x, y) = next(driver.visible())
+        window.actions.state.selection = (number,)
+        box = await browser.locator(PICTURE).first.bounding_box()
+        assert box is not None
+        left, top = box["x"] + x, box["y"] + plotter.window_size[1] - y
+        await browser.mouse.move(left, top)
+        await browser.mouse.down()
+        times = []
+        for step in range(events):
+            await asyncio.sleep(REST_SECONDS)
+            at = left + 20 + 20 * (step % 2), top
+            times.append(await _timed(browser, browser.mouse.move(*at)))
+        await browser.mouse.up()
+        figures |= _summary("drag", times)
+    window.close()
+    return figures
+
+
+async def _timed(browser: Page, event: Coroutine[Any, Any, None]) -> float:
+    """Return the milliseconds from an event to another picture, −1 for none; a look takes some 50 of them."""
+    before, began = await seen(browser), time.perf_counter()
+    await event
+    while time.perf_counter() - began < LONGEST:
+        if np.abs(await seen(browser) - before).max() > CHANGED:
+            return 1000.0 * (time.perf_counter() - began)
+    return -1.0
+
+
+def _summary(name: str, times: list[float]) -> dict[str, float]:
+    seen = [value for value in times if value >= 0.0]
+    if not seen:
+        return {f"{name}_missed": float(len(times))}
+    middle, slow = np.percentile(seen, (50, 95))
+    return {f"{name}_ms": middle, f"{name}_p95_ms": slow, f"{name}_missed": float(len(times) - len(seen))}
+
+
+def main() -> None:
+    """Print the figures, and write them."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--decals", type=int, default=1000)
+    parser.add_argument("--events", type=int, default=20)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    figures = asyncio.run(measure(options.decals, options.events))
+    for name, value in figures.items():
+        print(f"{name:24} {value:10.1f}")
+    if options.json is not None:
+        options.json.write_text(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
