@@ -6,7 +6,6 @@ from enum import Enum
 from typing import TypeAlias
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
 from blobtree.formulas.falloff import RIM
@@ -116,6 +115,8 @@ def turned_normals(
     owned = owners >= 0
     lips = np.flatnonzero(owned & (facing > LIP_RATIO * radii[owners]))
     if len(lips):
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
         nearest, rows = cKDTree(decals.positions).query(samples.positions[lips])
         close = nearest < LIP_NEARNESS * facing[lips]
         lips, rows = lips[close], rows[close]
