@@ -62,6 +62,8 @@ implicit-decals sandbox
 implicit-decals sandbox knot --decals 300 --save knot.json
 
 implicit-decals sandbox knot.json
+
+implicit-decals sandbox --lab
 """,
     "scatter": """Scatter decals over models and write a scene, or a table of decals.
 

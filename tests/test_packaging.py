@@ -22,7 +22,7 @@ FORBIDDEN = {
 PYVISTA_FILES = ("colors.py", "tree.py", "pyvista_views.py", "field_slice.py", "vtk_errors.py")
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
-EXTRAS = {"page.py": "browser", "panels.py": "browser", "sandbox.py": "browser"}
+EXTRAS = dict.fromkeys(("lab.py", "page.py", "panels.py", "sandbox.py"), "browser")
 """Files that need the packages of an extra, which a command imports late."""
 
 
@@ -104,7 +104,7 @@ def test_every_imported_distribution_is_a_declared_dependency() -> None:
                 if top in sys.stdlib_module_names or top in FOLDERS.values():
                     continue
                 extra = names_of(optional[EXTRAS[path.name]]) if path.name in EXTRAS else set()
-                known = declared & set(providers.get(top, ())) or top.replace("_", "-") in extra
+                known = (declared | extra) & set(providers.get(top, ())) or top.replace("_", "-") in extra
                 assert known, f"{path.relative_to(ROOT)} imports {top}"
 
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from decals.apps.commands.opening import check_options, opened, report_unsaved
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust, Whole, check_count
 from decals.apps.models.loading import import_definitions
-from decals.errors import MissingPackage
+from decals.errors import InvalidInput, MissingPackage
 from decals.window import EditWindow
 
 HOST = "127.0.0.1"
@@ -36,6 +36,8 @@ def sandbox(
     port: Whole = 8080,
     browser: bool = True,
     trust: Trust = False,
+    lab: Annotated[bool, Parameter(negative=())] = False,
+    lessons: Path | None = None,
 ) -> None:
     """Open models or a scene in the sandbox, a page in the browser.
 
@@ -66,10 +68,16 @@ def sandbox(
         Open the page in the default browser.
     trust
         Let a scene read files outside its folder, and any number of images.
+    lab
+        Open the contact lab: six lessons on decals and solids in contact.
+    lessons
+        A folder of other lessons for the lab.
     """
     check_options(decals, seed, save)
     check_count("--port", port, 0, MAX_PORT)
     serve, page = _toolkit()
+    if lab or lessons is not None:
+        page = _lab(model, lessons)
     import_definitions(define)
     opening = opened(
         model, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save, trust=trust
@@ -99,6 +107,17 @@ def _toolkit() -> tuple[Any, Any]:
             f"the sandbox needs trame ({error}); install it with: pip install 'implicit-decals[browser]'"
         ) from None
     return get_server, Page
+
+
+def _lab(model: list[str] | None, folder: Path | None) -> Any:
+    """Return the page of the contact lab, which brings its own scenes."""
+    from decals.apps.lab.lesson import LESSONS, load_lessons
+    from decals.apps.lab.page import LabPage
+
+    if model:
+        raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
+    found = load_lessons(LESSONS if folder is None else folder)
+    return lambda server, window: LabPage(server, window, found)
 
 
 def _announce(port: int) -> None:

@@ -227,16 +227,7 @@ class DecalsComponent:
         instance("camera", camera, bool, InvalidScene, "True to use the scene's camera")
         self.scene = shown
         if camera:
-            view = self._plotter.camera
-            view.position, view.focal_point, view.up = (
-                np.add(shown.camera.position, shown.origin),
-                np.add(shown.camera.target, shown.origin),
-                shown.camera.up,
-            )
-            view.view_angle = shown.camera.fov
-            view.parallel_projection = False
-            self._plotter.renderer.camera_set = True
-            self._plotter.renderer.reset_camera_clipping_range()
+            show_camera(self._plotter, shown)
         return shown
 
     def enable_picking(
@@ -385,6 +376,19 @@ STILL = {"screenshot", "return_img", "interactive", "auto_close"}
 
 REFINE_MILLISECONDS = 100
 """Time after the first picture of a window until the one with all samples."""
+
+
+def show_camera(plotter: Any, scene: Scene) -> None:
+    """Let the active subplot of a plotter show what the camera of a scene sees."""
+    view = plotter.camera
+    view.position, view.focal_point = (
+        np.add(point, scene.origin) for point in (scene.camera.position, scene.camera.target)
+    )
+    view.up = scene.camera.up
+    view.view_angle = scene.camera.fov
+    view.parallel_projection = False
+    plotter.renderer.camera_set = True
+    plotter.renderer.reset_camera_clipping_range()
 
 
 def _show_one_sample_first(plotter: Any) -> None:

@@ -1,6 +1,7 @@
 """Decals in a real browser, served by trame, as a program: ``python -m tests.frontends.in_browser NAME``.
 
-``page`` and ``sandbox`` take a path behind their name, where they save the picture of their page of docs.
+``page``, ``sandbox`` and ``lab`` take a path behind their name, where they save the picture of their page of
+docs.
 """
 
 import asyncio
@@ -8,6 +9,7 @@ import io
 import sys
 import tempfile
 from pathlib import Path
+from functools import partial
 from typing import Any
 from unittest.mock import patch
 
@@ -23,10 +25,13 @@ from trame_server.core import Server
 import decals
 from blobtree import Point
 from decals.apps.models.scenes import empty_scene
+from decals.apps.lab.lesson import LESSONS, load_lessons
+from decals.apps.lab.page import LabPage
 from decals.apps.sandbox.page import Page as SandboxPage
 from decals.apps.views import UPRIGHT
 from decals.editing.scatter_commands import decals_on
 from decals.window import EditWindow
+from tests.apps.lab.answers import ANSWERS
 from tests.decals.editing.scenes import digest, scene
 from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
@@ -225,14 +230,58 @@ async def sandbox_start(picture: str | None = None) -> None:
     window.close()
 
 
+async def lab(picture: str | None = None) -> None:
+    """A student answers each lesson's question wrong, then right."""
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("lab", client_type="vue3")
+    empty = decals.Scene(objects=(), camera=decals.Camera((0, 0, 8)))
+    window = EditWindow(empty, plotter=plotter)
+    window.show()
+    lab_page = LabPage(server, window, load_lessons(LESSONS))
+    requests: list[str] = []
+    async with served(server, size=(1280, 800)) as browser:
+        browser.on("request", lambda request: requests.append(request.url))
+        for number, attempts in enumerate(ANSWERS):
+            await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][number]["title"])
+            await until(partial(shows_lesson, lab_page, number))
+            for attempt in attempts:
+                for name, value in attempt.settings:
+                    sliders = lab_page.lab.values()["lab_sliders"]
+                    label = next(s["label"] for s in sliders if s["label"].startswith(name))
+                    if isinstance(value, str):
+                        await choose(browser, label, value)
+                        continue
+                    field = browser.get_by_role("textbox", name=label, exact=True)
+                    await field.fill(str(value))
+                    await field.press("Enter")
+                await until(lambda: not lab_page.lab.busy)
+                await browser.get_by_role("button", name="Check the answer").click()
+                kind = "success" if attempt.right else "warning"
+                await browser.locator(f".v-alert.text-{kind}").get_by_text(attempt.words).wait_for()
+            if picture is not None and number == 1:
+                await shows(browser, plotter)
+                image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+                image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+        assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
+    window.close()
+
+
+def shows_lesson(lab_page: LabPage, number: int) -> bool:
+    """Return True if the lab is at a lesson."""
+    return bool(lab_page.lab.values()["lab_number"] == number)
+
+
+async def choose(browser: Page, label: str, option: str) -> None:
+    """Choose an entry of a list."""
+    await browser.get_by_role("combobox", name=label, exact=True).press("ArrowDown")
+    await browser.get_by_role("option", name=option, exact=True).click()
+
+
 def main() -> None:
     """Run one of the functions above, by its name."""
     name, *arguments = sys.argv[1:]
-    asyncio.run(
-        {"page": page, "user": user, "streamed": streamed, "sandbox": sandbox, "start": sandbox_start}[name](
-            *arguments
-        )
-    )
+    checks = {"page": page, "user": user, "streamed": streamed, "sandbox": sandbox, "start": sandbox_start, "lab": lab}
+    asyncio.run(checks[name](*arguments))
     print("done")
 
 

@@ -1,0 +1,322 @@
+"""The state of the contact lab, and the events that its page sends.
+
+The lab runs on an edit window like the sandbox. Values and plots are computed in a thread from immutable
+values, so that the page never waits for them.
+"""
+
+import math
+import time
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from markdown_it import MarkdownIt
+
+from decals.apps.lab.bindings import AXES, binding, exchanged, number_of
+from decals.apps.lab.errors import InvalidLesson
+from decals.apps.lab.experiment import Experiment, Scope
+from decals.apps.lab.lesson import Lesson, Slider
+from decals.apps.lab.plots import described, drawn
+from decals.apps.lab.relaxing import Recording
+from decals.editing.commands import ReplaceScene, SetValues
+from decals.editing.queries import move_decals
+from decals.errors import ImplicitDecalsError
+from decals.field.mapping import ImageMapping
+from decals.record import Contact
+from decals.validation import member, stiffness_number
+from decals.vtk.component import show_camera
+from decals.window import EditWindow
+
+REST_SECONDS = 1.0
+"""A slider that rests so long has ended its edit."""
+
+STEPPING_SECONDS = 0.05
+"""Time that a relaxation takes between two looks at the session."""
+
+
+PROBE_SIZE = 0.015
+"""Radius of the probe in the view, in widths of a map."""
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What was computed for one state."""
+
+    key: object
+    values: list[dict[str, str]]
+    plots: list[dict[str, str]]
+    verdict: tuple[bool, str]
+
+
+class Lab:
+    """Lessons on an edit window.
+
+    Parameters
+    ----------
+    window
+        The edited window; its plotter is the view.
+    lessons
+        The lessons.
+
+    Notes
+    -----
+    Events never raise for bad values: the scene stays as it was, and the window's message says why.
+    """
+
+    def __init__(self, window: EditWindow, lessons: Sequence[Lesson]) -> None:
+        self._window, self._lessons = window, lessons
+        titles = [lesson.settings.title for lesson in lessons]
+        self._titles = [{"title": f"{i + 1}. {title}", "value": i} for i, title in enumerate(titles)]
+        self._texts = [_html(lesson.text) for lesson in lessons]
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="lab")
+        self._pending: Future[Results] | None = None
+        self._results: Results | None = None
+        self._asked: object = None
+        self._asking = False
+        self._submitted: object = None
+        self._last_step = math.inf
+        self.start(0)
+
+    # -- state ------------------------------------------------------------------------------------------
+
+    @property
+    def lesson(self) -> Lesson:
+        """The present lesson."""
+        return self._lessons[self._number]
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the lesson's decals, and of those that were added, in the document."""
+        numbers = self._window.document.decals.numbers
+        numbers = numbers[numbers >= self._first]
+        own = self._first + np.arange(len(self.lesson.scene.decals))
+        if not np.array_equal(numbers[: len(own)], own):
+            raise InvalidLesson("a decal of the lesson was deleted; undo, or start the lesson again")
+        return [int(number) for number in numbers]
+
+    def experiment(self) -> Experiment:
+        """Return the present state as immutable values."""
+        document, modes, lesson = self._window.document, self._window.actions.state.modes, self.lesson
+        settings = lesson.settings
+        decals = document.decals.take(np.array(self.numbers, np.int64))
+        relaxed = None
+        if self._recording is not None:
+            step = self._recording.step_of(decals.positions)
+            relaxed = self._recording.relaxed(self._step if step is None else step)
+        return Experiment(
+            objects=document.objects,
+            decals=decals,
+            contact=modes.contact,
+            stiffness=modes.stiffness,
+            mapping=modes.mapping,
+            probe=self._probe,
+            camera=lesson.scene.camera,
+            size=lesson.size,
+            in_space=settings.space,
+            line=settings.line,
+            relaxed=relaxed,
+        )
+
+    def _key(self) -> object:
+        document, modes = self._window.document, self._window.actions.state.modes
+        drawn_with = modes.contact, modes.stiffness, modes.mapping, self._probe, self._step
+        return self._number, document.objects, document.decals.version, drawn_with
+
+    def values(self) -> dict[str, Any]:
+        """Return all values of the page, by their names there."""
+        lesson, results = self.lesson, self._results
+        asked = results is not None and self._asked == results.key == self._key()
+        right, text = results.verdict if results is not None and asked else (False, "")
+        return {
+            "lab_titles": self._titles,
+            "lab_number": self._number,
+            "lab_text": self._texts[self._number],
+            "lab_question": lesson.settings.question.text,
+            "lab_sliders": [self._slider(i, slider) for i, slider in enumerate(lesson.settings.sliders)],
+            "lab_values": results.values if results is not None else [],
+            "lab_plots": results.plots if results is not None else [],
+            "lab_verdict": {"right": right, "text": text},
+        }
+
+    def _slider(self, number: int, slider: Slider) -> dict[str, Any]:
+        try:
+            value = self._read(slider.path)
+        except InvalidLesson:
+            value = None
+        step = slider.step or (slider.high - slider.low) / 200
+        ends = {"low": slider.low, "high": slider.high, "step": step, "choices": list(slider.choices)}
+        return {"number": number, "label": slider.label, "value": value, **ends}
+
+    def _read(self, path: str) -> Any:
+        modes = self._window.actions.state.modes
+        if path.startswith("probe."):
+            return self._probe[AXES.index(path[-1])]
+        match path:
+            case "contact":
+                return modes.contact.name.lower()
+            case "mapping":
+                return modes.mapping.name.lower()
+            case "stiffness":
+                return modes.stiffness
+            case "step":
+                return self._target
+            case "seed":
+                return self._recording.seed if self._recording is not None else 0
+        document = self._window.document
+        return binding(path).read(document.objects, document.decals.take(np.array(self.numbers, np.int64)))
+
+    # -- measuring --------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Go on with what is under way; call this regularly."""
+        if time.monotonic() - self._last_step > REST_SECONDS:
+            self._end_edit()
+        if self._recording is not None and self._step != self._target:
+            self._relax(self._recording)
+        if self._pending is not None and self._pending.done():
+            done, self._pending = self._pending, None
+            try:
+                self._results = done.result()
+            except ImplicitDecalsError as error:
+                self._results = Results(self._submitted, [], [], (False, str(error)))
+        key = self._key()
+        if self._asking and not self._editing:
+            self._asked, self._asking = key, False
+        if self._pending is None and (self._results is None or self._results.key != key):
+            try:
+                experiment = self.experiment()
+            except InvalidLesson as error:
+                self._results = Results(key, [], [], (False, str(error)))
+                return
+            self._submitted = key
+            self._pending = self._worker.submit(measured, self.lesson, experiment, key)
+
+    @property
+    def busy(self) -> bool:
+        """True until the values are those of the present state."""
+        return self._editing or self._asking or self._results is None or self._results.key != self._key()
+
+    @property
+    def _editing(self) -> bool:
+        """True until what sliders asked for is done."""
+        return self._step != self._target or self._window.background.busy_editing
+
+    def close(self) -> None:
+        """End the thread."""
+        self._worker.shutdown(cancel_futures=True)
+
+    # -- events -----------------------------------------------------------------------------------------
+
+    def start(self, number: int) -> None:
+        """Start a lesson, from its beginning: its scene replaces the present one."""
+        if isinstance(number, bool) or not isinstance(number, int) or number not in range(len(self._lessons)):
+            self._show(f"lesson: expected one from 0 to {len(self._lessons) - 1}, got {number!r:.40}")
+            return
+        window, lesson = self._window, self._lessons[number]
+        settings, modes = lesson.settings, window.actions.state.modes
+        self._end_edit()
+        self._number, self._asked, self._asking, self._probe = number, None, False, settings.probe
+        self._first = window.document.decals.next_number
+        self._step = self._target = 0
+        window.session.do(ReplaceScene(lesson.scene, f"lesson: {settings.title}"))
+        modes.contact = member("contact", settings.contact, Contact, InvalidLesson)
+        modes.mapping = member("mapping", settings.mapping, ImageMapping, InvalidLesson)
+        modes.stiffness = settings.stiffness
+        self._recording = self._recorded(0) if settings.steps else None
+        window.subplot.scene = window.document  # its bounds, before the camera's planes follow from them
+        show_camera(window.plotter, lesson.scene)
+        self._mark_probe()
+        window.redraw(whole=True)
+
+    def _recorded(self, seed: int) -> Recording:
+        lesson = self.lesson
+        return Recording(lesson.scene.objects, len(lesson.scene.decals), seed, lesson.settings.steps)
+
+    def set_value(self, number: int, raw: Any, last: bool = True) -> None:
+        """Set what a slider of the lesson moves; with ``last`` False, more values follow."""
+        try:
+            self._set(self.lesson.settings.sliders[number], raw, bool(last))
+        except (IndexError, TypeError):
+            self._show(f"slider: expected one of the lesson, got {number!r:.40}")
+        except ImplicitDecalsError as error:
+            self._show(str(error))
+        self._window.redraw(whole=bool(last))
+
+    def _set(self, slider: Slider, raw: Any, last: bool) -> None:
+        state, path = self._window.actions.state, slider.path
+        if path.startswith("probe."):
+            x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(raw))
+            self._probe = x, y, z
+            self._mark_probe()
+        elif path == "contact":
+            state.modes.contact = member("contact", raw, Contact, InvalidLesson)
+        elif path == "mapping":
+            state.modes.mapping = member("mapping", raw, ImageMapping, InvalidLesson)
+        elif path == "stiffness":
+            state.modes.stiffness = stiffness_number(number_of(raw), InvalidLesson)
+        elif path in ("step", "seed") and self._recording is not None:
+            if path == "seed":
+                self._recording = self._recorded(round(max(number_of(raw), 0.0)))
+                self._step = -1
+            else:
+                self._target = round(min(max(number_of(raw), 0.0), self._recording.iterations))
+        else:
+            command = binding(path).command(self._window.document, self.numbers, raw)
+            state.begin_series(("lab", path), command.label)
+            state.run_latest(command)
+            self._last_step = time.monotonic()
+            if last:
+                self._end_edit()
+
+    def _relax(self, recording: Recording) -> None:
+        """Show the step that was asked for, or the last one that is known in time."""
+        self._step = recording.advance(self._target, STEPPING_SECONDS)
+        numbers = self.numbers
+        moved = move_decals(
+            self._window.document.decals.take(np.array(numbers)), recording.points(self._step)
+        )
+        arrays = {name: getattr(moved, name) for name in ("positions", "normals", "tangents")}
+        self._window.actions.state.begin_series(("lab", "step"), "relax")
+        self._window.session.do(SetValues(numbers, arrays, "relax"))
+        if self._step == self._target:
+            self._end_edit()
+        self._window.redraw(whole=self._step == self._target)
+
+    def _end_edit(self) -> None:
+        self._last_step = math.inf
+        self._window.actions.state.end_stroke()
+
+    def check(self) -> None:
+        """Check the answer: the verdict appears once it is computed, until the scene changes."""
+        self._asking = True
+
+    def _show(self, message: str) -> None:
+        self._window.actions.state.show(message)
+
+    def _mark_probe(self) -> None:
+        """Show the probe in the view, if the lesson moves it."""
+        plotter = self._window.plotter
+        if not self.lesson.moves_probe:
+            plotter.remove_actor("probe", render=False)
+            return
+        ball = pv.Sphere(radius=PROBE_SIZE * self.lesson.size, center=self._probe)
+        plotter.add_mesh(ball, name="probe", color="white", pickable=False, reset_camera=False, render=False)
+
+
+def measured(lesson: Lesson, experiment: Experiment, key: object = None) -> Results:
+    """Return values, plots and the verdict of a lesson for one state of its scene."""
+    scope = Scope.at_probe(experiment)
+    plots = [
+        {"title": plot.title, "note": plot.note, "svg": drawn(plot, lesson, scope)}
+        for plot in lesson.settings.plots
+    ]
+    return Results(key, described(lesson, scope), plots, lesson.verdict(scope))
+
+
+def _html(text: str) -> str:
+    """Return Markdown as HTML; HTML and pictures in it stay text, so that it asks no other server."""
+    html: str = MarkdownIt("commonmark", {"html": False}).disable("image").enable("table").render(text)
+    return html

@@ -1,0 +1,310 @@
+"""Lessons: a file of text with its scene, read and checked."""
+
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from msgspec import Struct, field
+
+from decals.apps.lab.bindings import OWN, binding
+from decals.apps.lab.errors import InvalidLesson
+from decals.apps.lab.experiment import Scope
+from decals.apps.lab.formulas import Formula, parse
+from decals.apps.lab.measures import MEASURES
+from decals.errors import ImplicitDecalsError
+from decals.field.mapping import ImageMapping
+from decals.record import DEFAULT_STIFFNESS, Contact
+from decals.scenes.files import load_scene
+from decals.scenes.scene import Scene
+from decals.validation import member, stiffness_number
+
+FENCE = "+++"
+"""Line before and behind the settings of a lesson, which are TOML."""
+
+LESSONS = Path(__file__).parent / "lessons"
+"""The folder of the lessons that are installed."""
+
+ROUNDING = 1e-6
+"""Least value that is not shown as 0: fields have the precision of float32."""
+
+PLACEHOLDER = re.compile(r"\{([^{}]+)\}")
+"""A formula in a text, whose value is shown in its place."""
+
+Vector = tuple[float, float, float]
+Range = tuple[float, float]
+
+
+class Slider(Struct, forbid_unknown_fields=True, frozen=True):
+    """A slider, or a choice, of one parameter of the scene; `Lab` knows the paths."""
+
+    label: str
+    path: str
+    low: float = 0.0
+    high: float = 1.0
+    step: float = 0.0
+    choices: tuple[str, ...] = ()
+
+
+class Value(Struct, forbid_unknown_fields=True, frozen=True):
+    """A live value; conditions are shown as yes or no."""
+
+    label: str
+    formula: str
+
+
+class Curve(Struct, forbid_unknown_fields=True, frozen=True):
+    """One curve of a plot."""
+
+    label: str
+    formula: str
+
+
+class Plot(Struct, forbid_unknown_fields=True, frozen=True):
+    """Curves over a range or the lesson's line, or a map of colours over two ranges or the surface."""
+
+    title: str
+    curves: tuple[Curve, ...] = ()
+    map: str = ""
+    red: str = ""
+    red_label: str = ""
+    x: Range | None = None
+    y: Range | None = None
+    values: Range | None = None
+    marks: tuple[tuple[str, str], ...] = ()
+    note: str = ""
+
+
+class Check(Struct, forbid_unknown_fields=True, frozen=True):
+    """A condition of the right answer, and the text for a scene that does not meet it."""
+
+    holds: str
+    otherwise: str
+
+
+class Question(Struct, forbid_unknown_fields=True, frozen=True):
+    """A question: the first check that fails gives the text of a wrong answer."""
+
+    text: str
+    right: str
+    checks: tuple[Check, ...]
+
+
+class Settings(Struct, forbid_unknown_fields=True, frozen=True):
+    """What stands between the fences of a lesson."""
+
+    title: str
+    scene: str
+    question: Question
+    contact: str = "product"
+    stiffness: float = DEFAULT_STIFFNESS
+    mapping: str = "corrected"
+    probe: Vector = (0.0, 0.0, 0.0)
+    size: float | None = None
+    space: bool = False
+    line: tuple[int | Vector, int | Vector] = (0, 1)
+    steps: int = 0
+    sliders: tuple[Slider, ...] = ()
+    values: tuple[Value, ...] = ()
+    plots: tuple[Plot, ...] = field(default=())
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """A text with formulas in braces."""
+
+    parts: tuple[str | Formula, ...]
+
+    def filled(self, scope: Scope) -> str:
+        """Return the text with the values of its formulas."""
+        return "".join(p if isinstance(p, str) else shown(p.evaluate(scope)) for p in self.parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """A lesson.
+
+    Attributes
+    ----------
+    settings
+        Its settings.
+    text
+        Its text, in Markdown.
+    scene
+        The scene at the beginning.
+    formulas
+        All formulas by their text, for the variables of their places.
+    wrong, right
+        Text of each check that fails, and of the right answer.
+
+    Examples
+    --------
+    >>> from decals.apps.lab.lesson import LESSONS, load_lessons
+    >>> lessons = load_lessons(LESSONS)
+    >>> len(lessons), lessons[0].settings.title
+    (6, 'One decal')
+    """
+
+    settings: Settings
+    text: str
+    scene: Scene
+    formulas: dict[str, Formula]
+    wrong: tuple[Template, ...]
+    right: Template
+
+    @property
+    def size(self) -> float:
+        """Width of maps in model units."""
+        camera = self.scene.camera
+        visible = 2.0 * camera.distance * float(np.tan(np.radians(camera.fov) / 2))
+        return visible if self.settings.size is None else self.settings.size
+
+    @property
+    def moves_probe(self) -> bool:
+        """True if a slider moves the probe, so that it is shown."""
+        return any(slider.path.startswith("probe.") for slider in self.settings.sliders)
+
+    def verdict(self, scope: Scope) -> tuple[bool, str]:
+        """Return whether the scene answers the question, and the text to say so."""
+        question = self.settings.question
+        for check, text in zip(question.checks, self.wrong, strict=True):
+            if not np.all(self.formulas[check.holds].evaluate(scope)):
+                return False, text.filled(scope)
+        return True, self.right.filled(scope)
+
+
+def shown(value: Any) -> str:
+    """Return a value as a lesson shows it: three digits, yes or no, or nothing for NaN."""
+    number = np.ravel(value)[0]
+    if isinstance(number, bool | np.bool_):
+        return "yes" if number else "no"
+    if not np.isfinite(number):
+        return "–"
+    if abs(number) < ROUNDING:
+        return "0"
+    return f"{float(number):.0f}" if abs(number) >= 100 else f"{float(number):.3g}"
+
+
+def load_lessons(folder: Path) -> list[Lesson]:
+    """Return the lessons of a folder, in the order of their names.
+
+    Raises
+    ------
+    InvalidLesson
+        The folder has no lesson, or one that cannot be used; the message names the file and the field.
+    """
+    paths = sorted(folder.glob("*.md")) if folder.is_dir() else []
+    if not paths:
+        raise InvalidLesson(
+            f"expected a folder with lessons (*.md), found none in {str(folder)!r}; check the path"
+        )
+    return [load_lesson(path) for path in paths]
+
+
+def load_lesson(path: Path) -> Lesson:
+    """Return the lesson of a file; see `load_lessons`."""
+    try:
+        return _parsed(path.read_text(encoding="utf-8"), path.parent)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidLesson(f"could not read the lesson {str(path)!r} ({error})") from error
+    except ImplicitDecalsError as error:
+        raise InvalidLesson(f"{str(path)!r}: {error}") from error
+
+
+def _parsed(source: str, folder: Path) -> Lesson:
+    fence, *rest = source.split(f"{FENCE}\n", 2)
+    if fence or len(rest) != 2:
+        raise InvalidLesson(f"expected settings between two lines {FENCE!r} at the top; write them in TOML")
+    try:
+        settings = msgspec.convert(tomllib.loads(rest[0]), type=Settings)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InvalidLesson(f"settings: {error}; correct the TOML") from error
+    except msgspec.ValidationError as error:
+        raise InvalidLesson(f"settings: {error}") from error
+    _check_ranges(settings)
+    formulas: dict[str, Formula] = {}
+    for place, text, variables in _formulas(settings):
+        with _place(place):
+            formulas[text] = parse(text, MEASURES, variables)
+    scene = load_scene(folder / settings.scene)
+    for i, slider in enumerate(settings.sliders):
+        with _place(f"sliders[{i}]"):
+            _check_slider(slider, scene)
+    wrong = []
+    for i, check in enumerate(settings.question.checks):
+        with _place(f"question.checks[{i}].otherwise"):
+            wrong.append(_template(check.otherwise))
+    with _place("question.right"):
+        right = _template(settings.question.right)
+    return Lesson(settings, rest[1].strip(), scene, formulas, tuple(wrong), right)
+
+
+def _check_ranges(settings: Settings) -> None:
+    """Raise `InvalidLesson` for numbers that types do not exclude."""
+    member("contact", settings.contact, Contact, InvalidLesson)
+    member("mapping", settings.mapping, ImageMapping, InvalidLesson)
+    stiffness_number(settings.stiffness, InvalidLesson)
+    if not settings.question.checks:
+        raise InvalidLesson("question.checks: expected one check or more; a question needs an answer")
+    if settings.size is not None and not 0.0 < settings.size < np.inf:
+        raise InvalidLesson(f"size: expected a width above 0, got {settings.size!r}")
+    if not 0 <= settings.steps <= 1000:
+        raise InvalidLesson(f"steps: expected 0 to 1000, got {settings.steps!r}")
+    for i, slider in enumerate(settings.sliders):
+        if not slider.choices and not -np.inf < slider.low < slider.high < np.inf:
+            raise InvalidLesson(f"sliders[{i}]: expected low < high, got {slider.low!r} and {slider.high!r}")
+    for i, plot in enumerate(settings.plots):
+        if bool(plot.curves) == bool(plot.map):
+            raise InvalidLesson(f"plots[{i}]: expected either curves or a map; give one of them")
+        ranges = {"x": plot.x, "y": plot.y, "values": plot.values}
+        for name, ends in ranges.items():
+            if ends is not None and not -np.inf < ends[0] < ends[1] < np.inf:
+                raise InvalidLesson(f"plots[{i}].{name}: expected two numbers, low < high, got {list(ends)}")
+        if plot.map and (plot.x is None) != (plot.y is None):
+            raise InvalidLesson(f"plots[{i}]: a map has both x and y, or neither")
+
+
+def _check_slider(slider: Slider, scene: Scene) -> None:
+    """Raise `InvalidLesson` if a slider leads to no number or choice of the scene."""
+    if slider.path in OWN:
+        return
+    value = binding(slider.path).read(scene.objects, scene.decals)
+    if isinstance(value, str) != bool(slider.choices):
+        expected = "choices" if isinstance(value, str) else "no choices"
+        raise InvalidLesson(f"{slider.path}: expected {expected}, as its value is {value!r}")
+    if not isinstance(value, str | int | float):
+        raise InvalidLesson(f"{slider.path}: expected one number, got {value!r:.60}; add its index")
+
+
+def _formulas(settings: Settings) -> list[tuple[str, str, set[str]]]:
+    """Return place, text and variables of all formulas."""
+    found: list[tuple[str, str, set[str]]] = []
+    for i, value in enumerate(settings.values):
+        found.append((f"values[{i}]", value.formula, set()))
+    for i, plot in enumerate(settings.plots):
+        names = ({"x", "y"} if plot.x else set()) if plot.map else {"x"}
+        texts = [*(curve.formula for curve in plot.curves), *filter(None, (plot.map, plot.red))]
+        found += [(f"plots[{i}]", text, names) for text in texts]
+        found += [(f"plots[{i}].marks", text, set()) for mark in plot.marks for text in mark]
+    for i, check in enumerate(settings.question.checks):
+        found.append((f"question.checks[{i}]", check.holds, set()))
+    return found
+
+
+def _template(text: str) -> Template:
+    pieces = PLACEHOLDER.split(text)
+    return Template(tuple(parse(p, MEASURES, set()) if i % 2 else p for i, p in enumerate(pieces)))
+
+
+@contextmanager
+def _place(name: str) -> Iterator[None]:
+    """Let errors name the place in the file."""
+    try:
+        yield
+    except InvalidLesson as error:
+        raise InvalidLesson(f"{name}: {error}") from None

@@ -1,0 +1,452 @@
+"""The measures that formulas of lessons can name."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, TypeVar
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from blobtree import Contact as SolidContact
+from blobtree import Node, Point, polygonize
+from blobtree._typing import Float64Array
+from blobtree.formulas.falloff import RIM
+from blobtree.meshing.clip import enclosed_volume
+from decals.apps.lab.errors import InvalidLesson
+from decals.apps.lab.experiment import Experiment, Points, Scope
+from decals.apps.lab.formulas import Evaluate, Measure
+from decals.field.evaluate import Samples, evaluate
+from decals.model import Interaction
+from decals.record import Contact
+from decals.scenes.objects import TreeObject
+from decals.surfaces.surface import unit_rows
+
+UNIT_BALL = Point((0, 0, 0), radius=RIM)
+"""A primitive whose field at distance d is g(d)."""
+
+DIFFERENCE = 1e-3
+"""Distance between the points from which derivatives of images are computed, in radii."""
+
+STEP = 1e-3
+"""Distance between the points at which `jump` looks, in model units."""
+
+MAX_STEPS = 20_000
+"""Most points at which it looks."""
+
+RESOLUTION = 48
+"""Cells along the longest side of a solid."""
+
+BULGED = 1e-3
+"""Field below ½ at which a deformed solid counts as bulged."""
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+MEASURES: dict[str, Measure] = {}
+"""All measures, by their names."""
+
+
+def measure(*arguments: str) -> Callable[[Function], Function]:
+    """Register a function as a measure of its name; see `Measure` for the kinds of arguments."""
+
+    def register(function: Function) -> Function:
+        doc = (function.__doc__ or "").strip().removeprefix("Return ").rstrip(".")
+        MEASURES[function.__name__.strip("_")] = Measure(function, arguments, doc)
+        return function
+
+    return register
+
+
+for _kind in (*Contact, *Interaction):
+    MEASURES[_kind.name.lower()] = Measure(
+        lambda scope, value=float(_kind): value, (), f"number of {type(_kind).__name__}.{_kind.name}"
+    )
+
+# -- arithmetic -----------------------------------------------------------------------------------------
+
+
+@measure("number")
+def g(_scope: Scope, d: Any) -> Float64Array:
+    """Return the falloff g of a distance over the influence radius (paper, equation 2)."""
+    flat = np.ravel(np.asarray(d, np.float64))
+    values = UNIT_BALL(np.column_stack([flat, 0.0 * flat, 0.0 * flat]).astype(np.float32))
+    return np.asarray(values, np.float64).reshape(np.shape(d))
+
+
+@measure("number")
+def absolute(_scope: Scope, a: Any) -> Any:
+    """Return the absolute value."""
+    return np.abs(a)
+
+
+@measure("number", "number")
+def largest(_scope: Scope, a: Any, b: Any) -> Any:
+    """Return the larger one of two numbers."""
+    return np.maximum(a, b)
+
+
+@measure("number", "number", "number")
+def where(_scope: Scope, condition: Any, a: Any, b: Any) -> Any:
+    """Return the second argument where the first holds, else the third."""
+    return np.where(condition, a, b)
+
+
+# -- numbers of the scene -------------------------------------------------------------------------------
+
+
+@measure()
+def count(scope: Scope) -> int:
+    """Return the number of decals."""
+    return len(scope.experiment.decals)
+
+
+@measure("number", "number")
+def distance(scope: Scope, i: Any, k: Any) -> float:
+    """Return the distance between the centres of decals i and k."""
+    place, other = (_center(scope.experiment, number) for number in (i, k))
+    return float(np.linalg.norm(place - other))
+
+
+@measure("number")
+def radius(scope: Scope, i: Any) -> float:
+    """Return the visible radius of decal i."""
+    return float(scope.experiment.decals.radii[scope.experiment.decal(i)])
+
+
+@measure("number")
+def influence(scope: Scope, i: Any) -> float:
+    """Return the influence radius s of decal i, where its field ends."""
+    return float(scope.experiment.decals.influence[scope.experiment.decal(i)])
+
+
+@measure("number")
+def layer(scope: Scope, i: Any) -> int:
+    """Return the layer of decal i."""
+    return int(scope.experiment.decals.layers[scope.experiment.decal(i)])
+
+
+@measure("number")
+def interaction(scope: Scope, i: Any) -> int:
+    """Return the interaction of decal i: independent, push or overlap."""
+    return int(scope.experiment.decals.interactions[scope.experiment.decal(i)])
+
+
+@measure()
+def contact(scope: Scope) -> int:
+    """Return the contact mode: product, min, radial or elastic."""
+    return int(scope.experiment.contact)
+
+
+@measure()
+def stiffness(scope: Scope) -> float:
+    """Return the stiffness of elastic contact."""
+    return scope.experiment.stiffness
+
+
+# -- fields of decals at points -------------------------------------------------------------------------
+
+
+def _center(experiment: Experiment, number: Any) -> Float64Array:
+    return np.asarray(experiment.decals.positions[experiment.decal(number)], np.float64)
+
+
+@measure("number")
+def d(scope: Scope, i: Any) -> Float64Array:
+    """Return the distance from decal i over its influence radius."""
+    offsets = scope.points.positions - _center(scope.experiment, i)
+    return np.asarray(np.linalg.norm(offsets, axis=1) / influence(scope, i))
+
+
+@measure("number")
+def f(scope: Scope, i: Any) -> Float64Array:
+    """Return the field of decal i before contact (paper, equation 1)."""
+    return g(scope, d(scope, i))
+
+
+@measure("number", "number")
+def h(scope: Scope, i: Any, k: Any) -> Float64Array:
+    """Return the factor h by which decal i pushes decal k (paper, equation 5)."""
+    own, other = f(scope, k), f(scope, i)
+    return np.where((own >= 0.5) & (own >= other), _factor(own, other), np.nan)
+
+
+def _factor(own: Any, other: Any) -> Float64Array:
+    """Return the factor h of equation 5 of the owner's field, at least ½, and a neighbour's lower one."""
+    with np.errstate(all="ignore"):
+        u = np.clip((own + other - 1.0) / (2.0 * own - 1.0), 0.0, 1.0)
+        return np.where((own + other <= 1.0) | (own >= 1.0), 1.0, 1.0 - u ** (1.0 / (1.0 - own)))
+
+
+@measure("number", "number")
+def pushed(_scope: Scope, own: Any, other: Any) -> Float64Array:
+    """Return F of an owner's field and a neighbour's lower one (paper, figure 7); NaN for a higher one."""
+    own, other = np.clip(own, 0.0, 1.0), np.clip(other, 0.0, 1.0)
+    deformed = np.where(own >= 0.5, 0.5 + (own - 0.5) * _factor(own, other), own)
+    return np.where(other > own, np.nan, deformed)
+
+
+@measure()
+def top(scope: Scope) -> Float64Array:
+    """Return the highest field of all decals before contact."""
+    numbers = range(len(scope.experiment.decals))
+    distances = [d(scope, number) for number in numbers]
+    return g(scope, np.min(distances, axis=0) if distances else np.ones(len(scope.points.positions)))
+
+
+def _samples(scope: Scope, offset: Float64Array | None = None) -> Samples:
+    points, experiment = scope.points, scope.experiment
+    places = points.positions if offset is None else points.positions + offset
+    return evaluate(
+        experiment.decals,
+        places.astype(np.float32),
+        points.normals.astype(np.float32),
+        mapping=experiment.mapping,
+        contact=experiment.contact,
+        stiffness=experiment.stiffness,
+        device="cpu",
+    )
+
+
+def _shown(scope: Scope) -> Samples:
+    result: Samples = scope.shared("samples", lambda: _samples(scope))
+    return result
+
+
+@measure()
+def F(scope: Scope) -> Float64Array:  # noqa: N802  (the paper's name)
+    """Return the field after contact, in the contact mode of the view."""
+    samples = _shown(scope)
+    return np.where(samples.owner >= 0, samples.field, np.minimum(top(scope), 0.5))
+
+
+@measure()
+def owner(scope: Scope) -> Float64Array:
+    """Return the number of the decal that shows; −1 for none."""
+    return _shown(scope).owner.astype(np.float64)
+
+
+@measure()
+def stretch(scope: Scope) -> Float64Array:
+    """Return by how much the image is stretched: 1 keeps shapes."""
+    with np.errstate(all="ignore"):
+        small = _jacobians(scope)
+        singular = np.linalg.svd(np.nan_to_num(small), compute_uv=False)
+        return np.where(np.isfinite(small).all(axis=(1, 2)), singular[:, 0] / singular[:, 1], np.nan)
+
+
+@measure()
+def folded(scope: Scope) -> Float64Array:
+    """Return 1 where the image is folded, which means mirrored, else 0."""
+    with np.errstate(all="ignore"):
+        return np.where(np.linalg.det(_jacobians(scope)) < 0.0, 1.0, 0.0)
+
+
+def _jacobians(scope: Scope) -> Float64Array:
+    """Return derivatives of the image coordinates by two directions on the surface: float64[n, 2, 2]."""
+    result: Float64Array = scope.shared("jacobians", lambda: _differences(scope))
+    return result
+
+
+def _differences(scope: Scope) -> Float64Array:
+    normals, first = scope.points.normals, _shown(scope)
+    axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    right = unit_rows(np.cross(axes, normals))
+    radii = scope.experiment.decals.radii
+    step = DIFFERENCE * float(radii.min()) if len(radii) else DIFFERENCE
+    columns = []
+    for direction in (right, np.cross(normals, right)):
+        second = _samples(scope, np.asarray(step * direction, np.float64))
+        slope = (second.uv.astype(np.float64) - first.uv) / step
+        same = (second.owner == first.owner) & (first.owner >= 0)
+        columns.append(np.where(same[:, None], slope, np.nan))
+    return np.stack(columns, axis=2)
+
+
+# -- solids in contact ----------------------------------------------------------------------------------
+
+
+def _solids(scope: Scope) -> SolidContact:
+    trees = (item.tree for item in scope.experiment.objects if isinstance(item, TreeObject))
+    model = next((tree for tree in trees if isinstance(tree, SolidContact)), None)
+    if model is None:
+        raise InvalidLesson("the scene has no Contact of solids; undo, or start the lesson again")
+    return model
+
+
+def _solid(scope: Scope, number: Any, solids: tuple[Node, ...]) -> Node:
+    if np.ndim(number) or number != int(number) or not 0 <= number < len(solids):
+        raise InvalidLesson(f"the scene has no solid {number!s}; undo, or start the lesson again")
+    return solids[int(number)]
+
+
+@measure("number")
+def body(scope: Scope, i: Any) -> Float64Array:
+    """Return the field of solid i before it deforms."""
+    return _field(_solid(scope, i, _solids(scope).children), scope.points)
+
+
+@measure("number")
+def solid(scope: Scope, i: Any) -> Float64Array:
+    """Return the field of solid i after it deforms."""
+    return _field(_solid(scope, i, _solids(scope).solids()), scope.points)
+
+
+def _field(node: Node, points: Points) -> Float64Array:
+    return np.asarray(node(points.positions.astype(np.float32)), np.float64)
+
+
+@measure("number", "number")
+def area(scope: Scope, i: Any, k: Any) -> float:
+    """Return the area of the contact of solids i and k; 0 if they are apart."""
+    pair = tuple(sorted((int(i), int(k))))
+    return float(sum(surface.area for surface in _contacts(_solids(scope)) if surface.pair == pair))
+
+
+@measure("number")
+def volume(scope: Scope, i: Any) -> float:
+    """Return the volume of solid i after it deforms."""
+    return _volume(_solid(scope, i, _solids(scope).solids()))
+
+
+@measure("number")
+def free_volume(scope: Scope, i: Any) -> float:
+    """Return the volume of solid i alone."""
+    return _volume(_solid(scope, i, _solids(scope).children))
+
+
+@measure("number", "number")
+def penetration(scope: Scope, i: Any, k: Any) -> float:
+    """Return how deep solids i and k would overlap without contact, on the line of their centres."""
+    pair = [_solid(scope, number, _solids(scope).children) for number in (i, k)]
+    ends = [np.mean(node.bounds, axis=0, dtype=np.float64) for node in pair]
+    reach = max(float(np.ptp(node.bounds, axis=0).max()) for node in pair)
+    apart = ends[1] - ends[0]
+    direction = apart / max(float(np.linalg.norm(apart)), 1e-12)
+    x = np.linspace(-reach, float(np.linalg.norm(apart)) + reach, 4001)
+    line = Points.in_space(ends[0] + x[:, None] * direction)
+    inside = np.minimum(*(_field(node, line) for node in pair)) >= 0.5
+    return float(inside.sum() * (x[1] - x[0]))
+
+
+@measure("number", "number")
+def bulge(scope: Scope, i: Any, k: Any) -> float:
+    """Return the width of the bulge of solid i around its contact with solid k."""
+    model = _solids(scope)
+    pair = tuple(sorted((int(i), int(k))))
+    rings = [ring for s in _contacts(model) if s.pair == pair for ring in s.outlines]
+    if not rings:
+        return 0.0
+    vertices = _mesh(_solid(scope, i, model.solids())).vertices
+    fields = np.array([node(vertices) for node in model.children])
+    nearest = np.argmax(np.delete(fields, int(i), axis=0), axis=0)
+    nearest += nearest >= int(i)
+    bulged = vertices[(fields[int(i)] < 0.5 - BULGED) & (nearest == int(k))]
+    return float(cKDTree(np.concatenate(rings)).query(bulged)[0].max(initial=0.0))
+
+
+@lru_cache(maxsize=16)
+def _mesh(node: Node) -> Any:
+    return polygonize(node, resolution=RESOLUTION)
+
+
+def _volume(node: Node) -> float:
+    mesh = _mesh(node)
+    return enclosed_volume(mesh.vertices, mesh.faces)
+
+
+@lru_cache(maxsize=4)
+def _contacts(model: SolidContact) -> Any:
+    return tuple(model.contacts(resolution=RESOLUTION))
+
+
+# -- relaxations ----------------------------------------------------------------------------------------
+
+
+@measure()
+def step(scope: Scope) -> int:
+    """Return the number of the present step of the relaxation."""
+    relaxed = scope.experiment.relaxed
+    return 0 if relaxed is None else relaxed.step
+
+
+@measure("number")
+def energy(scope: Scope, n: Any) -> Any:
+    """Return the energy of the particles after step n."""
+    return _recorded(scope, "energies", n)
+
+
+@measure("number")
+def rho(scope: Scope, n: Any) -> Any:
+    """Return the least distance of particles after step n over the largest possible one."""
+    return _recorded(scope, "rhos", n)
+
+
+@measure("number")
+def variation(scope: Scope, n: Any) -> Any:
+    """Return the variation of the distances to the nearest particles after step n."""
+    return _recorded(scope, "variations", n)
+
+
+def _recorded(scope: Scope, name: str, n: Any) -> Any:
+    """Return a measure after steps; NaN for steps that were not taken yet."""
+    values = np.array(getattr(scope.experiment.relaxed, name, ()), np.float64)
+    numbers = np.rint(np.nan_to_num(n, nan=-1.0)).astype(int)
+    taken = (numbers >= 0) & (numbers < len(values))
+    return np.where(taken, np.append(values, np.nan)[np.where(taken, numbers, -1)], np.nan)
+
+
+# -- formulas at other points ---------------------------------------------------------------------------
+
+
+@measure("formula")
+def most(scope: Scope, formula: Evaluate) -> float:
+    """Return the largest value of a formula on the surface that the lesson's map shows."""
+    return float(np.nanmax(_on_map(scope, formula), initial=-np.inf))
+
+
+@measure("formula")
+def least(scope: Scope, formula: Evaluate) -> float:
+    """Return the smallest value there."""
+    return float(np.nanmin(_on_map(scope, formula), initial=np.inf))
+
+
+@measure("formula")
+def share(scope: Scope, formula: Evaluate) -> float:
+    """Return the part of that surface, from 0 to 1, on which a condition holds."""
+    return float(np.mean(_on_map(scope, formula) > 0.0))
+
+
+def _on_map(scope: Scope, formula: Evaluate) -> Float64Array:
+    points = scope.experiment.map_points()
+    values = np.asarray(formula(scope.at(points)), np.float64)
+    return np.broadcast_to(values, points.exists.shape)[points.exists]
+
+
+@measure("number", "formula")
+def at(scope: Scope, i: Any, formula: Evaluate) -> float:
+    """Return the value of a formula at the centre of decal i."""
+    return _value_at(scope, _center(scope.experiment, i), formula)
+
+
+@measure("number", "number", "formula")
+def between(scope: Scope, i: Any, k: Any, formula: Evaluate) -> float:
+    """Return the value of a formula between decals i and k, where their fields are equal."""
+    first, last = (_center(scope.experiment, number) for number in (i, k))
+    reach, other = influence(scope, i), influence(scope, k)
+    return _value_at(scope, first + reach / (reach + other) * (last - first), formula)
+
+
+def _value_at(scope: Scope, position: Float64Array, formula: Evaluate) -> float:
+    return float(np.ravel(formula(scope.at(scope.experiment.points_near(position))))[0])
+
+
+@measure("formula")
+def jump(scope: Scope, formula: Evaluate) -> float:
+    """Return the largest change of a formula between points 0.001 apart on the line, with one owner."""
+    ends = scope.experiment.line_points(2).variables["x"]
+    along = scope.at(scope.experiment.line_points(2 + int(min(np.ptp(ends) / STEP, MAX_STEPS))))
+    owners = owner(along)
+    changes = np.abs(np.diff(np.asarray(formula(along), np.float64)))
+    return float(np.nanmax(changes[owners[1:] == owners[:-1]], initial=0.0))
+
+
+MEASURES |= {"abs": MEASURES.pop("absolute"), "max": MEASURES.pop("largest")}

@@ -1,0 +1,285 @@
+"""Lessons without a browser: sliders move the scene, plots are right, wrong and right answers told apart."""
+
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import decals
+from decals.apps.lab.errors import InvalidLesson
+from decals.apps.lab.lab import Lab, measured
+from decals.apps.lab.lesson import LESSONS, load_lesson, load_lessons, shown
+from decals.apps.lab.measures import MEASURES
+from decals.apps.lab.plots import LEFT, TOP
+from decals.window import EditWindow
+from tests.apps.lab.answers import ANSWERS, STEP
+from tests.decals.editing.scenes import digest
+from tests.oracles.contact import falloff
+
+ROOT = Path(__file__).parents[3]
+EMPTY = decals.Scene(objects=(), camera=decals.Camera((0, 0, 8)))
+
+
+@pytest.fixture(scope="module")
+def window(vtk_display: None) -> Iterator[EditWindow]:
+    with EditWindow(EMPTY, off_screen=True, size=(60, 40)) as window:
+        window.show()
+        yield window
+
+
+@pytest.fixture(scope="module")
+def lab(window: EditWindow) -> Iterator[Lab]:
+    lab = Lab(window, load_lessons(LESSONS))
+    yield lab
+    lab.close()
+
+
+def wait(lab: Lab) -> dict[str, Any]:
+    end = time.monotonic() + 60
+    while lab.busy or lab._pending is not None:
+        lab._window.tick()
+        lab.refresh()
+        assert time.monotonic() < end
+        time.sleep(0.002)
+    return lab.values()
+
+
+def number_of(lab: Lab, label: str) -> int:
+    return next(int(s["number"]) for s in lab.values()["lab_sliders"] if s["label"].startswith(label))
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_wrong_and_right_answers_are_told_apart(lab: Lab, number: int) -> None:
+    lab.start(number)
+    for attempt in ANSWERS[number]:
+        for label, value in attempt.settings:
+            lab.set_value(number_of(lab, label), value)
+        assert wait(lab)["lab_verdict"]["text"] == ""  # not before the student asks
+        lab.check()
+        verdict = wait(lab)["lab_verdict"]
+        assert verdict["right"] is attempt.right, verdict
+        assert attempt.words in verdict["text"]
+        assert "{" not in verdict["text"]
+
+
+def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
+    lab.start(4)
+    lab.set_value(number_of(lab, STEP), 60)
+    wait(lab)
+    relaxed = lab.experiment().relaxed
+    assert relaxed is not None
+    energies = relaxed.energies[1:]
+    assert min(energies) > 0
+    first = int(np.argmax(np.array(relaxed.rhos) >= 0.75))
+    lab.set_value(number_of(lab, STEP), first)
+    lab.check()
+    verdict = wait(lab)["lab_verdict"]
+    assert verdict["right"], verdict
+    lab.set_value(number_of(lab, "Random start"), 3)
+    wait(lab)
+    assert lab.experiment().relaxed != relaxed
+
+
+@pytest.mark.parametrize("number", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 2, 3, 4, 5))])
+def test_every_slider_moves_the_scene_and_undo_brings_it_back(
+    lab: Lab, window: EditWindow, number: int
+) -> None:
+    lab.start(number)
+    for slider in wait(lab)["lab_sliders"]:
+        before, state = digest(window.document), lab._key()
+        done = len(window.session.labels)
+        target = next(
+            (c for c in slider["choices"] if c != slider["value"]), (slider["low"] + 2 * slider["high"]) / 3
+        )
+        lab.set_value(slider["number"], target, False)
+        lab.set_value(slider["number"], target)
+        wait(lab)
+        now = lab.values()["lab_sliders"][slider["number"]]["value"]
+        assert lab._key() != state
+        assert now == target if slider["choices"] else now == pytest.approx(target, abs=1.0)
+        entries = len(window.session.labels) - done
+        assert entries in (0, 1)
+        if entries:
+            assert digest(window.document) != before
+            window.session.undo()
+            assert digest(window.document) == before
+            window.session.redo()
+
+
+def test_a_moved_decal_lies_on_the_surface(lab: Lab, window: EditWindow) -> None:
+    lab.start(1)
+    lab.set_value(number_of(lab, "Blue decal"), 0.25)
+    position = lab.experiment().decals.positions[1]
+    np.testing.assert_allclose(position, (0.25, 0.0, 0.0), atol=1e-6)
+
+
+def test_a_verdict_vanishes_when_the_scene_changes(lab: Lab) -> None:
+    lab.start(1)
+    lab.check()
+    assert wait(lab)["lab_verdict"]["text"]
+    lab.set_value(number_of(lab, "Probe"), 0.77)
+    assert lab.values()["lab_verdict"]["text"] == ""
+    assert wait(lab)["lab_verdict"]["text"] == ""
+
+
+def test_a_lesson_whose_decal_was_deleted_says_so(lab: Lab, window: EditWindow) -> None:
+    lab.start(1)
+    wait(lab)
+    window.session.do(decals.editing.DeleteDecals([lab.numbers[0]]))
+    lab.check()
+    values = wait(lab)
+    assert "undo, or start the lesson again" in values["lab_verdict"]["text"]
+    lab.set_value(number_of(lab, "Blue decal"), 0.25)
+    assert "deleted" in window.actions.state.message
+    window.session.undo()
+    lab.check()
+    assert "apart" in wait(lab)["lab_verdict"]["text"]
+
+
+@pytest.mark.parametrize(
+    ("number", "value"),
+    [(99, 1.0), (-9, 1.0), ("0", 1.0), (None, 1.0), (0, "much"), (0, None), (0, float("nan")), (0, 1e99)],
+)
+def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, value: Any) -> None:
+    lab.start(1)
+    wait(lab)
+    before = digest(window.document)
+    lab.set_value(number, value)
+    assert digest(window.document) == before
+    assert "expected" in window.actions.state.message
+    lab.start(number if number != 0 else True)
+    assert digest(window.document) == before
+
+
+# -- plots ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_plots_are_pictures_without_addresses(lab: Lab, number: int) -> None:
+    lab.start(number)
+    values = wait(lab)
+    plots = lab.lesson.settings.plots
+    assert [plot["title"] for plot in values["lab_plots"]] == [plot.title for plot in plots]
+    for plot in values["lab_plots"]:
+        root = ElementTree.fromstring(plot["svg"])
+        for element in root.iter():
+            assert element.get("href", "data:image/png").startswith("data:image/png")
+        assert "nan" not in plot["svg"]
+    assert "<" not in re.sub(r"</?(p|strong|em|ul|ol|li|code)>", "", values["lab_text"])
+
+
+def test_the_plot_of_the_falloff_has_its_values(lab: Lab) -> None:
+    lab.start(0)
+    (path, *_) = re.findall(r'<path d="([^"]+)"', wait(lab)["lab_plots"][0]["svg"])
+    right, down = np.array([pair.split() for pair in re.split("[ML]", path)[1:]], float).T
+    x = (right - LEFT) / (right[-1] - LEFT) * 1.2
+    top = TOP + 15 * 1
+    height = (down[-1] - top) / 1.05  # g = 0 at the end, and the axis ends at 1.05
+    np.testing.assert_allclose(1.05 - (down - top) / height, falloff(x), atol=0.002)
+
+
+# -- files ----------------------------------------------------------------------------------------------
+
+
+def test_a_lesson_of_the_docs_is_loaded_and_answered(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "lessons.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"````markdown\n(.*?)````", page, flags=re.DOTALL)
+    (tmp_path / "1-touch.md").write_text(text, encoding="utf-8")
+    made: dict[str, Any] = {}
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    exec(code.replace("1-touch.json", str(tmp_path / "1-touch.json")), made)
+    (lesson,) = load_lessons(tmp_path)
+    state = made["scene"].decals
+
+    def verdict(x: float) -> tuple[bool, str]:
+        from tests.apps.lab.test_measures import experiment
+
+        moved = state.replace(positions=[state.positions[0], (x, 0, 0)])
+        return measured(lesson, experiment(decals=moved, camera=lesson.scene.camera)).verdict
+
+    assert verdict(1.5) == (False, "The distance is 1.5, and the radii together are 1.")
+    assert verdict(1.0)[0]
+    for name in MEASURES:
+        assert f"`{name}" in page, f"the docs do not name the measure {name}"
+
+
+LESSON = """+++
+title = "Touch"
+scene = "1-one-decal.json"
+[[sliders]]
+label = "x"
+path = "decals.0.x"
+[[plots]]
+title = "f"
+map = "f(0)"
+[question]
+text = "Where?"
+right = "Right."
+[[question.checks]]
+holds = "d(0) < 1"
+otherwise = "Wrong: {d(0)}."
++++
+Text
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("+++\nT", "T", "settings between two lines"),
+        ('title = "Touch"', "title = Touch", "settings: Invalid value"),
+        ('title = "Touch"', "", "missing required field `title`"),
+        ('title = "Touch"', "title = 3", "title"),
+        ('title = "Touch"', 'title = "Touch"\ncolour = 1', "unknown field `colour`"),
+        ('title = "Touch"', 'title = "Touch"\ncontact = "soft"', "contact: expected one of"),
+        ('title = "Touch"', 'title = "Touch"\nstiffness = 0', "stiffness: expected"),
+        ('title = "Touch"', 'title = "Touch"\nsize = -1.0', "size: expected"),
+        ('title = "Touch"', 'title = "Touch"\nsteps = 5000', "steps: expected"),
+        ("1-one-decal.json", "missing.json", "missing.json"),
+        ('"decals.0.x"', '"decals.0.w"', r"sliders\[0\]: path: expected"),
+        ('"decals.0.x"', '"decals.7.x"', r"sliders\[0\]: expected a decal from 0 to 0, got 7"),
+        ('"decals.0.x"', '"decals.*.x"', r"sliders\[0\]: path: expected"),
+        ('"decals.0.x"', '"objects.0.radius"', r"sliders\[0\]: expected the path of a parameter"),
+        ('"decals.0.x"', '"decals.0.interaction"', r"expected choices, as its value is 'push'"),
+        ('"decals.0.x"', '"decals.0.x"\nlow = 2.0', r"sliders\[0\]: expected low < high"),
+        ('map = "f(0)"', "", r"plots\[0\]: expected either curves or a map"),
+        ('map = "f(0)"', 'map = "f(0"', r"plots\[0\]: expected a formula"),
+        ('map = "f(0)"', 'map = "f(0)"\nx = [1.0, 0.0]', r"plots\[0\].x: expected two numbers"),
+        ('map = "f(0)"', 'map = "f(0)"\nx = [0.0, 1.0]', "both x and y"),
+        ('"d(0) < 1"', '"e(0) < 1"', r"question.checks\[0\]: .* unknown name 'e'"),
+        ('"d(0) < 1"', '"x < 1"', "unknown name 'x'"),
+        ("{d(0)}", "{d(0}", r"question.checks\[0\].otherwise: expected a formula"),
+        ('right = "Right."', "", "missing required field `right`"),
+    ],
+)
+def test_malformed_lessons_say_what_is_wrong(tmp_path: Path, old: str, new: str, words: str) -> None:
+    for name in ("1-one-decal.json", "target.png"):
+        (tmp_path / name).write_bytes((LESSONS / name).read_bytes())
+    path = tmp_path / "lesson.md"
+    path.write_text(LESSON, encoding="utf-8")
+    assert load_lesson(path).settings.title == "Touch"
+    assert old in LESSON
+    path.write_text(LESSON.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InvalidLesson, match=words) as error:
+        load_lesson(path)
+    assert "lesson.md" in str(error.value)
+
+
+def test_a_folder_without_lessons_is_refused(tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "missing"):
+        with pytest.raises(InvalidLesson, match="expected a folder with lessons"):
+            load_lessons(folder)
+    (tmp_path / "binary.md").write_bytes(b"\xff\xfe")
+    with pytest.raises(InvalidLesson, match="could not read"):
+        load_lessons(tmp_path)
+
+
+def test_values_are_short() -> None:
+    texts = {0.4999999: "0.5", 1234.5: "1234", 1e-8: "0", 0.01234: "0.0123", 100.4: "100"}
+    assert {number: shown(number) for number in texts} == texts
+    assert (shown(np.bool_(True)), shown(np.nan)) == ("yes", "–")

@@ -1,0 +1,164 @@
+"""Measures of lessons against analytic values and the oracle of equation 5."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import Contact as SolidContact
+from blobtree import Point
+from decals.apps.lab.errors import InvalidLesson
+from decals.apps.lab.experiment import Experiment, Points, Relaxed, Scope
+from decals.apps.lab.formulas import parse
+from decals.apps.lab.measures import MEASURES
+from decals.field.mapping import ImageMapping
+from decals.model import Decals
+from decals.record import Contact
+from decals.scenes.camera import Camera
+from decals.scenes.objects import MeshObject, TreeObject
+from tests.oracles.contact import RIM, contact_field, falloff
+
+CORNERS = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], np.float32)
+PLATE = MeshObject("plate", CORNERS, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+TWO = Decals([[0.0, 0.0, 0.0], [0.7, 0.1, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [0.6, 0.5])
+CAMERA = Camera((0, 0, 8))
+BALLS = SolidContact((Point((-0.8, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=1.0)), height=0)
+
+
+def experiment(**changes: Any) -> Experiment:
+    before = Experiment(
+        objects=(PLATE,),
+        decals=TWO,
+        contact=Contact.PRODUCT,
+        stiffness=2.0,
+        mapping=ImageMapping.CORRECTED,
+        probe=(0.3, 0.05, 0.0),
+        camera=CAMERA,
+        size=4.0,
+    )
+    return replace(before, **changes)
+
+
+def value(text: str, state: Experiment, points: Points | None = None) -> Any:
+    scope = Scope.at_probe(state)
+    return parse(text, MEASURES, set()).evaluate(scope if points is None else scope.at(points))
+
+
+def fields(points: Any, decals: Decals = TWO) -> Any:
+    distances = np.linalg.norm(points[:, None] - decals.positions[None], axis=2)
+    return falloff(distances / (decals.radii / RIM))
+
+
+def test_fields_before_and_after_contact_are_those_of_the_paper() -> None:
+    state = experiment()
+    points = state.map_points()
+    expected = fields(points.positions)
+    for i in (0, 1):
+        np.testing.assert_allclose(value(f"f({i})", state, points), expected[:, i], atol=2e-6)
+    after = contact_field(expected)
+    inside = np.isfinite(after)
+    np.testing.assert_allclose(value("F", state, points)[inside], after[inside], atol=3e-4)
+    np.testing.assert_allclose(value("F", state, points)[~inside], expected.max(axis=1)[~inside], atol=2e-6)
+    owned = inside & (expected[:, 0] > expected[:, 1] + 1e-3) & (expected[:, 0] > 0.51)
+    h = (after - 0.5)[owned] / (expected[owned, 0] - 0.5)
+    np.testing.assert_allclose(value("h(1, 0)", state, points)[owned], h, atol=2e-5)
+    assert (value("owner", state, points)[owned] == 0).all()
+
+
+def test_the_surface_of_figure_7_is_equation_5() -> None:
+    own, other = (grid.ravel() for grid in np.meshgrid(np.linspace(0.51, 0.999, 40), np.linspace(0, 1, 41)))
+    points = Points.in_space(np.zeros((len(own), 3)), x=own, y=other)
+    scope = Scope.at_probe(experiment()).at(points)
+    got = parse("pushed(x, y)", MEASURES, {"x", "y"}).evaluate(scope)
+    expected = np.where(other > own, np.nan, contact_field(np.column_stack([own, other])))
+    np.testing.assert_allclose(got, expected, atol=1e-9)
+
+
+def test_the_four_constraints_hold() -> None:
+    state = experiment()
+    assert value("most(where(f(0) + f(1) <= 1, abs(F - top), 0))", state) < 1e-5
+    assert value("at(0, F)", state) == pytest.approx(1.0)
+    assert value("between(0, 1, F)", state) == pytest.approx(0.5, abs=2e-3)
+    assert value("between(0, 1, f(0) - f(1))", state) == pytest.approx(0.0, abs=1e-5)
+    assert value("jump(F)", state) < 0.1
+    assert value("jump(where(f(0) > 0.8, 1, 0))", state) == 1.0
+
+
+def test_numbers_of_the_scene() -> None:
+    state = experiment(contact=Contact.ELASTIC, stiffness=3.0)
+    assert value("distance(0, 1)", state) == pytest.approx(np.hypot(0.7, 0.1))
+    assert value("influence(1) * 0.454202 / radius(1)", state) == pytest.approx(1.0, rel=1e-5)
+    assert value("count", state) == 2
+    assert value("contact == elastic and stiffness == 3", state)
+    assert value("interaction(0) == push and layer(0) == 0", state)
+    assert value("g(0) - g(0.5) - g(1)", state) == pytest.approx(1 - 0.75**3, abs=1e-6)
+    assert value("share(f(0) >= 0.5)", state) == pytest.approx(np.pi * 0.36 / 16, rel=0.02)
+
+
+def test_a_decal_alone_is_neither_stretched_nor_folded() -> None:
+    state = experiment(decals=TWO[:1])
+    assert value("most(stretch)", state) == pytest.approx(1.0, abs=0.02)
+    assert value("share(folded)", state) == 0
+
+
+def test_radial_contact_stretches_by_the_distance_of_the_plane() -> None:
+    """At the line of centres the ray is scaled by 1/R towards the plane, R in visible radii."""
+    decals = Decals([[0.0, 0.0, 0.0], [0.8, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [0.5, 0.5])
+    state = experiment(decals=decals, contact=Contact.RADIAL)
+    assert value("at(0, 1)", state) == 1
+    near = state.points_near([[0.2, 1e-4, 0.0]])
+    assert float(value("stretch", state, near)[0]) == pytest.approx(1.0, abs=0.01)  # both ways by 0.5/0.4
+    assert value("share(folded)", state) == 0
+
+
+def test_a_small_decal_in_a_large_one_folds_it_in_the_mode_of_the_paper_only() -> None:
+    decals = Decals([[0.0, 0.0, 0.0], [0.5, 0.3, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [1.1, 0.35])
+    assert value("share(folded)", experiment(decals=decals)) > 1e-3
+    assert value("share(folded)", experiment(decals=decals, contact=Contact.ELASTIC)) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "tolerance"),
+    [
+        ("area(0, 1)", np.pi * 0.36, 0.03),
+        ("area(1, 0)", np.pi * 0.36, 0.03),
+        ("penetration(0, 1)", 0.4, 0.005),
+        ("free_volume(0)", 4 / 3 * np.pi, 0.02),
+        ("volume(0)", 4 / 3 * np.pi - np.pi * 0.04 * (3 - 0.2) / 3, 0.02),
+        ("bulge(0, 1)", 0.0, 1e-9),
+    ],
+)
+def test_two_balls_in_contact(text: str, expected: float, tolerance: float) -> None:
+    state = experiment(objects=(TreeObject("balls", BALLS),), decals=Decals.empty(), in_space=True)
+    assert value(text, state) == pytest.approx(expected, abs=tolerance)
+
+
+def test_a_bulge_has_a_width() -> None:
+    model = SolidContact(BALLS.operands, height=0.08)
+    state = experiment(objects=(TreeObject("balls", model),), in_space=True)
+    assert 0.2 < value("bulge(0, 1)", state) < 1.0
+    assert value("bulge(0, 1)", state) == pytest.approx(value("bulge(1, 0)", state), abs=0.05)
+
+
+def test_steps_that_were_not_taken_have_no_measures() -> None:
+    state = experiment(relaxed=Relaxed(1, (np.nan, 5.0), (0.1, 0.6), (0.5, 0.2)))
+    assert value("step", state) == 1
+    assert value("rho(step)", state) == 0.6
+    assert np.isnan([value("rho(2)", state), value("energy(0)", state), value("variation(-1)", state)]).all()
+    assert np.isnan(value("rho(0)", experiment()))
+
+
+@pytest.mark.parametrize("text", ["f(2)", "radius(-1)", "distance(0, 1.5)", "area(0, 1)", "solid(0)"])
+def test_a_measure_of_a_part_that_is_gone_says_what_to_do(text: str) -> None:
+    with pytest.raises(InvalidLesson, match="undo, or start the lesson again"):
+        value(text, experiment())
+
+
+def test_maps_show_what_the_camera_sees() -> None:
+    state = experiment(camera=Camera((0, 0, -8)), size=8.0)
+    points = state.map_points()
+    assert points.exists.mean() == pytest.approx(36 / 64, rel=0.02)
+    first = points.positions[points.exists][0]
+    assert first[0] > 0 > -first[1]  # from below, the x axis points to the left
+    assert state.on_map((1.0, 2.0, 0.0)) == pytest.approx((-1.0, 2.0))
