@@ -117,7 +117,7 @@ def _lab(model: list[str] | None, folder: Path | None) -> Any:
     if model:
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
     found = load_lessons(LESSONS if folder is None else folder)
-    return lambda server, window: LabPage(server, window, found)
+    return lambda server, window, **_: LabPage(server, window, found)
 
 
 def _announce(port: int) -> None:

@@ -7,8 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from blobtree import Contact as SolidContact
-from blobtree import Node, Point, polygonize
+from blobtree import Node, Point, SolidContact, polygonize
 from blobtree._typing import Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.meshing.clip import enclosed_volume
@@ -268,7 +267,7 @@ def _solids(scope: Scope) -> SolidContact:
     trees = (item.tree for item in scope.experiment.objects if isinstance(item, TreeObject))
     model = next((tree for tree in trees if isinstance(tree, SolidContact)), None)
     if model is None:
-        raise InvalidLesson("the scene has no Contact of solids; undo, or start the lesson again")
+        raise InvalidLesson("the scene has no SolidContact; undo, or start the lesson again")
     return model
 
 

@@ -7,7 +7,8 @@ from trame.widgets import client, html, vuetify3
 
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
-from decals.apps.sandbox.page import COMPACT, FIELD, Page
+from decals.apps.sandbox.page import Page
+from decals.apps.sandbox.panels import COMPACT, FIELD, icon_button, named
 from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 330, 350
@@ -16,6 +17,7 @@ STYLE = """
 .lesson { font-size: 0.85rem; line-height: 1.35 }
 .lesson p, .lesson ul, .lesson ol, .lesson table { margin-bottom: 6px }
 .lesson ul, .lesson ol { padding-left: 20px }
+.answer .v-alert__content { color: rgb(var(--v-theme-on-surface)) }
 .lesson td, .lesson th { padding-right: 10px; text-align: left }
 """
 """How the text of a lesson looks."""
@@ -51,18 +53,11 @@ class LabPage(Page):
                     vuetify3.VSelect(
                         model_value=("lab_number",),
                         items=("lab_titles",),
-                        raw_attrs=['aria-label="lesson"'],
+                        raw_attrs=named("'lesson'"),
                         update_modelValue=(self.lab.start, "[$event]"),
                         **FIELD,
                     )
-                    vuetify3.VBtn(
-                        icon="mdi-restart",
-                        title="start the lesson again",
-                        raw_attrs=['aria-label="start the lesson again"'],
-                        size="small",
-                        variant="text",
-                        click=(self.lab.start, "[lab_number]"),
-                    )
+                    icon_button("mdi-restart", "start the lesson again", (self.lab.start, "[lab_number]"))
                 html.Div(v_html=("lab_text",), classes="lesson")
                 self._build_question()
                 self._build_sliders()
@@ -82,8 +77,8 @@ class LabPage(Page):
                     **COMPACT,
                 )
                 vuetify3.VTextField(
-                    model_value=("typeof s.value === 'number' ? Number(s.value.toPrecision(4)) : ''",),
-                    raw_attrs=[':aria-label="s.label"'],
+                    model_value=("typeof s.value === 'number' ? Number(s.value.toPrecision(3)) : ''",),
+                    raw_attrs=named("s.label"),
                     style="max-width: 84px",
                     change=(self.lab.set_value, "[s.number, $event.target.value, true]"),
                     **FIELD,
@@ -92,7 +87,7 @@ class LabPage(Page):
                 v_if="s.choices.length",
                 model_value=("s.value",),
                 items=("s.choices",),
-                raw_attrs=[':aria-label="s.label"'],
+                raw_attrs=named("s.label"),
                 update_modelValue=(self.lab.set_value, "[s.number, $event, true]"),
                 **FIELD,
             )
@@ -113,9 +108,9 @@ class LabPage(Page):
                 v_if="lab_verdict.text",
                 type=("lab_verdict.right ? 'success' : 'warning'",),
                 raw_attrs=['role="status"'],
-                variant="tonal",
+                variant="outlined",
                 density="compact",
-                classes="mt-3 text-body-2",
+                classes="mt-3 lesson answer",
             )
 
     def _build_right_side(self) -> None:
@@ -133,5 +128,4 @@ class LabPage(Page):
                     html.Div("{{ p.note }}", classes="text-caption")
             with html.Div(v_show="lab_side === 'model'"):
                 self._build_outline()
-                self._build_panel()
-                self._build_history()
+                self._build_panels()

@@ -136,10 +136,14 @@ class Page:
     def _build_right_side(self) -> None:
         """Build what stands right of the view."""
         with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="right"):
-            panels.build_decal_panel(self.sandbox)
-            self._build_panel()
-            panels.build_pick()
-            self._build_history()
+            self._build_panels()
+
+    def _build_panels(self) -> None:
+        """Build the panels of decals and nodes, and the history."""
+        panels.build_decal_panel(self.sandbox)
+        self._build_panel()
+        panels.build_pick()
+        self._build_history()
 
     def _build_toolbar(self) -> None:
         with vuetify3.VAppBar(density="compact", flat=True, border=True):

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Contact as SolidContact
-from blobtree import Point
+from blobtree import Point, SolidContact
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Relaxed, Scope
 from decals.apps.lab.formulas import parse
