@@ -8,8 +8,8 @@ import asyncio
 import io
 import sys
 import tempfile
-from pathlib import Path
 from functools import partial
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -24,9 +24,9 @@ from trame_server.core import Server
 
 import decals
 from blobtree import Point
-from decals.apps.models.scenes import empty_scene
 from decals.apps.lab.lesson import LESSONS, load_lessons
 from decals.apps.lab.page import LabPage
+from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
 from decals.apps.views import UPRIGHT
 from decals.editing.scatter_commands import decals_on
@@ -280,7 +280,14 @@ async def choose(browser: Page, label: str, option: str) -> None:
 def main() -> None:
     """Run one of the functions above, by its name."""
     name, *arguments = sys.argv[1:]
-    checks = {"page": page, "user": user, "streamed": streamed, "sandbox": sandbox, "start": sandbox_start, "lab": lab}
+    checks = {
+        "page": page,
+        "user": user,
+        "streamed": streamed,
+        "sandbox": sandbox,
+        "start": sandbox_start,
+        "lab": lab,
+    }
     asyncio.run(checks[name](*arguments))
     print("done")
 
