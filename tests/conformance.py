@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import blobtree
 from blobtree import InvalidNode, Node, from_json, to_json
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
-from blobtree.nodes.primitives import Profile
+from blobtree.nodes.primitives import Falling, Leaf
 from blobtree.nodes.values import OPTIONAL, fields_of
 from blobtree.tape.model import bounds_along, gradients_at
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around, random_leaf, random_profile, triple
@@ -59,6 +59,7 @@ DRAWS: dict[Quantity, Callable[[Rng, Parameter], Any]] = {
     Quantity.FACTOR: _numbers,
     Quantity.WIDTH: lambda rng, _: float(rng.uniform(0.1, 0.4)),
     Quantity.NUMBERS: lambda rng, p: int(rng.integers(int(max(p.low, 0)), int(min(p.high, 100)))),
+    Quantity.CHOICE: lambda rng, p: str(rng.choice(p.choices)),
     Quantity.COLOR: lambda rng, _: triple(rng.uniform(0.0, 1.0, 3)),
 }
 
@@ -180,12 +181,17 @@ def _problems(node: Node, rng: Rng) -> Iterator[str]:
     yield from _slopes(node, rng)
     yield from _box(node, rng)
     yield from _texts(node)
-    if isinstance(node, Profile):
-        for name in BUILT_IN_FALLOFFS:
-            falling: Any = replace(random_profile(rng, node, (1.0, 0.7)), falloff=name)  # type: ignore[type-var]
+    if isinstance(node, Leaf):
+        variants: dict[str, Any] = {"negative": replace(random_profile(rng, node, (1.0,)), weight=-0.7)}  # type: ignore[type-var]
+        if isinstance(node, Falling):
+            for name in BUILT_IN_FALLOFFS:
+                variants[name] = replace(random_profile(rng, node, (1.0, 0.7)), falloff=name)  # type: ignore[type-var]
+        for name, falling in variants.items():
             yield from _fields(falling, points_around(rng, falling, 60), name)
             yield from _box(falling, rng)
             yield from _texts(falling)
+        yield from _ranges(variants["negative"], rng)
+        yield from _slopes(variants["negative"], rng)
 
 
 def _fields(node: Node, points: Any, what: str) -> Iterator[str]:

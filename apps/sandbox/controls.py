@@ -84,6 +84,8 @@ def _control(parameter: Parameter, value: Any, size: float) -> Control:
         return Control(parameter.name, "color", hex_color(value), doc)
     if quantity is Quantity.FALLOFF:
         return Control(parameter.name, "choice", _falloff_name(value), doc, choices=tuple(FALLOFF_NAMES))
+    if quantity is Quantity.CHOICE:
+        return Control(parameter.name, "choice", value, doc, choices=parameter.choices)
     if quantity in NUMBERS and not isinstance(value, tuple):
         low, high = _ends(parameter, value, size)
         step = 1.0 if parameter.whole else (high - low) / STEPS
@@ -138,7 +140,7 @@ def parsed(node: Node, name: str, raw: Any) -> Any:
     parameter = declared[name]
     if parameter.quantity is Quantity.WIDTH and raw in (None, ""):
         return None
-    if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF):
+    if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF, Quantity.CHOICE):
         return raw
     number: Callable[[Any], Any] = _whole if parameter.whole else _number
     if isinstance(raw, list | tuple):

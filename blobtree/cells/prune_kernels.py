@@ -25,7 +25,6 @@ from blobtree.tape.codes import (
 )
 from blobtree.tape.dispatch import (
     closest,
-    direct_bounds,
     direct_stride,
     is_convex,
     min_influence,
@@ -34,7 +33,7 @@ from blobtree.tape.dispatch import (
     warp_forward,
     warp_stretch,
 )
-from blobtree.tape.evaluators import profile_value, to_local
+from blobtree.tape.evaluators import direct_bounds, profile_value, to_local
 from blobtree.transpile.specialize import unrolled
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -102,7 +101,13 @@ def direct_range(
     """Return the range of a direct field over a ball in front of its map, which is at tape[at]."""
     local = to_local(center, tape, at)
     bounds = direct_bounds(kind, local, radius * tape[at + 3][0], tape, at + PREFIX)
-    return widened(wp.vec2(bounds[0], bounds[1]))
+    profile = tape[at + 3]
+    margin = RANGE_MARGIN * (1.0 + profile[2]) * wp.abs(profile[3])
+    if bounds[0] == 0.0 and bounds[1] == 0.0:
+        return wp.vec2(0.0, 0.0)
+    if profile[3] < 0.0:
+        return wp.vec2(bounds[0] - margin, wp.min(bounds[1] + margin, 0.0))
+    return wp.vec2(wp.max(bounds[0] - margin, 0.0), bounds[1] + margin)
 
 
 @wp.func

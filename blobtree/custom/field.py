@@ -29,7 +29,6 @@ from blobtree.custom.source import (
     returned_type,
 )
 from blobtree.formulas.fields import FieldKind
-from blobtree.formulas.windows import window, window_bounds, windowed, windowed_bounds
 from blobtree.nodes.fields import BoxedField
 from blobtree.nodes.parameters import Parameter
 from blobtree.transpile.derivative import directional_derivative
@@ -219,7 +218,7 @@ def _row(kind: str, digest: str, definition: _Definition) -> FieldKind:
         "call": f"{source.function.key}({', '.join(['x', *readings])})",
     }
     value_name = f"custom_{kind}_value_gradient_{digest}"
-    scope: dict[str, Any] = {"window": window, "windowed": windowed, source.function.key: source.function}
+    scope: dict[str, Any] = {source.function.key: source.function}
     body = _GIVEN.format(**shared)
     if claims.derived:
         derivative = directional_derivative(source.function, [next(iter(source.parameters))])
@@ -228,11 +227,7 @@ def _row(kind: str, digest: str, definition: _Definition) -> FieldKind:
         body = _DERIVED.format(derivative=derivative.key, rest=rest)
     value_gradient = generated(value_name, _VALUE.format(name=value_name, body=body, **shared), scope)
     bounds_name = f"custom_{kind}_bounds_{digest}"
-    scope = {
-        "window_bounds": window_bounds,
-        "windowed_bounds": windowed_bounds,
-        source.function.key: source.function,
-    }
+    scope = {source.function.key: source.function}
     bounds = generated(
         bounds_name,
         _BOUNDS.format(
@@ -243,7 +238,7 @@ def _row(kind: str, digest: str, definition: _Definition) -> FieldKind:
         ),
         scope,
     )
-    return FieldKind(kind, value_gradient, bounds, texels, digest)
+    return FieldKind(kind, value_gradient, bounds, texels, windowed=True, digest=digest)
 
 
 def _claim_call(claim: float | CustomSource, readings: list[str], scope: dict[str, Any]) -> str:
@@ -265,12 +260,9 @@ def _range(definition: _Definition, call: str, readings: list[str], scope: dict[
 
 _VALUE = '''\
 def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """The user's field and its gradient in the window of its box."""
+    """The user's field and its gradient, seen from the middle of its box."""
 {texels}    x = q - wp.vec3(t0[0], t0[1], t0[2])
-    w = window(x, wp.vec3(t1[0], t1[1], t1[2]), t0[3])
-    if w[0] <= 0.0:
-        return wp.vec4(0.0, 0.0, 0.0, 0.0)
-{body}    return windowed(f, w)
+{body}    return f
 '''
 
 _GIVEN = "    f = {call}\n"
@@ -288,13 +280,10 @@ def {{name}}(
 ) -> wp.vec3:
     """Bounds of the user's field over a ball, by the claims about it."""
 {{texels}}    x = center - wp.vec3(t0[0], t0[1], t0[2])
-    w = window_bounds(x, radius, wp.vec3(t1[0], t1[1], t1[2]), t0[3])
-    if w[1] <= 0.0:
-        return wp.vec3(0.0, 0.0, 0.0)
     slope = {{slope}}
 {{range}}    low = wp.max(r[0] - {ROUNDING} * (1.0 + wp.abs(r[0])), 0.0)
     high = wp.max(r[1] + {ROUNDING} * (1.0 + wp.abs(r[1])), 0.0)
-    return windowed_bounds(wp.vec3(low, high, slope), w)
+    return wp.vec3(low, high, slope)
 '''
 
 

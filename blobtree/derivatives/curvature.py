@@ -68,7 +68,7 @@ def curvatures_of(gradients: Float64Array, hessians: Float64Array) -> Curvatures
     """Return the curvatures of level sets with these gradients (n, 3) and Hessians (n, 3, 3).
 
     With the unit normal n = −∇f / |∇f|, the shape operator dn is −H / |∇f| on the tangent plane (Goldman
-    2005, Curvature formulas for implicit curves and surfaces, section 4).
+    2005, Curvature formulas for implicit curves and surfaces).
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         slopes = np.linalg.norm(gradients, axis=1)

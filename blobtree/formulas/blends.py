@@ -16,8 +16,10 @@ from blobtree.formulas.operators import (
     blend_choice,
     difference_like_choice,
     difference_partials,
+    extremum_slope,
     intersection_like_choice,
     intersection_partials,
+    intersection_range,
     ricci_norm,
     ricci_partials,
     union_partials,
@@ -552,6 +554,16 @@ def masked_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     return KEEP_BOTH
 
 
+@wp.func
+def deepest_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """Return the dependence of a minimum: on one operand where that one is always the smaller."""
+    if a[1] <= b[0]:
+        return KEEP_LEFT
+    if b[1] <= a[0]:
+        return KEEP_RIGHT
+    return KEEP_BOTH
+
+
 # -- the table ------------------------------------------------------------------------------------------
 
 SUPERELLIPTIC = Operator(
@@ -637,6 +649,17 @@ MASKED = Operator(
     support=Support.COMMON,
 )
 
+DEEPEST = Operator(
+    "deepest",
+    intersection_partials,
+    extremum_slope,
+    intersection_range,
+    deepest_choice,
+    monotone=True,
+    signed=True,
+)
+"""min(f, g) of fields that are 0 or less: the union of pieces with a negative weight."""
+
 BLENDS: tuple[Operator, ...] = (
     SUPERELLIPTIC,
     R_UNION,
@@ -647,5 +670,6 @@ BLENDS: tuple[Operator, ...] = (
     CLEAN_UNION,
     CONTROLLABLE,
     MASKED,
+    DEEPEST,
 )
 """Every operator of this file."""

@@ -1,8 +1,8 @@
 """Convolution surfaces: integrals of a compact kernel over segments, arcs and triangles, in closed form.
 
-Source: Zanni, Bernhardt, Quiblier and Cani 2013, "SCALe-invariant Integral Surfaces" (SCALIS), sections 3 and
-4, with the kernel (1 − p²)³ of compact support. Their surface lies at a threshold of the integral; here the
-integral is scaled, so that a long straight line and a plane have the field ½ at their radius.
+Source: Zanni, Bernhardt, Quiblier and Cani 2013, "SCALe-invariant Integral Surfaces" (SCALIS), with the
+kernel (1 − p²)³ of compact support. Their surface lies at a threshold of the integral; here the integral is
+scaled, so that a long straight line and a plane have the field ½ at their radius.
 
     f(q) = N ∫ (1 − |p|²)₊³ ds / τ,    p = (q − S(s)) / τ(s)
 

@@ -8,19 +8,11 @@ import math
 
 import warp as wp
 
-from blobtree.formulas.falloff import RIM, falloff, falloff_derivative, falloff_steepest
+from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.noise import LARGEST_NOISE, STEEPEST_NOISE, gradient_noise
 from blobtree.formulas.operators import ricci_partials
-from blobtree.formulas.windows import (
-    smooth_step,
-    smooth_step_slope,
-    steepest_smooth_step,
-    window,
-    window_bounds,
-    windowed,
-    windowed_bounds,
-)
+from blobtree.formulas.windows import smooth_step, smooth_step_slope, steepest_smooth_step
 
 wp.set_module_options({"enable_backward": False})
 
@@ -68,28 +60,20 @@ def superquadric_norm(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -
 
 
 @wp.func
-def superquadric_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """Return (f, ∇f) of f = g(RIM · h)."""
-    h = superquadric_norm(q, tape, at)
-    d = RIM * h[0]
-    slope = 2.0 * RIM * d * falloff_derivative(d * d)
-    return wp.vec4(falloff(d * d), slope * h[1], slope * h[2], slope * h[3])
+def superquadric_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (u, ∇u) of u = RIM · h."""
+    return superquadric_norm(q, tape, at) * RIM
 
 
 @wp.func
 def superquadric_bounds(
     center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec3:
-    """Bound f over a ball; tape[at + 2][0] is the largest slope of h, which is that of a norm."""
+    """Bound u over a ball; tape[at + 2][0] is the largest slope of h, which is that of a norm."""
     steepest = RIM * tape[at + 2][0]
-    d = RIM * superquadric_norm(center, tape, at)[0]
-    nearest = wp.max(d * (1.0 - NORM_MARGIN) - steepest * radius, 0.0)
-    farthest = d * (1.0 + NORM_MARGIN) + steepest * radius
-    return wp.vec3(
-        falloff(farthest * farthest),
-        falloff(nearest * nearest),
-        steepest * falloff_steepest(nearest, farthest),
-    )
+    u = RIM * superquadric_norm(center, tape, at)[0]
+    nearest = u * (1.0 - NORM_MARGIN) - steepest * radius
+    return wp.vec3(nearest, u * (1.0 + NORM_MARGIN) + steepest * radius, steepest)
 
 
 @wp.func
@@ -111,79 +95,62 @@ def gyroid(x: wp.vec3, rate: wp.float32) -> wp.vec4:
 
 
 @wp.func
-def gyroid_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """Return (f, ∇f) of f = g(|G| / s) in a window; tape[at + 1][3] = rate, tape[at + 2][0] = 1 / s."""
+def gyroid_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (u, ∇u) of u = |G| / s; tape[at + 1][3] = rate, tape[at + 2][0] = 1 / s."""
     middle = tape[at]
-    half = tape[at + 1]
-    x = q - wp.vec3(middle[0], middle[1], middle[2])
-    w = window(x, wp.vec3(half[0], half[1], half[2]), middle[3])
-    if w[0] <= 0.0:
-        return wp.vec4(0.0, 0.0, 0.0, 0.0)
-    d = gyroid(x, half[3]) * tape[at + 2][0]
-    slope = 2.0 * d[0] * falloff_derivative(d[0] * d[0])
-    return windowed(wp.vec4(falloff(d[0] * d[0]), slope * d[1], slope * d[2], slope * d[3]), w)
+    u = gyroid(q - wp.vec3(middle[0], middle[1], middle[2]), tape[at + 1][3]) * tape[at + 2][0]
+    if u[0] < 0.0:
+        return -u
+    return u
 
 
 @wp.func
 def gyroid_bounds(
     center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec3:
-    """Bound f over a ball, in which |G| changes by at most √3 · rate · radius."""
-    middle = tape[at]
-    half = tape[at + 1]
-    x = center - wp.vec3(middle[0], middle[1], middle[2])
-    w = window_bounds(x, radius, wp.vec3(half[0], half[1], half[2]), middle[3])
-    if w[1] <= 0.0:
-        return wp.vec3(0.0, 0.0, 0.0)
-    steepest = STEEPEST_GYROID * half[3] * tape[at + 2][0]
-    d = wp.abs(gyroid(x, half[3])[0]) * tape[at + 2][0]
-    nearest = wp.max(d - steepest * radius, 0.0)
-    farthest = wp.min(d + steepest * radius, LARGEST_GYROID * tape[at + 2][0])
-    slope = steepest * falloff_steepest(nearest, wp.max(farthest, nearest))
-    return windowed_bounds(wp.vec3(falloff(farthest * farthest), falloff(nearest * nearest), slope), w)
+    """Bound u over a ball, in which |G| changes by at most √3 · rate · radius."""
+    rate = tape[at + 2][0]
+    steepest = STEEPEST_GYROID * tape[at + 1][3] * rate
+    u = gyroid_distance(center, tape, at)[0]
+    nearest = wp.max(u - steepest * radius, 0.0)
+    farthest = wp.min(u + steepest * radius, LARGEST_GYROID * rate)
+    return wp.vec3(nearest, wp.max(farthest, nearest), steepest)
 
 
 @wp.func
 def noise_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """Return (f, ∇f) of f = s(½ + (n − level) / 2 softness) in a window, s being `smooth_step`.
+    """Return (f, ∇f) of f = s(½ + (n − level) / 2 softness), s being `smooth_step`.
 
     tape[at + 1][3] = 1 / wavelength; tape[at + 2] = (level, 1 / (2 softness), seed, 0).
     """
     middle = tape[at]
-    half = tape[at + 1]
+    rate = tape[at + 1][3]
     shape = tape[at + 2]
-    x = q - wp.vec3(middle[0], middle[1], middle[2])
-    w = window(x, wp.vec3(half[0], half[1], half[2]), middle[3])
-    if w[0] <= 0.0:
-        return wp.vec4(0.0, 0.0, 0.0, 0.0)
-    n = gradient_noise(x * half[3], int(shape[2]))
+    n = gradient_noise((q - wp.vec3(middle[0], middle[1], middle[2])) * rate, int(shape[2]))
     t = 0.5 + (n[0] - shape[0]) * shape[1]
-    slope = smooth_step_slope(t) * shape[1] * half[3]
-    return windowed(wp.vec4(smooth_step(t), slope * n[1], slope * n[2], slope * n[3]), w)
+    slope = smooth_step_slope(t) * shape[1] * rate
+    return wp.vec4(smooth_step(t), slope * n[1], slope * n[2], slope * n[3])
 
 
 @wp.func
 def noise_bounds(center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
     """Bound f over a ball, in which the noise changes by at most STEEPEST_NOISE · radius / wavelength."""
     middle = tape[at]
-    half = tape[at + 1]
+    rate = tape[at + 1][3]
     shape = tape[at + 2]
-    x = center - wp.vec3(middle[0], middle[1], middle[2])
-    w = window_bounds(x, radius, wp.vec3(half[0], half[1], half[2]), middle[3])
-    if w[1] <= 0.0:
-        return wp.vec3(0.0, 0.0, 0.0)
-    n = gradient_noise(x * half[3], int(shape[2]))[0]
-    change = STEEPEST_NOISE * radius * half[3]
+    n = gradient_noise((center - wp.vec3(middle[0], middle[1], middle[2])) * rate, int(shape[2]))[0]
+    change = STEEPEST_NOISE * radius * rate
     low = 0.5 + (wp.max(n - change, -LARGEST_NOISE) - shape[0]) * shape[1]
     high = 0.5 + (wp.min(n + change, LARGEST_NOISE) - shape[0]) * shape[1]
-    slope = STEEPEST_NOISE * half[3] * shape[1] * steepest_smooth_step(low, high)
-    return windowed_bounds(wp.vec3(smooth_step(low), smooth_step(high), slope), w)
+    slope = STEEPEST_NOISE * rate * shape[1] * steepest_smooth_step(low, high)
+    return wp.vec3(smooth_step(low), smooth_step(high), slope)
 
 
-SUPERQUADRIC = FieldKind("superquadric", superquadric_value_gradient, superquadric_bounds, parameters=3)
-
-GYROID = FieldKind("gyroid", gyroid_value_gradient, gyroid_bounds, parameters=3)
-NOISE = FieldKind("noise", noise_value_gradient, noise_bounds, parameters=3)
+SUPERQUADRIC = FieldKind(
+    "superquadric", superquadric_distance, superquadric_bounds, parameters=3, distance=True
+)
+GYROID = FieldKind("gyroid", gyroid_distance, gyroid_bounds, parameters=3, distance=True, windowed=True)
+NOISE = FieldKind("noise", noise_value_gradient, noise_bounds, parameters=3, windowed=True)
 
 DIRECT_FIELDS = (SUPERQUADRIC, GYROID, NOISE)
 """Every direct field of this file."""

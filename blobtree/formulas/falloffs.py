@@ -45,7 +45,7 @@ def soft_object_slope(distance: wp.float32) -> wp.float32:
 
 @wp.func
 def blanc_schlick_value(distance: wp.float32) -> wp.float32:
-    """Piecewise rational in d² with hardness p (Blanc & Schlick 1995, section 3)."""
+    """Piecewise rational in d² with hardness p (Blanc & Schlick 1995)."""
     z = distance * distance
     if z <= 0.25:
         return 1.0 - 9.0 * z * z / (HARDNESS + (4.5 - 4.0 * HARDNESS) * z)

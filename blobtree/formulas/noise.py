@@ -22,7 +22,7 @@ MEAN_NOISE_SLOPE = 1.18
 
 @wp.func
 def scrambled(number: wp.int32) -> wp.int32:
-    """Return another number from 0 to 288, each once (Gustavson & McEwan 2012, eq. 3)."""
+    """Return another number from 0 to 288, each once (McEwan, Sheets, Gustavson & Richardson 2012)."""
     return ((34 * number + 10) * number) % PERIOD
 
 

@@ -4,14 +4,38 @@ The data region holds a texel for each grid point but those of the last column a
 (i + 1, j), (i, j + 1) and (i + 1, j + 1) of a layer. So two texels hold the corners of a cell. Samples are in
 units of the spacing. Outside the grid the distance is that of the nearest point of the grid, or the distance
 from the grid's box if that is larger: the solid ends at the box.
+
+From a distance d, below 0 inside, the field is a falloff of u = RIM + d / s. So it is ½ on the surface, 0
+from d = (1 − RIM) s outward, and 1 from −RIM s inward. For a ball of radius RIM · s that is the field of a
+`Point`.
 """
 
 import warp as wp
 
-from blobtree.formulas.distances import box_distance, distance_field, distance_field_bounds
+from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def box_distance(x: wp.vec3, half: wp.vec3) -> wp.vec4:
+    """Return (d, ∇d) of a box, seen from its middle (Quilez, Distance functions)."""
+    a = wp.abs(x[0]) - half[0]
+    b = wp.abs(x[1]) - half[1]
+    c = wp.abs(x[2]) - half[2]
+    sx = wp.where(x[0] < 0.0, -1.0, 1.0)
+    sy = wp.where(x[1] < 0.0, -1.0, 1.0)
+    sz = wp.where(x[2] < 0.0, -1.0, 1.0)
+    beyond = wp.vec3(wp.max(a, 0.0), wp.max(b, 0.0), wp.max(c, 0.0))
+    length = wp.length(beyond)
+    if length > 0.0:
+        return wp.vec4(length, sx * beyond[0] / length, sy * beyond[1] / length, sz * beyond[2] / length)
+    if a >= b and a >= c:
+        return wp.vec4(a, sx, 0.0, 0.0)
+    if b >= c:
+        return wp.vec4(b, 0.0, sy, 0.0)
+    return wp.vec4(c, 0.0, 0.0, sz)
 
 
 @wp.func
@@ -55,8 +79,8 @@ def grid_box_distance(u: wp.vec3, counts: wp.vec4) -> wp.vec4:
 
 
 @wp.func
-def volume_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """Return (f, ∇f) of sampled distances.
+def volume_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (u, ∇u) of sampled distances d: u = RIM + d / s.
 
     tape[at] = (first texel of the samples, first grid point); tape[at + 1] = (1 / spacing, 1 / s, growth in
     cells, largest slope of the samples); tape[at + 2] = (numbers of grid points, spacing).
@@ -69,14 +93,16 @@ def volume_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int3
     box = grid_box_distance(u, counts)
     if box[0] > d[0]:
         d = box
-    return distance_field(wp.vec4((d[0] - shape[2]) * counts[3], d[1], d[2], d[3]), shape[1])
+    return wp.vec4(
+        RIM + (d[0] - shape[2]) * counts[3] * shape[1], d[1] * shape[1], d[2] * shape[1], d[3] * shape[1]
+    )
 
 
 @wp.func
 def volume_bounds(
     center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec3:
-    """Bound f over a ball by the largest slope of the samples; the box's distance has slope 1."""
+    """Bound u over a ball by the largest slope of the samples; the box's distance has slope 1."""
     first = tape[at]
     shape = tape[at + 1]
     counts = tape[at + 2]
@@ -87,10 +113,11 @@ def volume_bounds(
     slope = wp.max(shape[3], 1.0)
     low = wp.max(d - slope * reach, box - reach) - shape[2]
     high = wp.max(d + slope * reach, box + reach) - shape[2]
-    return distance_field_bounds(low * counts[3], high * counts[3], slope, shape[1])
+    rate = counts[3] * shape[1]
+    return wp.vec3(RIM + low * rate, RIM + high * rate, slope * shape[1])
 
 
-VOLUME = FieldKind("volume", volume_value_gradient, volume_bounds, parameters=3)
+VOLUME = FieldKind("volume", volume_distance, volume_bounds, parameters=3, distance=True)
 
 VOLUME_FIELDS = (VOLUME,)
 """Every kind of sampled fields."""

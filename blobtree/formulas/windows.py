@@ -68,6 +68,26 @@ def window_bounds(x: wp.vec3, radius: wp.float32, half: wp.vec3, fade: wp.float3
 
 
 @wp.func
+def box_window(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (w, ∇w) at q of a box with tape[at] = (middle, fade) and tape[at + 1] = (half lengths, ·)."""
+    middle = tape[at]
+    half = tape[at + 1]
+    x = q - wp.vec3(middle[0], middle[1], middle[2])
+    return window(x, wp.vec3(half[0], half[1], half[2]), middle[3])
+
+
+@wp.func
+def box_window_bounds(
+    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Return `window_bounds` over a ball for such a box."""
+    middle = tape[at]
+    half = tape[at + 1]
+    x = center - wp.vec3(middle[0], middle[1], middle[2])
+    return window_bounds(x, radius, wp.vec3(half[0], half[1], half[2]), middle[3])
+
+
+@wp.func
 def windowed(f: wp.vec4, w: wp.vec4) -> wp.vec4:
     """Return (value, gradient) of a field under a window."""
     g = f * w[0] + w * f[0]

@@ -2,7 +2,7 @@
 
 The cells are the leaves of an octree. Each block of a `BlockTree` has 4³ cells; eight of them may be merged
 to a leaf, and each may be replaced by the block that refines it. A group of cells may be one leaf if that
-changes no topology: the three conditions of Ju et al. (2002), *Dual contouring of Hermite data*, section 4.
+changes no topology: the three conditions of Ju et al. (2002), *Dual contouring of Hermite data*.
 
 * Each of the smaller cells may be a leaf.
 * In the merged cell, the inside corners are connected along its edges, and so are the outside corners.

@@ -28,13 +28,13 @@ from blobtree.tape.codes import (
 from blobtree.tape.dispatch import (
     closest,
     direct_stride,
-    direct_value_gradient,
     partials,
     stride,
     warp_forward,
     warp_pullback,
 )
 from blobtree.tape.evaluators import (
+    direct_value_gradient,
     gradient_combine,
     gradient_leaf,
     gradient_pullback_affine,

@@ -26,6 +26,7 @@ from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
 from blobtree.kernels import load_together
 from blobtree.meshing.creases import sharpened
+from blobtree.meshing.crumbs import without_crumbs
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
@@ -205,7 +206,7 @@ def _within_chord_error(
         polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=pass_report)
         error = _largest_chord_error(polygonizer.device_mesh, pass_report)
         if error <= chord_error:
-            return polygonizer.mesh
+            return without_crumbs(polygonizer.mesh, chord_error)
         passes.append((size, error))
         density = len(polygonizer.device_mesh.faces) * size**2  # triangles per squared cell size
         if number == 1:
@@ -243,7 +244,7 @@ def _adaptive_within_chord_error(
         within = passes.run(pass_report)
         pass_report(_STAGES[-1], 1.0)
         if within:
-            return passes.mesh.mesh(creases)
+            return without_crumbs(passes.mesh.mesh(creases), chord_error)
         if number == 1:
             counts = [passes.expected_triangles(scale=scale) for scale in BASE_SCALES]
             _announce_count(min(counts), chord_error)

@@ -196,7 +196,7 @@ class CleanUnion(AssociativeCombination):
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class ControllableBlend(AssociativeCombination):
-    """Blend of two operands between two angles (Barthe, Wyvill & de Groot 2004).
+    """Blend of two operands between two angles (after Barthe, Wyvill & de Groot 2004).
 
     In the plane of the field values (f, g) an elliptical arc joins the surfaces between the ray at
     `left_angle` from the f axis and the ray at `right_angle` from the g axis. Outside it is the union. A

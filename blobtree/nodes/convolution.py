@@ -20,12 +20,12 @@ from blobtree.formulas.convolution import (
     SHEET_RIM,
 )
 from blobtree.lazy import Lazy
-from blobtree.nodes.curves import Arc, Limb
+from blobtree.nodes.curves import Arc, checked_radii
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.flats import triangle_texels
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius, parameters_of
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, beside
-from blobtree.nodes.tree import Node, Sum
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
+from blobtree.nodes.tree import Macro, Node, Sum
 from blobtree.validation import Vector
 
 STEEPEST_TAPER = 0.5
@@ -72,7 +72,7 @@ class ConvolutionSegment(ConvolutionPrimitive):
     """A straight limb whose radius changes linearly, and which joins others in a sum without a bulge.
 
     A long one shows its radii, as the hull of two balls does, up to a change of radius of half its length.
-    The field is SCALIS of a compact polynomial kernel (Zanni et al. 2013, section 3), in closed form.
+    The field is SCALIS of a compact polynomial kernel (Zanni et al. 2013), in closed form.
 
     Raises
     ------
@@ -183,7 +183,7 @@ class ConvolutionArc(ConvolutionPrimitive):
 class ConvolutionTriangle(ConvolutionPrimitive):
     """A flat sheet of one thickness over a triangle, which joins others at an edge without a bulge.
 
-    The field is SCALIS of a compact polynomial kernel (Zanni et al. 2013, section 4), in closed form.
+    The field is SCALIS of a compact polynomial kernel (Zanni et al. 2013), in closed form.
 
     Raises
     ------
@@ -232,7 +232,7 @@ class ConvolutionTriangle(ConvolutionPrimitive):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ConvolutionStroke(Limb):
+class ConvolutionStroke(Macro, Leaf):
     """A limb along a polyline without bulges at its corners: the sum of convolution segments.
 
     Repeat the first point at the end for a closed one.
@@ -252,11 +252,22 @@ class ConvolutionStroke(Limb):
 
     file_tag = "convolution_stroke"
 
+    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
+    radii: Annotated[
+        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
+    ]
+    _: KW_ONLY
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "radii", checked_radii(self.points, self.radii))
+
     @Lazy
     def expanded(self) -> Node:
         """Return the sum of segments between neighbours."""
         ends = zip(pairwise(self.points), pairwise(self.radii), strict=True)
-        same: dict[str, Any] = {"color": self.color, "attributes": self.attributes}
+        same: dict[str, Any] = {"color": self.color, "attributes": self.attributes, "weight": self.weight}
         return Sum(
             tuple(
                 ConvolutionSegment(*points, radius=radii[0], end_radius=radii[1], **same)

@@ -1,6 +1,6 @@
 """Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii."""
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 from typing import Annotated
 
@@ -12,8 +12,17 @@ from blobtree.formulas.curve_skeletons import ARC, CURVE
 from blobtree.formulas.skeletons import CIRCLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Primitive, Segment, beside, octagons
-from blobtree.nodes.tree import Macro, Node, Union
+from blobtree.nodes.primitives import (
+    DEFAULT_COLOR,
+    OPTIONAL_FIELD,
+    Columns,
+    Pieces,
+    Primitive,
+    Segment,
+    beside,
+    octagons,
+)
+from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
 
 STRAIGHTEST_ARC = 1e3
@@ -239,7 +248,7 @@ class TaperedBezier(Primitive):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Polyline(Macro, Leaf):
+class Polyline(Pieces):
     """A tube around straight lines from point to point: the union of segments.
 
     Raises
@@ -273,47 +282,21 @@ class Polyline(Macro, Leaf):
     def expanded(self) -> Node:
         """Return the union of segments between different neighbours."""
         ends = [pair for pair in pairwise(self.points) if pair[0] != pair[1]]
-        return Union(
-            tuple(
-                Segment(*pair, radius=self.radius, color=self.color, attributes=self.attributes)
-                for pair in ends
-            )
-        )
+        return self.united(Segment(*pair, radius=self.radius, **self.shared) for pair in ends)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Limb(Macro, Leaf):
-    """A tube through points, with a radius at each of them; a macro for what lies between them."""
+class Stroke(Pieces):
+    """A limb along points, with given radii there: a spline of any length, whose pieces are parabolas.
 
-    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
-    radii: Annotated[
-        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
-    ]
-    _: KW_ONLY
-    color: Color = DEFAULT_COLOR
+    A Catmull–Rom spline runs through the points with their radii. Its tangents are those of the chordal
+    spline (Catmull & Rom 1974; Barry & Goldman 1988). Two parabolas in the four coordinates x, y, z
+    and radius join two points. Where radii change steeply, their slope is limited, so that they stay above 0.
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if len(self.points) < 2 or any(a == b for a, b in pairwise(self.points)):
-            raise InvalidNode(
-                f"points: expected two or more points, each other than the one before, got {self.points}"
-            )
-        if len(self.radii) == 1:
-            object.__setattr__(self, "radii", self.radii * len(self.points))
-        if len(self.radii) != len(self.points):
-            raise InvalidNode(
-                f"radii: expected one for each of {len(self.points)} points, or one for all, "
-                f"got {len(self.radii)}"
-            )
+    A B-spline is smoother, and never leaves the convex hull of the points and their radii. It starts and ends
+    at the first and last one, and the others attract it: it is quadratic, with uniform knots (de Boor 1978).
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Stroke(Limb):
-    """A smooth tube through points, with the given radii there: a Catmull–Rom spline of any length.
-
-    The tangents are those of the chordal Catmull–Rom spline (Catmull & Rom 1974; Barry & Goldman 1988). Two
-    parabolas in the four coordinates x, y, z and radius join two points, so curve and radius are C¹. Where
-    radii change steeply, their slope is limited, so that they stay above 0. The pieces join in a union.
+    Curve and radius are C¹. A `width` is that at the start; elsewhere it is in proportion to the radius.
 
     Raises
     ------
@@ -326,26 +309,74 @@ class Stroke(Limb):
     >>> worm = Stroke([(0, 0, 0), (1, 1, 0), (2, 0, 0)], [0.1, 0.3, 0.1])
     >>> worm([[1, 1.3, 0], [1, 1, 0.3]]).round(3).tolist()
     [0.5, 0.5]
+    >>> arch = Stroke([(0, 0, 0), (1, 1, 0), (2, 0, 0)], [0.2], spline="b_spline")
+    >>> arch([[1, 0.7, 0], [0, 0, 0.2]]).round(3).tolist()
+    [0.5, 0.5]
     """
 
     file_tag = "stroke"
 
+    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
+    radii: Annotated[
+        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
+    ]
+    _: KW_ONLY
+    spline: Annotated[
+        str,
+        Parameter(
+            Quantity.CHOICE,
+            "'catmull_rom' through the points, or 'b_spline', which they attract",
+            choices=("catmull_rom", "b_spline"),
+        ),
+    ] = field(default="catmull_rom", metadata=OPTIONAL_FIELD)
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "radii", checked_radii(self.points, self.radii))
+
     @Lazy
     def expanded(self) -> Node:
-        """Return the union of two parabolas per span."""
+        """Return the union of the parabolas."""
         balls = np.column_stack([self.points, self.radii])
-        lengths = np.linalg.norm(np.diff(balls[:, :3], axis=0), axis=1)[:, None]
-        slopes = _chordal_slopes(balls, lengths)
-        longest = np.maximum(np.vstack([lengths, [[0.0]]]), np.vstack([[[0.0]], lengths]))[:, 0]
-        steepest = 4.0 * STEEPEST_RADIUS * balls[:, 3] / longest
-        slopes[:, 3] = np.clip(slopes[:, 3], -steepest, steepest)
-        after = balls[:-1] + 0.25 * lengths * slopes[:-1]
-        before = balls[1:] - 0.25 * lengths * slopes[1:]
-        middles = 0.5 * (after + before)
-        first = np.stack([balls[:-1], after, middles], axis=1)
-        second = np.stack([middles, before, balls[1:]], axis=1)
-        pieces = np.stack([first, second], axis=1).reshape(-1, 3, 4).tolist()
-        return Union(tuple(_piece(self, *controls) for controls in pieces))
+        pieces = _b_spline(balls) if self.spline == "b_spline" else _catmull_rom(balls)
+        return self.united(self._piece(*controls) for controls in pieces.tolist())
+
+    def _piece(self, start: list[float], control: list[float], end: list[float]) -> TaperedBezier:
+        a, b, c = (tuple(ball[:3]) for ball in (start, control, end))
+        width = None if self.width is None else self.width * start[3] / self.radii[0]
+        radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
+        return TaperedBezier(a, b, c, **radii, **self.shared | {"width": width})  # type: ignore[arg-type]  # lists of four
+
+
+def checked_radii(points: tuple[Vector, ...], radii: tuple[float, ...]) -> tuple[float, ...]:
+    """Return a radius for each point of a limb; raise `InvalidNode` if points or radii are none."""
+    if len(points) < 2 or any(a == b for a, b in pairwise(points)):
+        raise InvalidNode(
+            f"points: expected two or more points, each other than the one before, got {points}"
+        )
+    if len(radii) == 1:
+        return radii * len(points)
+    if len(radii) != len(points):
+        raise InvalidNode(
+            f"radii: expected one for each of {len(points)} points, or one for all, got {len(radii)}"
+        )
+    return radii
+
+
+def _catmull_rom(balls: Float64Array) -> Float64Array:
+    """Return the control points (2n − 2, 3, 4) of two parabolas between each two of n balls (x, y, z, r)."""
+    lengths = np.linalg.norm(np.diff(balls[:, :3], axis=0), axis=1)[:, None]
+    slopes = _chordal_slopes(balls, lengths)
+    longest = np.maximum(np.vstack([lengths, [[0.0]]]), np.vstack([[[0.0]], lengths]))[:, 0]
+    steepest = 4.0 * STEEPEST_RADIUS * balls[:, 3] / longest
+    slopes[:, 3] = np.clip(slopes[:, 3], -steepest, steepest)
+    after = balls[:-1] + 0.25 * lengths * slopes[:-1]
+    before = balls[1:] - 0.25 * lengths * slopes[1:]
+    middles = 0.5 * (after + before)
+    first = np.stack([balls[:-1], after, middles], axis=1)
+    second = np.stack([middles, before, balls[1:]], axis=1)
+    return np.stack([first, second], axis=1).reshape(-1, 3, 4)
 
 
 def _chordal_slopes(balls: Float64Array, lengths: Float64Array) -> Float64Array:
@@ -356,7 +387,13 @@ def _chordal_slopes(balls: Float64Array, lengths: Float64Array) -> Float64Array:
     return slopes
 
 
-def _piece(stroke: Stroke, start: list[float], control: list[float], end: list[float]) -> TaperedBezier:
-    a, b, c = (tuple(ball[:3]) for ball in (start, control, end))
-    radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
-    return TaperedBezier(a, b, c, **radii, color=stroke.color, attributes=stroke.attributes)  # type: ignore[arg-type]  # lists of four
+def _b_spline(balls: Float64Array) -> Float64Array:
+    """Return the control points (n − 2, 3, 4) of the parabolas of a quadratic B-spline, one for two balls.
+
+    Neighbours meet in the middle between two balls; the first and the last parabola end at balls.
+    """
+    middles = 0.5 * (balls[:-1] + balls[1:])
+    if len(balls) == 2:
+        return np.stack([balls[:1], middles, balls[1:]], axis=1)
+    joints = np.concatenate([balls[:1], middles[1:-1], balls[-1:]])
+    return np.stack([joints[:-1], balls[1:-1], joints[1:]], axis=1)

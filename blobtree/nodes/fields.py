@@ -18,18 +18,19 @@ from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.noise import MEAN_NOISE_SLOPE
 from blobtree.nodes.parameters import Color, Parameter, Quantity, columns_of, parameters_of
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf
-from blobtree.tape.program import ProgramField
+from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, Leaf, Profile
+from blobtree.tape.program import ProgramField, profile_extent, profile_factor
 from blobtree.validation import Vector
 
 BOX_MARGIN = 2e-6
 """Relative widening of boxes, so that float32 leaves nothing of a field outside."""
 
 
-class FieldPrimitive(ProgramField, Leaf):
+class FieldPrimitive(Leaf, ProgramField):
     """A direct field and a colour: a leaf of the tree.
 
-    Its field is a function of the point itself, not of the distance from a skeleton.
+    Its field is a function of the point itself, not of the distance from a skeleton. Every one has a
+    `weight`. Only those whose function is some distance take a `falloff`.
 
     Examples
     --------
@@ -39,6 +40,26 @@ class FieldPrimitive(ProgramField, Leaf):
     """
 
     field_kind: ClassVar[FieldKind]
+
+    def __new__(cls, *_: Any, **named: Any) -> Self:
+        """Refuse a falloff or a width that has no meaning."""
+        for name in PROFILE:
+            if name in named and name not in parameters_of(cls):
+                raise InvalidNode(
+                    f"{name}: expected none, a {cls.__name__} is no function of a distance; it takes a weight"
+                )
+        return super().__new__(cls)
+
+    @property
+    def mean_radius(self) -> float:
+        """Distance of the surface, to which a width is relative; for kinds with a width."""
+        raise NotImplementedError
+
+    @property
+    def profile_factor(self) -> float:
+        """Factor k of `evaluators.profile_distance`."""
+        falloff, width, _ = self.profile
+        return 1.0 if width is None else profile_factor(falloff, width, self.mean_radius)
 
     def grown(self, distance: float) -> Self:
         """Refuse an offset; kinds with a measure of size replace this."""
@@ -51,6 +72,12 @@ class FieldPrimitive(ProgramField, Leaf):
         """Return lower and upper corners (n, 3) of boxes outside which the fields of n leaves are 0."""
         lower, upper = cls.box(cls._columns(leaves))
         margin = BOX_MARGIN * (upper - lower)
+        if cls.field_kind.distance and not cls.field_kind.windowed:
+            farther = [
+                leaf.profiled and profile_extent(leaf.profile[0], leaf.profile_factor) - 1.0
+                for leaf in leaves
+            ]
+            margin += 0.5 * np.array(farther)[:, None] * (upper - lower)
         return lower - margin, upper + margin
 
     @classmethod
@@ -76,16 +103,17 @@ class FieldPrimitive(ProgramField, Leaf):
         return {
             name: columns_of(leaves, parameter)
             for name, parameter in parameters_of(cls).items()
-            if parameter.quantity not in (Quantity.COLOR, Quantity.ATTRIBUTES)
+            if parameter.quantity not in (Quantity.COLOR, Quantity.ATTRIBUTES) and name not in PROFILE
         }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Superquadric(FieldPrimitive):
+class Superquadric(Profile, FieldPrimitive):
     """A superquadric ellipsoid: a box with rounded edges, a cylinder, an ellipsoid, a diamond (Barr 1981).
 
     Its field is g(RIM · h) with h = ((X^(2/ε₂) + Y^(2/ε₂))^(ε₂/ε₁) + Z^(2/ε₁))^(ε₁/2), where X, Y and Z are
-    the distances from the centre in semi-axes. This norm is 1 on the surface.
+    the distances from the centre in semi-axes. This norm is 1 on the surface. A `width` is one at the mean
+    semi-axis ∛(abc), and in proportion to the others.
 
     Examples
     --------
@@ -112,6 +140,11 @@ class Superquadric(FieldPrimitive):
     ] = 1.0  # fmt: skip
     _: KW_ONLY
     color: Color = DEFAULT_COLOR
+
+    @property
+    def mean_radius(self) -> float:
+        """The geometric mean of the semi-axes."""
+        return float(np.cbrt(np.prod(self.semi_axes)))
 
     def grown(self, distance: float) -> "Superquadric":
         """Return this superquadric with semi-axes longer by a distance."""
@@ -182,7 +215,7 @@ class BoxedField(FieldPrimitive):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Gyroid(BoxedField):
+class Gyroid(Profile, BoxedField):
     """A wall along a gyroid, the minimal surface without straight lines (Schoen 1970).
 
     Its field is g(RIM · G / τ) with G = sin X cos Y + sin Y cos Z + sin Z cos X, X = 2π x / period. τ is half
@@ -201,6 +234,11 @@ class Gyroid(BoxedField):
 
     period: Annotated[float, Parameter(Quantity.LENGTH, "length after which the wall repeats")]
     thickness: Annotated[float, Parameter(Quantity.LENGTH, "mean thickness of the wall")]
+
+    @property
+    def mean_radius(self) -> float:
+        """Half the thickness."""
+        return 0.5 * self.thickness
 
     def grown(self, distance: float) -> "Gyroid":
         """Return this gyroid with a wall that is thicker by the distance on both sides."""

@@ -11,8 +11,8 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.flat_skeletons import RECTANGLE, TRIANGLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, Primitive, beside
-from blobtree.nodes.tree import Macro, Node, Union
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Pieces, Primitive, beside
+from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
 
 SMALLEST_SINE = 1e-6
@@ -140,7 +140,7 @@ def triangle_texels(columns: Columns, numbers: Float64Array) -> Float64Array:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Polygon(Macro, Leaf):
+class Polygon(Pieces):
     """A flat polygon with a rounded edge, also a concave one: the union of triangles that fill it.
 
     The triangles are ears of the polygon (Meisters 1975), and differ from it by `FLATNESS` at most.
@@ -180,12 +180,7 @@ class Polygon(Macro, Leaf):
         """Return the union of ears."""
         ears = _ears(_in_plane(np.array(self.points)))
         corners = [[self.points[place] for place in ear] for ear in ears]
-        return Union(
-            tuple(
-                Triangle(*ear, radius=self.radius, color=self.color, attributes=self.attributes)
-                for ear in corners
-            )
-        )
+        return self.united(Triangle(*ear, radius=self.radius, **self.shared) for ear in corners)
 
 
 def _in_plane(points: Float64Array) -> Float64Array:

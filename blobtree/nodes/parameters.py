@@ -92,6 +92,8 @@ class Quantity(Enum):
     """Pairs of names."""
     FALLOFF = "falloff"
     """A `Falloff`, or the name of one."""
+    CHOICE = "choice"
+    """One of the texts that the declaration lists."""
     WIDTH = "width"
     """A length above 0, or None for the one that follows from other parameters."""
     NUMBERS = "numbers"
@@ -133,6 +135,8 @@ class Parameter:
         Number of components of `Quantity.NUMBERS`: 1 is a number, more a vector.
     whole
         `Quantity.NUMBERS` holds whole numbers.
+    choices
+        Texts that `Quantity.CHOICE` allows.
     """
 
     quantity: Quantity
@@ -144,12 +148,15 @@ class Parameter:
     name: str = ""
     size: int = 1
     whole: bool = False
+    choices: tuple[str, ...] = ()
 
     @property
     def check(self) -> Callable[[Any], Any]:
         """A function that returns the checked value, or raises `InvalidNode`."""
         if self.quantity is Quantity.NUMBERS:
             return self._checked_numbers
+        if self.quantity is Quantity.CHOICE:
+            return self._checked_choice
         return self._checked_in_range if self.is_bounded else partial(CHECKS[self.quantity], self.name)
 
     def _checked_in_range(self, value: Any) -> Any:
@@ -175,6 +182,11 @@ class Parameter:
         if self.quantity is Quantity.POINTS:
             return tuple(chain.from_iterable(value))
         return tuple(value) if isinstance(value, tuple) else (float(value),)
+
+    def _checked_choice(self, value: Any) -> Any:
+        if isinstance(value, str) and value in self.choices:
+            return value
+        raise InvalidNode(f"{self.name}: expected {' or '.join(map(repr, self.choices))}, got {shown(value)}")
 
     def _checked_numbers(self, value: Any) -> Any:
         """Return `value` as a float, an int or a tuple of floats."""
@@ -344,5 +356,6 @@ def _type_name(hint: Any) -> str:
         AttributeMapping: "dict",
         float | None: "float or None",
         Falloff | str: "Falloff or str",
+        str: "str",
     }
     return names.get(inner, "array-like")

@@ -7,7 +7,7 @@ the order of declaration, `texels` need not be written. Falloff, width and weigh
 """
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import product
 from typing import Annotated, Any, ClassVar, cast
@@ -15,6 +15,7 @@ from typing import Annotated, Any, ClassVar, cast
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.formulas.blends import DEEPEST
 from blobtree.formulas.falloff import WYVILL, Falloff
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
@@ -28,7 +29,7 @@ from blobtree.nodes.parameters import (
     parameters_of,
     unit_vectors,
 )
-from blobtree.nodes.tree import Node
+from blobtree.nodes.tree import AssociativeCombination, Macro, Node, Union
 from blobtree.nodes.values import OPTIONAL
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
@@ -52,25 +53,18 @@ Columns = dict[str, Float64Array]
 
 LARGEST_WEIGHT = 1000.0
 
-_OPTIONAL = {OPTIONAL: True}
+OPTIONAL_FIELD = {OPTIONAL: True}
+"""Metadata of fields that texts and files leave out at their defaults."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Profile:
-    """How the field of a primitive falls with the distance: keywords of primitives around a skeleton.
+class LeafKeywords:
+    """The keywords that every leaf has."""
 
-    With weight 1 an isolated primitive shows its `radius`, whatever falloff and width it has.
-    """
-
-    falloff: Annotated[
-        Falloff | str, Parameter(Quantity.FALLOFF, "how the field falls off with the distance, or its name")
-    ] = field(default=WYVILL, metadata=_OPTIONAL)
-    width: Annotated[
-        float | None,
-        Parameter(
-            Quantity.WIDTH, "distance beyond the surface over which it blends; None grows with the radius"
-        ),
-    ] = field(default=None, metadata=_OPTIONAL)
+    attributes: Annotated[
+        AttributeMapping,
+        Parameter(Quantity.ATTRIBUTES, "numbers, vectors and labels by name"),
+    ] = field(default=NO_ATTRIBUTES, metadata=OPTIONAL_FIELD)
     weight: Annotated[
         float,
         Parameter(
@@ -80,30 +74,85 @@ class Profile:
             high=LARGEST_WEIGHT,
             hint="for more take a larger radius",
         ),
-    ] = field(default=1.0, metadata=_OPTIONAL)
+    ] = field(default=1.0, metadata=OPTIONAL_FIELD)
 
-
-PROFILE = tuple(Profile.__dataclass_fields__)
-"""Names of the keywords that every primitive has."""
+    @property
+    def profile(self) -> tuple[Falloff, float | None, float]:
+        """Falloff, width (None in proportion to the radius) and weight."""
+        return WYVILL, None, self.weight
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Attributed:
-    """The keyword that every leaf has."""
+class Falling(LeafKeywords):
+    """The keyword of leaves whose field is a function of a distance."""
 
-    attributes: Annotated[
-        AttributeMapping,
-        Parameter(Quantity.ATTRIBUTES, "numbers, vectors and labels by name"),
-    ] = field(default=NO_ATTRIBUTES, metadata=_OPTIONAL)
+    falloff: Annotated[
+        Falloff | str, Parameter(Quantity.FALLOFF, "how the field falls off with the distance, or its name")
+    ] = field(default=WYVILL, metadata=OPTIONAL_FIELD)
+
+    @property
+    def profile(self) -> tuple[Falloff, float | None, float]:
+        """Falloff, width (None in proportion to the radius) and weight."""
+        return cast(Falloff, self.falloff), None, self.weight
 
 
-class Leaf(Attributed, Node):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Profile(Falling):
+    """The keywords of leaves that show a radius, whatever falloff and width they have."""
+
+    width: Annotated[
+        float | None,
+        Parameter(
+            Quantity.WIDTH, "distance beyond the surface over which it blends; None grows with the radius"
+        ),
+    ] = field(default=None, metadata=OPTIONAL_FIELD)
+
+    @property
+    def profile(self) -> tuple[Falloff, float | None, float]:
+        """Falloff, width (None in proportion to the radius) and weight."""
+        return cast(Falloff, self.falloff), self.width, self.weight
+
+
+PROFILE = ("falloff", "width", "weight")
+"""Names of the keywords that every primitive has."""
+
+PLAIN = (WYVILL, None, 1.0)
+
+
+class Leaf(LeafKeywords, Node):
     """A node without operands: a shape of one colour."""
 
     color: Color
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.profile != PLAIN:
+            object.__setattr__(self, "profiled", True)
+            object.__setattr__(self, "signed", self.weight < 0.0)
 
-class Primitive(ProgramPrimitive, Profile, Leaf):
+
+class Pieces(Profile, Macro, Leaf):
+    """A leaf that stands for several, whose field is a falloff of the distance from all of them."""
+
+    def united(self, pieces: Iterable[Node]) -> Node:
+        """Return the pieces as one shape: the strongest of their fields at each point."""
+        kind = Deepest if self.signed else Union
+        return kind(tuple(pieces))
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """The keywords of all pieces."""
+        return {name: getattr(self, name) for name in (*PROFILE, "color", "attributes")}
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Deepest(AssociativeCombination):
+    """Union of operands with negative weights, F = min fᵢ."""
+
+    operator = DEEPEST
+
+
+class Primitive(Profile, Leaf, ProgramPrimitive):
     """A skeleton with a visible radius, a colour and a `Profile`: a leaf of the tree."""
 
     skeleton: ClassVar[Skeleton]
@@ -114,17 +163,6 @@ class Primitive(ProgramPrimitive, Profile, Leaf):
         if declared:
             raise TypeError(f"{cls.__name__}: every primitive has a parameter {declared[0]!r} already")
         super().__init_subclass__()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.falloff is not WYVILL or self.width is not None or self.weight != 1.0:
-            object.__setattr__(self, "profiled", True)
-            object.__setattr__(self, "signed", self.weight < 0.0)
-
-    @property
-    def profile(self) -> tuple[Falloff, float | None, float]:
-        """Falloff, width (None in proportion to the radius) and weight."""
-        return cast(Falloff, self.falloff), self.width, self.weight
 
     @classmethod
     def radii(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:

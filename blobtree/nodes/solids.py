@@ -1,7 +1,7 @@
 """Solid shapes: the cylinder, the half-space, and the ellipsoid as a ball under a map."""
 
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -13,14 +13,13 @@ from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
     Columns,
-    Leaf,
+    Pieces,
     Point,
     Primitive,
-    Profile,
     beside,
     octagons,
 )
-from blobtree.nodes.tree import Macro, Node
+from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
 
 LARGEST_RATIO = 1e5
@@ -28,7 +27,7 @@ LARGEST_RATIO = 1e5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ellipsoid(Macro, Profile, Leaf):
+class Ellipsoid(Pieces):
     """An ellipsoid, its axes parallel to those of its space: a ball of radius 1 under a scale.
 
     Its field is g(r · RIM) with r² = (x/a)² + (y/b)² + (z/c)², so its level sets are ellipsoids too.
@@ -62,8 +61,7 @@ class Ellipsoid(Macro, Profile, Leaf):
     def expanded(self) -> Node:
         """Return a ball of radius 1 under a scale and a translation."""
         width = None if self.width is None else self.width / float(np.cbrt(np.prod(self.semi_axes)))
-        profile: dict[str, Any] = {"falloff": self.falloff, "width": width, "weight": self.weight}
-        ball = Point((0.0, 0.0, 0.0), radius=1.0, color=self.color, attributes=self.attributes, **profile)
+        ball = Point((0.0, 0.0, 0.0), radius=1.0, **self.shared | {"width": width})
         return ball.transform(np.column_stack([np.diag(self.semi_axes), self.center]))
 
 
@@ -118,7 +116,7 @@ class Cylinder(Primitive):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HalfSpace(Macro, Leaf):
+class HalfSpace(Pieces):
     """All that lies below a plane, clipped by bounds: its field is exact within `extent` of a point.
 
     It is a solid `Cylinder` with rounded edges, below the plane, whose radius and depth are `extent`. Choose
@@ -147,6 +145,4 @@ class HalfSpace(Macro, Leaf):
         (normal,) = unit_vectors(np.array([self.normal]))
         top = np.array(self.point) - self.radius * normal
         start, end = tuple(top.tolist()), tuple((top - self.extent * normal).tolist())
-        return Cylinder(
-            start, end, self.extent, radius=self.radius, color=self.color, attributes=self.attributes
-        )
+        return Cylinder(start, end, self.extent, radius=self.radius, **self.shared)

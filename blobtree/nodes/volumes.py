@@ -14,7 +14,7 @@ from blobtree.formulas.falloff import RIM
 from blobtree.formulas.volumes import VOLUME
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.parameters import Color, Parameter, Quantity
-from blobtree.nodes.primitives import DEFAULT_COLOR
+from blobtree.nodes.primitives import DEFAULT_COLOR, Falling
 from blobtree.nodes.samples import MAX_NUMBERS, Samples
 from blobtree.sampling.mesh_distances import mesh_distances, triangles_of
 from blobtree.validation import Vector, finite_vector, positive_number
@@ -30,12 +30,12 @@ WIDTH_CELLS = 4.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Volume(FieldPrimitive):
+class Volume(Falling, FieldPrimitive):
     """A solid by a grid of signed distances: below 0 inside, 0 on the surface.
 
     Distances are interpolated linearly. The field is g(RIM + d / s): ½ on the surface, and 0 from the
-    distance `width` outward, with s = width / (1 − RIM). The solid ends at the box of the grid. `from_sdf`
-    and `from_mesh` make volumes.
+    distance `width` outward, with s = width / (1 − RIM). It ends there with every `falloff`. The solid ends
+    at the box of the grid. `from_sdf` and `from_mesh` make volumes.
 
     Examples
     --------
@@ -62,6 +62,11 @@ class Volume(FieldPrimitive):
         float, Parameter(Quantity.DISTANCE, "distance by which the surface lies outside that of the samples")
     ] = 0.0
     color: Color = DEFAULT_COLOR
+
+    @property
+    def profile_factor(self) -> float:
+        """Factor k of `evaluators.profile_distance`: whatever the falloff, the field ends at the width."""
+        return (1.0 / self.profile[0].rim - 1.0) / (1.0 / RIM - 1.0)
 
     def grown(self, distance: float) -> "Volume":
         """Return this volume with its surface farther out, as far as the samples' distances reach."""
@@ -102,6 +107,7 @@ def from_sdf(
     spacing: float,
     width: float,
     color: Any = DEFAULT_COLOR,
+    **keywords: Any,
 ) -> Volume:
     """Return the solid of a signed distance, sampled on a grid.
 
@@ -122,6 +128,8 @@ def from_sdf(
         Distance from the surface at which the field becomes 0.
     color : color
         Colour of the solid.
+    keywords
+        `falloff`, `weight` and `attributes` of the solid.
 
     Raises
     ------
@@ -153,7 +161,7 @@ def from_sdf(
         )
     if samples.array.min() >= 0.0:
         raise InvalidNode("distances: expected some below 0, inside the solid, got none")
-    return Volume(samples, corner, step, width=width, color=color)
+    return Volume(samples, corner, step, width=width, color=color, **keywords)
 
 
 def from_mesh(
@@ -163,6 +171,7 @@ def from_mesh(
     radius: float | None = None,
     width: float | None = None,
     color: Any = DEFAULT_COLOR,
+    **keywords: Any,
 ) -> Volume:
     """Return the solid in a closed triangle mesh, or a shell around any mesh.
 
@@ -181,6 +190,8 @@ def from_mesh(
         Distance from the surface at which the field becomes 0; by default four cells.
     color : color
         Colour of the solid.
+    keywords
+        `falloff`, `weight` and `attributes` of the solid.
 
     Raises
     ------
@@ -219,7 +230,7 @@ def from_mesh(
     )
     samples = Samples.of((distances - shell) / step)
     x, y, z = corner.tolist()
-    return Volume(samples, (x, y, z), step, width=blend, color=color)
+    return Volume(samples, (x, y, z), step, width=blend, color=color, **keywords)
 
 
 def _sampled(

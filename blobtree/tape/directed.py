@@ -23,7 +23,6 @@ from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import REGISTERS
 from blobtree.tape.dispatch import (
-    direct_value_gradient,
     directed_partials,
     directed_slope,
     is_monotone,
@@ -36,6 +35,7 @@ from blobtree.tape.evaluators import (
     GRADIENT,
     bound_direct,
     bound_leaf,
+    direct_value_gradient,
     gradient_leaf,
     gradient_pullback_affine,
     gradient_pullback_warp,

@@ -59,8 +59,8 @@ def is_convex(kind: wp.int32) -> wp.bool:
 
 
 @unrolled
-def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """Return (value, ∇f) of a direct field."""
+def kind_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return `FieldKind.value_gradient`."""
     result = wp.vec4()
     for code in range(wp.static(len(FIELDS))):
         if kind == code:
@@ -69,14 +69,34 @@ def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.ve
 
 
 @unrolled
-def direct_bounds(
+def kind_bounds(
     kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec3:
-    """Return (smallest value, largest value, largest |∇f|) of a direct field over a ball."""
+    """Return `FieldKind.bounds`."""
     result = wp.vec3()
     for code in range(wp.static(len(FIELDS))):
         if kind == code:
             result = wp.static(FIELDS[code].bounds)(center, radius, tape, at)
+    return result
+
+
+@unrolled
+def is_distance(kind: wp.int32) -> wp.bool:
+    """Return `FieldKind.distance`."""
+    result = bool(False)
+    for code in range(wp.static(len(FIELDS))):
+        if kind == code:
+            result = bool(wp.static(FIELDS[code].distance))
+    return result
+
+
+@unrolled
+def is_windowed(kind: wp.int32) -> wp.bool:
+    """Return `FieldKind.windowed`."""
+    result = bool(False)
+    for code in range(wp.static(len(FIELDS))):
+        if kind == code:
+            result = bool(wp.static(FIELDS[code].windowed))
     return result
 
 

@@ -35,14 +35,17 @@ from blobtree.formulas.falloff import (
     falloff_slope_bound,
     falloff_steepest,
 )
+from blobtree.formulas.windows import box_window, box_window_bounds, windowed, windowed_bounds
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import (
-    direct_bounds,
-    direct_value_gradient,
     falloff_numbers,
     falloff_slope,
     falloff_value,
+    is_distance,
     is_monotone,
+    is_windowed,
+    kind_bounds,
+    kind_value_gradient,
     paints,
     partials,
     slope,
@@ -119,6 +122,62 @@ def profile_steepest(nearest: wp.float32, farthest: wp.float32, profile: wp.vec4
         far = profile_distance(farthest, profile)
         largest = -falloff_slope(code, wp.clamp(numbers[1], near, far))
     return largest * profile[2] * numbers[0] / RIM
+
+
+@wp.func
+def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+    """Return (value, ∇f) of a direct field: its kind's function, falloff, window and weight.
+
+    tape[at − 1] is its profile.
+    """
+    profile = tape[at - 1]
+    w = wp.vec4(1.0, 0.0, 0.0, 0.0)
+    if is_windowed(kind):
+        w = box_window(q, tape, at)
+        if w[0] <= 0.0:
+            return wp.vec4(0.0, 0.0, 0.0, 0.0)
+    f = kind_value_gradient(kind, q, tape, at)
+    if is_distance(kind):
+        u = wp.max(f[0], 0.0)
+        g = falloff(u * u)
+        rate = 2.0 * u * falloff_derivative(u * u)
+        if profile[1] != 0.0 or profile[2] != 1.0:
+            g = profile_value(f[0], profile)
+            rate = profile_slope(f[0], profile)
+        f = wp.vec4(g, rate * f[1], rate * f[2], rate * f[3])
+    if is_windowed(kind):
+        f = windowed(f, w)
+    return f * profile[3]
+
+
+@wp.func
+def direct_bounds(
+    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec3:
+    """Return (smallest value, largest value, largest |∇f|) of a direct field over a ball."""
+    profile = tape[at - 1]
+    w = wp.vec3(1.0, 1.0, 0.0)
+    if is_windowed(kind):
+        w = box_window_bounds(center, radius, tape, at)
+        if w[1] <= 0.0:
+            return wp.vec3(0.0, 0.0, 0.0)
+    f = kind_bounds(kind, center, radius, tape, at)
+    if is_distance(kind):
+        near = wp.max(f[0], 0.0)
+        far = wp.max(f[1], 0.0)
+        g = wp.vec3(falloff(far * far), falloff(near * near), falloff_steepest(near, far))
+        if profile[1] != 0.0 or profile[2] != 1.0:
+            g = wp.vec3(
+                profile_value(f[1], profile),
+                profile_value(f[0], profile),
+                profile_steepest(f[0], f[1], profile),
+            )
+        f = wp.vec3(g[0], g[1], g[2] * f[2])
+    if is_windowed(kind):
+        f = windowed_bounds(f, w)
+    if profile[3] < 0.0:
+        f = wp.vec3(f[1], f[0], -f[2])
+    return f * profile[3]
 
 
 @wp.func

@@ -202,6 +202,11 @@ class ProgramField(ProgramLeaf):
 
     field_kind: ClassVar[FieldKind]
 
+    @property
+    def profile_factor(self) -> float:
+        """Factor k of `evaluators.profile_distance`; unused by kinds without a distance."""
+        return 1.0
+
     def grown(self, distance: float) -> Self:
         """Return this leaf with its visible surface farther out by a distance, in its own units.
 
@@ -280,9 +285,9 @@ def influence_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
 
 
 def grown_fields(leaves: list[PlacedPrimitive]) -> list[ProgramField]:
-    """Return direct fields with the offsets of their placements applied."""
+    """Return direct fields with the offsets of their placements applied, see `influence_radii`."""
     return [
-        leaf.grown(placement.growth) if placement.growth else leaf
+        leaf.grown(-placement.growth if leaf.signed else placement.growth) if placement.growth else leaf
         for leaf, placement in cast("list[tuple[ProgramField, Placement]]", leaves)
     ]
 
@@ -302,12 +307,28 @@ def profile_factors(primitives: list[PlacedPrimitive], influences: Float64Array)
         if primitive.profiled:
             falloff, width, _ = primitive.profile
             radius = float(influences[number, 0]) * RIM
-            if width is not None and width < NARROWEST_WIDTH * radius:
-                raise InvalidNode(
-                    f"width: expected at least {NARROWEST_WIDTH:g} of the radius {radius:g}, got {width:g}"
-                )
-            factors[number] = 1.0 if width is None else radius * (1.0 / falloff.rim - 1.0) / width
+            factors[number] = 1.0 if width is None else profile_factor(falloff, width, radius)
     return factors
+
+
+def profile_factor(falloff: Falloff, width: float, radius: float) -> float:
+    """Return the factor k of a width around a surface at the distance `radius`.
+
+    Raises
+    ------
+    InvalidNode
+        The width is too small for the radius.
+    """
+    if width < NARROWEST_WIDTH * radius:
+        raise InvalidNode(
+            f"width: expected at least {NARROWEST_WIDTH:g} of the radius {radius:g}, got {width:g}"
+        )
+    return radius * (1.0 / falloff.rim - 1.0) / width
+
+
+def profile_extent(falloff: Falloff, factor: float) -> float:
+    """Return the distance at which a profile ends, over the influence radius."""
+    return RIM * (1.0 + (1.0 / falloff.rim - 1.0) / factor) * (1.0 + EXTENT_MARGIN)
 
 
 def support_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
@@ -322,10 +343,11 @@ def support_radii(primitives: list[PlacedPrimitive]) -> Float64Array:
     if not any(placed.primitive.profiled for placed in primitives):
         return influences
     factors = profile_factors(primitives, influences)
-    rims = np.array([p.profile[0].rim if p.profiled else RIM for p, _ in primitives])
-    extents = RIM * (1.0 + (1.0 / rims - 1.0) / np.where(factors == 0.0, 1.0, factors))
-    extents *= np.where(factors == 0.0, 1.0, 1.0 + EXTENT_MARGIN)
-    radii: Float64Array = influences * extents[:, None]
+    extents = [
+        profile_extent(primitive.profile[0], factor) if factor else 1.0
+        for (primitive, _), factor in zip(primitives, factors.tolist(), strict=True)
+    ]
+    radii: Float64Array = influences * np.array(extents)[:, None]
     return radii
 
 

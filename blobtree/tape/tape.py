@@ -10,7 +10,7 @@ instruction after the other:
                    world → local map, then (largest stretch of that map, its profile), where the profile is
                    (0, 0, 0) or (code of a falloff, k > 0, weight), see `evaluators.profile_distance`
       code ≥ FIELD  a run of `count` direct fields of fields[code − FIELD], each behind PREFIX texels as those
-                   of a warp: parameters, then a texel of colour
+                   of a stretched primitive: parameters, then a texel of colour
       PUSH         register[count] = accumulator; accumulator = 0
       POP          accumulator = operator(register[count], accumulator)
       POP_SWAPPED  accumulator = operator(accumulator, register[count])
@@ -45,6 +45,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
+from blobtree.formulas.falloff import WYVILL
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.tape.bounds import warp_parameters
@@ -171,6 +172,7 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
     carrying = [placed.primitive for run in runs if run.stretched for placed in run.primitives]
     falloffs = {primitive.profile[0] for primitive in carrying if primitive.profiled}
+    falloffs |= {WYVILL} if fields else set()  # formulas of direct fields name one
     instruction_set = instruction_set_for(skeletons, operators, warps, fields, falloffs)
     region = DataRegion(precision)
     of_warps = warp_parameters(program)
@@ -215,7 +217,7 @@ def _texels(
             code = instruction_set.fields.index(kind) + FIELD
             parameter = _parameter(parameters, region)
             yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
-            yield _field_texels(primitives, region)
+            yield _field_texels(primitives, instruction_set, region)
         case Run(Skeleton() as kind, stretched, operator, parameters, primitives):
             code = instruction_set.skeletons.index(kind) + (STRETCHED if stretched else 0)
             parameter = _parameter(parameters, region)
@@ -282,12 +284,20 @@ def _primitive_texels(
     return np.concatenate(parts, axis=1).reshape(-1, 4)
 
 
-def _field_texels(placed_fields: list[PlacedPrimitive], region: DataRegion) -> NDArray[np.float64]:
-    """Return maps, parameters and colours of a run's direct fields, all at once."""
+def _field_texels(
+    placed_fields: list[PlacedPrimitive], instruction_set: InstructionSet, region: DataRegion
+) -> NDArray[np.float64]:
+    """Return maps and profiles, parameters and colours of a run's direct fields, all at once."""
     placements, placed_by = distinct_placements(placed_fields)
     leaves = grown_fields(placed_fields)
+    prefixes = _prefixes(placements)[placed_by]
+    prefixes[:, -1, 1:] = (0.0, 1.0, 1.0)
+    for number, leaf in enumerate(leaves):
+        if leaf.profiled:
+            falloff, _, weight = leaf.profile
+            prefixes[number, -1, 1:] = (instruction_set.falloffs.index(falloff), leaf.profile_factor, weight)
     parameters = _with_data(leaves[0].packed_fields(leaves), leaves, region)
-    parts = [_prefixes(placements)[placed_by], parameters, _color_texels(leaves)]
+    parts = [prefixes, parameters, _color_texels(leaves)]
     return np.concatenate(parts, axis=1).reshape(-1, 4)
 
 

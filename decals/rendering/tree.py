@@ -26,14 +26,16 @@ from blobtree.tape.directed_along import (
     pullback_warp_along,
 )
 from blobtree.tape.dispatch import (
-    direct_bounds,
-    direct_value_gradient,
     directed_partials,
     directed_slope,
     falloff_numbers,
     falloff_slope,
     falloff_value,
+    is_distance,
     is_monotone,
+    is_windowed,
+    kind_bounds,
+    kind_value_gradient,
     paints,
     partials,
     reads_gradients,
@@ -42,7 +44,15 @@ from blobtree.tape.dispatch import (
     warp_pullback,
     warp_stretch,
 )
-from blobtree.tape.evaluators import BOUND, COLOR, GRADIENT, Evaluator, direction_to_local, to_local
+from blobtree.tape.evaluators import (
+    BOUND,
+    COLOR,
+    GRADIENT,
+    Evaluator,
+    direct_value_gradient,
+    direction_to_local,
+    to_local,
+)
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
 from blobtree.tape.tape import Tape
@@ -81,7 +91,7 @@ _ALONG: dict[Any, tuple[str, ...]] = {
     directed_partials: ("a", "b", "direction_a", "direction_b"),
     warp_forward: ("q",),
     warp_pullback: ("q", "g"),
-    direct_value_gradient: ("q",),
+    kind_value_gradient: ("q",),
     falloff_value: ("distance",),
     falloff_slope: ("distance",),
 }
@@ -167,7 +177,7 @@ def _library(kinds: Kinds) -> str:
         direction_to_local,
         trace_ray,
     ]
-    flags = [is_monotone, paints, *([reads_gradients] if kinds.directed else [])]
+    flags = [is_monotone, paints, is_distance, is_windowed, *([reads_gradients] if kinds.directed else [])]
     provided = [*_choices(kinds), *flags, falloff_numbers, field_bound, field_gradient]
     return translate_library(functions, provided=provided)
 
@@ -180,6 +190,8 @@ def _functions_along(kinds: Kinds, skeletons: list[Skeleton]) -> Iterable[Any]:
         yield profiled_leaf_along
     if kinds.warps:
         yield pullback_warp_along
+    if kinds.fields:
+        yield directional_derivative(direct_value_gradient, ["q"])
 
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
@@ -197,8 +209,8 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
         warp_forward: {code: warps[code].forward for code in kinds.warps},
         warp_pullback: {code: warps[code].pullback for code in kinds.warps},
         warp_stretch: {code: warps[code].stretch for code in kinds.warps},
-        direct_value_gradient: {code: fields[code].value_gradient for code in kinds.fields},
-        direct_bounds: {code: fields[code].bounds for code in kinds.fields},
+        kind_value_gradient: {code: fields[code].value_gradient for code in kinds.fields},
+        kind_bounds: {code: fields[code].bounds for code in kinds.fields},
         falloff_value: {code: falloffs[code].value for code in kinds.falloffs},
         falloff_slope: {code: falloffs[code].slope for code in kinds.falloffs},
     }
@@ -227,23 +239,24 @@ def _derivative_like(choice: Any, chooser: Any, names: tuple[str, ...]) -> Any:
 
 def _dispatch(kinds: Kinds) -> str:
     """Those functions, each knowing the kinds in use alone."""
-    rows = {code: kinds.instruction_set.operators[code] for code in kinds.operators}
-    flags = {
-        "is_monotone": [code for code, row in rows.items() if row.monotone],
-        "paints": [code for code, row in rows.items() if row.paints],
-    }
+    operators = {code: kinds.instruction_set.operators[code] for code in kinds.operators}
+    fields = {code: kinds.instruction_set.fields[code] for code in kinds.fields}
+    flags = [
+        _flag("is_monotone", {code: row.monotone for code, row in operators.items()}),
+        _flag("paints", {code: row.paints for code, row in operators.items()}),
+        _flag("is_distance", {code: row.distance for code, row in fields.items()}),
+        _flag("is_windowed", {code: row.windowed for code, row in fields.items()}),
+    ]
     if kinds.directed:
-        flags["reads_gradients"] = [code for code, row in rows.items() if row.gradients]
+        flags.append(_flag("reads_gradients", {code: row.gradients for code, row in operators.items()}))
     choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
-    return "\n".join(
-        [*choices, *(_flag(name, among, len(rows)) for name, among in flags.items()), _falloff_numbers(kinds)]
-    )
+    return "\n".join([*choices, *flags, _falloff_numbers(kinds)])
 
 
-def _flag(name: str, among: list[int], count: int) -> str:
-    """Return a function that is true for the operators `among` `count` ones in use."""
-    test = " || ".join(f"operator == {code}" for code in among) or "false"
-    return f"bool {name}(int operator) {{ return {'true' if len(among) == count else test}; }}"
+def _flag(name: str, values: dict[int, bool]) -> str:
+    """Return a function of a code in use that returns its value."""
+    test = " || ".join(f"code == {code}" for code, value in values.items() if value) or "false"
+    return f"bool {name}(int code) {{ return {'true' if all(values.values()) else test}; }}"
 
 
 def _falloff_numbers(kinds: Kinds) -> str:

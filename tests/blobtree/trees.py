@@ -66,7 +66,7 @@ from blobtree import (
 )
 from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.falloffs import MORE_FALLOFFS
-from blobtree.nodes.primitives import Profile
+from blobtree.nodes.primitives import Falling, Leaf, Profile
 from blobtree.validation import Vector
 
 BUILT_IN_FALLOFFS = [row.name for row in (*FALLOFFS, *MORE_FALLOFFS)]
@@ -189,9 +189,14 @@ PROFILE_SOURCES = (random_leaf, random_solid, random_shape)
 
 
 def random_profile(rng: np.random.Generator, leaf: Any, weights: Sequence[float]) -> Node:
-    """A primitive with another falloff, width and weight; the leaf itself if it has none."""
-    if not isinstance(leaf, Profile):
+    """A leaf with another falloff, width and weight, as far as it has them."""
+    if not isinstance(leaf, Leaf):
         return cast(Node, leaf)
+    if not isinstance(leaf, Profile):
+        changed: Any = {"weight": float(rng.choice(weights))}
+        if isinstance(leaf, Falling):
+            changed["falloff"] = str(rng.choice(BUILT_IN_FALLOFFS))
+        return cast(Node, replace(leaf, **changed))
     size = float(getattr(leaf, "radius", 0.5))
     width = None if rng.random() < 0.4 else float(size * rng.uniform(0.4, 2.0))
     falloff, weight = str(rng.choice(BUILT_IN_FALLOFFS)), float(rng.choice(weights))

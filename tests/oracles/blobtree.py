@@ -134,33 +134,36 @@ def signed(node: Node, points: ArrayLike) -> Field:
         case Box(center=center, size=size, radius=radius, color=color):
             beyond = np.maximum(np.abs(q - np.array(center)) - 0.5 * np.array(size), 0.0)
             return _leaf(beyond, radius, color)
-        case Superquadric(center=center, semi_axes=semi_axes, color=color):
+        case Superquadric(center=center, semi_axes=semi_axes):
             x, y, z = (np.abs(q - np.array(center)) / np.array(semi_axes)).T
             vertical, horizontal = node.vertical, node.horizontal
             across = (x ** (2.0 / horizontal) + y ** (2.0 / horizontal)) ** (horizontal / vertical)
-            leaf = _leaf_at((across + z ** (2.0 / vertical)) ** (vertical / 2.0) * RIM, color)
-            return replace(leaf, margin=np.minimum(np.minimum(x, y), z))  # diamonds have edges there
+            ratio = (across + z ** (2.0 / vertical)) ** (vertical / 2.0)
+            edges = np.minimum(np.minimum(x, y), z)  # diamonds have edges there
+            return _falling(ratio, float(np.cbrt(np.prod(semi_axes))), node.width, node, edges)
         case Leaf() if isinstance(node, shapes.KINDS):
-            distance, other = shapes.distances(node, q)
-            leaf, next_leaf = (_leaf_at(d * RIM, node.color) for d in (distance, other))
-            apart = np.where(next_leaf.value > 0.0, leaf.value - next_leaf.value, np.inf)
-            return replace(leaf, margin=apart)
-        case Gyroid(center=center, period=period, thickness=thickness, color=color):
+            radius = node.radii[0] if isinstance(node, Stroke) else node.radius
+            width, free = node.width, np.full(len(q), np.inf)
+            leaf, next_leaf = (_falling(d, radius, width, node, free) for d in shapes.distances(node, q))
+            apart = np.where(next_leaf.value != 0.0, np.abs(leaf.value - next_leaf.value), np.inf)
+            return replace(leaf, margin=np.minimum(apart, leaf.margin))
+        case Gyroid(center=center, period=period, thickness=thickness):
             x, y, z = 2.0 * np.pi / period * (q - np.array(center)).T
             level = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
-            leaf = _leaf_at(np.abs(level) * RIM / (0.5 * thickness * 2.0 * np.pi / period * 1.529), color)
+            ratio = np.abs(level) / (0.5 * thickness * 2.0 * np.pi / period * 1.529)
+            leaf = _falling(ratio, 0.5 * thickness, node.width, node, np.full(len(q), np.inf))
             return replace(leaf, value=leaf.value * direct_fields.window(node, q))
         case Noise(center=center, wavelength=wavelength, color=color):
             noise = direct_fields.gradient_noise((q - np.array(center)) / wavelength, node.seed)
             t = np.clip(0.5 + (noise - node.level) / (2.0 * node.softness), 0.0, 1.0)
             value = t * t * (3.0 - 2.0 * t) * direct_fields.window(node, q)
-            return replace(_leaf_at(np.zeros(len(q)), color), value=value)
+            return replace(_leaf_at(np.zeros(len(q)), color), value=node.weight * value)
         case ConvolutionSegment() | ConvolutionArc() | ConvolutionTriangle():
-            value = convolution.evaluate(node, q)[:, 0]
+            value = node.weight * convolution.evaluate(node, q)[:, 0]
             return Field(value, np.tile(np.array(node.color), (len(q), 1)), np.full(len(q), np.inf))
-        case Volume(color=color):
-            leaf = _leaf_at(np.zeros(len(q)), color)
-            return replace(leaf, value=volumes.value(node, q), margin=volumes.clearance(node, q))
+        case Volume():
+            ratio = 1.0 + volumes.distance(node, q) * (1.0 / RIM - 1.0) / node.width
+            return _falling(ratio, 1.0, 1.0 / RIM - 1.0, node, volumes.clearance(node, q))
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
@@ -215,6 +218,8 @@ def signed(node: Node, points: ArrayLike) -> Field:
             values = parameter_values(node)
             fields = [evaluate(x, q) for x in node.operands]
             return reduce(lambda a, b: _blended(a, b, node, **values), fields)
+        case ConvolutionStroke():
+            return signed(written_out(node), q)
         case Macro():
             return evaluate(written_out(node), q)
     raise TypeError(type(node))
@@ -320,7 +325,7 @@ def written_out(node: Node) -> Node:
             return Union(Difference(a, b), Difference(b, a))
         case ConvolutionStroke(points=points, radii=radii, color=color):
             ends = list(zip(pairwise(points), pairwise(radii), strict=True))
-            same: Any = {"color": color}
+            same: Any = {"color": color, "weight": node.weight}
             return Sum([ConvolutionSegment(*p, radius=r[0], end_radius=r[1], **same) for p, r in ends])
         case LocalBlend(first=a, second=b, region=region):
             return Sum(Union(a, b), Masked(Intersection(a, b), region))
@@ -412,9 +417,7 @@ def _profiled(node: Primitive, q: Floats) -> Field:
     return _falling(ratio, float(getattr(node, radii[0])), node.width, node, base.margin)
 
 
-def _falling(
-    ratio: Floats, radius: float, width: float | None, node: Primitive | Ellipsoid, margin: Floats
-) -> Field:
+def _falling(ratio: Floats, radius: float, width: float | None, node: Any, margin: Floats) -> Field:
     """The field at distances (n,) over the radius, by the falloff of a node."""
     name = str(getattr(node.falloff, "name", node.falloff))
     rim = falloffs.rim(name)

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
 
 from blobtree import (
     Arc,
@@ -76,7 +77,8 @@ def curve_of(node: object) -> Curve:
     if isinstance(node, Arc):
         return _arc(node)
     if isinstance(node, Stroke):
-        return _stroke(np.column_stack([node.points, node.radii]))
+        balls = np.column_stack([node.points, node.radii])
+        return _b_spline(balls) if node.spline == "b_spline" else _stroke(balls)
     if isinstance(node, TaperedBezier):
         radii = (node.radius, node.control_radius, node.end_radius)
         points = (node.start, node.control, node.end)
@@ -115,6 +117,15 @@ def _stroke(balls: Floats) -> Curve:
         return result
 
     return curve
+
+
+def _b_spline(balls: Floats) -> Curve:
+    """A quadratic B-spline with uniform knots, which ends at the first and the last ball."""
+    degree = min(2, len(balls) - 1)
+    inner = np.linspace(0.0, 1.0, len(balls) - degree + 1)
+    knots = np.concatenate([np.zeros(degree), inner, np.ones(degree)])
+    spline = BSpline(knots, balls, degree)
+    return lambda t: np.asarray(spline(t))
 
 
 def bezier(controls: ArrayLike) -> Curve:

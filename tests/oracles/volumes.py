@@ -6,23 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from blobtree import RIM, Volume
+from blobtree import Volume
 
 Floats = NDArray[np.float64]
 
 
-def value(node: Volume, points: NDArray[Any]) -> Floats:
-    """The field (n,) at points (n, 3)."""
+def distance(node: Volume, points: NDArray[Any]) -> Floats:
+    """The signed distances (n,) at points (n, 3)."""
     cells = _cells(node, points)
     last = np.subtract(node.samples.shape, 1)
     inside = np.clip(cells, 0, last)
     sampled = map_coordinates(node.samples.array.astype(np.float64), inside.T, order=1)
     beyond = np.abs(cells - last / 2) - last / 2
     box = np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
-    distance = np.maximum(sampled, box) * node.spacing - node.growth
-    t = np.clip(RIM + distance * (1.0 - RIM) / node.width, 0.0, 1.0)
-    field: Floats = (1.0 - t * t) ** 3
-    return field
+    return np.asarray(np.maximum(sampled, box) * node.spacing - node.growth)
 
 
 def clearance(node: Volume, points: NDArray[Any]) -> Floats:

@@ -1,5 +1,7 @@
 """Adaptive cells: closed meshes within a chord error, of few triangles where the surface bends unevenly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from blobtree import Difference, Mesh, Node, Point, Segment, Sum, Union, polygon
 from blobtree._typing import BoolArray, Int32Array
 from blobtree.meshing.adaptive_cells import SIMPLE
 from blobtree.meshing.adaptive_mesh import _torn_vertices
+from blobtree.meshing.crumbs import _pieces, without_crumbs
 from blobtree.meshing.patches import PATCH_COUNT
 from tests.blobtree.meshing.test_chord import BALL, CUT, points_on
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid, euler, volume
@@ -143,3 +146,35 @@ def test_torn_vertices_are_found() -> None:
     assert np.flatnonzero(_flags(pinched, 8)).tolist() == [0, 4]  # 4 is no longer used
     assert _flags(TETRAHEDRON[:3], 4)[1:].all()  # open
     assert _flags(np.concatenate([TETRAHEDRON, TETRAHEDRON[:, ::-1]]), 4).all()  # edges of four triangles
+
+
+def test_no_crumbs_float_off_a_sharp_rim() -> None:
+    """The rim of a lens is thinner than any cell; samples in it may lie alone."""
+    lens = (Point((0, 0, 0), radius=1.0) & Point((1.9, 0, 0), radius=1.0)).rotate((1, 2, 3), 33)
+    mesh = polygonize(lens, chord_error=0.01)
+    assert_closed(mesh)
+    assert_valid(mesh)
+    assert len(np.unique(_pieces(mesh.faces, len(mesh.vertices)))) == 1
+
+
+def test_small_pieces_go_where_they_lie_beside_a_larger_one() -> None:
+    ball = polygonize(Point((0, 0, 0), radius=1.0), resolution=16)
+    count = len(ball.vertices)
+    offsets = [np.zeros(3), 1.012 * ball.vertices[0], 1.2 * ball.vertices[0]]
+    places = [ball.vertices * (0.005 if number else 1.0) + offset for number, offset in enumerate(offsets)]
+    together = replace(
+        ball,
+        vertices=np.concatenate(places).astype(np.float32),
+        faces=np.concatenate([ball.faces + number * count for number in range(3)]),
+        normals=np.tile(ball.normals, (3, 1)),
+        colors=np.tile(ball.colors, (3, 1)),
+        sheet_counts=np.repeat(np.arange(3, dtype=np.uint8), count),
+    )
+    kept = without_crumbs(together, 0.01)
+    assert kept.sheet_counts is not None
+    np.testing.assert_array_equal(kept.sheet_counts, np.repeat([0, 2], count))
+    np.testing.assert_array_equal(kept.vertices[count:], together.vertices[2 * count :])
+    np.testing.assert_array_equal(kept.faces[len(ball.faces) :] - count, ball.faces)
+    assert without_crumbs(together, 0.001) is together
+    small = replace(ball, vertices=1e-3 * ball.vertices)
+    assert without_crumbs(small, 0.01) is small

@@ -102,6 +102,20 @@ def test_an_attribute_is_averaged_by_weight_and_has_a_default() -> None:
     assert (A + B).attribute_names == ["age", "bone", "flow"]
 
 
+def test_attributes_are_known_where_rays_hit() -> None:
+    tree = (A + B).rotate((0, 0, 1), 30)
+    ways = np.random.default_rng(3).normal(size=(60, 3))
+    hits = tree.raycast(-5.0 * ways, ways)
+    places = hits.positions[hits.hit]
+    assert len(places) > 20
+    behind = np.linalg.solve(np.array(tree.matrix)[:, :3], places.T).T
+    shares = oracle.value(B, behind) / (oracle.value(A, behind) + oracle.value(B, behind))
+    np.testing.assert_allclose(tree.attribute("age", places), 10 + 10 * shares, rtol=1e-4)
+    np.testing.assert_allclose(tree.attribute("flow", places)[:, 1], shares, atol=1e-4)
+    np.testing.assert_array_equal(tree.attribute("bone", places) == "arm", shares < 0.5)
+    np.testing.assert_allclose(tree.rest_coordinates(places), behind, atol=1e-5)
+
+
 def test_the_strongest_label_wins() -> None:
     rng = np.random.default_rng(1)
     balls = [

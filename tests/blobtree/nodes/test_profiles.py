@@ -1,6 +1,7 @@
 """Falloff, width and weight of primitives: values, visible radii, supports, meshes, files and bad input."""
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,19 +12,30 @@ from blobtree import (
     ISO,
     Box,
     Cone,
+    ConvolutionSegment,
+    ConvolutionTriangle,
     Difference,
     Disc,
+    Ellipsoid,
+    Gyroid,
+    HalfSpace,
     InvalidDefinition,
     InvalidNode,
     Node,
+    Noise,
     NumericParameter,
     Point,
+    Polygon,
+    Polyline,
     Segment,
+    Stroke,
     Sum,
+    Superquadric,
     Torus,
     Union,
     define_falloff,
     from_json,
+    from_sdf,
     numeric_parameters,
     numeric_values,
     polygonize,
@@ -44,6 +56,8 @@ from tests.oracles import falloffs as exact
 
 EACH_FALLOFF = pytest.mark.parametrize("name", BUILT_IN_FALLOFFS)
 
+LINE = ((0, 0, 0), (0.5, 0, 0), (1, 0, 0))
+SQUARE = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
 PRIMITIVES: dict[str, tuple[Any, tuple[float, float, float]]] = {
     "point": (lambda **p: Point((0, 0, 0), radius=0.4, **p), (0.4, 0, 0)),
     "segment": (lambda **p: Segment((0, 0, 0), (1, 0, 0), radius=0.4, **p), (0.5, 0.4, 0)),
@@ -51,9 +65,27 @@ PRIMITIVES: dict[str, tuple[Any, tuple[float, float, float]]] = {
     "torus": (lambda **p: Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
     "disc": (lambda **p: Disc((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
     "box": (lambda **p: Box((0, 0, 0), (1, 1, 1), radius=0.4, **p), (0.9, 0, 0)),
+    "polyline": (lambda **p: Polyline(LINE, radius=0.4, **p), (0.5, 0.4, 0)),
+    "stroke": (lambda **p: Stroke(LINE, (0.4,), **p), (1.4, 0, 0)),
+    "b-spline": (lambda **p: Stroke(LINE, (0.4,), spline="b_spline", **p), (1.4, 0, 0)),
+    "polygon": (
+        lambda **p: Polygon(SQUARE, radius=0.4, **p),
+        (1.4, 0, 0),
+    ),
+    "half space": (lambda **p: HalfSpace((0, 0, 0), (1, 0, 0), 2.0, radius=0.4, **p), (0, 0, 0)),
+    "ellipsoid": (lambda **p: Ellipsoid((0, 0, 0), (0.4, 0.4, 0.4), **p), (0.4, 0, 0)),
+    "superquadric": (lambda **p: Superquadric((0, 0, 0), (0.4, 0.4, 0.4), **p), (0.4, 0, 0)),
     "ring": (lambda **p: Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, **p), (1.4, 0, 0)),
 }
 """Makers of primitives, and a point on the surface of each, of which x is the direction outwards."""
+
+DIRECT: tuple[Any, ...] = (
+    Superquadric((0, 0, 0), (0.8, 0.5, 0.6), 0.5, 0.8),
+    Gyroid((0, 0, 0), (3, 3, 3), period=2.0, thickness=0.4),
+    Noise((0, 0, 0), (3, 3, 3), wavelength=1.0),
+    ConvolutionSegment((-1, 0, 0), (1, 0, 0), radius=0.4, end_radius=0.3),
+    ConvolutionTriangle((-1, 0, 0), (1, 0, 0), (0, 1, 0), radius=0.3),
+)
 
 
 @EACH_FALLOFF
@@ -77,7 +109,7 @@ def test_a_falloff_is_that_of_its_source(name: str) -> None:
 @pytest.mark.parametrize("name", [*BUILT_IN_FALLOFFS, "staircase"])
 def test_an_isolated_primitive_shows_its_radius_and_ends_at_its_width(kind: str, name: str) -> None:
     make, surface = PRIMITIVES[kind]
-    sign = np.sign(surface[0]) if kind != "segment" else 0.0
+    sign = -1.0 if kind == "cone" else float(kind not in ("segment", "polyline"))
     outward = np.array([sign, 0.0 if sign else 1.0, 0.0])
     for width in (None, 0.1, 1.0):
         node = make(falloff=name, width=width)
@@ -138,6 +170,68 @@ def test_a_carved_solid_has_a_closed_mesh_without_what_is_carved() -> None:
     np.testing.assert_allclose(oracle.value(tree, carved.vertices[carved.vertices[:, 0] > 0]), ISO, atol=1e-4)
 
 
+def test_pieces_carve_as_one_shape_and_not_as_a_sum() -> None:
+    """At a corner of a polyline two segments overlap, and the field is that of the nearer one."""
+    corner: dict[str, Any] = {
+        "points": [(-1, 0, 0), (0, 0, 0), (0, 1, 0)],
+        "radius": 0.4,
+        "falloff": "cauchy",
+    }
+    ball, line = Point((0, 0, 0), radius=1.2), Polyline(**corner)
+    q = points_around(np.random.default_rng(9), ball, 500)
+    carved = ball + Polyline(**corner, weight=-0.8)
+    np.testing.assert_allclose(carved(q), ball(q) - 0.8 * line(q), atol=1e-6)
+    np.testing.assert_allclose(carved.twist(20)(q), oracle.value(carved.twist(20), q), atol=2e-6)
+    np.testing.assert_array_equal((ball | Polyline(**corner, weight=-0.8))(q), ball(q))
+    assert_closed(polygonize(carved, resolution=32))
+
+
+def test_the_width_of_a_stroke_is_in_proportion_to_its_radius() -> None:
+    """So its field is one function of the distance over the radius, also where its parabolas meet."""
+    node = Stroke(((0, 0, 0), (1, 0, 0), (2, 0, 0)), (0.2, 0.2, 0.4), width=0.1)
+    ratio = 1.0 + 0.9 * 0.1 / 0.2
+    start, end = np.array([[0.0, 0.2 * ratio, 0], [2.0 + 0.4 * ratio, 0, 0]])
+    assert float(node(start)) == pytest.approx(float(node(end)), abs=1e-6)
+    assert 0.0 < float(node(start)) < 0.01
+
+
+@pytest.mark.parametrize("weight", [2.0, -1.5])
+def test_direct_fields_have_weights(weight: float) -> None:
+    for plain in DIRECT:
+        weighted: Any = replace(plain, weight=weight)
+        points = points_around(np.random.default_rng(10), plain, 300)
+        np.testing.assert_allclose(weighted(points), weight * plain(points), atol=2e-6)
+        np.testing.assert_allclose(weighted.gradient(points), weight * plain.gradient(points), atol=1e-5)
+        other = Point((0.3, 0, 0), radius=0.9)
+        tree = other + weighted
+        np.testing.assert_allclose(tree(points), oracle.value(tree, points), atol=1e-5)
+        mesh = polygonize(tree, resolution=24)
+        assert_closed(mesh)
+        away = mesh.vertices[np.linalg.norm(tree.gradient(mesh.vertices), axis=1) > 0.5]
+        np.testing.assert_allclose(oracle.value(tree, away), ISO, atol=2e-3)
+
+
+def test_a_falloff_of_what_has_no_distance_is_refused() -> None:
+    limb: dict[str, Any] = {"start": (0, 0, 0), "end": (2, 0, 0), "radius": 0.3, "end_radius": 0.3}
+    with pytest.raises(InvalidNode, match="falloff: expected none, a ConvolutionSegment is no function of a"):
+        ConvolutionSegment(**limb, falloff="gaussian")  # type: ignore[call-arg]
+    with pytest.raises(InvalidNode, match="width: expected none, a Noise"):
+        Noise((0, 0, 0), (4, 4, 4), wavelength=1.0, width=0.2)  # type: ignore[call-arg]
+    with pytest.raises(InvalidNode, match=r"width: expected at least 0\.0001 of the radius 0.5"):
+        Superquadric((0, 0, 0), (0.5, 0.5, 0.5), width=1e-6).tape  # noqa: B018
+
+
+def test_volumes_take_the_keywords_of_leaves() -> None:
+    def distance(points: Any) -> Any:
+        return np.linalg.norm(points, axis=1) - 1.0
+
+    same: dict[str, Any] = {"spacing": 0.25, "width": 0.5, "falloff": "gaussian", "weight": 2.0}
+    ball = from_sdf(distance, (-2, -2, -2), (2, 2, 2), **same, attributes={"age": 3.0})
+    assert float(ball((1, 0, 0))) == pytest.approx(2.0 * ISO, abs=1e-5)
+    assert float(ball((1.5, 0, 0))) == 0.0 < float(ball((1.4, 0, 0)))
+    assert ball.attributes == {"age": 3.0}
+
+
 def test_an_offset_shrinks_what_carves() -> None:
     tree = Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=0.5, weight=-1.0)
     grown = Point((0, 0, 0), radius=1.1) + Point((1, 0, 0), radius=0.4, weight=-1.0)
@@ -165,7 +259,7 @@ def test_texts_and_files_leave_out_defaults() -> None:
     for text in (repr(plain), str(plain), to_json(plain).decode()):
         assert "falloff" not in text
         assert "w" not in text.replace("blobtree", "")
-    assert repr(other).endswith("falloff='metaball', weight=2.0)")
+    assert repr(other).endswith("weight=2.0, falloff='metaball')")
     assert '"falloff": "metaball"' in to_json(other).decode()
     assert "width" not in to_json(other).decode()
     for node in (plain, other, Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.4, width=0.3)):

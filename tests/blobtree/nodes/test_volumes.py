@@ -31,7 +31,7 @@ from blobtree.nodes.samples import Samples
 from blobtree.tape.model import bounds_at
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.blobtree.trees import points_around
-from tests.oracles.volumes import value
+from tests.oracles.blobtree import value
 
 
 def ball_distance(points: Float64Array) -> Float64Array:

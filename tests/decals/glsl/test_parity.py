@@ -13,7 +13,9 @@ from blobtree.tape.dispatch import (
     falloff_numbers,
     falloff_slope,
     falloff_value,
+    is_distance,
     is_monotone,
+    is_windowed,
     paints,
     partials,
     slope,
@@ -54,15 +56,20 @@ WRITTEN_TWICE = {
     "is_monotone",
     "paints",
     "falloff_numbers",
+    "is_distance",
+    "is_windowed",
 }
 """Switches over the tables, written per backend."""
 
 OF_LIBRARY_KINDS = {
     "direct_value_gradient",
     "direct_bounds",
+    "kind_value_gradient",
+    "kind_bounds",
     "value_direct",
     "bound_direct",
     "gradient_direct",
+    "color_direct",
     "directed_partials",
     "directed_slope",
 }
@@ -82,7 +89,9 @@ def shared(module: str) -> list[TypedFunction]:
 FUNCTIONS = {f"{module}.{typed.name}": typed for module in MODULES for typed in shared(module)}
 CHOOSERS: list[Any] = [
     partials,
+    is_distance,
     is_monotone,
+    is_windowed,
     paints,
     slope,
     warp_forward,
