@@ -66,7 +66,7 @@ from blobtree import (
 )
 from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.falloffs import MORE_FALLOFFS
-from blobtree.nodes.primitives import Falling, Leaf, Profile
+from blobtree.nodes.primitives import Falling, Leaf, Primitive, Profile
 from blobtree.validation import Vector
 
 BUILT_IN_FALLOFFS = [row.name for row in (*FALLOFFS, *MORE_FALLOFFS)]
@@ -185,6 +185,9 @@ def random_shape(rng: np.random.Generator) -> Node:
 
 
 SHAPES = MoreKinds(random_shape)
+Profiled = (Primitive, Ellipsoid)
+"""Classes that get a profile in random trees; tests of conformance give one to all."""
+
 PROFILE_SOURCES = (random_leaf, random_solid, random_shape)
 
 
@@ -206,12 +209,12 @@ def random_profile(rng: np.random.Generator, leaf: Any, weights: Sequence[float]
 
 def random_profiled_leaf(rng: np.random.Generator) -> Node:
     leaf = PROFILE_SOURCES[int(rng.integers(0, 3))](rng)
-    return random_profile(rng, leaf, (1.0, 1.0, 1.0, 0.6, 1.5))
+    return random_profile(rng, leaf, (1.0, 1.0, 1.0, 0.6, 1.5)) if isinstance(leaf, Profiled) else leaf
 
 
 def random_signed_leaf(rng: np.random.Generator) -> Node:
     leaf = PROFILE_SOURCES[int(rng.integers(0, 3))](rng)
-    return random_profile(rng, leaf, (1.0, 1.0, 1.0, 1.0, -0.5, -1.5))
+    return random_profile(rng, leaf, (1.0, 1.0, 1.0, 1.0, -0.5, -1.5)) if isinstance(leaf, Profiled) else leaf
 
 
 PROFILED = MoreKinds(random_profiled_leaf)
