@@ -49,7 +49,7 @@ import warp as wp
 
 from blobtree.errors import UntranslatableFunction
 from blobtree.transpile.derivative_rules import CASTS, RULES, STEPS, Rule
-from blobtree.transpile.specialize import referenced_values, warp_function
+from blobtree.transpile.specialize import original_function, referenced_values, warp_function
 
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -182,7 +182,8 @@ class _Transformation:
         self.scope["wp"] = wp
         self.active = set(varying)
         self.types: dict[str, Any] = {}
-        self.depends = False
+        self.depends = original_function(function) is not None
+        """Whether the result varies. A switch over a table may, with the rows of another instruction set."""
         self.lines: list[str] = []
         self.indent = "    "
         self.count = 0

@@ -13,6 +13,9 @@ WIDE_GAP = 0.74
 """Distance from the nearest particle, in spacings, from which a sample lies in a wide gap. In a hexagonal
 tiling no point is farther than 0.577."""
 
+EVEN = 1.1
+"""Largest ratio of spacings at which the density counts as even."""
+
 MIN_SAMPLES = 2
 """Least number of samples of a wide gap; the corner of a square has fewer."""
 
@@ -34,7 +37,8 @@ def fill_gaps(
     """Return particles, those beside wide gaps moved; gaps remain along lips and ragged boundaries.
 
     A particle beside a wide gap moves toward the centre of the least ball around the samples nearest to it.
-    It stays if another particle would be nearer than before, and nearer than `least`.
+    It stays if another particle would be nearer than before, and nearer than `least`. Where the density is
+    not even, all stay: wide gaps belong beside its steps.
 
     Parameters
     ----------
@@ -49,6 +53,8 @@ def fill_gaps(
     least
         Least distance of particles, in spacings.
     """
+    if sizes.max() > EVEN * sizes.min():
+        return points
     counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
     samples = domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
     for _ in range(ROUNDS):

@@ -131,6 +131,11 @@ def opened(a: Floats, b: Floats, opening: Floats) -> Floats:
     return larger
 
 
+def deepest(a: Floats, b: Floats) -> Floats:
+    smaller: Floats = np.minimum(a, b)
+    return smaller
+
+
 VALUES: dict[str, Callable[..., Floats]] = {
     "superelliptic": superelliptic,
     "r_union": r_union,
@@ -141,6 +146,7 @@ VALUES: dict[str, Callable[..., Floats]] = {
     "clean_union": clean_union,
     "controllable": controllable,
     "masked": masked,
+    "deepest": deepest,
     "gradient_blend": opened,
 }
 """Blends by the names of their operators."""
@@ -151,11 +157,16 @@ def partials(
 ) -> tuple[Floats, Floats, Floats]:
     """Partial derivatives by a and b, and the largest change of them within a step: large near kinks."""
     value = VALUES[name]
-    at_a = [value(np.maximum(a + s * step, 0.0), b, **parameters) for s in (-1.0, 0.0, 1.0)]
-    at_b = [value(a, np.maximum(b + s * step, 0.0), **parameters) for s in (-1.0, 0.0, 1.0)]
+    at_a = [value(moved(a, s * step), b, **parameters) for s in (-1.0, 0.0, 1.0)]
+    at_b = [value(a, moved(b, s * step), **parameters) for s in (-1.0, 0.0, 1.0)]
     below, above = ((f[1] - f[0]) / step for f in (at_a, at_b)), ((f[2] - f[1]) / step for f in (at_a, at_b))
     (a0, b0), (a1, b1) = below, above
     return 0.5 * (a0 + a1), 0.5 * (b0 + b1), np.maximum(np.abs(a1 - a0), np.abs(b1 - b0))
+
+
+def moved(f: Floats, step: float) -> Floats:
+    """f and a step, but not past 0."""
+    return np.where(f < 0.0, np.minimum(f + step, 0.0), np.maximum(f + step, 0.0))
 
 
 def kink(name: str, a: Floats, b: Floats, reach: float = 2e-3, **parameters: Any) -> Floats:

@@ -40,7 +40,7 @@ def run(row: Operator, part: str, setting: dict[str, float], **arguments: Any) -
     declared = python_function(function).__annotations__
     several = {"parameter": 0.0, "tape": [numbers + [0.0] * (4 - len(numbers))]}
     extra: dict[str, Any] = (
-        several if len(numbers) > 1 else dict.fromkeys(("parameter", "width"), numbers or 0.0)
+        several if len(numbers) > 1 else dict.fromkeys(("parameter", "width", "exponent"), numbers or 0.0)
     )
     return call(function, **arguments, **{name: value for name, value in extra.items() if name in declared})
 
@@ -53,9 +53,15 @@ def test_the_table_is_complete() -> None:
     assert set(oracle.VALUES) == {row.name for row in (*BLENDS, GRADIENT_BLEND)}
 
 
+def operands(row: Operator) -> tuple[Floats, Floats]:
+    """Pairs of fields; those of a signed row are not positive."""
+    a, b = pairs()
+    return (-a, -b) if row.signed else (a, b)
+
+
 @EVERY_ROW
 def test_values(row: Operator, setting: dict[str, float]) -> None:
-    a, b = pairs()
+    a, b = operands(row)
     expected = oracle.VALUES[row.name](a, b, **setting)
     np.testing.assert_allclose(partials(row, setting, a, b)[:, 0], expected, rtol=1e-5, atol=2e-6)
 
@@ -63,8 +69,8 @@ def test_values(row: Operator, setting: dict[str, float]) -> None:
 @EVERY_ROW
 def test_partials_are_differences(row: Operator, setting: dict[str, float]) -> None:
     """Away from kinks, where one-sided differences of float64 agree with each other."""
-    a, b = pairs()
-    present = np.minimum(a, b) > 1e-3
+    a, b = operands(row)
+    present = np.minimum(np.abs(a), np.abs(b)) > 1e-3
     a, b = a[present], b[present]
     by_a, by_b, change = oracle.partials(row.name, a, b, **setting)
     smooth = change < 1e-3
@@ -76,7 +82,7 @@ def test_partials_are_differences(row: Operator, setting: dict[str, float]) -> N
 
 @EVERY_ROW
 def test_an_absent_operand(row: Operator, setting: dict[str, float]) -> None:
-    a, _ = pairs()
+    a, _ = operands(row)
     zero = np.zeros_like(a)
     right, left = partials(row, setting, a, zero)[:, 0], partials(row, setting, zero, a)[:, 0]
     np.testing.assert_array_equal(right, zero if row.support is Support.COMMON else a)
@@ -85,19 +91,20 @@ def test_an_absent_operand(row: Operator, setting: dict[str, float]) -> None:
 
 
 @EVERY_ROW
-def test_results_are_finite_and_not_negative(row: Operator, setting: dict[str, float]) -> None:
+def test_results_are_finite_and_of_one_sign(row: Operator, setting: dict[str, float]) -> None:
     tiny = np.array([0.0, 1e-38, 1e-30, 1e-19, 1e-12, 1e-7, 0.25, 0.5, 1.0, 3.0])
     a, b = (both.ravel() for both in np.meshgrid(tiny, tiny))
-    seen = partials(row, setting, a, b)
+    sign = -1.0 if row.signed else 1.0
+    seen = partials(row, setting, sign * a, sign * b)
     assert np.isfinite(seen).all()
-    assert (seen[:, 0] >= 0.0).all()
+    assert (sign * seen[:, 0] >= 0.0).all()
 
 
 @EVERY_ROW
 def test_order_matters_where_the_table_says_so(row: Operator, setting: dict[str, float]) -> None:
     if not row.commutes:
         return
-    a, b = pairs()
+    a, b = operands(row)
     value = oracle.VALUES[row.name]
     np.testing.assert_allclose(value(a, b, **setting), value(b, a, **setting), rtol=1e-12)
     third = np.full_like(a, 0.6)
@@ -112,6 +119,8 @@ def test_ranges_contain_samples_and_choices_are_exact(row: Operator, setting: di
     ends[:, ::3] = np.sort(ends[:, ::3, :1] + [0.0, 0.05], axis=2)
     ends[0, ::7, 0] = ends[1, ::5, 0] = 0.0
     ends[0, ::35] = ends[1, ::25] = 0.0
+    if row.signed:
+        ends = np.sort(-ends, axis=2)
     ends = ends.astype(np.float32).astype(np.float64)
     bounds = run(row, "range", setting, a=ends[0], b=ends[1]).astype(np.float64)
     choice = run(row, "choice", setting, a=ends[0], b=ends[1])
@@ -128,7 +137,7 @@ def test_ranges_contain_samples_and_choices_are_exact(row: Operator, setting: di
             (KEEP_LEFT, np.stack([a, np.ones_like(a), np.zeros_like(a)], axis=1)),
             (KEEP_RIGHT, np.stack([b, np.zeros_like(a), np.ones_like(a)], axis=1)),
         ):
-            kept = (choice == keep) & (np.maximum(a, b) > 0.0)
+            kept = (choice == keep) & ((a != 0.0) | (b != 0.0))
             np.testing.assert_allclose(seen[kept, 0], expected[kept, 0], rtol=1e-6, atol=1e-7)
             np.testing.assert_allclose(seen[kept, 1:], expected[kept, 1:], atol=1e-5)
         np.testing.assert_array_equal(seen[choice == KEEP_NONE, 0], 0.0)
@@ -138,7 +147,7 @@ def test_ranges_contain_samples_and_choices_are_exact(row: Operator, setting: di
 def test_no_slope_exceeds_its_bound(row: Operator, setting: dict[str, float]) -> None:
     """|∂F/∂a ∇a + ∂F/∂b ∇b| for gradients of bounded length; for monotone rows also slopes below 0."""
     rng = np.random.default_rng(1)
-    a, b = pairs()
+    a, b = operands(row)
     count = len(a)
     slopes = rng.uniform(0.0, 3.0, (2, count))
     if row.monotone:
@@ -157,7 +166,7 @@ def test_no_slope_exceeds_its_bound(row: Operator, setting: dict[str, float]) ->
 
 @EVERY_ROW
 def test_monotone_rows_never_fall(row: Operator, setting: dict[str, float]) -> None:
-    a, b = pairs()
+    a, b = operands(row)
     seen = partials(row, setting, a, b)
     if row.monotone:
         assert (seen[:, 1:] >= -1e-6).all()

@@ -48,6 +48,9 @@ MODULES = (
     "decals.record",
     "decals.field.ownership",
 )
+OF_WARP_ALONE = {"warp_extent", "unknown_extent"}
+"""Functions that no shader calls."""
+
 WRITTEN_TWICE = {
     "closest",
     "min_influence",
@@ -82,7 +85,7 @@ The core tables have none of these, and `test_tapes` compares the library's.
 def shared(module: str) -> list[TypedFunction]:
     """What both backends have from one source, save what reads a whole tape: see `test_glsl_tapes`."""
     functions = typed_functions(import_module(module))
-    left_out, whole_tapes = WRITTEN_TWICE | OF_LIBRARY_KINDS, {"span", "cells"}
+    left_out, whole_tapes = OF_WARP_ALONE | WRITTEN_TWICE | OF_LIBRARY_KINDS, {"span", "cells"}
     return [f for f in functions if f.name not in left_out and not whole_tapes & set(f.parameters)]
 
 

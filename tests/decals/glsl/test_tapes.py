@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, Node, Point, Segment, Superquadric, from_sdf
+from blobtree import Box, Node, Point, Polyline, Segment, Superquadric, from_sdf
 from blobtree.formulas.blends import BLENDS
 from blobtree.tape.instruction_set import LIBRARY
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
@@ -51,7 +51,10 @@ FIELD_TREES = [
     VOLUME.rotate((1, 2, 3), 30) + Point((0.8, 0, 0), radius=0.4),
 ]
 CONTACT_TREES = random_trees(seed=36, count=6, depth=2, more=CONTACTS)
-BLEND_TREES = [*BLEND_NODES, *random_trees(seed=37, count=4, depth=2, more=BLENDED)]
+NEGATIVE = Point((0, 0, 0), radius=1.0) + Polyline(
+    [(-1, 0, 0), (0, 1, 0), (1, 0, 0)], radius=0.4, weight=-0.5
+)
+BLEND_TREES = [*BLEND_NODES, NEGATIVE, *random_trees(seed=37, count=4, depth=2, more=BLENDED)]
 LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
 
 
