@@ -1,13 +1,11 @@
 """Compile all kernels for processors ahead of time into `blobtree/compiled`, from where the wheel takes them.
 
-    python .ci/compile_kernels.py [--cuda]
+    python .ci/compile_kernels.py
 
 They fit the architecture and the system of this machine. Run it right before the wheel is built: kernels
-whose sources have changed since are carried along, but never loaded. ``--cuda`` adds PTX for graphics cards,
-which takes no card, but minutes.
+whose sources have changed since are carried along, but never loaded.
 """
 
-import argparse
 import importlib
 import os
 import shutil
@@ -17,13 +15,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-KEPT = (".o", ".ptx", ".meta")
+KEPT = (".o", ".meta")
 
 WITHOUT_GRADIENT_BLENDS = ("blobtree.derivatives.", "blobtree.meshing.crease")
 """Modules whose kernels are left out for gradient blends: they are large, or never used there."""
-
-PTX_ARCHITECTURE = 75
-"""Oldest CUDA architecture that Warp supports; drivers make code for later ones from its PTX."""
 
 
 def kernel_files() -> list[str]:
@@ -36,14 +31,13 @@ def kernel_files() -> list[str]:
     ]
 
 
-def compile_all(cache: Path, *, cuda: bool) -> None:
+def compile_all(cache: Path) -> None:
     """Compile every kernel into an empty kernel cache."""
     os.environ["WARP_CACHE_PATH"] = str(cache)
     import warp as wp
 
     from blobtree.device import start_warp
     from blobtree.formulas.gradient_blends import GRADIENT_BLEND
-    from blobtree.kernels import CUDA_BLOCK
     from blobtree.tape.instruction_set import BUILT_IN, LIBRARY, instruction_set_for
 
     start_warp()
@@ -69,23 +63,13 @@ def compile_all(cache: Path, *, cuda: bool) -> None:
     modules = list({kernel.module.name: kernel.module for kernel in (*kernels, *instances)}.values())
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         list(threads.map(lambda module: wp.load_module(module, device="cpu"), modules))
-    for module in modules if cuda else ():
-        folder = (
-            cache
-            / wp.config.version
-            / module.get_module_identifier(module.options["block_dim"] or CUDA_BLOCK)
-        )
-        wp.compile_aot_module(module, arch=[PTX_ARCHITECTURE], module_dir=folder, use_ptx=True)
 
 
 def main() -> None:
     """Replace `blobtree/compiled` by the kernels of the present sources."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cuda", action="store_true", help="add PTX for graphics cards")
-    cuda = parser.parse_args().cuda
     target = ROOT / "blobtree" / "compiled"
     with tempfile.TemporaryDirectory() as folder:
-        compile_all(Path(folder), cuda=cuda)
+        compile_all(Path(folder))
         shutil.rmtree(target, ignore_errors=True)
         shutil.copytree(folder, target, ignore=_left_out)
     files = [file for file in target.rglob("*") if file.is_file()]

@@ -156,37 +156,25 @@ def _is_cached(module: wp.Module, device: wp.Device) -> bool:
     folder = kernel_cache() / _folder_name(module, device)
     suffixes = (".o",) if device.is_cpu else (".ptx", ".cubin")
     if not _has_file(folder, suffixes):
-        _copy_shipped(folder, _binary_name(module, device))
+        _copy_shipped(folder)
     return _has_file(folder, suffixes)
-
-
-def _binary_name(module: wp.Module, device: wp.Device) -> str:
-    """Return the name under which Warp looks for the compiled module of a CUDA device; none for the CPU."""
-    name = getattr(module, "_get_compile_output_name", None)  # private, so another Warp may lack it
-    return "" if device.is_cpu or name is None else str(name(device, block_dim=_block_size(module, device)))
 
 
 def _has_file(folder: Path, suffixes: tuple[str, ...]) -> bool:
     return folder.is_dir() and any(file.suffix in suffixes for file in folder.iterdir())
 
 
-def _copy_shipped(folder: Path, binary: str = "") -> None:
-    """Copy the shipped kernels that belong into this folder of the cache; other processes may do so too.
-
-    Shipped PTX is that of the oldest architecture, from which drivers make code for all later ones. It gets
-    the name ``binary`` that Warp expects for the device; where that is no PTX, kernels compile as usual.
-    """
+def _copy_shipped(folder: Path) -> None:
+    """Copy the shipped kernels that belong into this folder of the cache; other processes may do so too."""
     shipped = SHIPPED / wp.config.version / folder.name
-    if not shipped.is_dir() or binary.endswith(".cubin"):
+    if not shipped.is_dir():
         return
     with _cache_errors():
         folder.mkdir(parents=True, exist_ok=True)
         for file in shipped.iterdir():
-            if file.suffix == ".ptx" and not binary:
-                continue
             with tempfile.NamedTemporaryFile(dir=folder, delete=False) as copy:
                 copy.write(file.read_bytes())
-            Path(copy.name).replace(folder / (binary if file.suffix == ".ptx" else file.name))
+            Path(copy.name).replace(folder / file.name)
 
 
 def _load(module: wp.Module, device: wp.Device) -> None:
@@ -201,8 +189,7 @@ def _load(module: wp.Module, device: wp.Device) -> None:
                 raise
             _logger.info("removing damaged kernels from %s: %s", folder, error)
             shutil.rmtree(folder)
-            if device.is_cpu:  # a driver that refused the shipped PTX would refuse it again
-                _copy_shipped(folder)
+            _copy_shipped(folder)
             wp.load_module(module, device=device)
 
 

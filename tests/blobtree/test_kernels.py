@@ -127,21 +127,6 @@ def test_shipped_kernels_of_another_version_of_warp_are_left(cache: Path) -> Non
     assert kernels._state.compiled == before + 1
 
 
-def test_shipped_ptx_takes_the_name_that_the_device_expects(cache: Path) -> None:
-    """Warp makes PTX without a graphics card, and names it by the architecture of the device."""
-    module = _double.module
-    name = module.get_module_identifier(kernels.CUDA_BLOCK)
-    shipped = kernels.SHIPPED / str(wp.config.version) / name
-    wp.compile_aot_module(module, arch=[75], module_dir=shipped, use_ptx=True)
-    assert (shipped / f"{name}.sm75.ptx").is_file()
-    folder = cache / name
-    kernels._copy_shipped(folder, f"{name}.sm90.cubin")
-    assert not folder.exists()
-    kernels._copy_shipped(folder, f"{name}.sm90.ptx")
-    assert (folder / f"{name}.sm90.ptx").read_bytes() == (shipped / f"{name}.sm75.ptx").read_bytes()
-    assert (folder / f"{name}.meta").is_file()
-
-
 def test_a_cache_that_cannot_be_written_is_named(cache: Path) -> None:
     cache.write_text("a file, where a folder should be")
     with pytest.raises(UnusableCache, match="set the environment variable WARP_CACHE_PATH") as raised:
