@@ -183,7 +183,7 @@ class _Transformation:
         self.active = set(varying)
         self.types: dict[str, Any] = {}
         self.depends = original_function(function) is not None
-        """Whether the result varies. A switch over a table may, with the rows of another instruction set."""
+        """The result varies. That of a switch over a table does with the rows of another instruction set."""
         self.lines: list[str] = []
         self.indent = "    "
         self.count = 0
