@@ -52,7 +52,7 @@ FIELD_TREES = [
 ]
 CONTACT_TREES = random_trees(seed=36, count=6, depth=2, more=CONTACTS)
 NEGATIVE = Point((0, 0, 0), radius=1.0) + Polyline(
-    [(-1, 0, 0), (0, 1, 0), (1, 0, 0)], radius=0.4, weight=-0.5
+    ((-1, 0, 0), (0, 1, 0), (1, 0, 0)), radius=0.4, weight=-0.5
 )
 BLEND_TREES = [*BLEND_NODES, NEGATIVE, *random_trees(seed=37, count=4, depth=2, more=BLENDED)]
 LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
