@@ -28,6 +28,10 @@ Operand = Callable[[Rng], Node]
 EXACT = 1e-4
 """Largest relative error of values and gradients, absolute below 1."""
 
+ON_CURVES = 1e-3
+"""The same for gradients of strokes, where few points exceed EXACT: the closest point of a curve is the
+root of a polynomial of degree 5 in float32."""
+
 AWAY = 2e-3
 """Field values between a point and the nearest kink, where gradients are compared."""
 
@@ -205,7 +209,7 @@ def _fields(node: Node, points: Any, what: str) -> Iterator[str]:
     expected = oracle.gradient(node, points[smooth])
     length = np.maximum(1.0, np.linalg.norm(expected, axis=1))
     error = np.linalg.norm(seen[smooth, 1:] - expected, axis=1) / length
-    if error.max(initial=0.0) > EXACT:
+    if error.max(initial=0.0) > (ON_CURVES if isinstance(node, blobtree.Stroke) else EXACT):
         yield f"{what}: gradient differs from float64 by {error.max():.3g}"
 
 
