@@ -12,6 +12,7 @@ cache on disk, under a hash of the source. `loaded` does more than that:
 * Warp's own headers are parsed once per machine, not once per thread of every process (`_kept_headers`).
 """
 
+import hashlib
 import logging
 import os
 import shutil
@@ -212,14 +213,16 @@ def _kept_headers() -> Iterator[None]:
     """Within a ``with`` block, kernels compile with Warp's parsed headers from the kernel cache.
 
     Warp parses its headers once per thread into a temporary folder, which takes two seconds. Warp itself
-    removes a file there that is damaged or does not fit its headers; then the kept one is removed too. This
-    function is a no-op for versions of Warp without such a folder.
+    removes a file there that is damaged or does not fit its headers; then the kept one is removed too. Each
+    installation of Warp has its own files, because these name the folder of its headers. This function is a
+    no-op for versions of Warp without such a folder.
     """
     folder_of_thread = getattr(wp._src.context.runtime, "get_clang_pch_dir", lambda: None)()
     if folder_of_thread is None:
         yield
         return
-    kept, used = kernel_cache() / HEADERS, Path(folder_of_thread)
+    installation = hashlib.sha256(str(Path(wp.__file__).resolve().parent).encode()).hexdigest()[:12]
+    kept, used = kernel_cache() / HEADERS / installation, Path(folder_of_thread)
     _copy_newer(kept, used)
     yield
     for file in kept.glob("*.pch"):

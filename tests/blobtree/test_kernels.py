@@ -136,7 +136,7 @@ def test_a_cache_that_cannot_be_written_is_named(cache: Path) -> None:
 
 def test_headers_are_parsed_once_per_machine(cache: Path) -> None:
     _doubled()
-    (kept,) = (cache / HEADERS).glob("*.pch")
+    (kept,) = (cache / HEADERS).glob("*/*.pch")
     parsed = kept.stat().st_mtime_ns
 
     def compile_in_thread() -> None:
@@ -151,7 +151,7 @@ def test_headers_are_parsed_once_per_machine(cache: Path) -> None:
 
 def test_damaged_headers_are_replaced(cache: Path) -> None:
     _doubled()
-    (kept,) = (cache / HEADERS).glob("*.pch")
+    (kept,) = (cache / HEADERS).glob("*/*.pch")
     whole = kept.read_bytes()
     kept.write_bytes(whole[:1000])
     shutil.rmtree(_object_file(cache).parent)
@@ -162,3 +162,16 @@ def test_damaged_headers_are_replaced(cache: Path) -> None:
         _forget()
         assert thread.submit(_doubled).result() == [2.0, 5.0]
     assert kept.stat().st_size > len(whole) / 2
+
+
+def test_each_installation_of_warp_has_its_own_headers(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Headers parsed for another folder do not compile, with thousands of lines of errors."""
+    loaded(_double)
+    (kept,) = (cache / HEADERS).glob("*/*.pch")
+    monkeypatch.setattr(wp, "__file__", str(tmp_path / "warp" / "__init__.py"))
+    with kernels._kept_headers():
+        pass
+    (other,) = {*(cache / HEADERS).glob("*/*.pch")} - {kept}
+    assert other.parent != kept.parent
