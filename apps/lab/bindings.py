@@ -49,7 +49,7 @@ class DecalPath:
     name: str
 
     def rows(self, count: int) -> list[int]:
-        """Return the decals, or raise `InvalidLesson` if there is none."""
+        """Return the decals; raise `InvalidLesson` for a scene without decals."""
         rows = list(range(count)) if self.row is None else [self.row]
         if not rows or rows[-1] >= count:
             raise InvalidLesson(f"expected a decal from 0 to {count - 1}, got {self.row}")

@@ -86,7 +86,7 @@ class Experiment:
     line
         Ends of the lesson's line, or the numbers of two decals.
     relaxed
-        The relaxation, if there is one.
+        The relaxation of a lesson on scattering, else None.
     cache
         Values that several formulas share, with the points they hold at.
     """

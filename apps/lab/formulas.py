@@ -89,7 +89,7 @@ class Formula:
     part: Evaluate
 
     def evaluate(self, scope: Any) -> Any:
-        """Return the value in a scope: a number, a truth value, or an array; NaN where there is none."""
+        """Return the value in a scope: a number, a truth value, or an array; NaN if undefined."""
         with np.errstate(all="ignore"):
             return self.part(scope)
 

@@ -94,7 +94,7 @@ class LabPage(Page):
 
     @staticmethod
     def _build_values() -> None:
-        with html.Table(v_if="lab_values.length", classes="mb-2 text-caption", style="width: 100%"):  # noqa: SIM117
+        with html.Table(v_if="lab_values.length", classes="mb-2 text-caption", style="width: 100%"):  # noqa: SIM117  (one level of HTML a line)
             with html.Tr(v_for="v in lab_values", key="v.label"):
                 html.Td("{{ v.label }}")
                 html.Td("{{ v.text }}", style="text-align: right; font-variant-numeric: tabular-nums")

@@ -212,7 +212,7 @@ def _borders(regions: Any) -> BoolArray:
 def _colored(
     values: Float64Array, low: float, high: float, red: BoolArray, lines: BoolArray | None
 ) -> Image.Image:
-    """Return colours of values; nothing where there is none."""
+    """Return colours of values; NaN and infinities are transparent."""
     place = np.nan_to_num((values - low) / (high - low)).clip(0.0, 1.0) * (len(SCALE) - 1)
     steps = np.arange(len(SCALE))
     channels = [np.interp(place, steps, SCALE[:, channel]) for channel in range(3)]

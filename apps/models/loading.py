@@ -19,7 +19,7 @@ from decals.validation import is_file
 def load_model(model: str, *, trust: bool = False, crease_angle: float | None = None) -> SceneObject | Scene:
     """Load the sample or the file that a MODEL argument names; ``trust`` is that of `decals.load_scene`.
 
-    Meshes get the crease angle, if there is one; by default they keep their own.
+    Meshes get the crease angle if it is given; else they keep their own.
 
     Raises
     ------
