@@ -77,6 +77,14 @@ implicit-decals render scene.json -o picture.png
 
 implicit-decals scatter bunny.ply --spacing 0.02 --sizing touching --along curvature -o decals.csv
 """,
+    "measure": """Measure how the decals of a saved scene lie: coverage, stretch, folds, contact lines.
+
+For example:
+
+implicit-decals measure scene.json
+
+implicit-decals measure scene.json --contact elastic --json
+""",
     "polygonize": """Write the surface of an implicit model as a triangle mesh.
 
 For example:

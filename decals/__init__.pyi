@@ -13,6 +13,7 @@ from .scattering.sizing import Sizing
 from .scenes.camera import Camera
 from .scenes.cover import cover
 from .scenes.files import load_model, load_scene, save_scene
+from .scenes.measure import measure
 from .scenes.objects import MeshObject, TreeObject
 from .scenes.render import render
 from .scenes.scene import DecalImage, Scene
@@ -46,6 +47,7 @@ __all__ = [
     "load_image",
     "load_model",
     "load_scene",
+    "measure",
     "render",
     "rendering",
     "save_scene",

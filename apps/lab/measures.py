@@ -15,16 +15,13 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Scope
 from decals.apps.lab.formulas import Evaluate, Measure
 from decals.field.evaluate import Samples, evaluate
+from decals.field.jacobian import folds_of, stretch_of
 from decals.model import Interaction
 from decals.record import Contact
 from decals.scenes.objects import TreeObject
-from decals.surfaces.surface import unit_rows
 
 UNIT_BALL = Point((0, 0, 0), radius=RIM)
 """A primitive whose field at distance d is g(d)."""
-
-DIFFERENCE = 1e-3
-"""Distance between the points from which derivatives of images are computed, in radii."""
 
 STEP = 1e-3
 """Distance between the points at which `jump` looks, in model units."""
@@ -191,16 +188,16 @@ def top(scope: Scope) -> Float64Array:
     return g(scope, np.min(distances, axis=0) if distances else np.ones(len(scope.points.positions)))
 
 
-def _samples(scope: Scope, offset: Float64Array | None = None) -> Samples:
+def _samples(scope: Scope, *, jacobian: bool = False) -> Samples:
     points, experiment = scope.points, scope.experiment
-    places = points.positions if offset is None else points.positions + offset
     return evaluate(
         experiment.decals,
-        places.astype(np.float32),
+        points.positions.astype(np.float32),
         points.normals.astype(np.float32),
         mapping=experiment.mapping,
         contact=experiment.contact,
         stiffness=experiment.stiffness,
+        jacobian=jacobian,
         device="cpu",
     )
 
@@ -226,38 +223,20 @@ def owner(scope: Scope) -> Float64Array:
 @measure()
 def stretch(scope: Scope) -> Float64Array:
     """Return by how much the image is stretched: 1 keeps shapes."""
-    with np.errstate(all="ignore"):
-        small = _jacobians(scope)
-        singular = np.linalg.svd(np.nan_to_num(small), compute_uv=False)
-        return np.where(np.isfinite(small).all(axis=(1, 2)), singular[:, 0] / singular[:, 1], np.nan)
+    maps = _jacobians(scope)
+    return np.where(np.isfinite(maps[:, 0, 0]), stretch_of(np.nan_to_num(maps)), np.nan)
 
 
 @measure()
 def folded(scope: Scope) -> Float64Array:
     """Return 1 where the image is folded, which means mirrored, else 0."""
-    with np.errstate(all="ignore"):
-        return np.where(np.linalg.det(_jacobians(scope)) < 0.0, 1.0, 0.0)
+    return np.where(folds_of(_jacobians(scope), scope.points.normals), 1.0, 0.0)
 
 
 def _jacobians(scope: Scope) -> Float64Array:
-    """Return derivatives of the image coordinates by two directions on the surface: float64[n, 2, 2]."""
-    result: Float64Array = scope.shared("jacobians", lambda: _differences(scope))
+    """Return derivatives of the image coordinates along the surface: float64[n, 2, 3]."""
+    result: Float64Array = scope.shared("jacobians", lambda: _samples(scope, jacobian=True).jacobian)
     return result
-
-
-def _differences(scope: Scope) -> Float64Array:
-    normals, first = scope.points.normals, _shown(scope)
-    axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    right = unit_rows(np.cross(axes, normals))
-    radii = scope.experiment.decals.radii
-    step = DIFFERENCE * float(radii.min()) if len(radii) else DIFFERENCE
-    columns = []
-    for direction in (right, np.cross(normals, right)):
-        second = _samples(scope, np.asarray(step * direction, np.float64))
-        slope = (second.uv.astype(np.float64) - first.uv) / step
-        same = (second.owner == first.owner) & (first.owner >= 0)
-        columns.append(np.where(same[:, None], slope, np.nan))
-    return np.stack(columns, axis=2)
 
 
 # -- solids in contact ----------------------------------------------------------------------------------

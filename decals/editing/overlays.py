@@ -1,12 +1,14 @@
 """What the decals do to a surface, sampled on its mesh: owners, stretch, folds and contact lines."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from decals.editing.document import Document
 from decals.field.evaluate import evaluate
+from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
 from decals.field.mapping import ImageMapping
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 
@@ -25,8 +27,8 @@ class SurfaceSamples:
     fields
         Field of the owner after contact, 0 without one, float32, shape (n,).
     stretch
-        Of each triangle inside one decal: the larger singular value of the map from the surface to the
-        undeformed image, over the decal's scale; 1 without deformation, NaN elsewhere. Shape (m,).
+        Of the middle of each triangle inside one decal: ratio of the largest to the smallest stretch of the
+        image, as `decals.measure` has it; 1 keeps shapes, NaN elsewhere. Shape (m,).
     folds
         True for triangles whose image is turned over, shape (m,).
     """
@@ -60,42 +62,25 @@ def sample_surface(
     contact, mapping, stiffness
         Modes, as for `decals.evaluate`.
     """
-    samples = evaluate(
-        document.decals, vertices, normals, contact=contact, mapping=mapping, stiffness=stiffness
-    )
+    modes: dict[str, Any] = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
+    samples = evaluate(document.decals, vertices, normals, **modes)
     inside = np.linalg.norm(samples.uv - INSIDE, axis=1) <= INSIDE
     owners = np.where(inside, samples.owner, -1).astype(np.int32)
     fields = np.where(inside, samples.field, 0.0).astype(np.float32)
     stretch, folds = np.full(len(faces), np.nan), np.zeros(len(faces), np.bool_)
-    whole = (owners[faces] >= 0).all(axis=1) & (np.ptp(owners[faces], axis=1) == 0)
-    rows = np.flatnonzero(whole)
+    rows = np.flatnonzero((owners[faces] >= 0).all(axis=1) & (np.ptp(owners[faces], axis=1) == 0))
     if len(rows):
-        corners = faces[rows]
-        shown, owner_rows = np.unique(owners[corners[:, 0]], return_inverse=True)
-        radii = document.decals.take(shown).radii.astype(np.float64)[owner_rows]
-        jacobians = _jacobians(vertices[corners].astype(np.float64), samples.uv[corners].astype(np.float64))
-        jacobians *= 2.0 * radii[:, None, None]
-        stretch[rows] = np.linalg.svd(jacobians, compute_uv=False)[:, 0]
-        folds[rows] = np.linalg.det(jacobians) < 0.0
+        corners, facings = vertices[faces[rows]], normals[faces[rows]]
+        turns = normal_derivatives_of_triangles(corners, facings)
+        middles, facing = corners.mean(axis=1), facings.mean(axis=1)
+        maps = evaluate(
+            document.decals, middles, facing, jacobian=True, normal_derivatives=turns, **modes
+        ).jacobian
+        assert maps is not None
+        stretch[rows] = stretch_of(maps)
+        a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+        folds[rows] = folds_of(maps, np.cross(b - a, c - a))
     return SurfaceSamples(owners, fields, stretch, folds)
-
-
-def _jacobians(corners: Float64Array, uv: Float64Array) -> Float64Array:
-    """Return the derivative of image coordinates in an orthonormal frame of each triangle, (k, 2, 2).
-
-    Corners have the shape (k, 3, 3), their image coordinates (k, 3, 2). The frame is right-handed with the
-    normal, as tangent and bitangent of a decal are.
-    """
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    length = np.maximum(np.linalg.norm(first, axis=1), 1e-300)
-    along = first / length[:, None]
-    side = np.einsum("ki,ki->k", second, along)
-    height = np.maximum(np.linalg.norm(second - side[:, None] * along, axis=1), 1e-300)
-    du, dv = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    d_along = du / length[:, None]
-    d_across = (dv - side[:, None] * d_along) / height[:, None]
-    result: Float64Array = np.stack([d_along, d_across], axis=2)
-    return result
 
 
 def contact_lines(vertices: Float32Array, faces: Int32Array, owners: Int32Array) -> Float32Array:

@@ -1,5 +1,6 @@
-from .evaluate import Samples
+from .evaluate import Neighbors, Samples
 
 __all__ = [
+    "Neighbors",
     "Samples",
 ]

@@ -8,19 +8,45 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import known_device
 from blobtree.kernels import loaded
 from blobtree.validation import real
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
+from decals.field.jacobian import image_jacobians
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
 from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH, RECORD, RIM_RADIUS, Contact
 from decals.validation import describe, member, stiffness_number
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbors:
+    """All decals that act at m points, in one list; those of point i are at ``offsets[i]:offsets[i + 1]``.
+
+    Attributes
+    ----------
+    offsets : int64[m + 1]
+        First entry of each point.
+    decals : int32[k]
+        Numbers of the decals with a field above 0, ascending for each point.
+    fields : float32[k]
+        Field f of each before contact (paper, equation 1): ½ on its undeformed rim.
+    pushes : float32[k]
+        Push of each alone on the owner of the point: by which share of what is left to its rim it moves the
+        image outward. 0 without a push, 1 on their contact line. In PRODUCT and MIN this is 1 − h of equation
+        5, in RADIAL and ELASTIC a share of the way along the ray. In RADIAL a decal that has no field at the
+        point can push there too; it is not listed.
+    """
+
+    offsets: Int64Array
+    decals: Int32Array
+    fields: Float32Array
+    pushes: Float32Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +64,19 @@ class Samples:
         F after contact (paper, equation 5): 1 at the centre, ½ on rims and contact lines. 0 without owner.
     color : float32[m, 4] or None
         Colour of all decals over each other, linear with premultiplied alpha. None without images.
+    jacobian : float64[m, 2, 3] or None
+        Derivative of `uv` by the point along the surface: the gradients of u and v, in the tangent plane.
+        NaN without an owner. None if it was not asked for.
+    neighbors : Neighbors or None
+        All decals that act at each point, and their pushes. None if they were not asked for.
     """
 
     owner: Int32Array
     uv: Float32Array
     field: Float32Array
     color: Float32Array | None = None
+    jacobian: Float64Array | None = None
+    neighbors: Neighbors | None = None
 
 
 def evaluate(
@@ -56,6 +89,9 @@ def evaluate(
     stiffness: float = DEFAULT_STIFFNESS,
     index: DecalIndex | None = None,
     images: AnyImage | Iterable[AnyImage] | None = None,
+    jacobian: bool = False,
+    normal_derivatives: ArrayLike | None = None,
+    neighbors: bool = False,
     device: Any = None,
 ) -> Samples:
     """Evaluate decals at surface points: owner, image coordinates, field and colour.
@@ -78,6 +114,12 @@ def evaluate(
         Index of these decals. Built if not given; an editor has its own.
     images : image or sequence of images, optional
         Images of any kind and size, see `decals.images.image_pixels`, for `Samples.color`.
+    jacobian : bool, optional
+        True also returns the derivative of the image coordinates, `Samples.jacobian`.
+    normal_derivatives : float[m, 3, 3], optional
+        Derivatives of the normals by the point, for the derivative on curved surface. By default it is flat.
+    neighbors : bool, optional
+        True also returns the fields and pushes of all decals, `Samples.neighbors`.
     device : optional
         Warp device. Default: Warp's default device.
 
@@ -89,7 +131,8 @@ def evaluate(
     Raises
     ------
     InvalidPoints
-        Points and normals are not two arrays of the same shape [m, 3].
+        Points and normals are not two arrays of the same shape [m, 3], or the derivatives of the normals are
+        not one of shape [m, 3, 3].
     InvalidImage
         An image of another type or shape, or fewer images than the decals refer to.
     InvalidDecals
@@ -114,6 +157,8 @@ def evaluate(
     [[0.5, 0.5], [0.75, 0.5], [0.0, 0.0]]
     >>> samples.field.round(2)
     array([1.  , 0.85, 0.  ], dtype=float32)
+    >>> decals.evaluate(disk, [[0.5, 0, 0]], [[0, 0, 1]], jacobian=True).jacobian.round(2).tolist()
+    [[[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]]
     """
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
     contact = member("contact", contact, Contact, InvalidScene)
@@ -123,6 +168,13 @@ def evaluate(
     count = len(positions)
     if count != len(facings):
         raise InvalidPoints(f"normals: expected one for each of {count} points, got {len(facings)}")
+    turns = None
+    if normal_derivatives is not None:
+        turns = _as_rows("normal_derivatives", normal_derivatives, (3, 3)).astype(np.float64)
+        if len(turns) != count:
+            raise InvalidPoints(
+                f"normal_derivatives: expected one for each of {count} points, got {len(turns)}"
+            )
     indexed = _indexed(decals, index, device)
     indexed.stiffness = stiffness
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
@@ -137,7 +189,67 @@ def evaluate(
     ]
     wp.launch(loaded(sample_points, device), count, inputs, [owner, uv, field], device=device)
     color = None if images is None else _colors(decals, _each_pixels(images), [*inputs, owner], device)
-    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color)
+    derivative = None
+    if jacobian:
+        derivative = _jacobians(positions, facings, inputs[2:], (owner.numpy(), uv.numpy()), turns, device)
+    near = _neighbors(decals, inputs, owner, device) if neighbors else None
+    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near)
+
+
+def _jacobians(
+    points: Float32Array,
+    normals: Float32Array,
+    modes: list[Any],
+    center: tuple[Int32Array, Float32Array],
+    normal_derivatives: Float64Array | None,
+    device: Any,
+) -> Float64Array:
+    """Return derivatives of image coordinates; `modes` are mapping, contact mode and indexed decals."""
+    spheres: Float32Array = modes[-1].records.numpy()[::RECORD, 3]
+    radii = np.ones(len(points))
+    owned = center[0] >= 0
+    radii[owned] = RIM_RADIUS * spheres[center[0][owned]]
+
+    def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
+        owner: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+        uv: Any = wp.zeros(len(points), dtype=wp.vec2, device=device)
+        field: Any = wp.zeros(len(points), dtype=wp.float32, device=device)
+        given: list[Any] = [wp.array(rows, dtype=wp.vec3, device=device) for rows in (points, normals)]
+        wp.launch(sample_points, len(points), [*given, *modes], [owner, uv, field], device=device)
+        return owner.numpy(), uv.numpy()
+
+    return image_jacobians(sampled, points, normals, radii, center, normal_derivatives)
+
+
+def _neighbors(decals: Decals | DecalEditor, inputs: list[Any], owner: Any, device: Any) -> Neighbors:
+    """Return all decals with a field at points; the index lists whole influences, not only reaches."""
+    from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
+
+    points, normals, _, contact, indexed = inputs
+    if isinstance(decals, DecalEditor):
+        rows, known = decals.decals, decals.numbers
+    else:
+        rows, known = decals, np.arange(len(decals))
+    wide = index_on(rows, device, reach=1.0 / NEIGHBOR_REACH)
+    wide.stiffness = indexed.stiffness
+    owners = owner.numpy()
+    kept = np.searchsorted(known, owners).astype(np.int32)
+    empty: list[Any] = [wp.zeros(0, dtype=kind, device=device) for kind in (wp.int32, wp.float32)]
+    counts: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+    placed: Any = wp.array(np.where(owners >= 0, kept, owners), dtype=wp.int32, device=device)
+    given = [points, normals, contact, wide, placed]
+    kernel = loaded(list_neighbors, device)
+    wp.launch(kernel, len(points), [*given, empty[0]], [counts, empty[0], empty[1], empty[1]], device=device)
+    offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
+    starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
+    total = int(offsets[-1])
+    lists: list[Any] = [
+        wp.zeros(total, dtype=kind, device=device) for kind in (wp.int32, wp.float32, wp.float32)
+    ]
+    wp.launch(kernel, len(points) if total else 0, [*given, starts], [counts, *lists], device=device)
+    found, fields, pushes = (values.numpy() for values in lists)
+    order = np.lexsort((found, np.repeat(np.arange(len(points)), np.diff(offsets))))
+    return Neighbors(offsets, known[found[order]].astype(np.int32), fields[order], pushes[order])
 
 
 def _each_pixels(images: AnyImage | Iterable[AnyImage]) -> list[UInt8Array]:
@@ -205,12 +317,17 @@ def _colors(
     return result
 
 
-def _as_rows(name: str, values: ArrayLike) -> Float32Array:
+def _as_rows(name: str, values: ArrayLike, shape: tuple[int, ...] = (3,)) -> Float32Array:
+    expected = ", ".join(map(str, ("m", *shape)))
     try:
         with np.errstate(over="ignore"):
             array = np.asarray(real(values), np.float32)
     except (TypeError, ValueError, OverflowError):
-        raise InvalidPoints(f"{name}: expected numbers of shape [m, 3], got {describe(values)}") from None
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidPoints(f"{name}: expected shape [m, 3], got {list(array.shape)}; give one row per point")
+        raise InvalidPoints(
+            f"{name}: expected numbers of shape [{expected}], got {describe(values)}"
+        ) from None
+    if array.shape[1:] != shape:
+        raise InvalidPoints(
+            f"{name}: expected shape [{expected}], got {list(array.shape)}; give one row per point"
+        )
     return array

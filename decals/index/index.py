@@ -174,9 +174,12 @@ class DecalIndex:
         return offsets, ids.numpy()
 
 
-def index_on(decals: Decals, device: Any = None) -> Any:
-    """Build the index of decals on a device, an `IndexedDecals`, without a copy on the host."""
-    placed = _device_arrays(decals.positions, decals.influence, decals.ranks, device)
+def index_on(decals: Decals, device: Any = None, *, reach: float = 1.0) -> Any:
+    """Build the index of decals on a device, an `IndexedDecals`, without a copy on the host.
+
+    `reach` multiplies the distance to which decals are listed, their neighbour reach.
+    """
+    placed = _device_arrays(decals.positions, reach * decals.influence, decals.ranks, device)
     levels, table, ids, _ = build_index(*placed)
     return indexed_decals(decals.packed(), levels, table, ids, layered=decals.layered, device=device)
 

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 import decals
+from decals.field.jacobian import folds_of, stretch_of
 from decals.model import Decals
 from tests.decals.fault_models import Arrays
 
 STRETCHED = 5.0
 """Ratio of the largest to the smallest stretch of an image from which it counts as stretched."""
-
-STEP = 1e-3
-"""Step of the differences, in median radii."""
 
 CHUNK = 1 << 16
 """Points that are evaluated at a time."""
@@ -41,7 +39,7 @@ def random_points(mesh: Arrays, count: int, seed: int) -> tuple[np.ndarray, np.n
 
 
 def distortion(layout: Decals, mesh: Arrays, count: int, seed: int = 7) -> Distortion:
-    """Measure what `decals.evaluate` shows at random points, and at steps along their faces."""
+    """Measure what `decals.evaluate` shows at random points, with the normals of their faces."""
     points, normals = random_points(mesh, count, seed)
     parts = [
         _measured(layout, points[first : first + CHUNK], normals[first : first + CHUNK])
@@ -53,18 +51,10 @@ def distortion(layout: Decals, mesh: Arrays, count: int, seed: int = 7) -> Disto
 
 def _measured(layout: Decals, points: np.ndarray, normals: np.ndarray) -> tuple[int, int, int, int]:
     """Counts of stretched, folded, measured and bare points."""
-    axis = np.where(np.abs(normals[:, :1]) > 0.8, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-    u = np.cross(normals, axis)
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(normals, u)
-    step = STEP * float(np.median(layout.radii))
-    shifts = (0 * u, step * u, -step * u, step * v, -step * v)
-    center, *sides = [decals.evaluate(layout, points + shift, normals) for shift in shifts]
-    shown = (center.owner >= 0) & (((center.uv - 0.5) ** 2).sum(axis=1) <= 0.2501)
-    sure = shown & np.all([side.owner == center.owner for side in sides], axis=0)
-    columns = [(sides[k].uv - sides[k + 1].uv)[sure].astype(np.float64) for k in (0, 2)]
-    jacobians = np.stack(columns, axis=-1)
-    sizes = np.linalg.svd(jacobians, compute_uv=False)
-    stretched = sizes[:, 0] > STRETCHED * sizes[:, 1]
-    folded = np.linalg.det(jacobians) < 0
+    found = decals.evaluate(layout, points, normals, jacobian=True)
+    assert found.jacobian is not None
+    shown = (found.owner >= 0) & (((found.uv - 0.5) ** 2).sum(axis=1) <= 0.2501)
+    sure = shown & np.isfinite(found.jacobian[:, 0, 0])
+    stretched = stretch_of(found.jacobian[sure]) > STRETCHED
+    folded = folds_of(found.jacobian[sure], normals[sure])
     return int(stretched.sum()), int(folded.sum()), int(sure.sum()), int((~shown).sum())

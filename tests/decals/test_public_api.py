@@ -15,10 +15,11 @@ PACKAGES = [
 NAMES = [
     "Camera", "Contact", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError", "Interaction",
     "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__", "bake", "cover",
-    "edit", "evaluate", "load_image", "load_model", "load_scene", "render", "save_scene", "scatter", "show",
+    "edit", "evaluate", "load_image", "load_model", "load_scene", "measure",
+    "render", "save_scene", "scatter", "show",
 ]  # fmt: skip
 OF_PACKAGES = {
-    "field": ["Samples"],
+    "field": ["Neighbors", "Samples"],
     "index": ["DecalEditor", "DecalIndex"],
     "rendering": [
         "Background", "Buffers", "Context", "Drawable", "Light", "Lighting", "Picture", "Projection",

@@ -1,0 +1,101 @@
+"""``implicit-decals measure``: how the decals of a saved scene lie on its models."""
+
+import json
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from decals import Scene
+from decals import measure as measured
+from decals.apps.commands.options import (
+    DEFAULT_CONTACT,
+    DEFAULT_STIFFNESS,
+    ContactName,
+    Definitions,
+    MappingName,
+    OptionalWhole,
+    Trust,
+    Whole,
+)
+from decals.apps.commands.progress_bars import PREPARING, progress_bars
+from decals.apps.models.loading import import_definitions, load_models
+from decals.errors import InvalidInput
+
+LABELS = {
+    "area": "area",
+    "coverage": "coverage",
+    "gap_area": "area without an image",
+    "overlap_area": "area inside two rims or more",
+    "stretch_median": "stretch, median",
+    "stretch_p95": "stretch, 95 % of the points below",
+    "stretch_max": "stretch, largest",
+    "folded": "folded share",
+    "contact_length": "length of contact lines",
+    "rho": "evenness, rho",
+    "cv": "variation of the nearest distance",
+    "cv6": "variation of six distances",
+    "samples": "points",
+}
+
+
+def measure(
+    scene: str,
+    /,
+    *,
+    contact: ContactName = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
+    mapping: MappingName = "corrected",
+    samples: OptionalWhole = None,
+    seed: Whole = 0,
+    json_output: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    define: Definitions = None,
+    trust: Trust = False,
+) -> None:
+    """Measure coverage, gaps, overlaps, stretch, folds and contact lines of a saved scene.
+
+    Parameters
+    ----------
+    scene
+        A saved scene in JSON.
+    contact
+        Contact mode: product, min, radial or elastic.
+    stiffness
+        Stiffness of elastic contact, from 1 to 64.
+    mapping
+        Image mapping: corrected or chord.
+    samples
+        Number of random points on the models. Default: 200 for each decal.
+    seed
+        Seed of these points.
+    json_output
+        Print one JSON object in place of a table, with the measures of each decal.
+    define
+        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
+        repeated.
+    trust
+        Let a scene read files outside its folder, and any number of images.
+    """
+    import_definitions(define)
+    with progress_bars() as progress:
+        progress(PREPARING, 0.0)
+        loaded = load_models([scene], trust=trust)
+        if not isinstance(loaded, Scene):
+            raise InvalidInput(f"expected a saved scene in JSON, got the model {scene!r}; scatter makes one")
+        found = measured(
+            loaded,
+            contact=contact,
+            stiffness=stiffness,
+            mapping=mapping,
+            samples=samples,
+            seed=seed,
+            progress=progress,
+        )
+    if json_output:
+        print(json.dumps(found.to_dict()))
+        return
+    table = Table(box=None, show_header=False)
+    for name, value in found.summary().items():
+        table.add_row(LABELS[name], f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
+    Console().print(table, highlight=False)

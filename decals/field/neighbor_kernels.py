@@ -1,0 +1,105 @@
+"""Warp kernel of `evaluate`: the fields of all decals at points, and their pushes on the owners."""
+
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+import warp as wp
+
+from blobtree.kernels import KERNEL_OPTIONS
+from decals.field.contact import contact_push
+from decals.field.elastic import plane_push
+from decals.field.ownership import NO_OWNER
+from decals.field.radial import MIN_ADVANCE, are_nested, plane_distance
+from decals.index.lookup import IndexedDecals, cell_range
+from decals.record import (
+    RECORD,
+    Contact,
+    apart,
+    complement_of,
+    faces,
+    field_complement,
+    has_cells,
+    is_contact_rank,
+    rank_of,
+    visible_radius,
+    xyz,
+)
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+MIN_REMAINDER = 1.0e-6
+"""Smallest divisor 1 − t; on the rim no way is left."""
+
+
+@wp.func
+def field_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.float32:
+    """Return the field f of a decal before contact; 0 out of its influence, or where it faces away."""
+    ball = index.records[RECORD * decal]
+    w = q - xyz(ball)
+    squared = wp.dot(w, w)
+    size = ball[3] * ball[3]
+    if squared >= size or not faces(n_q, decal, index.records):
+        return 0.0
+    return 1.0 - field_complement(squared / size)
+
+
+@wp.func
+def push_at(
+    q: wp.vec3, n_q: wp.vec3, owner: wp.int32, decal: wp.int32, contact: wp.int32, index: IndexedDecals
+) -> wp.float32:
+    """Return the push of one neighbour alone on the owner of q: 0 without, 1 on their contact line."""
+    rank = rank_of(owner, index.records)
+    if decal == owner or not is_contact_rank(rank) or rank_of(decal, index.records) != rank:
+        return 0.0
+    if not has_cells(contact):
+        e = complement_of(q, n_q, decal, index.records)
+        return contact_push(e, complement_of(q, n_q, owner, index.records))
+    radius = visible_radius(owner, index.records)
+    other = visible_radius(decal, index.records)
+    between = apart(owner, decal, index.records)
+    w = (q - xyz(index.records[RECORD * owner])) / radius
+    distance = wp.length(w)
+    remaining = wp.max(1.0 - distance, MIN_REMAINDER)
+    if distance == 0.0 or not faces(n_q, decal, index.records):
+        return 0.0
+    ray = w / distance
+    if contact == Contact.ELASTIC:
+        push = plane_push(ray, distance, between, radius, other, index.stiffness)
+        return wp.min(push / remaining, 1.0)
+    if wp.dot(ray, between) <= MIN_ADVANCE or are_nested(owner, decal, index.records):
+        return 0.0
+    end = plane_distance(ray, between, radius, other) / radius
+    return wp.clamp((distance / end - distance) / remaining, 0.0, 1.0) if end < 1.0 else 0.0
+
+
+@wp.kernel
+def list_neighbors(
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    contact: wp.int32,
+    index: IndexedDecals,
+    owners: wp.array(dtype=wp.int32),
+    offsets: wp.array(dtype=wp.int32),
+    counts: wp.array(dtype=wp.int32),
+    decals: wp.array(dtype=wp.int32),
+    fields: wp.array(dtype=wp.float32),
+    pushes: wp.array(dtype=wp.float32),
+):
+    """Count the decals with a field at each point; with offsets, also write them, their fields and pushes."""
+    i = wp.tid()
+    q = points[i]
+    n_q = wp.normalize(normals[i])
+    count = wp.int32(0)
+    for level in range(index.level_count):
+        span = cell_range(q, level, index)
+        for j in range(span[0], span[1]):
+            decal = index.ids[j]
+            field = field_at(q, n_q, decal, index)
+            if field > 0.0:
+                if offsets.shape[0] > 0:
+                    decals[offsets[i] + count] = decal
+                    fields[offsets[i] + count] = field
+                    if owners[i] != NO_OWNER:
+                        pushes[offsets[i] + count] = push_at(q, n_q, owners[i], decal, contact, index)
+                count += 1
+    counts[i] = count

@@ -1,0 +1,385 @@
+"""`measure`: how decals lie on a scene, at random points that the scattering did not use."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from blobtree.progress import Progress, reporting
+from decals.errors import InvalidScene
+from decals.field.evaluate import Samples, evaluate
+from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of, tangent_axes
+from decals.field.mapping import ImageMapping
+from decals.model import Decals, Interaction
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.scattering.domain import Domain, apportion
+from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
+from decals.scenes.objects import MeshObject, SceneObject
+from decals.scenes.scene import Scene
+from decals.surfaces.normals import split_at_creases
+from decals.surfaces.surface import unit_rows
+from decals.validation import instance, whole_number
+
+SAMPLES_PER_DECAL = 200
+MIN_SAMPLES = 20_000
+MAX_DEFAULT_SAMPLES = 1_000_000
+MAX_SAMPLES = 100_000_000
+"""Points on the surfaces: default for each decal, least and most of the default, and limit."""
+
+CHUNK = 1 << 16
+"""Points that are evaluated at a time."""
+
+LINE_STEP = 0.05
+"""Length of the segments that find contact lines, in visible radii of the owner."""
+
+TURN_STEP = 1e-2
+"""Step of the derivatives of normals, in visible radii."""
+
+IMAGE_RADIUS_SQUARED = 0.25001
+"""Squared radius of an image in its coordinates, with a margin for rounding (`decals.field.mapping`)."""
+
+STREAM = 9
+"""Stream of random numbers that no scattering uses."""
+
+PERCENTILES = (50.0, 95.0, 100.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DecalMeasures:
+    """Measures of each decal, float64[n] each; areas and lengths in the scene's units.
+
+    Attributes
+    ----------
+    visible_area
+        Area on which the decal is the topmost one and shows its image.
+    overlap_area
+        Area inside its undeformed rim that lies inside the rim of another decal too.
+    stretch_median, stretch_p95, stretch_max
+        Ratio of the largest to the smallest stretch of its image; NaN where nothing of it shows.
+    folded
+        Share of its visible area on which the image is folded, which means mirrored; NaN likewise.
+    contact_length
+        Length of the lines on which it meets other contact decals.
+    nearest
+        Distance to the nearest decal that faces the same way; infinity without one.
+    """
+
+    visible_area: Float64Array
+    overlap_area: Float64Array
+    stretch_median: Float64Array
+    stretch_p95: Float64Array
+    stretch_max: Float64Array
+    folded: Float64Array
+    contact_length: Float64Array
+    nearest: Float64Array
+
+
+@dataclass(frozen=True, eq=False)
+class Measures:
+    """Measures of a scene; areas and lengths in the scene's units.
+
+    Attributes
+    ----------
+    area
+        Area of all surfaces outside other, closed surfaces.
+    coverage
+        Share of the area that shows an image, from 0 to 1.
+    gap_area
+        Area that shows none.
+    overlap_area
+        Area inside the undeformed rims of two or more decals.
+    stretch_median, stretch_p95, stretch_max
+        Ratio of the largest to the smallest stretch of an image, over the points that show one; 1 keeps
+        shapes. NaN without any.
+    folded
+        Share of these points where the image is folded, which means mirrored.
+    contact_length
+        Length of all lines on which two contact decals of one layer meet.
+    rho, cv, cv6
+        Evenness of the centres, as `decals.scattering.Spacing` has it: least distance over that of a
+        hexagonal tiling, and variations of the distances to one neighbour and to six.
+    samples
+        Number of points that were evaluated.
+    decals
+        The same for each decal.
+    """
+
+    area: float
+    coverage: float
+    gap_area: float
+    overlap_area: float
+    stretch_median: float
+    stretch_p95: float
+    stretch_max: float
+    folded: float
+    contact_length: float
+    rho: float
+    cv: float
+    cv6: float
+    samples: int
+    decals: DecalMeasures
+
+    def summary(self) -> dict[str, float]:
+        """Return the measures of the whole scene by name."""
+        return {name: value for name, value in vars(self).items() if name != "decals"}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all measures as numbers and lists for JSON; None stands for what is unknown."""
+        each = {name: list(map(_finite, column)) for name, column in asdict(self.decals).items()}
+        return {name: _finite(value) for name, value in self.summary().items()} | {"decals": each}
+
+
+def _finite(value: float) -> float | None:
+    return (int(value) if isinstance(value, int) else float(value)) if np.isfinite(value) else None
+
+
+def measure(
+    scene: Scene,
+    *,
+    contact: Contact | str = DEFAULT_CONTACT,
+    stiffness: float = DEFAULT_STIFFNESS,
+    mapping: ImageMapping | str = ImageMapping.CORRECTED,
+    samples: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Measures:
+    """Measure how decals lie on a scene: coverage, gaps, overlaps, stretch, folds, contact lines, evenness.
+
+    Random points, uniform by area, are evaluated with the normals with which the scene is drawn. So every
+    measure is an estimate. For m points the error of a share p is about √(p (1 − p)/m), and often far less,
+    because the points are stratified. That of the contact length is about 3/√m of it for decals that touch
+    all around; single decals have only their part of the points. Transparent images count as visible.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    contact, stiffness, mapping
+        Modes, as for `decals.evaluate`.
+    samples : int, optional
+        Number of points. Default: 200 for each decal, from 20,000 to 1,000,000.
+    seed : int
+        Seed of the points; equal seeds give equal measures.
+    progress : callable, optional
+        Called with the name of the stage and the fraction done.
+
+    Returns
+    -------
+    Measures
+
+    Raises
+    ------
+    InvalidScene
+        No scene, a scene without objects, or an option out of range.
+
+    See Also
+    --------
+    decals.evaluate : what decals show at given points, with the Jacobian and the neighbours.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=30)
+    >>> measures = decals.measure(scene)
+    >>> measures.coverage > 0.999, measures.folded < 0.01, len(measures.decals.visible_area)
+    (True, True, 30)
+    """
+    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    count = len(scene.decals)
+    if samples is None:
+        samples = min(max(SAMPLES_PER_DECAL * count, MIN_SAMPLES), MAX_DEFAULT_SAMPLES)
+    samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+    seed = whole_number("seed", seed, 0, None, InvalidScene)
+    if not scene.objects:
+        raise InvalidScene("expected a scene with an object to measure, got none; add one")
+    modes = {"contact": contact, "stiffness": stiffness, "mapping": mapping}
+    with reporting(progress) as report:
+        report("measuring", 0.0)
+        domain = Domain([item.surface for item in scene.objects], seed)
+        counts = apportion(domain.areas, samples)
+        points = domain.sample(counts, STREAM)
+        sums = _Sums(scene.decals, domain.area / samples)
+        rng = np.random.default_rng([seed, STREAM])
+        done = 0
+        for number, item in enumerate(scene.objects):
+            rows = np.flatnonzero(points.surface_ids == number)
+            for part, normals, turns in _drawn(item, points.positions[rows], points.normals[rows], scene):
+                sums.add(part, normals, turns, modes, rng)
+                done += len(part)
+                report("measuring", done / samples)
+    return sums.result(domain.area, samples)
+
+
+def _drawn(
+    item: SceneObject, points: Float32Array, normals: Float32Array, scene: Scene
+) -> Iterator[tuple[Float32Array, Float32Array, Float64Array]]:
+    """Give points of an object in parts, the normals with which it is drawn, and their derivatives."""
+    split = None
+    if isinstance(item, MeshObject):
+        split = split_at_creases(item.vertices, item.faces, item.crease_angle)
+    radii = scene.decals.radii
+    step = TURN_STEP * float(np.median(radii)) if len(radii) else 1.0
+    for first in range(0, len(points), CHUNK):
+        part, facings = points[first : first + CHUNK], normals[first : first + CHUNK]
+        if split is not None and isinstance(item, MeshObject):
+            faces, weights = item.surface.locate(part)
+            rows = split.faces[faces]
+            corners = split.normals[rows]
+            turns = normal_derivatives_of_triangles(item.vertices[split.rows[rows]], corners)
+            yield part, np.einsum("mk,mki->mi", weights, corners).astype(np.float32), turns
+        else:
+            yield part, facings, _turns(item, part, facings, step)
+
+
+def _turns(item: SceneObject, points: Float32Array, normals: Float32Array, step: float) -> Float64Array:
+    """Return derivatives of the normals of an implicit surface by differences, float64[m, 3, 3]."""
+    turns = np.zeros((len(points), 3, 3))
+    for axis in tangent_axes(normals):
+        ahead, behind = (item.surface.normal(points + sign * step * axis) for sign in (1.0, -1.0))
+        turns += ((ahead - behind).astype(np.float64) / (2.0 * step))[:, :, None] * axis[:, None, :]
+    return turns
+
+
+class _Sums:
+    """Sums over points of equal area, and the stretch at each."""
+
+    def __init__(self, decals: Decals, area: float) -> None:
+        self.decals, self.area = decals, area
+        count = len(decals)
+        self.shown, self.overlapped, self.lines = (np.zeros(count) for _ in range(3))
+        self.overlap = 0
+        self._owners: list[Int32Array] = []
+        self._stretch: list[Float64Array] = []
+        self._folds: list[BoolArray] = []
+
+    def add(
+        self,
+        points: Float32Array,
+        normals: Float32Array,
+        turns: Float64Array,
+        modes: dict[str, Any],
+        rng: np.random.Generator,
+    ) -> None:
+        """Add points."""
+        found = evaluate(
+            self.decals,
+            points,
+            normals,
+            **modes,
+            jacobian=True,
+            normal_derivatives=turns,
+            neighbors=True,
+        )
+        count = len(self.decals)
+        inside = ((found.uv.astype(np.float64) - 0.5) ** 2).sum(axis=1) <= IMAGE_RADIUS_SQUARED
+        shown = (found.owner >= 0) & inside
+        self.shown += np.bincount(found.owner[shown], minlength=count)
+        self._add_overlaps(found)
+        assert found.jacobian is not None
+        known = shown & np.isfinite(found.jacobian[:, 0, 0])
+        self._owners.append(found.owner[known])
+        self._stretch.append(stretch_of(found.jacobian[known]))
+        self._folds.append(folds_of(found.jacobian[known], normals[known]))
+        self._add_lines(found, points, normals, turns, modes, rng)
+
+    def _add_overlaps(self, found: Samples) -> None:
+        near = found.neighbors
+        assert near is not None
+        rows = np.repeat(np.arange(len(found.owner)), np.diff(near.offsets))
+        inside = near.fields >= 0.5
+        several = np.bincount(rows[inside], minlength=len(found.owner)) > 1
+        self.overlap += int(several.sum())
+        self.overlapped += np.bincount(near.decals[inside & several[rows]], minlength=len(self.decals))
+
+    def _add_lines(
+        self,
+        found: Samples,
+        points: Float32Array,
+        normals: Float32Array,
+        turns: Float64Array,
+        modes: dict[str, Any],
+        rng: np.random.Generator,
+    ) -> None:
+        """Count the random segments that leave an owner across a contact line (Crofton's formula)."""
+        rows = np.flatnonzero(found.owner >= 0)
+        if not len(rows):
+            return
+        owners, facings = found.owner[rows], normals[rows]
+        steps = LINE_STEP * self.decals.radii[owners].astype(np.float64)
+        first, second = tangent_axes(unit_rows(facings).astype(np.float64))
+        angles = rng.uniform(0.0, 2.0 * np.pi, (len(rows), 1))
+        axes = np.cos(angles) * first + np.sin(angles) * second
+        across = np.cos(angles) * second - np.sin(angles) * first
+        ways = [sign * axis for axis in (axes, across) for sign in (1.0, -1.0)]
+        ranks = np.where(self.decals.interactions == Interaction.PUSH, self.decals.ranks, -1)
+        for way in ways:
+            shift = steps[:, None] * way
+            ends = evaluate(
+                self.decals,
+                points[rows] + shift,
+                facings + np.einsum("mij,mj->mi", turns[rows], shift),
+                **modes,
+            ).owner
+            crossed = (ends >= 0) & (ends != owners)
+            crossed[crossed] = (ranks[owners] == ranks[ends])[crossed] & (ranks[owners] >= 0)[crossed]
+            hits = np.bincount(owners[crossed], 1.0 / steps[crossed], minlength=len(self.decals))
+            self.lines += hits * np.pi / len(ways)
+
+    def result(self, area: float, samples: int) -> Measures:
+        """Return the measures of all points that were added."""
+        count = len(self.decals)
+        owners = np.concatenate([np.zeros(0, np.int32), *self._owners])
+        stretch = np.concatenate([np.zeros(0), *self._stretch])
+        folds = np.concatenate([np.zeros(0, np.bool_), *self._folds])
+        order = np.lexsort((stretch, owners))
+        ends = np.cumsum(np.bincount(owners, minlength=count))
+        parts = np.split(stretch[order], ends[:-1]) if count else []
+        percentiles = np.array([_percentiles(part) for part in parts]).reshape(-1, 3)
+        known = np.bincount(owners, minlength=count)
+        folded = np.bincount(owners[folds], minlength=count)
+        nearest = _nearest(self.decals)
+        spacing = spacing_of_distances(nearest, ideal_spacing(area, count))
+        lengths = self.area * self.lines
+        median, high, most = _percentiles(stretch)
+        return Measures(
+            area=area,
+            coverage=float(self.shown.sum() / samples),
+            gap_area=float(area - self.area * self.shown.sum()),
+            overlap_area=self.area * self.overlap,
+            stretch_median=median,
+            stretch_p95=high,
+            stretch_max=most,
+            folded=float(folds.mean()) if len(folds) else float("nan"),
+            contact_length=0.5 * float(lengths.sum()),
+            rho=spacing.rho,
+            cv=spacing.cv,
+            cv6=spacing.cv6,
+            samples=samples,
+            decals=DecalMeasures(
+                visible_area=self.area * self.shown,
+                overlap_area=self.area * self.overlapped,
+                stretch_median=percentiles[:, 0],
+                stretch_p95=percentiles[:, 1],
+                stretch_max=percentiles[:, 2],
+                folded=np.where(known > 0, folded / np.maximum(known, 1), np.nan),
+                contact_length=lengths,
+                nearest=nearest[:, 0],
+            ),
+        )
+
+
+def _percentiles(values: NDArray[np.floating]) -> Sequence[float]:
+    if not len(values):
+        return [float("nan")] * len(PERCENTILES)
+    return [float(value) for value in np.percentile(values, PERCENTILES)]
+
+
+def _nearest(decals: Decals) -> Float64Array:
+    """Return the distances to the six nearest decals that face the same way, ascending: float64[n, 6]."""
+    if not len(decals):
+        return np.zeros((0, 6))
+    tree = FacingTree(decals.positions, decals.normals)
+    return tree.nearest(decals.positions, decals.normals, count=6, skip_self=True)[0]
