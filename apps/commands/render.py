@@ -67,8 +67,9 @@ def render(
     decals
         Number of decals. Default: 500.
     image
-        Image of the decals: eye, rivet, rock, scale or tile, optionally with a colour (scale#b0413e), or a
-        picture file. Can be repeated: each decal then takes one at random. Default: scale.
+        Image of the decals: eye, rivet, rock, scale, spatter or tile, optionally with a colour
+        (scale#b0413e), or a picture file. Can be repeated: each decal then takes one at random. Default:
+        scale.
     camera
         View: three-quarter, front, back, left, right, top, bottom, or a direction x,y,z toward the camera.
         Default: three-quarter.

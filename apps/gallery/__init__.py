@@ -9,9 +9,12 @@ from importlib.resources import files
 from typing import Literal, get_args
 
 Example = Literal[
+    "field",
     "sphere",
     "edges",
     "spanning",
+    "stain",
+    "pairs",
     "touching",
     "particles",
     "deforming",

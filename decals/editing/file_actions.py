@@ -13,7 +13,7 @@ from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
-from decals.images.builtin import is_builtin
+from decals.images.builtin import BUILTIN_IMAGES, is_builtin
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
 from decals.scenes.meshes import write_mesh
@@ -207,7 +207,7 @@ class FileActions:
             count = len(state.session.document.images)
             state.show(f"added {text} as image {count - 1}; press I to show it on the selected decals")
 
-        self._state.prompt.begin(TextPrompt("image file, or scale, tile, eye, rivet, rock", "", accept))
+        self._state.prompt.begin(TextPrompt(f"image file, or {', '.join(BUILTIN_IMAGES)}", "", accept))
 
     def _checked_path(self, text: str, suffixes: tuple[str, ...]) -> Path:
         """Return the path of a file to write, or raise `InvalidEdit`."""

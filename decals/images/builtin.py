@@ -1,4 +1,4 @@
-"""Generated decal images, by name: eye, rivet, rock, scale and tile."""
+"""Generated decal images, by name: eye, rivet, rock, scale, spatter and tile."""
 
 import re
 from functools import lru_cache, partial
@@ -153,6 +153,38 @@ def paint_scale(canvas: Canvas, base: Color) -> tuple[Field, Field]:
     return dark_ring(canvas, color, width=0.055), np.ones_like(rho)
 
 
+SPATTER_COLOR = rgb("#8c1512")
+SPATTER_EDGE = 0.97
+SPATTER_BLOT = 0.5
+"""Mean radius of the blot in the middle."""
+
+
+def paint_spatter(canvas: Canvas, base: Color) -> tuple[Field, Field]:
+    """Paint a stain of thick liquid: a blot with rays, and drops that grow smaller outward."""
+    x, y, rho = canvas.x, canvas.y, canvas.rho
+    angle = np.arctan2(y, x)
+    around_x, around_y = np.cos(angle), np.sin(angle)
+    lobes = fractal_noise(2.2 * around_x + 5.0, 2.2 * around_y, octaves=3, seed=4)
+    rays = fractal_noise(7.0 * around_x, 7.0 * around_y + 3.0, octaves=2, seed=12)
+    blot = SPATTER_BLOT + 0.5 * (lobes - 0.5) + 0.85 * np.maximum(rays - 0.62, 0.0)
+    drops = np.maximum.reduce(
+        [
+            (0.62 - 0.42 * rho) / grain - cell_noise(grain * x + seed, grain * y - seed, seed=seed)[0] / grain
+            for grain, seed in ((3.2, 6), (6.5, 23))
+        ]
+    )
+    inner = np.maximum(blot - rho, 0.55 * drops - 0.035)
+    inside = np.minimum(inner, SPATTER_EDGE - rho)
+
+    r, g, b = base
+    thick = smoothstep(0.02, 0.12, inner)
+    height = 0.10 * smoothstep(0.0, 0.07, inner)
+    color = mix((0.78 * r, 0.62 * g, 0.62 * b), (0.45 * r, 0.35 * g, 0.35 * b), thick)
+    color = color * light(canvas, height, ambient=0.6)[..., None]
+    color = color + (0.55 * shine(canvas, height, sharpness=90.0))[..., None]
+    return color, canvas.below(-inside, 0.0)
+
+
 TILE_COLOR = rgb("#2f7f95")
 
 
@@ -184,6 +216,7 @@ _PAINTERS = {
     "rivet": (paint_rivet, RIVET_COLOR),
     "rock": (paint_rock, ROCK_COLOR),
     "scale": (paint_scale, SCALE_COLOR),
+    "spatter": (paint_spatter, SPATTER_COLOR),
     "tile": (paint_tile, TILE_COLOR),
 }
 
@@ -224,8 +257,8 @@ def generate_image(reference: str, size: int = 256) -> NDArray[np.uint8]:
     """Generate one of the built-in decal images.
 
     The decal's rim is the circle inscribed in the square. ``scale``, ``rock`` and ``tile`` are opaque and end
-    in a near-black ring, the contact line between neighbours (paper, figure 8); ``rivet`` and ``eye``
-    are cut out of a transparent square.
+    in a near-black ring, the contact line between neighbours (paper, figure 8); ``rivet``, ``eye`` and
+    ``spatter`` are cut out of a transparent square.
 
     Parameters
     ----------
@@ -252,7 +285,7 @@ def generate_image(reference: str, size: int = 256) -> NDArray[np.uint8]:
     --------
     >>> import decals
     >>> decals.images.BUILTIN_IMAGES
-    ('eye', 'rivet', 'rock', 'scale', 'tile')
+    ('eye', 'rivet', 'rock', 'scale', 'spatter', 'tile')
     >>> decals.images.generate_image("tile#b0413e", size=64).shape
     (64, 64, 4)
     """

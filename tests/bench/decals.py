@@ -9,6 +9,8 @@ oracles of the tests. Other parts:
     --only million                   rendering 1,000,000 decals
     --only faults                    stretched, folded, oversized and missing decals on six models
     --only contact                   folds, stretch, continuity and time of all contact modes
+    --only octree                    the paper's octree beside the index
+    --only methods                   ray tracer, coordinates at vertices, and fragment shader
     --peers                          mesh-clipped decals, log maps, and texture coordinates at vertices
 """
 
@@ -108,6 +110,17 @@ def measure_contact(*, quick: bool) -> Figures:
     return figures
 
 
+def measure_paper(part: str, *, quick: bool) -> Figures:
+    """Measure the paper's octree, or its three methods of drawing, and print the figures."""
+    from tests.bench import paper_methods, paper_octree
+
+    measure = paper_octree.measure if part == "octree" else paper_methods.measure
+    figures = measure(quick=quick)
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
+    print(*(f"{name:36} {value:12.4g}" for name, value in figures.items()), sep="\n")
+    return figures
+
+
 def measure_peers(*, quick: bool) -> Figures:
     """Measure other methods, and print the figures."""
     from tests.bench import decal_peers
@@ -129,7 +142,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench.decals", description=__doc__)
     parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
-    parser.add_argument("--only", choices=["index", "million", "faults", "contact"], help="measure one part")
+    parser.add_argument(
+        "--only",
+        choices=["index", "million", "faults", "contact", "octree", "methods"],
+        help="measure one part",
+    )
     parser.add_argument("--peers", action="store_true", help="measure other methods")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
@@ -139,6 +156,8 @@ def main() -> None:
         figures = measure_faults(quick=options.quick)
     elif options.only == "contact":
         figures = measure_contact(quick=options.quick)
+    elif options.only in ("octree", "methods"):
+        figures = measure_paper(options.only, quick=options.quick)
     elif options.only:
         figures = measure_index(options.device)
     elif options.peers:

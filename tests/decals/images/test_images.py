@@ -17,8 +17,8 @@ def _rho(size: int) -> NDArray[np.float64]:
     return np.hypot(*np.meshgrid(ticks, ticks))
 
 
-def test_the_names_are_the_five() -> None:
-    assert BUILTIN_IMAGES == ("eye", "rivet", "rock", "scale", "tile")
+def test_the_names_are_the_six() -> None:
+    assert BUILTIN_IMAGES == ("eye", "rivet", "rock", "scale", "spatter", "tile")
 
 
 @pytest.mark.parametrize("name", BUILTIN_IMAGES)
@@ -49,6 +49,15 @@ def test_cut_outs_have_a_smooth_edge_inside_the_rim(name: str) -> None:
     soft = (alpha > 0) & (alpha < 255)
     assert soft.any()
     assert np.ptp(rho[soft]) < 6 / 256
+
+
+def test_a_spatter_is_one_colour_within_its_rim() -> None:
+    image, rho = generate_image("spatter", 256).astype(int), _rho(256)
+    opaque = image[..., 3] == 255
+    assert (image[..., 3][rho > 0.99] == 0).all()
+    assert 0.15 < opaque.mean() < 0.6
+    assert opaque[rho < 0.2].all()
+    assert (image[opaque, 0] > image[opaque, 1]).all()
 
 
 @pytest.mark.parametrize("name", CUT_OUT)
@@ -88,7 +97,7 @@ def test_a_colour_tints() -> None:
 
 @pytest.mark.parametrize("reference", ["", "scales", "scale#", "scale#12345", "SCALE", "scale#12345g"])
 def test_unknown_names_say_what_there_is(reference: str) -> None:
-    with pytest.raises(InvalidImage, match=r"eye, rivet, rock, scale, tile"):
+    with pytest.raises(InvalidImage, match=r"eye, rivet, rock, scale, spatter, tile"):
         generate_image(reference)
 
 
