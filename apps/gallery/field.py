@@ -26,9 +26,12 @@ def panels() -> Sequence[Panel]:
     return Panel(_decal()), Panel(_graph())
 
 
-def line(points: ArrayLike, color: tuple[float, float, float] = INK, *, radius: float = _THIN) -> Node:
+def line(
+    points: Sequence[ArrayLike], color: tuple[float, float, float] = INK, *, radius: float = _THIN
+) -> Node:
     """Return a line through points."""
-    return Polyline(np.asarray(points, np.float64), radius=radius, color=color)
+    rows = np.asarray(points, np.float64).tolist()
+    return Polyline(tuple((x, y, z) for x, y, z in rows), radius=radius, color=color)
 
 
 def _decal() -> Scene:

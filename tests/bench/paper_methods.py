@@ -10,6 +10,8 @@ vertices and by the fragment shader.
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any, cast
 
 import numpy as np
 import pyvista as pv
@@ -73,7 +75,7 @@ def measure(*, quick: bool) -> Figures:
     for name, cell_size in CELLS.items():
         mesh = polygonize(tree, cell_size=cell_size)
         figures[f"{name}_triangles"] = len(mesh.faces)
-        figures[f"{name}_vertices_s"] = _least(lambda mesh=mesh: at_vertices(decals, mesh))
+        figures[f"{name}_vertices_s"] = _least(partial(at_vertices, decals, mesh))
         figures |= {f"{name}_{key}": value for key, value in _vertex_errors(decals, mesh).items()}
     return figures
 
@@ -165,16 +167,16 @@ def draw(*, side: int = 300) -> Image.Image:
 def _by_vertices(decals: Decals, mesh: Mesh, image: DecalImage, camera: Camera, side: int) -> Image.Image:
     """Draw with image coordinates at vertices, as graphics hardware does."""
     owner, uv = at_vertices(decals, mesh)
-    model = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+    model: Any = pv.PolyData.from_regular_faces(mesh.vertices.astype(float), mesh.faces.astype(int))
     model.point_data.active_normals = mesh.normals
     model.active_texture_coordinates = np.where(owner[:, None] >= 0, [[1, -1]] * uv + [[0, 1]], 0.0)
     pixels = image.pixels.astype(np.float64)
     alpha = pixels[..., 3:] / 255
     over = alpha * pixels[..., :3] + (1 - alpha) * 255 * np.array(CLAY)
-    texture = pv.Texture(over.astype(np.uint8))
+    texture = cast(Any, pv.Texture)(over.astype(np.uint8))
     texture.repeat = False
     texture.interpolate = True
-    plotter = pv.Plotter(off_screen=True, window_size=(side, side))
+    plotter: Any = pv.Plotter(off_screen=True, window_size=[side, side])
     plotter.set_background("white")
     plotter.add_mesh(model, texture=texture, smooth_shading=True)
     plotter.camera.position, plotter.camera.focal_point = camera.position, camera.target
