@@ -16,7 +16,7 @@ from decals.errors import InvalidInput
 FOLDER = Path("gallery")
 """Default folder of the pictures of all examples."""
 MAX_SIDE = 4096
-"""Longest side of a panel, in pixels: a picture has up to four panels."""
+"""Longest side of a panel, in pixels: a picture has up to five panels."""
 
 
 def gallery(

@@ -16,6 +16,7 @@ Example = Literal[
     "stain",
     "pairs",
     "touching",
+    "by_hand",
     "particles",
     "deforming",
     "painted",

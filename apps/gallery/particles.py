@@ -1,8 +1,8 @@
 """Particles and decals
 ====================
 
-Figures 10 and 11 of the paper: particles that repel each other on a surface, and the decals at their
-positions.
+Figures 10 and 11 of the paper: 1,000 particles that repel each other on a surface, and the decals at
+their positions.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from decals import DecalImage, Scene, scatter
 from decals.apps.gallery.helpers import Panel, main, ring_image, sample, sample_camera
 
-COUNT = 500
+COUNT = 1000
 
 
 def panels() -> Sequence[Panel]:
