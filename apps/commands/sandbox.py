@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import pyvista as pv
 from cyclopts import Parameter
 from rich.console import Console
 
@@ -12,6 +11,7 @@ from decals.apps.commands.options import Definitions, OptionalWhole, Trust, Whol
 from decals.apps.models.loading import import_definitions
 from decals.errors import InvalidInput, MissingPackage
 from decals.window import EditWindow
+from decals.window.host_plotter import new_plotter
 
 HOST = "127.0.0.1"
 """The page is served to this machine only."""
@@ -82,7 +82,7 @@ def sandbox(
     opening = opened(
         model, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save, trust=trust
     )
-    plotter = pv.Plotter(off_screen=True, window_size=list(FIRST_SIZE))
+    plotter = new_plotter(True, FIRST_SIZE)
     window = EditWindow(opening.scene, path=opening.path, plotter=plotter, recover=opening.recover)
     opening.add_images(window)
     try:

@@ -98,6 +98,7 @@ class Display:
         self._key: tuple[object, ...] = ()
         self._meshes: tuple[Sequence[SceneObject], list[pv.PolyData]] = (), []
         self._names: list[str] = []
+        self._decorated: list[Any] = []
         self._axes = False
 
     def values(self) -> dict[str, Any]:
@@ -198,6 +199,9 @@ class Display:
     def _install(self, shown: Shown, message: str, options: DisplayOptions) -> None:
         """Exchange the actors, and hide the scene where a mesh stands for it."""
         plotter, subplot = self._window.plotter, self._window.subplot
+        for actor in self._decorated:
+            subplot.remove(actor)
+        self._decorated = []
         for name in self._names:
             plotter.remove_actor(name, render=False, reset_camera=False)
         plotter.scalar_bars.clear()
@@ -214,6 +218,7 @@ class Display:
             )
             if decorated:
                 subplot.apply(actor)
+                self._decorated.append(actor)
 
     # -- cameras ----------------------------------------------------------------------------------------
 

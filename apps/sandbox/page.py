@@ -6,12 +6,12 @@ from typing import Any
 
 from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import html, vuetify3
-from trame_pyvista.widgets import PyVistaRemoteView
 
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.folder import thumbnails
 from decals.apps.sandbox.panels import DROP, FIELD, named
 from decals.apps.sandbox.sandbox import Sandbox
+from decals.apps.sandbox.view import StreamedView
 from decals.editing.actions import KEYS
 from decals.editing.key_bindings import format_gestures
 from decals.window import EditWindow, browser_keys
@@ -123,7 +123,8 @@ class Page:
                         **browser_keys(self._window),
                     ),
                 ):
-                    self.view = PyVistaRemoteView(self._window.plotter, style="height: 100%")
+                    self.view = StreamedView(self._window, self.sandbox.take_step, style="height: 100%")
+                    self.sandbox.schedule = self.view.update
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status"'])

@@ -74,6 +74,8 @@ class Sandbox:
     ----------
     display : Display
         How the view shows the scene.
+    schedule
+        Asks for a call of `take_step` before the next frame. Default: it is called at once.
 
     Notes
     -----
@@ -98,6 +100,8 @@ class Sandbox:
         self._start: dict[str, Any] = {}
         self.show_start(start)
         self._last_step = math.inf
+        self.schedule: Callable[[], None] = self.take_step
+        self._step: Callable[[], None] | None = None
         self._rows: list[dict[str, Any]] = []
         self._objects: Any = None
         self._images: Any = None
@@ -204,10 +208,31 @@ class Sandbox:
 
     def set_value(self, name: str, raw: Any, last: bool = True) -> None:
         """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`."""
-        with self._reported(whole=bool(last)):
-            trees = self._window.actions.trees
-            trees.set_parameter(name, parsed(trees.selected_node, name, raw), last=bool(last))
-            self._last_step = math.inf if last else time.monotonic()
+        trees = self._window.actions.trees
+        self._slide(
+            lambda: trees.set_parameter(name, parsed(trees.selected_node, name, raw), last=bool(last)),
+            last=bool(last),
+        )
+
+    def _slide(self, step: Callable[[], None], *, last: bool) -> None:
+        """Carry out a step of a slider; while it moves, only the newest one, before the next frame."""
+
+        def reported() -> None:
+            with self._reported(whole=last):
+                step()
+                self._last_step = math.inf if last else time.monotonic()
+
+        if last:
+            reported()
+            return
+        self._step = reported
+        self.schedule()
+
+    def take_step(self) -> None:
+        """Carry out the newest step of a slider, if one waits."""
+        step, self._step = self._step, None
+        if step is not None:
+            step()
 
     def settle(self) -> None:
         """Keep the view up to date, and end the edit of a slider that has rested; call this regularly."""
@@ -401,9 +426,8 @@ class Sandbox:
 
     def set_decals(self, name: str, raw: Any, last: bool = True) -> None:
         """Set a value of the selected decals to what a control sent."""
-        with self._reported(whole=bool(last)):
-            set_decal_value(self._window.actions.state, name, raw, last=bool(last))
-            self._last_step = math.inf if last else time.monotonic()
+        state = self._window.actions.state
+        self._slide(lambda: set_decal_value(state, name, raw, last=bool(last)), last=bool(last))
 
     def set_brush(self, name: str, raw: Any, _last: bool = True) -> None:
         """Set the brush, or one of its numbers."""
@@ -464,7 +488,8 @@ class Sandbox:
 
     @contextmanager
     def _reported(self, *, whole: bool = True) -> Iterator[None]:
-        """Turn errors of the event into the message, and draw the result."""
+        """Turn errors of the event into the message, and draw the result; an event ends the steps before."""
+        self.take_step()
         try:
             yield
         except ImplicitDecalsError as error:

@@ -32,6 +32,7 @@ from decals.editing.tree_commands import (
 )
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.objects import TreeObject, bounds_of
+from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
 
 RESIZE_STEP = 1.05
@@ -126,9 +127,11 @@ class TreeActions:
         """Point on the surface for the handle of the selected primitive, shape (3,)."""
         assert self._state.primitive is not None
         number, path = self._state.primitive
-        surface = self._state.session.document.objects[number].surface
-        target = self._middle(number, path) + self._state.handle_offset
-        position: Float32Array = surface.project(target[None])[0][0]
+        target = (self._middle(number, path) + self._state.handle_offset)[None]
+        projected = project_without_mesh(self._tree(number), target)
+        if projected is None:
+            projected = self._state.session.document.objects[number].surface.project(target)
+        position: Float32Array = projected[0][0]
         return position
 
     def begin_drag(self) -> None:

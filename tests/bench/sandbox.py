@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from playwright.async_api import Page
 from trame.app import get_server
 
@@ -23,12 +22,16 @@ import decals
 from blobtree import Point
 from decals.apps.sandbox.page import Page as SandboxPage
 from decals.window import EditWindow
+from decals.window.host_plotter import new_plotter
 from tests.decals.window.driver import Driver
 from tests.frontends.browsing import PICTURE, seen, served, until
 
 SIZE = 1200, 800
 REST_SECONDS = 0.5
 """Time between two events."""
+
+MOVE_SECONDS = 0.04
+"""Time between two moves of the pointer; the page drops those that follow sooner."""
 
 TREE = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6) + Point((-1.0, -0.3, 0.4), radius=0.5)
 
@@ -43,11 +46,11 @@ async def measure(count: int, events: int) -> dict[str, float]:
     """Return the figures for a number of decals and of events."""
     began = time.perf_counter()
     scene = decals.cover(TREE, count=count, images=["scale"])
-    plotter = pv.Plotter(off_screen=True, window_size=list(SIZE))
+    plotter = new_plotter(True, SIZE)
     server = get_server("sandbox bench", client_type="vue3")
     window = EditWindow(scene, plotter=plotter)
     window.show()
-    SandboxPage(server, window)
+    page = SandboxPage(server, window)
     async with served(server, size=SIZE) as browser:
         await until(lambda: not window.subplot.warming_up)
         figures = {"first_picture_warm_s": time.perf_counter() - began}
@@ -59,7 +62,7 @@ async def measure(count: int, events: int) -> dict[str, float]:
             await asyncio.sleep(REST_SECONDS)
             times.append(await _timed(browser, browser.keyboard.press(("PageUp", "PageDown")[number % 2])))
         figures |= _summary("slider", times)
-        window.actions.state.primitive = None
+        page.sandbox.select("")
         driver = Driver(window)
         number, (x, y) = next(driver.visible())
         window.actions.state.selection = (number,)
@@ -68,20 +71,31 @@ async def measure(count: int, events: int) -> dict[str, float]:
         left, top = box["x"] + x, box["y"] + plotter.window_size[1] - y
         await browser.mouse.move(left, top)
         await browser.mouse.down()
+        await until(lambda: window.tools.drags_decals)
         times = []
         for step in range(events):
             await asyncio.sleep(REST_SECONDS)
-            at = left + 20 + 20 * (step % 2), top
-            times.append(await _timed(browser, browser.mouse.move(*at)))
+            x = left + 20 + 20 * (step % 2)
+            first, event = browser.mouse.move(x - 1, top), browser.mouse.move(x, top)
+            times.append(await _timed(browser, event, first))  # the page sends no first move after a rest
         await browser.mouse.up()
         figures |= _summary("drag", times)
     window.close()
     return figures
 
 
-async def _timed(browser: Page, event: Coroutine[Any, Any, None]) -> float:
-    """Return the milliseconds from an event to another picture, −1 for none; a look takes some 50 of them."""
-    before, began = await seen(browser), time.perf_counter()
+async def _timed(
+    browser: Page, event: Coroutine[Any, Any, None], first: Coroutine[Any, Any, None] | None = None
+) -> float:
+    """Return the milliseconds from an event to another picture, −1 for none; a look takes some 50 of them.
+
+    Another event may come first, which changes nothing.
+    """
+    before = await seen(browser)
+    if first is not None:
+        await first
+        await asyncio.sleep(MOVE_SECONDS)
+    began = time.perf_counter()
     await event
     while time.perf_counter() - began < LONGEST:
         if np.abs(await seen(browser) - before).max() > CHANGED:

@@ -13,6 +13,7 @@ from blobtree.nodes.surgery import move_branch
 from decals.apps.sandbox.display import MODES, OVERLAYS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.views import PRESETS
+from decals.errors import InvalidScene
 from decals.record import Contact
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
@@ -74,6 +75,16 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
     sandbox.set_display("overlay", "folds")
     settle(sandbox, shared)
     assert "triangles folded" in sandbox.status
+
+
+def test_a_former_mode_keeps_no_mesh(sandbox: Sandbox, shared: EditWindow) -> None:
+    sandbox.set_display("mode", "polygonized")
+    settle(sandbox, shared)
+    actor = shared.plotter.actors["sandbox mesh"]
+    sandbox.set_display("mode", "traced")
+    settle(sandbox, shared)
+    with pytest.raises(InvalidScene, match="expected an actor with decals"):
+        shared.subplot.remove(actor)
 
 
 def test_overlays_follow_edits(sandbox: Sandbox, shared: EditWindow) -> None:

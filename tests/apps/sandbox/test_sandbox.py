@@ -43,6 +43,31 @@ def finish(window: EditWindow) -> None:
         time.sleep(0.005)
 
 
+def test_of_waiting_slider_steps_only_the_newest_is_carried_out(window: EditWindow) -> None:
+    sandbox, asked, radii = Sandbox(window), [], []
+    sandbox.schedule = lambda: asked.append(True)
+    sandbox.select("0/1")
+
+    def changed(_: object) -> None:
+        tree: Any = tree_of(window.document)
+        radii.append(tree.children[1].radius)
+
+    window.session.subscribe(changed)
+    for radius in (0.65, 0.7, 0.75):
+        sandbox.set_value("radius", radius, False)
+    assert (len(asked), radii) == (3, [])
+    sandbox.take_step()
+    sandbox.take_step()
+    assert radii == [0.75]
+    sandbox.set_value("radius", 0.8, False)
+    sandbox.select("0/0")  # any other event comes after the step
+    assert radii[-1] == 0.8
+    sandbox.set_value("radius", 0.85, False)
+    sandbox.set_value("radius", 0.9, True)
+    tree: Any = tree_of(window.document)
+    assert (tree.children[0].radius, tree.children[1].radius) == (0.9, 0.8)
+
+
 def shapes(window: EditWindow) -> list[str]:
     return [row["label"] for row in outline(window.document) if "/" in row["key"] or row["key"].isdigit()]
 

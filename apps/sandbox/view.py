@@ -1,0 +1,129 @@
+"""The view of the page: pictures of a plotter, each sent once, as soon as it is drawn."""
+
+import asyncio
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from PIL import Image
+from trame_pyvista.widgets import PyVistaRemoteView
+from trame_vtk.modules.vtk.protocols import vtkWebPublishImageDelivery
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+
+from blobtree._typing import UInt8Array
+from decals.window import EditWindow
+from decals.window.event_bindings import running_loop
+from decals.window.frames import FrameState
+
+QUALITY, COARSE_QUALITY = 92, 75
+"""JPEG quality of a picture at rest, and of one while something moves."""
+
+PENDING_MESSAGES = 4
+"""With more messages on their way to the browser than this, the next picture waits."""
+
+PENDING_SECONDS = 0.01
+"""Time between two looks at the messages on their way."""
+
+
+class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typed
+    """Draws the newest state only, once all messages that wait are handled, and encodes it in a thread.
+
+    trame's own view draws a frame for every message, and waits half a second for a picture that is still
+    being encoded.
+
+    Parameters
+    ----------
+    window
+        The edited window.
+    before_frame
+        Called before each frame.
+    options
+        Options of the element.
+    """
+
+    def __init__(self, window: EditWindow, before_frame: Callable[[], None], **options: Any) -> None:
+        self._window, self._before_frame = window, before_frame
+        self._outdated = False
+        self._task: asyncio.Task[None] | None = None
+        self._delivery: Any = None
+        self._camera_time = 0
+        super().__init__(window.plotter, **options)
+        self.server.add_protocol_to_configure(self._take_over)
+
+    def _take_over(self, protocol: Any) -> None:
+        """Draw here what trame's own delivery would draw."""
+        for part in protocol.getLinkProtocols():
+            if isinstance(part, vtkWebPublishImageDelivery):
+                self._delivery = part
+                part.push_render = self._push
+
+    def _push(self, _view: str, animated: bool = False, _stale: int = 0) -> None:
+        """Draw after input of the view; while a button is down, trame asks for frames all the time."""
+        camera_time = self._window.plotter.renderer.camera.GetMTime()
+        if not animated or camera_time != self._camera_time:
+            self._camera_time = camera_time
+            self.update()
+
+    def update(self, **_: Any) -> None:
+        """Send a new picture to the page soon."""
+        self._outdated = True
+        loop = running_loop()
+        if self._delivery is not None and self._task is None and loop is not None:
+            self._task = loop.create_task(self._send(), name="pictures of the sandbox")
+
+    async def _send(self) -> None:
+        """Send pictures until the last one is up to date."""
+        try:
+            while self._outdated:
+                await asyncio.sleep(0)  # messages that wait are handled first
+                while self._delivery.coreServer.network_monitor.pending > PENDING_MESSAGES:
+                    await asyncio.sleep(PENDING_SECONDS)
+                self._before_frame()
+                self._outdated = False
+                if not self._window.plotter.render_window:
+                    return
+                pixels = self._draw()
+                coarse = self._window.frames.state is FrameState.COARSE
+                image = await asyncio.to_thread(_encoded, pixels, COARSE_QUALITY if coarse else QUALITY)
+                self._publish(image, pixels)
+        finally:
+            self._task = None
+
+    def _draw(self) -> UInt8Array:
+        """Draw a frame at the size of the page's view, and return its pixels."""
+        target: Any = self._window.plotter.render_window
+        target.GetInteractor().EnableRenderOff()
+        tracked: dict[str, Any] = next(iter(self._delivery.tracking_views.values()), {})
+        if "originalSize" in tracked:
+            size = [int(side * tracked.get("ratio", 1) + 0.5) for side in tracked["originalSize"]]
+            if min(size) > 0 and size != list(target.GetSize()):
+                target.SetSize(size)
+        target.Render()
+        width, height = target.GetSize()
+        picture = vtkWindowToImageFilter(input=target, read_front_buffer=False, should_rerender=False)
+        picture.Update()
+        pixels: UInt8Array = pv.convert_array(picture.GetOutput().GetPointData().GetScalars())
+        return np.ascontiguousarray(pixels.reshape(height, width, 3)[::-1])
+
+    def _publish(self, image: bytes, pixels: UInt8Array) -> None:
+        height, width, _ = pixels.shape
+        for view in self._delivery.tracking_views:
+            message = {
+                "id": view,
+                "image": self._delivery.addAttachment(image),
+                "format": "jpeg",
+                "size": [width, height],
+                "memsize": len(image),
+                "workTime": 0,
+                "stale": False,
+            }
+            self._delivery.publish("viewport.image.push.subscription", message)
+
+
+def _encoded(pixels: UInt8Array, quality: int) -> bytes:
+    """Return a picture as JPEG."""
+    file = BytesIO()
+    Image.fromarray(pixels).save(file, "JPEG", quality=quality)
+    return file.getvalue()
