@@ -43,7 +43,7 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
         delivery.coreServer = SimpleNamespace(network_monitor=SimpleNamespace(pending=0))
         delivery.tracking_views["7"] = {"originalSize": [100, 70], "ratio": 1}
         view._take_over(Protocol(object(), delivery))
-        view.update()  # without a loop, nobody would see it
+        view.update()  # without a loop, nothing is sent
         assert sent == []
 
         async def changes() -> None:
