@@ -28,10 +28,6 @@ Operand = Callable[[Rng], Node]
 EXACT = 1e-4
 """Largest relative error of values and gradients, absolute below 1."""
 
-ON_CURVES = 1e-3
-"""The same for gradients of strokes, where few points exceed EXACT: the closest point of a curve is the
-root of a polynomial of degree 5 in float32."""
-
 AWAY = 2e-3
 """Field values between a point and the nearest kink, where gradients are compared."""
 
@@ -187,6 +183,8 @@ def _problems(node: Node, rng: Rng) -> Iterator[str]:
     yield from _texts(node)
     if isinstance(node, Leaf):
         variants: dict[str, Any] = {"negative": replace(random_profile(rng, node, (1.0,)), weight=-0.7)}  # type: ignore[type-var]
+        if Quantity.RADIUS in {item.quantity for item in parameters_of(type(node)).values()}:
+            variants["offset"] = random_profile(rng, node, (1.0,)).offset(float(rng.uniform(-0.1, 0.2)))
         if isinstance(node, Falling):
             for name in BUILT_IN_FALLOFFS:
                 variants[name] = replace(random_profile(rng, node, (1.0, 0.7)), falloff=name)  # type: ignore[type-var]
@@ -209,7 +207,7 @@ def _fields(node: Node, points: Any, what: str) -> Iterator[str]:
     expected = oracle.gradient(node, points[smooth])
     length = np.maximum(1.0, np.linalg.norm(expected, axis=1))
     error = np.linalg.norm(seen[smooth, 1:] - expected, axis=1) / length
-    if error.max(initial=0.0) > (ON_CURVES if isinstance(node, blobtree.Stroke) else EXACT):
+    if error.max(initial=0.0) > EXACT:
         yield f"{what}: gradient differs from float64 by {error.max():.3g}"
 
 

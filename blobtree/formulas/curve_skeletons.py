@@ -23,6 +23,10 @@ ROOT_STEPS = 20
 ROOT_TOLERANCE = 1e-7
 """Change of a root, for parameters from 0 to 1, that ends its iteration."""
 
+POLISH_STEPS = 3
+POLISH_LIMIT = 4e-3
+"""Longest step of `polished`: beside a centre of curvature, a root in float32 is that far off."""
+
 
 @wp.func
 def closest_on_arc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
@@ -160,23 +164,30 @@ def curve_ratio(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 @wp.func
 def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
-    """Return t after a Newton step for N(t) = ½ (|c − q|²)' s − |c − q|² s'.
+    """Return t after Newton steps for N(t) = ½ (|c − q|²)' s − |c − q|² s'.
 
     Its vectors cancel less than the coefficients of N. Lengths are in units of s(0), for squares overflow.
     """
     unit = 1.0 / tape[at][3]
-    c = curve_point(t, tape, at)
-    slope = (tape[at + 1] + (tape[at + 2] * 2.0 + tape[at + 3] * (3.0 * t)) * t) * unit
-    bend = (tape[at + 2] * 2.0 + tape[at + 3] * (6.0 * t)) * unit
-    w = (wp.vec3(c[0], c[1], c[2]) - q) * unit
-    s = c[3] * unit
-    d = wp.vec3(slope[0], slope[1], slope[2])
-    n = wp.dot(w, d) * s - wp.dot(w, w) * slope[3]
-    rate = (wp.dot(d, d) + wp.dot(w, wp.vec3(bend[0], bend[1], bend[2]))) * s
-    rate -= wp.dot(w, d) * slope[3] + wp.dot(w, w) * bend[3]
-    if rate * 1.0e-3 <= wp.abs(n):
-        return t  # N is flat here, or t is an end
-    return wp.clamp(t - n / rate, 0.0, 1.0)
+    root = float(t)
+    for _step in range(POLISH_STEPS):
+        c = curve_point(root, tape, at)
+        slope = (tape[at + 1] + (tape[at + 2] * 2.0 + tape[at + 3] * (3.0 * root)) * root) * unit
+        bend = (tape[at + 2] * 2.0 + tape[at + 3] * (6.0 * root)) * unit
+        w = (wp.vec3(c[0], c[1], c[2]) - q) * unit
+        s = c[3] * unit
+        d = wp.vec3(slope[0], slope[1], slope[2])
+        n = wp.dot(w, d) * s - wp.dot(w, w) * slope[3]
+        rate = (wp.dot(d, d) + wp.dot(w, wp.vec3(bend[0], bend[1], bend[2]))) * s
+        rate -= wp.dot(w, d) * slope[3] + wp.dot(w, w) * bend[3]
+        if rate <= 0.0:
+            break
+        following = wp.clamp(root - wp.clamp(n / rate, -POLISH_LIMIT, POLISH_LIMIT), 0.0, 1.0)
+        change = wp.abs(following - root)
+        root = following
+        if change <= ROOT_TOLERANCE:
+            break
+    return root
 
 
 @wp.func

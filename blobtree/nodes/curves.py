@@ -344,9 +344,10 @@ class Stroke(Pieces):
 
     def _piece(self, start: list[float], control: list[float], end: list[float]) -> TaperedBezier:
         a, b, c = (tuple(ball[:3]) for ball in (start, control, end))
-        width = None if self.width is None else self.width * start[3] / self.radii[0]
         radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
-        return TaperedBezier(a, b, c, **radii, **self.shared | {"width": width})  # type: ignore[arg-type]  # lists of four
+        piece = TaperedBezier(a, b, c, **radii, **self.shared)  # type: ignore[arg-type]  # lists of four
+        object.__setattr__(piece, "to_width_radius", self.radii[0] - start[3])
+        return piece
 
 
 def checked_radii(points: tuple[Vector, ...], radii: tuple[float, ...]) -> tuple[float, ...]:

@@ -154,6 +154,8 @@ class ProgramLeaf(ProgramNode):
     color: Vector
     profiled = False
     """True if falloff, width or weight are not the default ones."""
+    to_width_radius = 0.0
+    """The radius at which the profile has its width, minus the leaf's first radius."""
 
     @property
     def profile(self) -> tuple[Falloff, float | None, float]:
@@ -306,7 +308,7 @@ def profile_factors(primitives: list[PlacedPrimitive], influences: Float64Array)
     for number, (primitive, _) in enumerate(primitives):
         if primitive.profiled:
             falloff, width, _ = primitive.profile
-            radius = float(influences[number, 0]) * RIM
+            radius = float(influences[number, 0]) * RIM + primitive.to_width_radius
             factors[number] = 1.0 if width is None else profile_factor(falloff, width, radius)
     return factors
 

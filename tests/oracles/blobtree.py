@@ -142,10 +142,12 @@ def signed(node: Node, points: ArrayLike) -> Field:
             edges = np.minimum(np.minimum(x, y), z)  # diamonds have edges there
             return _falling(ratio, float(np.cbrt(np.prod(semi_axes))), node.width, node, edges)
         case Leaf() if isinstance(node, shapes.KINDS):
-            radius = node.radii[0] if isinstance(node, Stroke) else node.radius
+            radius = node.radii[0] + shapes.growth_of(node) if isinstance(node, Stroke) else node.radius
             width, free = node.width, np.full(len(q), np.inf)
             leaf, next_leaf = (_falling(d, radius, width, node, free) for d in shapes.distances(node, q))
             apart = np.where(next_leaf.value != 0.0, np.abs(leaf.value - next_leaf.value), np.inf)
+            if isinstance(node, shapes.CURVES):
+                apart[shapes.near_focus(node, q)] = 0.0
             return replace(leaf, margin=np.minimum(apart, leaf.margin))
         case Gyroid(center=center, period=period, thickness=thickness):
             x, y, z = 2.0 * np.pi / period * (q - np.array(center)).T
@@ -281,8 +283,8 @@ def grown(node: Node, distance: float) -> Node:
         case TaperedBezier(radius=radius, control_radius=control, end_radius=end):
             radius, control, end = (value + distance for value in (radius, control, end))
             return replace(node, radius=radius, control_radius=control, end_radius=end)
-        case Stroke(radii=radii):
-            return replace(node, radii=tuple(radius + distance for radius in radii))
+        case Stroke():
+            return shapes.GrownStroke.of(node, distance)
         case HalfSpace(point=point, normal=normal, radius=radius):
             moved = np.array(point) + distance * np.array(normal) / np.linalg.norm(normal)
             return replace(node, point=tuple(moved), radius=radius + distance)

@@ -5,6 +5,7 @@ minimum at another place of the skeleton, infinite without another one.
 """
 
 from collections.abc import Callable
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -46,6 +47,31 @@ KINDS = (
 )
 """Kinds of nodes of which `distances` are known."""
 
+CURVES = (Arc, QuadraticBezier, CubicBezier, TaperedBezier, Stroke)
+
+FOCUS = 1e-2
+"""Distance from a centre of curvature, over the radius of curvature, below which a point is near it.
+
+The closest point moves a hundred times as far as such a point, and float32 gives it only within 1e-4.
+"""
+
+
+class GrownStroke(Stroke):
+    """A stroke under an offset: its curve has larger radii everywhere, and keeps its shape."""
+
+    growth = 0.0
+
+    @classmethod
+    def of(cls, stroke: Stroke, distance: float) -> "GrownStroke":
+        names = [field.name for field in fields(Stroke)]
+        grown = cls(**{name: getattr(stroke, name) for name in names})
+        object.__setattr__(grown, "growth", growth_of(stroke) + distance)
+        return grown
+
+
+def growth_of(stroke: Stroke) -> float:
+    return stroke.growth if isinstance(stroke, GrownStroke) else 0.0
+
 
 def distances(node: object, q: Floats) -> tuple[Floats, Floats]:
     """Return both for a node of any of these kinds at points (n, 3)."""
@@ -78,7 +104,9 @@ def curve_of(node: object) -> Curve:
         return _arc(node)
     if isinstance(node, Stroke):
         balls = np.column_stack([node.points, node.radii])
-        return _b_spline(balls) if node.spline == "b_spline" else _stroke(balls)
+        curve = _b_spline(balls) if node.spline == "b_spline" else _stroke(balls)
+        growth = np.array([0.0, 0.0, 0.0, growth_of(node)])
+        return lambda t: curve(t) + growth
     if isinstance(node, TaperedBezier):
         radii = (node.radius, node.control_radius, node.end_radius)
         points = (node.start, node.control, node.end)
@@ -162,6 +190,13 @@ def _arc(node: Arc) -> Curve:
 
 def along_curve(q: Floats, curve: Curve) -> tuple[Floats, Floats]:
     """By dense search over the curve, refined around the best place."""
+    least, _, lowest, best = _closest_places(q, curve)
+    lowest[np.arange(len(q)), best] = np.inf
+    return least, lowest.min(axis=1)
+
+
+def _closest_places(q: Floats, curve: Curve) -> tuple[Floats, Floats, Floats, NDArray[np.intp]]:
+    """Least ratios and their places (n,); ratios of samples that are local minima; the least sample."""
     t = np.linspace(0.0, 1.0, SAMPLES + 1)
     balls = curve(t)
     ratios = np.linalg.norm(q[:, None] - balls[:, :3], axis=2) / balls[:, 3]
@@ -169,19 +204,40 @@ def along_curve(q: Floats, curve: Curve) -> tuple[Floats, Floats]:
     lowest = np.where((ratios <= padded[:, :-2]) & (ratios < padded[:, 2:]), ratios, np.inf)
     best = lowest.argmin(axis=1)
     low, high = t[np.maximum(best - 1, 0)], t[np.minimum(best + 1, SAMPLES)]
-
-    def ratio(s: Floats) -> Floats:
-        ball = curve(s)
-        result: Floats = np.linalg.norm(q - ball[:, :3], axis=1) / ball[:, 3]
-        return result
-
     for _ in range(60):
         third = (high - low) / 3.0
-        falls = ratio(low + third) >= ratio(high - third)
+        falls = _ratio(q, curve, low + third) >= _ratio(q, curve, high - third)
         low, high = np.where(falls, low + third, low), np.where(falls, high, high - third)
-    least = np.minimum(ratio(0.5 * (low + high)), ratios[np.arange(len(q)), best])
-    lowest[np.arange(len(q)), best] = np.inf
-    return least, lowest.min(axis=1)
+    place, at_best = 0.5 * (low + high), ratios[np.arange(len(q)), best]
+    least = _ratio(q, curve, place)
+    return np.minimum(least, at_best), np.where(least <= at_best, place, t[best]), lowest, best
+
+
+def _ratio(q: Floats, curve: Curve, t: Floats) -> Floats:
+    ball = curve(t)
+    result: Floats = np.linalg.norm(q - ball[:, :3], axis=1) / ball[:, 3]
+    return result
+
+
+def near_focus(node: object, q: Floats, step: float = 1e-4) -> NDArray[np.bool_]:
+    """Points (n,) within `FOCUS` of a centre of curvature, or with two closest points beside each other.
+
+    With ρ = |q − c| / s, the curvature of ½ ρ² s² over |c'|² at its minimum is 1 − |q − c| / radius of
+    curvature for a constant radius s.
+    """
+    curve = curve_of(node)
+    place = _closest_places(q, curve)[1]
+    inner = (place > 2.0 * step) & (place < 1.0 - 2.0 * step)
+    middle = np.clip(place, step, 1.0 - step)
+    before, ball, after = curve(middle - step), curve(middle), curve(middle + step)
+    speed = np.linalg.norm((after - before)[:, :3], axis=1) / (2.0 * step)
+    squares = [_ratio(q, curve, middle + shift) ** 2 for shift in (-step, 0.0, step)]
+    bend = 0.5 * (squares[0] - 2.0 * squares[1] + squares[2]) / step**2 * ball[:, 3] ** 2
+    around = np.clip(place + np.linspace(-10.0, 10.0, 201)[:, None] / SAMPLES, 0.0, 1.0)
+    ratios = np.array([_ratio(q, curve, t) for t in around])
+    turns = (np.diff(np.sign(np.diff(ratios, axis=0)), axis=0) > 0.0).sum(axis=0)
+    near: NDArray[np.bool_] = inner & ((bend < FOCUS * speed**2) | (turns > 1))
+    return near
 
 
 def _from_rectangle(q: Floats, node: Rectangle) -> Floats:

@@ -47,6 +47,7 @@ from blobtree.nodes.tree import NODE_KINDS
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
 from tests.oracles import blobtree as oracle
+from tests.oracles import shapes
 
 TORUS = Torus((0.1, 0.2, 0.3), (1, 2, 2), 1.0, radius=0.25)
 DISC = Disc((0.1, 0.2, 0.3), (2, -1, 2), 1.0, radius=0.2)
@@ -67,6 +68,7 @@ SHAPES: list[Node] = [
     Polygon(((-1, -1, 0.2), (1, -1, 0.2), (1, 1, 0.2), (0, -0.2, 0.2), (-1, 1, 0.2)), radius=0.2),
 ]
 WORM = Stroke(((-1, 0, 0), (0.1, 0.8, 0.3), (0.5, 0, -0.4), (1, 0.3, 0)), (0.1, 0.3, 0.2, 0.25))
+STEEP = Stroke(((-1, 0, 0), (-0.8, 0.1, 0.1), (0.5, 0, -0.4)), (0.05, 0.4, 0.1), width=0.2)
 GROUND = HalfSpace((0.1, 0.2, 0.3), (1, 2, 2), 0.8, radius=0.2)
 SQUARE: tuple[tuple[float, float, float], ...] = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 NODES = [TORUS, DISC, BOX, ELLIPSOID, *SHAPES]
@@ -110,9 +112,10 @@ def test_the_visible_radius_is_the_distance_of_the_surface_from_the_skeleton(nod
     np.testing.assert_allclose(oracle.value(node, hits.positions[hits.hit]), ISO, atol=1e-3)
 
 
-@pytest.mark.parametrize("node", [WORM, GROUND], ids=["stroke", "half_space"])
+@pytest.mark.parametrize("node", [WORM, STEEP, GROUND], ids=["stroke", "steep", "half_space"])
 def test_strokes_and_half_spaces_are_those_of_float64(node: Leaf) -> None:
-    for placed in (node, node.rotate((1, 2, 3), 50).scale(0.8), node.scale((1, 2, 1)), node.twist(30.0)):
+    turned = node.rotate((1, 2, 3), 50).scale(0.8)
+    for placed in (node, turned, node.scale((1, 2, 1)), node.twist(30.0), node.offset(0.15)):
         points = points_around(np.random.default_rng(2), placed, 300)
         field = oracle.evaluate(placed, points)
         np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
@@ -120,10 +123,24 @@ def test_strokes_and_half_spaces_are_those_of_float64(node: Leaf) -> None:
         expected = oracle.gradient(placed, points[smooth])
         np.testing.assert_allclose(placed.gradient(points[smooth]), expected, atol=5e-4)
     assert from_json(to_json(node)) == node == eval(repr(node), KINDS)
-    grown = node.offset(0.1)
-    assert grown(points_around(np.random.default_rng(1), node, 50)).max() <= 1.0
     shifted = moved(node, (1, 2, 3))
     assert type(shifted) is type(node)
+
+
+def test_gradients_are_exact_beside_centres_of_curvature() -> None:
+    a, b, c, d = (
+        (0.3028, 0.3788, 0.1614),
+        (0.7283, 0.6825, -0.7979),
+        (-0.7574, -0.2483, 0.6544),
+        (-0.591, -0.0943, 0.1234),
+    )
+    node, focus = CubicBezier(a, b, c, d, radius=0.65), np.array([-0.57167065, -0.09599333, 0.2077729])
+    steps = np.random.default_rng(1).normal(size=(200, 3)) * 1e-3
+    points = (focus + steps).astype(np.float32)
+    points = points[~shapes.near_focus(node, points.astype(np.float64))]
+    assert len(points) > 20
+    expected = oracle.gradient(node, points)
+    np.testing.assert_allclose(node.gradient(points), expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
 
 
 def test_a_stroke_passes_through_its_points_with_its_radii() -> None:

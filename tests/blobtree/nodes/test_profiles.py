@@ -189,10 +189,11 @@ def test_pieces_carve_as_one_shape_and_not_as_a_sum() -> None:
 def test_the_width_of_a_stroke_is_in_proportion_to_its_radius() -> None:
     """So its field is one function of the distance over the radius, also where its parabolas meet."""
     node = Stroke(((0, 0, 0), (1, 0, 0), (2, 0, 0)), (0.2, 0.2, 0.4), width=0.1)
-    ratio = 1.0 + 0.9 * 0.1 / 0.2
-    start, end = np.array([[0.0, 0.2 * ratio, 0], [2.0 + 0.4 * ratio, 0, 0]])
-    assert float(node(start)) == pytest.approx(float(node(end)), abs=1e-6)
-    assert 0.0 < float(node(start)) < 0.01
+    for grown, radius in ((node, 0.2), (node.offset(0.1), 0.3)):
+        ratio = 1.0 + 0.9 * 0.1 / radius
+        start, end = np.array([[0.0, radius * ratio, 0], [2.0 + (radius + 0.2) * ratio, 0, 0]])
+        assert float(grown(start)) == pytest.approx(float(grown(end)), abs=1e-6)
+        assert 0.0 < float(grown(start)) < 0.01
 
 
 @pytest.mark.parametrize("weight", [2.0, -1.5])
