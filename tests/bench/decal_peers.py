@@ -35,6 +35,7 @@ from decals.rendering.options import RenderOptions
 from decals.scenes.objects import MeshObject
 from decals.scenes.scene import DecalImage, Scene
 from tests.bench.clipped_decals import ClippedMesh, MeshDecals
+from tests.bench.exponential_maps import ExponentialMaps
 from tests.decals.field import log_maps as analytic
 from tests.decals.shapes import torus
 
@@ -210,6 +211,15 @@ class LogMaps:
         return cached[1]
 
 
+def exponential_map(mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -> Float64Array:
+    """Return the discrete exponential map of the vertices around a vertex, interpolated linearly."""
+    maps = ExponentialMaps.of(mesh.vertices, mesh.faces, mesh.normals(mesh.vertices))
+    reached, offsets = maps.map(vertex, 1.5 * radius)
+    values = np.zeros((len(mesh.vertices), 2))
+    values[reached] = offsets @ frame_at(mesh, vertex)[:2].T
+    return Locator(mesh.vertices, mesh.faces).interpolate(values, points)
+
+
 def potpourri() -> LogMaps | None:
     """Return the log maps of potpourri3d, or None if it is not installed."""
     try:
@@ -299,6 +309,30 @@ def measure_at_vertices(item: MeshObject, decals: Decals) -> Row:
         errors=errors_of(at_vertices),
         note=f"{area[straddling].sum() / area.sum():.0%} of the surface lies in triangles of several owners; "
         "the frame is that of the mesh without decals",
+    )
+
+
+def measure_exponential_maps(item: MeshObject, decals: Decals, count: int) -> Row:
+    """Measure discrete exponential maps of the mesh, each decal at its nearest vertex."""
+    vertices = item.vertices.astype(np.float64)
+    normals = analytic.unit(vertex_normals(item))
+    setup, maps = timed(lambda: ExponentialMaps.of(vertices, item.faces, normals))
+    centers = [int(np.linalg.norm(item.vertices - p, axis=1).argmin()) for p in decals.positions[:count]]
+    begin = time.perf_counter()
+    reached = sum(
+        len(maps.map(center, 1.5 * float(radius))[0])
+        for center, radius in zip(centers, decals.radii[:count], strict=True)
+    )
+    seconds = time.perf_counter() - begin
+    return Row(
+        "discrete exponential maps",
+        "no contact, no implicit surfaces, one connected mesh, decals at vertices only",
+        setup_s=setup,
+        decal_ms=1e3 * seconds / count,
+        megabytes=1e-6 * 12 * reached / count * len(decals),
+        errors=errors_of(exponential_map),
+        note=f"{count} decals timed, in NumPy; memory: two coordinates and a vertex number for each vertex; "
+        "drawn as uv at vertices",
     )
 
 
@@ -396,6 +430,7 @@ def measure(*, quick: bool) -> tuple[str, list[Row]]:
         measure_implicit(item, decals),
         measure_clipped(item, decals),
         measure_at_vertices(item, decals),
+        measure_exponential_maps(item, decals, 5 if quick else LOG_MAPS),
         measure_log_maps(item, decals, 5 if quick else LOG_MAPS),
     ]
     return f"{item.name}, {len(item.faces):,} faces", [row for row in rows if row is not None]

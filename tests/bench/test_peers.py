@@ -8,6 +8,7 @@ import pytest
 from decals.model import Decals
 from tests.bench import decal_peers
 from tests.bench.clipped_decals import MeshDecals
+from tests.bench.exponential_maps import ExponentialMaps
 from tests.decals.shapes import torus
 
 TORUS = decal_peers.torus_mesh(rows=120)
@@ -119,3 +120,28 @@ def test_table_and_figures_are_equal() -> None:
         "log_maps_decal_ms": 50.0,
         "log_maps_megabytes": 3.0,
     }
+
+
+def rolled_sheet(radius: float, *, side: int = 41) -> tuple[Any, Any, Any, Any]:
+    """Return vertices, faces, normals and flat coordinates of a sheet with random points, rolled up."""
+    rng = np.random.default_rng(5)
+    i, j = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
+    flat = np.stack([i, j], -1).reshape(-1, 2) / (side - 1) - 0.5
+    flat += rng.uniform(-0.2, 0.2, flat.shape) / side
+    angle = flat[:, 0] / radius
+    normals = np.column_stack([np.sin(angle), np.zeros(len(flat)), np.cos(angle)])
+    vertices = np.column_stack([radius * normals[:, 0], flat[:, 1], radius * (normals[:, 2] - 1)])
+    a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1)
+    faces = np.concatenate([np.stack([a, a + side, a + side + 1], 1), np.stack([a, a + side + 1, a + 1], 1)])
+    return vertices, faces, normals, flat
+
+
+@pytest.mark.parametrize(("radius", "limit"), [(1e6, 1e-6), (0.2, 2e-3)])
+def test_exponential_maps_unroll_what_can_be_unrolled(radius: float, limit: float) -> None:
+    vertices, faces, normals, flat = rolled_sheet(radius)
+    center = len(vertices) // 2
+    reached, offsets = ExponentialMaps.of(vertices, faces, normals).map(center, 0.4)
+    along = np.cross([0.0, 1.0, 0.0], normals[center])
+    coordinates = offsets @ np.stack([along, [0.0, 1.0, 0.0]], axis=1)
+    assert len(reached) > 300
+    assert np.linalg.norm(coordinates - (flat[reached] - flat[center]), axis=1).max() < limit
