@@ -26,8 +26,6 @@ from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import WarmupPlan
 from decals.validation import require_rgba
 
-MAX_IMAGE_SIZE = 2048
-"""Side of an image on the GPU, at most."""
 MAX_IMAGE_BYTES = 1 << 29
 """Memory of all images without mip levels, at most; for more, all become smaller."""
 _TEXEL_BYTES = 8  # four half floats
@@ -37,8 +35,15 @@ class ImageArray:
     """Images for one shader: layer ``i`` is image ``i``, its first row at v = 1.
 
     Images are sRGB. They are converted to linear light with premultiplied alpha in half floats, so filtering
-    and compositing are sums. All layers have one size, with mip levels. An empty list gives one transparent
-    layer.
+    and compositing are sums. All layers have one width and one height, with mip levels. An empty list gives
+    one transparent layer.
+
+    Attributes
+    ----------
+    width, height : int
+        Texels of a layer.
+    texture : moderngl.TextureArray
+        The layers.
 
     Raises
     ------
@@ -49,15 +54,15 @@ class ImageArray:
     def __init__(self, context: Context, images: Sequence[UInt8Array]) -> None:
         for number, image in enumerate(images):
             require_rgba(f"image {number}", image)
-        size = common_size(
-            [image.shape[:2] for image in images], limit=min(MAX_IMAGE_SIZE, context.max_texture_size)
-        )
-        layers = [linear_premultiplied(resized(image, size)) for image in images] or [
-            np.zeros((size, size, 4), np.float32)
-        ]
-        data = np.stack(layers)[:, ::-1].astype(np.float16)
-        self.size = size
-        self.texture = context.gl.texture_array((size, size, len(layers)), 4, data.tobytes(), dtype="f2")
+        shapes = [(image.shape[0], image.shape[1]) for image in images]
+        self.height, self.width = common_shape(shapes, limit=context.max_texture_size)
+        layers = len(images) or 1
+        self.texture = context.gl.texture_array((self.width, self.height, layers), 4, dtype="f2")
+        empty = np.zeros((1, 1, 4), np.uint8)
+        for layer, image in enumerate(images or [empty]):
+            texels = linear_premultiplied(resized(image, (self.height, self.width))[::-1])
+            region = (0, 0, layer, self.width, self.height, 1)
+            self.texture.write(texels.astype(np.float16).tobytes(), viewport=region)
         self.texture.repeat_x = self.texture.repeat_y = False
         self.texture.build_mipmaps()
         self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
@@ -72,13 +77,18 @@ class ImageArray:
         self.texture.release()
 
 
-def common_size(shapes: Sequence[tuple[int, ...]], *, limit: int = MAX_IMAGE_SIZE) -> int:
-    """Return the power of two from the largest side upward, within the limits of size and memory."""
-    largest = max((max(shape) for shape in shapes), default=1)
-    size = min(1 << (largest - 1).bit_length(), 1 << (limit.bit_length() - 1))
-    while len(shapes) * size * size * _TEXEL_BYTES > MAX_IMAGE_BYTES and size > 1:
-        size //= 2
-    return size
+def common_shape(shapes: Sequence[tuple[int, int]], *, limit: int) -> tuple[int, int]:
+    """Return powers of two from the largest height and width upward, within the limits of size and memory."""
+    height, width = (
+        min(1 << (max(sides, default=1) - 1).bit_length(), 1 << (limit.bit_length() - 1))
+        for sides in ([shape[axis] for shape in shapes] for axis in (0, 1))
+    )
+    while len(shapes) * height * width * _TEXEL_BYTES > MAX_IMAGE_BYTES:
+        if height >= width:
+            height //= 2
+        else:
+            width //= 2
+    return height, width
 
 
 def linear_premultiplied(image: UInt8Array) -> Float32Array:
@@ -89,12 +99,12 @@ def linear_premultiplied(image: UInt8Array) -> Float32Array:
     return np.concatenate([decoded[image[..., :3]] * alpha, alpha], axis=-1)
 
 
-def resized(image: UInt8Array, size: int) -> UInt8Array:
-    """Return an image as a square, colours weighted by alpha so that hidden colours do not show."""
-    if image.shape[:2] == (size, size):
+def resized(image: UInt8Array, shape: tuple[int, int]) -> UInt8Array:
+    """Return an image in another shape, colours weighted by alpha so that hidden colours do not show."""
+    if image.shape[:2] == shape:
         return image
     picture = Image.fromarray(np.ascontiguousarray(image))
-    return np.asarray(picture.resize((size, size), Image.Resampling.LANCZOS))
+    return np.asarray(picture.resize(shape[::-1], Image.Resampling.LANCZOS))
 
 
 ROW_TEXELS = 1 << TEXTURE_WIDTH_BITS

@@ -12,7 +12,7 @@ from decals.rendering.uploads import (
     ROW_TEXELS,
     DataTexture,
     ImageArray,
-    common_size,
+    common_shape,
     linear_premultiplied,
     resized,
 )
@@ -101,8 +101,23 @@ def test_image_layers_rows_and_mip_levels(context: Context) -> None:
     array.release()
 
 
+def test_wide_images_keep_their_width(context: Context) -> None:
+    image = np.zeros((2, 4096, 4), np.uint8)
+    image[:, ::2] = 255
+    array = ImageArray(context, [image, np.zeros((3, 5, 4), np.uint8)])
+    assert (array.height, array.width) == (4, 4096)
+    texels = np.frombuffer(array.texture.read(), np.float16).reshape(2, 4, 4096, 4)
+    assert (texels[0, :, ::2] == 1).all()
+    assert (texels[0, :, 1::2] == 0).all()
+    assert (texels[1] == 0).all()
+    array.release()
+
+
 def test_no_images(context: Context) -> None:
-    assert ImageArray(context, []).size == 1
+    array = ImageArray(context, [])
+    assert (array.height, array.width) == (1, 1)
+    assert not np.frombuffer(array.texture.read(), np.float16).any()
+    array.release()
 
 
 @pytest.mark.parametrize(
@@ -114,24 +129,26 @@ def test_bad_images(context: Context, bad: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("shapes", "size"),
+    ("shapes", "common"),
     [
-        ([], 1),
-        ([(1, 1)], 1),
-        ([(100, 3)], 128),
-        ([(64, 64), (65, 2)], 128),
-        ([(16000, 8)], 2048),
-        ([(2048, 2048)] * 17, 1024),
+        ([], (1, 1)),
+        ([(1, 1)], (1, 1)),
+        ([(100, 3)], (128, 4)),
+        ([(64, 64), (65, 2)], (128, 64)),
+        ([(40000, 8)], (16384, 8)),
+        ([(8192, 8192)], (8192, 8192)),
+        ([(2048, 2048)] * 17, (1024, 2048)),
+        ([(4096, 256)] * 100, (2048, 256)),
     ],
 )
-def test_the_common_size(shapes: list[tuple[int, int]], size: int) -> None:
-    assert common_size(shapes) == size
+def test_the_common_shape(shapes: list[tuple[int, int]], common: tuple[int, int]) -> None:
+    assert common_shape(shapes, limit=16384) == common
 
 
 def test_resizing_does_not_bleed_hidden_colours() -> None:
     image = np.zeros((6, 6, 4), np.uint8)
     image[..., 0] = 255  # red, hidden
     image[:, 3:] = [0, 255, 0, 255]
-    wide = resized(image, 16)
+    wide = resized(image, (16, 16))
     assert wide.shape == (16, 16, 4)
     assert wide[wide[..., 3] > 0][:, 0].max() == 0
