@@ -38,7 +38,8 @@ class Contact(IntEnum):
     """Compression at contact lines, along rays in the cells of RADIAL: no image folds, the middle stays."""
 
 
-DEFAULT_CONTACT = Contact.PRODUCT
+DEFAULT_CONTACT = Contact.ELASTIC
+"""The contact mode of everything that is not given one."""
 
 DEFAULT_STIFFNESS = 2.0
 """Stiffness of elastic contact."""

@@ -7,17 +7,17 @@ from cyclopts import Parameter
 
 from decals import bake as bake_scene
 from decals.apps.commands.options import (
-    DEFAULT_CONTACT,
-    DEFAULT_STIFFNESS,
     MAX_SAMPLES,
     ContactName,
     CreaseAngle,
     Definitions,
     MappingName,
     OptionalWhole,
+    Stiffness,
     Trust,
     Whole,
     check_count,
+    given,
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_model
@@ -32,9 +32,9 @@ def bake(
     size: Whole = 2048,
     samples: Whole = 2,
     vertex_colors: Annotated[bool, Parameter(negative=())] = False,
-    contact: ContactName = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: MappingName = "corrected",
+    contact: ContactName = None,
+    stiffness: Stiffness = None,
+    mapping: MappingName = None,
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     crease_angle: CreaseAngle = None,
@@ -86,10 +86,8 @@ def bake(
             size=size,
             samples=samples,
             vertex_colors=vertex_colors,
-            contact=contact,
-            stiffness=stiffness,
-            mapping=mapping,
             resolution=resolution,
             creases=creases,
             progress=progress,
+            **given(contact=contact, stiffness=stiffness, mapping=mapping),
         )

@@ -5,15 +5,13 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from decals import Contact, ImageMapping
 from decals.apps.commands.opening import check_options, opened, report_unsaved
 from decals.apps.commands.options import (
-    DEFAULT_CONTACT,
-    DEFAULT_STIFFNESS,
     ContactName,
     Definitions,
     MappingName,
     OptionalWhole,
+    Stiffness,
     Trust,
     parse_size,
 )
@@ -33,9 +31,9 @@ def edit(
     ] = None,
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x800",
-    contact: ContactName = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: MappingName = "corrected",
+    contact: ContactName = None,
+    stiffness: Stiffness = None,
+    mapping: MappingName = None,
     seed: OptionalWhole = None,
     save: Path | None = None,
     define: Definitions = None,
@@ -78,7 +76,8 @@ def edit(
     """
     pixels = parse_size(size)
     check_options(decals, seed, save)
-    stiffness_number(stiffness, InvalidInput)
+    if stiffness is not None:
+        stiffness_number(stiffness, InvalidInput)
     EditWindow.require_screen()
     import_definitions(define)
     opening = opened(
@@ -89,9 +88,9 @@ def edit(
         path=opening.path,
         size=pixels,
         recover=opening.recover,
-        contact=Contact[contact.upper()],
+        contact=contact,
         stiffness=stiffness,
-        mapping=ImageMapping[mapping.upper()],
+        mapping=mapping,
     )
     opening.add_images(window)
     try:

@@ -10,14 +10,14 @@ from rich.table import Table
 from decals import Scene
 from decals import measure as measured
 from decals.apps.commands.options import (
-    DEFAULT_CONTACT,
-    DEFAULT_STIFFNESS,
     ContactName,
     Definitions,
     MappingName,
     OptionalWhole,
+    Stiffness,
     Trust,
     Whole,
+    given,
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_models
@@ -44,9 +44,9 @@ def measure(
     scene: str,
     /,
     *,
-    contact: ContactName = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: MappingName = "corrected",
+    contact: ContactName = None,
+    stiffness: Stiffness = None,
+    mapping: MappingName = None,
     samples: OptionalWhole = None,
     seed: Whole = 0,
     json_output: Annotated[bool, Parameter(name="--json", negative=())] = False,
@@ -60,7 +60,7 @@ def measure(
     scene
         A saved scene in JSON.
     contact
-        Contact mode: product, min, radial or elastic.
+        Contact mode: product, min, radial or elastic. Default: elastic.
     stiffness
         Stiffness of elastic contact, from 1 to 64.
     mapping
@@ -85,12 +85,10 @@ def measure(
             raise InvalidInput(f"expected a saved scene in JSON, got the model {scene!r}; scatter makes one")
         found = measured(
             loaded,
-            contact=contact,
-            stiffness=stiffness,
-            mapping=mapping,
             samples=samples,
             seed=seed,
             progress=progress,
+            **given(contact=contact, stiffness=stiffness, mapping=mapping),
         )
     if json_output:
         print(json.dumps(found.to_dict()))

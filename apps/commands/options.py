@@ -41,15 +41,14 @@ OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=F
 Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
 """Modules that define custom nodes."""
 
-ContactName = Literal["product", "min", "radial", "elastic"]
-"""Contact modes on the command line."""
+ContactName = Annotated[Literal["product", "min", "radial", "elastic"] | None, Parameter(show_default=False)]
+"""An optional contact mode on the command line."""
 
-DEFAULT_CONTACT: ContactName = "product"
-DEFAULT_STIFFNESS = 2.0
-"""Those of `decals.render`."""
+Stiffness = Annotated[float | None, Parameter(show_default=False)]
+"""An optional stiffness on the command line."""
 
-MappingName = Literal["corrected", "chord"]
-"""Image mappings on the command line."""
+MappingName = Annotated[Literal["corrected", "chord"] | None, Parameter(show_default=False)]
+"""An optional image mapping on the command line."""
 
 CreaseAngle = Annotated[float | None, Parameter(show_default=False)]
 """An optional crease angle of meshes, in degrees, on the command line."""
@@ -73,3 +72,8 @@ def check_count(option: str, value: int, low: int, high: int) -> None:
     """Raise `InvalidInput` if a whole number lies outside its range."""
     if not low <= value <= high:
         raise InvalidInput(f"{option}: expected a whole number from {low} to {high}, got {value}")
+
+
+def given(**options: Any) -> dict[str, Any]:
+    """Return the options that are not None; the function that they are passed to decides about the others."""
+    return {name: value for name, value in options.items() if value is not None}

@@ -8,8 +8,6 @@ from cyclopts import Parameter
 
 from decals import Scene, save_scene
 from decals.apps.commands.options import (
-    DEFAULT_CONTACT,
-    DEFAULT_STIFFNESS,
     MAX_SAMPLES,
     TILE,
     ContactName,
@@ -17,9 +15,11 @@ from decals.apps.commands.options import (
     Definitions,
     MappingName,
     OptionalWhole,
+    Stiffness,
     Trust,
     Whole,
     check_count,
+    given,
     parse_size,
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
@@ -44,9 +44,9 @@ def render(
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x900",
     samples: Whole = 2,
-    contact: ContactName = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: MappingName = "corrected",
+    contact: ContactName = None,
+    stiffness: Stiffness = None,
+    mapping: MappingName = None,
     seed: OptionalWhole = None,
     save: Path | None = None,
     crease_angle: CreaseAngle = None,
@@ -80,12 +80,15 @@ def render(
     samples
         Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine.
     contact
-        Contact mode: product (equation 5 of the paper), min (only the strongest push counts), radial
-        (scales images along rays), or elastic (compresses images at contact lines; never folds one).
+        Contact mode: elastic (compresses images at contact lines; never folds one), product (equation 5 of
+        the paper), min (only the strongest push counts), or radial (scales images along rays). Default:
+        elastic.
     stiffness
         Stiffness of elastic contact, from 1 to 64: how close to contact lines images are compressed.
+        Default: 2.
     mapping
         Image mapping: corrected for the curvature of the surface, or chord (the paper's projection).
+        Default: corrected.
     seed
         Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
@@ -102,9 +105,8 @@ def render(
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
     check_count("--samples", samples, 1, MAX_SAMPLES)
-    drawing = RenderOptions(
-        size=pixels, samples=samples, contact=contact, stiffness=stiffness, mapping=mapping
-    )
+    modes = given(contact=contact, stiffness=stiffness, mapping=mapping)
+    drawing = RenderOptions(size=pixels, samples=samples, **modes)
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
         check_output(save, (".json",))

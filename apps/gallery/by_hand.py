@@ -9,7 +9,7 @@ others.
 from collections.abc import Sequence
 
 from blobtree import Ellipsoid
-from decals import DecalImage, Scene, TreeObject
+from decals import Contact, DecalImage, Scene, TreeObject
 from decals.apps.gallery import SIDE
 from decals.apps.gallery.helpers import CLAY, Panel, camera_at, main
 from decals.editing import Actions, EditSession, PointerTools
@@ -51,7 +51,7 @@ def panels() -> Sequence[Panel]:
         if number in SHOWN:
             scenes.append(session.document.scene)
     scenes.append(_dragged(tools, session))
-    return [Panel(scene) for scene in scenes]
+    return [Panel(scene, contact=Contact.PRODUCT) for scene in scenes]
 
 
 def _dragged(tools: PointerTools, session: EditSession) -> Scene:

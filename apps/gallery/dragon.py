@@ -10,7 +10,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from decals import NO_IMAGE, DecalImage, Decals, Interaction, MeshObject, Scene, TreeObject, scatter
+from decals import (
+    NO_IMAGE,
+    Contact,
+    DecalImage,
+    Decals,
+    Interaction,
+    MeshObject,
+    Scene,
+    TreeObject,
+    scatter,
+)
 from decals.apps.gallery.helpers import Panel, camera_at, main, sample, sample_camera
 
 COUNT = 2000
@@ -45,7 +55,8 @@ def panels() -> Sequence[Panel]:
         camera_at((-1.6, 0.9, -2.0), (-0.82, 0.5, 0.0), up=UP, fov=24.0),
         camera_at((-2.4, -0.4, 1.4), (-0.75, -0.7, 0.3), up=UP, fov=20.0),
     )
-    return [Panel(scene), *(Panel(scene.replace(camera=view)) for view in views)]
+    scenes = [scene, *(scene.replace(camera=view) for view in views)]
+    return [Panel(one, contact=Contact.PRODUCT) for one in scenes]
 
 
 def _colored(scales: Decals) -> Decals:

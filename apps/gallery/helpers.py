@@ -51,7 +51,7 @@ class Panel:
     """A scene and the modes in which its decals are drawn."""
 
     scene: Scene
-    contact: Contact = Contact.PRODUCT
+    contact: Contact = RenderOptions.contact
     mapping: ImageMapping = ImageMapping.CORRECTED
 
 

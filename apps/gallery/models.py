@@ -7,7 +7,7 @@ horse. With ``--side 2160`` the panels have the height of a 4k picture.
 
 from collections.abc import Sequence
 
-from decals import DecalImage, Scene, scatter
+from decals import Contact, DecalImage, Scene, scatter
 from decals.apps.gallery.helpers import Panel, camera_at, main, sample, sample_camera
 from decals.images import generate_image
 
@@ -33,9 +33,10 @@ def panels() -> Sequence[Panel]:
             images=tuple(DecalImage(image, generate_image(image, 512)) for image in images),
             decals=scatter(model.surface, count=count, images=len(images)),
         )
-        panels.append(Panel(scene))
+        panels.append(Panel(scene, contact=Contact.PRODUCT))
         if name == "knot":
-            panels.append(Panel(scene.replace(camera=camera_at(*CLOSE_UP, fov=16.0))))
+            close = scene.replace(camera=camera_at(*CLOSE_UP, fov=16.0))
+            panels.append(Panel(close, contact=Contact.PRODUCT))
     return panels
 
 

@@ -7,7 +7,7 @@ their positions.
 
 from collections.abc import Sequence
 
-from decals import DecalImage, Scene, scatter
+from decals import Contact, DecalImage, Scene, scatter
 from decals.apps.gallery.helpers import Panel, main, ring_image, sample, sample_camera
 
 COUNT = 1000
@@ -20,7 +20,7 @@ def panels() -> Sequence[Panel]:
     decals = scatter(knot.surface, count=COUNT)
     dots = decals.replace(radii=0.18 * decals.radii)
     return [
-        Panel(Scene(objects=(knot,), camera=camera, images=images, decals=marks))
+        Panel(Scene(objects=(knot,), camera=camera, images=images, decals=marks), contact=Contact.PRODUCT)
         for marks, images in (
             (dots, (ring_image((60, 60, 70)),)),
             (decals, (DecalImage.load("scale#4d8a57"),)),

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from decals import Decals, Scene
+from decals import Contact, Decals, Scene
 from decals.apps.gallery.helpers import Panel, camera_above, main, plane, ring_image, single_decal
 
 _GOLD, _TEAL, _RUST = (214, 156, 64), (78, 150, 150), (176, 84, 60)
@@ -29,7 +29,10 @@ def panels() -> Sequence[Panel]:
     ]
     seven = Decals.concatenate([single_decal((0, 0, 0), up, 0.45), *ring])
     return [
-        Panel(Scene(objects=(plane(),), camera=camera_above(), images=images, decals=group))
+        Panel(
+            Scene(objects=(plane(),), camera=camera_above(), images=images, decals=group),
+            contact=Contact.PRODUCT,
+        )
         for group in (pair, seven)
     ]
 

@@ -19,7 +19,7 @@ from decals.apps.lab.formulas import Formula, parse
 from decals.apps.lab.measures import MEASURES
 from decals.errors import ImplicitDecalsError
 from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_STIFFNESS, Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.scenes.files import load_scene
 from decals.scenes.scene import Scene
 from decals.validation import member, stiffness_number
@@ -101,7 +101,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     title: str
     scene: str
     question: Question
-    contact: str = "product"
+    contact: str = DEFAULT_CONTACT.name.lower()
     stiffness: float = DEFAULT_STIFFNESS
     mapping: str = "corrected"
     probe: Vector = (0.0, 0.0, 0.0)

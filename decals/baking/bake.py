@@ -74,8 +74,8 @@ def bake(
         Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
         not needed.
     contact : Contact or str
-        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"``,
-        ``"radial"`` or ``"elastic"``.
+        Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
+        paper), ``"min"`` or ``"radial"``.
     stiffness : float
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str

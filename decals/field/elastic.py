@@ -29,6 +29,7 @@ from decals.field.radial import (
     balls_nested,
     comes_next,
     is_above,
+    lies_on_top,
     nested_owner,
     power,
     size_above,
@@ -168,7 +169,7 @@ def elastic_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: Indexed
 
 @wp.func
 def kept_owner(
-    q: wp.vec3, first: wp.vec4i, last: wp.vec4i, closest: wp.int32, index: IndexedDecals
+    q: wp.vec3, n_q: wp.vec3, first: wp.vec4i, last: wp.vec4i, closest: wp.int32, index: IndexedDecals
 ) -> wp.int32:
     """Return the decal of `decals.field.radial.nested_owner`, given all candidates at q."""
     a = first
@@ -180,6 +181,8 @@ def kept_owner(
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
         inside = bool(tried != closest)
+        if inside:
+            inside = lies_on_top(n_q, tried, index.records)
         lower = wp.int32(NO_OWNER)
         lower_size = wp.float32(0.0)
         for _kept in range(MAX_KEPT):
@@ -211,7 +214,7 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
 
     They are those of `cell_owner` and `elastic_complement`. One traversal of the index finds the candidates,
     and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
-    one is the owner, unless it is nested with another holder above it.
+    one is the owner, unless it is nested with another holder above it that faces the surface well.
     """
     closest = wp.int32(NO_OWNER)
     least = wp.float32(0.0)
@@ -255,11 +258,12 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
         if holders == 2:
             offset = xyz(topmost_ball) - xyz(own_ball)
             if balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
-                owner = topmost
+                if lies_on_top(n_q, topmost, index.records):
+                    owner = topmost
         elif count > MAX_KEPT:
             owner = nested_owner(q, n_q, closest, index)
         else:
-            owner = kept_owner(q, a, b, closest, index)
+            owner = kept_owner(q, n_q, a, b, closest, index)
         own_ball = index.records[RECORD * owner]
     radius = RIM_RADIUS * own_ball[3]
     w = (q - xyz(own_ball)) / radius

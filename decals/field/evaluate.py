@@ -107,7 +107,7 @@ def evaluate(
     mapping : ImageMapping or str, optional
         Image mapping: CORRECTED (default) or CHORD.
     contact : Contact or str, optional
-        Contact mode: PRODUCT (default), MIN, RADIAL or ELASTIC.
+        Contact mode: ELASTIC (default), PRODUCT, MIN or RADIAL.
     stiffness : float, optional
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     index : DecalIndex, optional

@@ -8,9 +8,9 @@ ray so that its rim lies at R.
 
 Two decals are nested if one of them would keep less than MIN_KEPT_RADIUS of its radius before their plane.
 Nested decals do not push each other. The smaller one lies above the other, and of equal ones that of the
-lower number. So a small decal deep inside a large one is seen whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is
-compressed more than 1/MIN_KEPT_RADIUS times. There are no gaps: every point inside a rim lies at least in the
-cell of the decal of least |q − p|² − ρ².
+lower number, on surface that it faces well (`lies_on_top`). So a small decal deep inside a large one is seen
+whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is compressed more than 1/MIN_KEPT_RADIUS times. There are no
+gaps: every point inside a rim lies at least in the cell of the decal of least |q − p|² − ρ².
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -26,6 +26,7 @@ from decals.record import (
     apart,
     complement_of,
     faces,
+    facing_limit,
     field_complement,
     rank_of,
     visible_radius,
@@ -39,6 +40,9 @@ NO_OWNER = -1
 
 MIN_KEPT_RADIUS = 0.21
 """Smallest share of its radius that a decal keeps towards a neighbour that pushes it."""
+
+TOP_MARGIN = 0.75
+"""Amount above the facing limit of the least cosine between the normals of surface and of an upper decal."""
 
 RIM_SQUARED = RIM_RADIUS * RIM_RADIUS
 MIN_ADVANCE = 1.0e-37
@@ -112,6 +116,16 @@ def are_nested(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)
 
 
 @wp.func
+def lies_on_top(n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True if a decal faces surface with this normal so well that it may lie above decals around it.
+
+    At edges and thin walls, decals of the other side are near, and face the surface little.
+    """
+    facing = decals[RECORD * decal + 1]
+    return wp.dot(xyz(facing), n_q) > facing_limit(facing[3]) + TOP_MARGIN
+
+
+@wp.func
 def comes_next(
     ball: wp.vec4,
     decal: wp.int32,
@@ -156,6 +170,8 @@ def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDeca
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
         inside = bool(tried != closest)
+        if inside:
+            inside = lies_on_top(n_q, tried, index.records)
         lower = wp.int32(NO_OWNER)
         lower_size = wp.float32(0.0)
         for level in range(index.level_count):

@@ -78,8 +78,8 @@ class RenderOptions:
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
     contact : Contact or str
-        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"``,
-        ``"radial"`` or ``"elastic"``.
+        Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
+        paper), ``"min"`` or ``"radial"``.
     mapping : ImageMapping or str
         Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     background : Background

@@ -42,8 +42,8 @@ def render(
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
     contact : Contact or str
-        Contact mode: how decals that push each other share the surface; ``"product"``, ``"min"``,
-        ``"radial"`` or ``"elastic"``.
+        Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
+        paper), ``"min"`` or ``"radial"``.
     stiffness : float
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str

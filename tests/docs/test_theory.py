@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 RIM = np.sqrt(1 - 2 ** (-1 / 3))
 NEIGHBOUR_REACH = 0.575
 FACING_LIMIT = -0.25
+TOP_LIMIT = 0.5
 LEAST_PART = 0.21
 STIFFNESS = 2.0
 ABSENT = 2.0
@@ -42,6 +43,7 @@ class World:
         self.distances = np.linalg.norm(points[:, None] - self.centres[None], axis=2)
         cosines = normals @ decals.normals.astype(np.float64).T
         self.faces = decals.spill[None] | (cosines > FACING_LIMIT)
+        self.tops = decals.spill[None] | (cosines > TOP_LIMIT)
         influence = self.radii / RIM
         acts = self.faces & (self.distances < NEIGHBOUR_REACH * influence)
         self.e = np.where(acts, complement((self.distances / influence) ** 2), ABSENT)
@@ -85,8 +87,9 @@ def shown_in_cells(world: World, group: Ints, contact: Contact) -> tuple[Ints, A
     upper_first = np.lexsort((group, radii))
     owner = np.full(len(power), -1)
     for i in upper_first[::-1]:
-        outside = inside & (power < power[:, i : i + 1]) & ~stacked[i]
-        owner[inside[:, i] & ~outside.any(axis=1)] = i
+        less = inside & (power < power[:, i : i + 1])
+        on_top = world.tops[:, group[i]] | ~less.any(axis=1)
+        owner[inside[:, i] & ~(less & ~stacked[i]).any(axis=1) & on_top] = i
     ray = world.points - centres[owner]
     x = np.linalg.norm(ray, axis=1)
     ray /= np.maximum(x, 1e-300)[:, None]
@@ -225,7 +228,7 @@ def test_concentric_equal_decals_show_their_rim_alone() -> None:
         positions=np.zeros((2, 3)), normals=[[0, 0, 1]] * 2, tangents=[[1, 0, 0]] * 2, radii=[1.0, 1.0]
     )
     point, normal = [[0.3, 0.2, 0.0]], [[0.0, 0.0, 1.0]]
-    pushed = evaluate(decals, point, normal)
+    pushed = evaluate(decals, point, normal, contact=Contact.PRODUCT)
     assert pushed.owner[0] == 0
     assert pushed.field[0] == pytest.approx(0.5)
     stacked = evaluate(decals, point, normal, contact=Contact.RADIAL)

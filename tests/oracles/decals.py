@@ -14,6 +14,7 @@ from tests.oracles.contact import RIM, complements, log_factor, rim_distance
 
 FACING_LIMIT = -0.25
 LEAST = 0.21
+ON_TOP = 0.5
 STIFFNESS = 2.0
 CHUNK = 2_000_000
 
@@ -41,7 +42,7 @@ def decals_at(
     *,
     corrected: bool = True,
     reach: float = 1.0,
-    contact: str = "product",
+    contact: str = "elastic",
 ) -> Any:
     """What the topmost of `decals` (anything with their arrays) shows at points with unit normals.
 
@@ -57,7 +58,7 @@ def colors_at(
     color_of: Any,
     *,
     corrected: bool = True,
-    contact: str = "product",
+    contact: str = "elastic",
 ) -> Any:
     """Premultiplied colours of all decals over each other, from the lowest up.
 
@@ -158,46 +159,65 @@ class _Scene:
         return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
 
     def cells(self, members: Any, *, elastic: bool) -> Any:
-        """Convex cells between radical planes; stacked decals over each other, the smaller uppermost."""
+        """Convex cells between radical planes. Of stacked decals the smallest shows that faces q well."""
         centres, radii = self.centres[members], self.radii[members]
-        apart = centres[None] - centres[:, None]
-        distance = np.linalg.norm(apart, axis=2)
-        with np.errstate(all="ignore"):
-            plane = (distance**2 + radii[:, None] ** 2 - radii[None] ** 2) / (2 * distance)
-            keeps = plane / radii[:, None]
-            share = plane * distance
-        stacked = ~((keeps > LEAST) & (keeps.T > LEAST))
         squared, facing = self.squared[:, members], self.facing[:, members]
         power = (squared / RIM**2 - 1) * radii**2
         inside = facing & (power <= 0)
+        near = inside | (np.abs(power) < 1e-3 * radii**2)
+        away = np.where(self.spill[members], 4.0, self.cosine[:, members] - ON_TOP)
+        # Only the nearest few of each point, in order of their numbers: all the rows that are compared.
+        few = np.argsort(~near, axis=1, kind="stable")[:, : max(1, near.sum(axis=1).max(initial=0))]
+        power_few, inside_few, near_few, away_few = (
+            np.take_along_axis(each, few, axis=1) for each in (power, inside, near, away)
+        )
+        stacked_few = _stacked(centres[few][:, :, None], centres[few][:, None], radii[few], radii[few])
         # Beyond the plane to j where j has less power, unless i and j are stacked or j faces away.
-        beyond = (power[:, None, :] < power[:, :, None]) & facing[:, None, :] & ~stacked
-        shows = inside & ~beyond.any(axis=2)
+        less = power_few[:, None, :] < power_few[:, :, None]
+        beyond = less & (inside_few[:, None, :] & ~stacked_few)
+        lowest = ~(less & inside_few[:, None, :]).any(axis=2)
+        shows = inside_few & ~beyond.any(axis=2) & ((away_few > 0) | lowest)
         upper = np.argsort(np.argsort(radii, kind="stable"), kind="stable")
-        owner = np.where(shows, upper, len(members)).argmin(axis=1)
-        owned = shows.any(axis=1)
+        uppermost = np.where(shows, upper[few], len(members)).argmin(axis=1)
+        owner, owned = few[np.arange(len(few)), uppermost], shows.any(axis=1)
+        apart = centres[None] - centres[owner][:, None]
+        distance = np.linalg.norm(apart, axis=2)
+        stacked = _stacked(centres[owner][:, None], centres[None], radii[owner], radii)
         w = self.points - centres[owner]
         x = np.linalg.norm(w, axis=1)
         ray = w / np.maximum(x, 1e-300)[:, None]
-        ahead = np.einsum("ma,mna->mn", ray, apart[owner])
-        blocks = facing & ~stacked[owner] & (ahead > 0)
-        planes = np.where(blocks, share[owner] / np.where(ahead > 0, ahead, 1), np.inf)
+        ahead = np.einsum("ma,mna->mn", ray, apart)
+        blocks = facing & ~stacked & (ahead > 0)
+        share = 0.5 * (distance**2 + radii[owner, None] ** 2 - radii[None] ** 2)
+        planes = np.where(blocks, share / np.where(ahead > 0, ahead, 1), np.inf)
         if elastic:
-            r = _compressed(x / radii[owner], planes / radii[owner, None], distance[owner], radii, owner)
+            r = _compressed(x / radii[owner], planes / radii[owner, None], distance, radii, owner)
         else:
             r = x / np.minimum(planes.min(axis=1), radii[owner])
         z = (np.minimum(r, 1) * RIM) ** 2
-        near = inside | (np.abs(power) < 1e-3 * radii**2)
-        sizes = np.where(near[:, None] & near[:, :, None], radii**2 + (radii**2)[:, None], 1e-300)
-        gap = np.abs(power[:, None] - power[:, :, None]) / sizes
-        gap[:, np.arange(len(members)), np.arange(len(members))] = 4.0
+        large = radii[few] ** 2
+        pairs = near_few[:, None] & near_few[:, :, None]
+        sizes = np.where(pairs, large[:, :, None] + large[:, None], 1e-300)
+        gap = np.abs(power_few[:, None] - power_few[:, :, None]) / sizes
+        gap[:, np.arange(few.shape[1]), np.arange(few.shape[1])] = 4.0
         doubt = np.minimum((np.abs(power) / radii**2).min(axis=1), gap.min(axis=(1, 2)))
+        over = (inside_few[:, None, :] & stacked_few & less).any(axis=2)
+        doubt = np.minimum(doubt, np.where(inside_few & over, np.abs(away_few), 4.0).min(axis=1))
         return np.where(owned, members[owner], -1), complements(z), doubt
 
     def facing_doubt(self) -> Any:
         """Distance to the facing limit of a decal that reaches the point."""
         near = (self.squared < 1) & ~self.spill
         return np.where(near, np.abs(self.cosine - FACING_LIMIT), 4.0).min(axis=1, initial=4.0)
+
+
+def _stacked(first: Any, second: Any, own: NDArray[Any], other: NDArray[Any]) -> Any:
+    """Which decals of the first have no plane to those of the second, or one that is too near a centre."""
+    distance, own, other = np.linalg.norm(second - first, axis=-1), own[..., :, None], other[..., None, :]
+    with np.errstate(all="ignore"):
+        keeps = (distance**2 + own**2 - other**2) / (2 * distance * own)
+        kept_by_other = (distance**2 + other**2 - own**2) / (2 * distance * other)
+    return ~((keeps > LEAST) & (kept_by_other > LEAST))
 
 
 def _compressed(

@@ -23,6 +23,7 @@ TWO = wp.constant(wp.float64(2.0))
 FOUR = wp.constant(wp.float64(4.0))
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
 FACING_LIMIT = wp.constant(wp.float64(-0.25))
+ON_TOP = wp.constant(wp.float64(0.5))
 KEPT_LEAST = wp.constant(wp.float64(0.21))
 TINY = wp.constant(wp.float64(1e-300))
 NEARLY = wp.constant(wp.float64(1e-3))
@@ -233,13 +234,19 @@ def convex(
             own = power(q, i, these)
             r = wp.float64(these.radii[i])
             inside = bool(own <= ZERO)
+            away = wp.dot(n, wide(these.normals[i])) - ON_TOP
+            shows = bool(these.spill[i] != 0 or away > ZERO)
+            lowest = bool(True)
             for j in range(first, first + these.size):
                 if j != i and these.ranks[j] == rank and facing(n, j, these):
                     doubt = wp.min(doubt, doubt_of_pair(own, power(q, j, these), i, j, these))
                     if power(q, j, these) < own:
+                        lowest = False
                         if not lie_over(i, j, these):
                             inside = False
-            if inside and r < smallest:  # of equal ones the first stays
+                        elif these.spill[i] == 0 and own <= ZERO:
+                            doubt = wp.min(doubt, wp.abs(away))
+            if inside and (shows or lowest) and r < smallest:  # of equal ones the first stays
                 smallest = r
                 owner = i
     if owner < 0:

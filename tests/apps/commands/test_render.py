@@ -55,7 +55,7 @@ def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
 
 def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:
     pv.Sphere().save(folder / "ball.ply")
-    assert run([*small("ball.ply"), "--save", "s.json", "-o", "product.png"]) == 0
+    assert run([*small("ball.ply"), "--save", "s.json", "-o", "default.png"]) == 0
     scene = load_scene(folder / "s.json")
     with Renderer() as renderer:
         for contact in Contact:
@@ -67,8 +67,8 @@ def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:
                     scene, RenderOptions(size=(64, 48), samples=1, contact=contact, mapping=mapping)
                 )
                 assert np.array_equal(picture(folder / "out.png"), drawn)
-                default = (contact, mapping) == (Contact.PRODUCT, ImageMapping.CORRECTED)
-                assert default == np.array_equal(drawn, picture(folder / "product.png"))
+                default = (contact, mapping) == (Contact.ELASTIC, ImageMapping.CORRECTED)
+                assert default == np.array_equal(drawn, picture(folder / "default.png"))
 
 
 def test_the_crease_angle_of_meshes(folder: Path, capsys: Capture) -> None:

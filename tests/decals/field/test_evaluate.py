@@ -1,5 +1,6 @@
 """Owner, field and image coordinates against brute force in float64, on kind and hostile sets."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,9 +111,10 @@ def worst(got: Any, want: Any, rows: Any) -> Any:
 def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:
     decals, points, normals = make(np.random.default_rng(SETS.index(make)))
     points, normals = np.array(points, np.float32), np.array(normals, np.float32)
-    got = evaluate(decals, points, normals, mapping=mapping)
+    got = evaluate(decals, points, normals, mapping=mapping, contact="product")
     facing, corrected = unit(normals.astype(float)), mapping == ImageMapping.CORRECTED
-    want = decals_at(decals, points, facing, corrected=corrected)
+    seen = partial(decals_at, decals, points, facing, corrected=corrected, contact="product")
+    want = seen()
     clear = want.doubt > TIE
     assert clear.mean() > 0.5
     assert np.array_equal(got.owner[clear], want.owner[clear])
@@ -120,7 +122,7 @@ def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:
     assert same.sum() > 100
     cut = worst(got, want, same).max()
     assert cut <= CUT_ERROR
-    errors = worst(got, decals_at(decals, points, facing, corrected=corrected, reach=NEIGHBOR_REACH), same)
+    errors = worst(got, seen(reach=NEIGHBOR_REACH), same)
     print(f"{make.__name__}, {mapping.name}: cut {cut:.1e}, rounding {errors.max():.1e}")
     assert np.quantile(errors, 0.999) <= ROUNDING_ERROR  # a neighbour may lie on the very limit
     bare = got.owner < 0
@@ -140,7 +142,7 @@ def test_a_lone_decal_shows_its_image_undistorted() -> None:
 def test_ties_go_to_the_lowest_number_and_show_the_rim() -> None:
     flat = {"normals": [[0, 0, 1]] * 3, "tangents": [[1, 0, 0]] * 3}
     decals = Decals([[1, 0, 0], [-1, 0, 0], [1, 0, 0]], radii=[2, 2, 2], **flat)
-    samples = evaluate(decals, [[0, 0.5, 0], [0.5, 0, 0]], [[0, 0, 1]] * 2)
+    samples = evaluate(decals, [[0, 0.5, 0], [0.5, 0, 0]], [[0, 0, 1]] * 2, contact="product")
     assert samples.owner.tolist() == [0, 0]
     assert samples.field == pytest.approx(0.5)
 
@@ -148,7 +150,7 @@ def test_ties_go_to_the_lowest_number_and_show_the_rim() -> None:
 @pytest.mark.parametrize("radii", [(0.1, 2.0), (2.0, 0.1)])
 def test_ties_between_unlike_sizes_go_to_the_lowest_number_too(radii: NDArray[Any]) -> None:
     decals = Decals([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, radii)
-    assert evaluate(decals, [[0, 0, 0]], [[0, 0, 1]]).owner.tolist() == [0]
+    assert evaluate(decals, [[0, 0, 0]], [[0, 0, 1]], contact="product").owner.tolist() == [0]
 
 
 def test_index_and_brute_force_agree_to_the_bit() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from decals.field.mapping import ImageMapping
 from decals.images.load import decode_srgb
 from decals.model import Decals
-from decals.record import Contact
+from decals.record import DEFAULT_CONTACT, Contact
 from decals.rendering.options import SceneLike
 from decals.rendering.picture import Buffers
 from decals.scenes.camera import Camera
@@ -48,7 +48,7 @@ def view_of(decals: Decals, *shapes: Shape) -> View:
 
 
 def compare(
-    view: SceneLike, buffers: Buffers, mapping: ImageMapping, contact: Contact = Contact.PRODUCT
+    view: SceneLike, buffers: Buffers, mapping: ImageMapping, contact: Contact = DEFAULT_CONTACT
 ) -> np.ndarray:
     """Owner, field and uv of all covered pixels against brute force; which of them have an owner."""
     seen = buffers.object_id >= 0

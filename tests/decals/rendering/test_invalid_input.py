@@ -58,7 +58,7 @@ def test_sizes_at_both_limits_beside_usual_ones(renderer: Renderer) -> None:
     }
     view = view_of(usual, shape)
     mixed = View(view.objects, view.camera, Decals.concatenate([usual, Decals(**arrays)]), (WHITE,))
-    buffers = renderer.buffers(mixed, RenderOptions(size=SIZE))
+    buffers = renderer.buffers(mixed, RenderOptions(size=SIZE, contact="product"))
     seen = buffers.object_id >= 0
     assert (buffers.owner[seen] == 62).all()  # its field is highest wherever no other has its centre
     assert np.isfinite(buffers.uv).all()

@@ -10,11 +10,10 @@ from decals.errors import TooMuchData
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals, Interaction
-from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.uploads import LoopLimit
 from tests.decals.rendering.pictures import WHITE
-from tests.decals.rendering.test_millions import check_one_point, one_point
+from tests.decals.rendering.test_millions import PAPER, check_one_point, one_point
 from tests.decals.shapes import View
 
 
@@ -83,11 +82,11 @@ def test_a_picture_of_decals_that_were_piled_up_is_refused_until_they_are_gone(r
     assert isinstance(start.decals, Decals)
     editor = DecalEditor(start.decals)
     view = View(start.objects, start.camera, editor, (WHITE,))  # type: ignore[arg-type]  # an editor is drawn too
-    check_one_point(renderer.buffers(view, RenderOptions(size=(24, 18))))
+    check_one_point(renderer.buffers(view, PAPER))
     numbers = np.arange(3, 9_000)
     editor.assign(numbers, one_point(len(numbers)).decals)
     for _ in range(2):
         with pytest.raises(TooMuchData, match=r"9,000 decals reach the same place"):
-            renderer.buffers(view, RenderOptions(size=(24, 18)))
+            renderer.buffers(view, PAPER)
     editor.delete(numbers)
-    check_one_point(renderer.buffers(view, RenderOptions(size=(24, 18))))
+    check_one_point(renderer.buffers(view, PAPER))

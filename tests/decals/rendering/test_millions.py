@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from decals.errors import TooMuchData
 from decals.model import Decals
+from decals.record import Contact
 from decals.rendering.options import RenderOptions
 from decals.rendering.picture import Buffers
 from decals.rendering.renderer import Renderer
@@ -18,6 +19,8 @@ from tests.oracles.decals import decals_at
 MILLION = 1_000_000
 SIZE = (160, 120)
 TIE = 1e-4
+PAPER = RenderOptions(size=(24, 18), contact=Contact.PRODUCT)
+"""Decals on one point push each other in the paper's contact alone."""
 
 
 def random_decals(count: int, seed: int, *, spread: float) -> tuple[Shape, Decals]:
@@ -93,14 +96,14 @@ def check_one_point(buffers: Buffers) -> None:
 
 
 def test_thousands_on_one_point(renderer: Renderer) -> None:
-    check_one_point(renderer.buffers(one_point(3_000), RenderOptions(size=(24, 18))))
+    check_one_point(renderer.buffers(one_point(3_000), PAPER))
 
 
 def test_a_million_on_one_point(renderer: Renderer) -> None:
     """Right, or, where the driver would end the loop before its end, refused; then all is as it was."""
     if renderer.context.max_loop_iterations is None:
-        check_one_point(renderer.buffers(one_point(MILLION), RenderOptions(size=(24, 18))))
+        check_one_point(renderer.buffers(one_point(MILLION), PAPER))
         return
     with pytest.raises(TooMuchData, match=r"1,000,000 decals reach the same place; expected at most 8,191"):
-        renderer.buffers(one_point(MILLION), RenderOptions(size=(24, 18)))
-    check_one_point(renderer.buffers(one_point(3), RenderOptions(size=(24, 18))))
+        renderer.buffers(one_point(MILLION), PAPER)
+    check_one_point(renderer.buffers(one_point(3), PAPER))

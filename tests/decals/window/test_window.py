@@ -76,13 +76,13 @@ def test_the_camera_is_left_its_drags_and_wheel(driver: Driver) -> None:
 
 def test_a_click_places_on_either_object(driver: Driver) -> None:
     for number in (0, 1):
-        at = next(at for n, at in driver.visible() if n in decals_on(driver.document, [number]))
+        shown, at = next((n, at) for n, at in driver.visible() if n in decals_on(driver.document, [number]))
         driver.click(at, ctrl=True)
         (placed,) = driver.window.actions.state.selection
         assert placed in decals_on(driver.document, [number])
         seen = driver.window.tools.at(*at)
         assert seen is not None
-        assert seen.owner == placed
+        assert seen.owner in (placed, shown)  # a smaller one stays on top
     assert len(driver.document.decals) == 62
 
 
@@ -131,15 +131,15 @@ def test_keys_of_pyvista_are_ours_where_the_table_says_so(driver: Driver) -> Non
 
 def test_p_and_u_change_how_the_window_draws_and_picks(driver: Driver) -> None:
     subplot, modes = driver.window.subplot, driver.window.actions.state.modes
-    assert (subplot.contact, subplot.mapping) == (Contact.PRODUCT, ImageMapping.CORRECTED)
+    assert (subplot.contact, subplot.mapping) == (Contact.ELASTIC, ImageMapping.CORRECTED)
     first = driver.shot()
     driver.key("u")
     assert subplot.mapping is ImageMapping.CHORD
     assert (driver.shot() != first).any()
     driver.key("P", shift=True)
     assert subplot.stiffness == modes.stiffness == 3.0
-    driver.key("p")
-    driver.key("p")
+    for _ in range(3):
+        driver.key("p")
     assert subplot.contact is modes.contact is Contact.RADIAL
     assert "contact mode: radial" in driver.window.overlay.status
     owner, _ = driver.owners()
