@@ -1,5 +1,10 @@
 """``implicit-decals sandbox``: modelling and decals in the browser."""
 
+import ipaddress
+import secrets
+import socket
+import webbrowser
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,7 +19,12 @@ from decals.window import EditWindow
 from decals.window.host_plotter import new_plotter
 
 HOST = "127.0.0.1"
-"""The page is served to this machine only."""
+"""By default, the page is served to this machine only."""
+
+ANY_ADDRESS = ("0.0.0.0", "::")
+"""Hosts that stand for all addresses of this machine."""
+
+TITLE = "Implicit Decals sandbox"
 
 MAX_PORT = 65535
 FIRST_SIZE = (700, 700)
@@ -34,14 +44,17 @@ def sandbox(
     save: Path | None = None,
     define: Definitions = None,
     port: Whole = 8080,
+    host: str = HOST,
     browser: bool = True,
+    desktop: Annotated[bool, Parameter(negative=())] = False,
     trust: Trust = False,
     lab: Annotated[bool, Parameter(negative=())] = False,
     lessons: Path | None = None,
 ) -> None:
     """Open models or a scene in the sandbox, a page in the browser.
 
-    The page is served to this machine only. Ctrl + C in the terminal ends it; unsaved changes are kept.
+    The page is served to this machine only, unless --host is given. Ctrl + C in the terminal ends it;
+    unsaved changes are kept.
 
     Parameters
     ----------
@@ -64,8 +77,13 @@ def sandbox(
         repeated.
     port
         Port of the page; 0 takes a free one.
+    host
+        Address to serve the page at, such as 0.0.0.0 for all networks. Its URL then has a token, without
+        which the page does not work. Default: this machine only.
     browser
         Open the page in the default browser.
+    desktop
+        Show the page in a window of its own. Needs pywebview.
     trust
         Let a scene read files outside its folder, and any number of images.
     lab
@@ -75,9 +93,11 @@ def sandbox(
     """
     check_options(decals, seed, save)
     check_count("--port", port, 0, MAX_PORT)
-    serve, page = _toolkit()
-    if lab or lessons is not None:
-        page = _lab(model, lessons)
+    if model and (lab or lessons is not None):
+        raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
+    serve, page = _toolkit(lessons)
+    if desktop:
+        _require_webview()
     import_definitions(define)
     opening = opened(
         model, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save, trust=trust
@@ -89,38 +109,71 @@ def sandbox(
         with window:
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
-            page(server, window, start=not model)
-            server.controller.on_server_ready.add(lambda **_: _announce(server.port))
-            server.start(host=HOST, port=port, open_browser=browser, show_connection_info=False, timeout=0)
+            in_lesson = lab or lessons is not None
+            page(server, window, in_lesson=in_lesson, start=not model and not in_lesson)
+            query = _protect(server, host)
+            own_browser = browser and not desktop and bool(query)  # trame's knows no token
+            server.controller.on_server_ready.add(
+                lambda **_: _announce(host, server.port, query, open_browser=own_browser)
+            )
+            window_options = {"exec_mode": "desktop", "title": TITLE} if desktop else {}
+            server.start(
+                host=host,
+                port=port,
+                open_browser=browser and not query,
+                show_connection_info=False,
+                timeout=0,
+                **window_options,
+            )
     finally:
         report_unsaved(window, "sandbox")
 
 
-def _toolkit() -> tuple[Any, Any]:
-    """Return trame's server and our page, which needs trame."""
+def _toolkit(folder: Path | None) -> tuple[Any, Any]:
+    """Return trame's server and our page with the lessons of a folder; both need trame."""
     try:
         from trame.app import get_server
 
-        from decals.apps.sandbox.page import Page
+        from decals.apps.lab.lesson import LESSONS, load_lessons
+        from decals.apps.lab.page import LabPage
     except ImportError as error:
         raise MissingPackage(
             f"the sandbox needs trame ({error}); install it with: pip install 'implicit-decals[browser]'"
         ) from None
-    return get_server, Page
-
-
-def _lab(model: list[str] | None, folder: Path | None) -> Any:
-    """Return the page of the contact lab, which brings its own scenes."""
-    from decals.apps.lab.lesson import LESSONS, load_lessons
-    from decals.apps.lab.page import LabPage
-
-    if model:
-        raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
     found = load_lessons(LESSONS if folder is None else folder)
-    return lambda server, window, **_: LabPage(server, window, found)
+    return get_server, lambda server, window, **options: LabPage(server, window, found, **options)
 
 
-def _announce(port: int) -> None:
+def _require_webview() -> None:
+    """Raise `MissingPackage` without pywebview, whose window shows the page."""
+    if find_spec("webview") is None:
+        raise MissingPackage(
+            "--desktop needs pywebview; install it with: pip install 'pywebview[qt]', or leave out --desktop"
+        )
+
+
+def _protect(server: Any, host: str) -> str:
+    """Ask every browser for a new token, unless only this machine is served; return the end of the URL."""
+    if _is_loopback(host):
+        return ""
+    token = f"t{secrets.token_urlsafe(24)}"  # the page reads digits alone as a number
+    server.cli.set_defaults(authKey=token)
+    return f"?secret={token}"
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name
+        return host == "localhost"
+
+
+def _announce(host: str, port: int, query: str, *, open_browser: bool) -> None:
+    """Print the URL of the page, and open it if trame does not."""
+    shown = socket.gethostname() if host in ANY_ADDRESS else f"[{host}]" if ":" in host else host
+    url = f"http://{shown}:{port}/{query}"
     Console(stderr=True, soft_wrap=True).print(
-        f"sandbox at http://{HOST}:{port}/ (Ctrl + C ends it)", highlight=False, markup=False
+        f"sandbox at {url} (Ctrl + C ends it)", highlight=False, markup=False
     )
+    if open_browser:
+        webbrowser.open(url)

@@ -78,7 +78,7 @@ class Lab:
         self._asking = False
         self._submitted: object = None
         self._last_step = math.inf
-        self.start(0)
+        self._number = 0
 
     # -- state ------------------------------------------------------------------------------------------
 
@@ -288,6 +288,11 @@ class Lab:
     def _end_edit(self) -> None:
         self._last_step = math.inf
         self._window.actions.state.end_stroke()
+
+    def leave(self) -> None:
+        """Leave the lesson: its scene stays, its probe goes."""
+        self._end_edit()
+        self._window.plotter.remove_actor("probe", render=False)
 
     def check(self) -> None:
         """Check the answer: the verdict appears once it is computed, until the scene changes."""

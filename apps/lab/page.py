@@ -7,7 +7,7 @@ from trame.widgets import client, html, vuetify3
 
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
-from decals.apps.sandbox.page import Page
+from decals.apps.sandbox.page import PANEL_WIDTH, Page
 from decals.apps.sandbox.panels import COMPACT, FIELD, icon_button, named
 from decals.window import EditWindow
 
@@ -22,6 +22,18 @@ STYLE = """
 """
 """How the text of a lesson looks."""
 
+LAB_VALUES = (
+    "lab_titles",
+    "lab_number",
+    "lab_text",
+    "lab_question",
+    "lab_sliders",
+    "lab_values",
+    "lab_plots",
+    "lab_verdict",
+)
+"""Names of the values of a lesson, which a page knows from the beginning."""
+
 
 class LabPage(Page):
     """A page of the sandbox with lessons.
@@ -32,23 +44,47 @@ class LabPage(Page):
         As for `Page`.
     lessons
         The lessons.
+    in_lesson
+        Begin with the first lesson.
+    options
+        Options of the `Sandbox`.
     """
 
-    def __init__(self, server: Any, window: EditWindow, lessons: Sequence[Lesson]) -> None:
+    def __init__(
+        self,
+        server: Any,
+        window: EditWindow,
+        lessons: Sequence[Lesson],
+        *,
+        in_lesson: bool = True,
+        **options: Any,
+    ) -> None:
         self.lab = Lab(window, lessons)
-        server.state.lab_side = "plots"
-        super().__init__(server, window)
+        server.state.update({"lab_side": "plots", **dict.fromkeys(LAB_VALUES)})
+        titles = [lesson.settings.title for lesson in lessons]
+        super().__init__(server, window, lessons=titles, start_lesson=self.lab.start, **options)
+        if in_lesson:
+            self.sandbox.open_lesson(0)
         server.controller.on_server_exited.add(lambda **_: self.lab.close())
 
     def values(self) -> dict[str, Any]:
         """Return all values that the page shows, by their names there."""
-        self.lab.refresh()
-        return {**super().values(), **self.lab.values()}
+        values = {**super().values(), "in_lesson": self.sandbox.in_lesson}
+        if self.sandbox.in_lesson:
+            self.lab.refresh()
+            values |= self.lab.values()
+        elif self._shown.get("in_lesson"):
+            self.lab.leave()
+        return values
 
     def _build_left_side(self) -> None:
-        with vuetify3.VNavigationDrawer(permanent=True, width=LESSON_WIDTH, location="left"):
+        with vuetify3.VNavigationDrawer(
+            permanent=True, width=(f"in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH}",), location="left"
+        ):
             client.Style(STYLE)
-            with html.Div(classes="pa-3"):
+            with html.Div(v_if="!in_lesson"):
+                self._build_outline()
+            with html.Div(v_if="in_lesson", classes="pa-3"):
                 with html.Div(classes="d-flex align-center ga-1 mb-2"):
                     vuetify3.VSelect(
                         model_value=("lab_number",),
@@ -58,6 +94,7 @@ class LabPage(Page):
                         **FIELD,
                     )
                     icon_button("mdi-restart", "start the lesson again", (self.lab.start, "[lab_number]"))
+                    icon_button("mdi-close", "leave the lesson", self.sandbox.close_lesson)
                 html.Div(v_html=("lab_text",), classes="lesson")
                 self._build_question()
                 self._build_sliders()
@@ -114,18 +151,26 @@ class LabPage(Page):
             )
 
     def _build_right_side(self) -> None:
-        with vuetify3.VNavigationDrawer(permanent=True, width=PLOTS_WIDTH, location="right"):
+        with vuetify3.VNavigationDrawer(
+            permanent=True, width=(f"in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH}",), location="right"
+        ):
             with vuetify3.VBtnToggle(
-                v_model="lab_side", mandatory=True, density="compact", variant="text", classes="mx-2 mt-1"
+                v_if="in_lesson",
+                v_model="lab_side",
+                mandatory=True,
+                density="compact",
+                variant="text",
+                classes="mx-2 mt-1",
             ):
                 vuetify3.VBtn("Plots", value="plots", size="small")
                 vuetify3.VBtn("Model", value="model", size="small")
-            with html.Div(v_show="lab_side === 'plots'", classes="px-2 pb-2"):
+            with html.Div(v_if="in_lesson && lab_side === 'plots'", classes="px-2 pb-2"):
                 self._build_values()
                 with html.Div(v_for="p in lab_plots", key="p.title", classes="mb-2"):
                     html.Div("{{ p.title }}", classes="text-body-2 font-weight-medium")
                     html.Div(v_html=("p.svg",))
                     html.Div("{{ p.note }}", classes="text-caption")
-            with html.Div(v_show="lab_side === 'model'"):
-                self._build_outline()
+            with html.Div(v_if="!in_lesson || lab_side === 'model'"):
+                with html.Div(v_if="in_lesson"):
+                    self._build_outline()
                 self._build_panels()

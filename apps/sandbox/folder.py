@@ -146,6 +146,6 @@ def thumbnails() -> dict[str, str]:
     }
 
 
-def values_of_start(folder: Path, samples: tuple[str, ...], lessons: list[dict[str, Any]]) -> dict[str, Any]:
+def values_of_start(folder: Path, samples: tuple[str, ...], lessons: list[str]) -> dict[str, Any]:
     """Return all that the start page lists."""
     return {"samples": list(samples), "lessons": lessons, **listed(folder)}

@@ -147,10 +147,10 @@ def build_start(sandbox: Sandbox) -> None:
             html.H2("Lessons", classes="text-subtitle-2")
             with vuetify3.VList(density="compact"):
                 vuetify3.VListItem(
-                    v_for="lesson in start.lessons",
-                    key="lesson.name",
-                    title=("lesson.title",),
-                    href=("lesson.address",),
+                    v_for="(lesson, i) in start.lessons",
+                    key="i",
+                    title=("lesson",),
+                    click=(sandbox.open_lesson, "[i]"),
                 )
 
 

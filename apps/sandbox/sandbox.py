@@ -6,7 +6,7 @@ window's session and its actions.
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -68,12 +68,16 @@ class Sandbox:
     start
         Show the start page first.
     lessons
-        Lessons that the start page lists.
+        Titles of lessons that the start page lists.
+    start_lesson
+        Starts one of them, by its index.
 
     Attributes
     ----------
     display : Display
         How the view shows the scene.
+    in_lesson
+        True while the page shows a lesson.
     schedule
         Asks for a call of `take_step` before the next frame. Default: it is called at once.
 
@@ -89,14 +93,16 @@ class Sandbox:
         *,
         folder: Path | None = None,
         start: bool = False,
-        lessons: list[dict[str, Any]] | None = None,
+        lessons: Sequence[str] = (),
+        start_lesson: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._window = window
         self._folder = (Path() if folder is None else folder).resolve()
         self.display = Display(window)
         files = window.actions.files
         files.folder, files.show_view = self._folder, self.display.show_from
-        self._lessons = lessons or []
+        self._lessons, self._start_lesson = list(lessons), start_lesson
+        self.in_lesson = False
         self._start: dict[str, Any] = {}
         self.show_start(start)
         self._last_step = math.inf
@@ -309,6 +315,21 @@ class Sandbox:
         """Show or hide the start page."""
         self._start = {"open": bool(shown), **values_of_start(self._folder, SAMPLES, self._lessons)}
 
+    def open_lesson(self, number: int) -> None:
+        """Start one of the lessons."""
+        with self._reported():
+            if isinstance(number, bool) or number not in range(len(self._lessons)):
+                raise InvalidEdit(
+                    f"lesson: expected one from 0 to {len(self._lessons) - 1}, got {describe(number)}"
+                )
+            self._window.background.require_idle()
+            self._start_lesson(number)
+            self.in_lesson, self._start = True, {**self._start, "open": False}
+
+    def close_lesson(self) -> None:
+        """Leave the lesson; its scene stays, and can be edited."""
+        self.in_lesson = False
+
     def new_model(self) -> None:
         """Begin an empty scene."""
         with self._reported():
@@ -400,6 +421,7 @@ class Sandbox:
         return new_file(self._folder, name)
 
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
+        self.in_lesson = False
         self._window.actions.files.open(load, path)
         self._start = {**self._start, "open": False}
         self.display.bookmarks.clear()

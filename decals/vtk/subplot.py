@@ -211,17 +211,18 @@ class SubplotRenderer:
             self._scene = None
             self.applied.clear()
 
-    def _enclose_objects(self, box: Callable[[Sequence[SceneObject]], Box]) -> None:
-        """Give the proxy actor the bounds of the scene's objects, if they changed."""
+    def _enclose_objects(self, box: Callable[[Sequence[SceneObject]], Box]) -> bool:
+        """Give the proxy actor the bounds of the scene's objects; return True if there are others now."""
         if self._scene is None:
-            return
+            return False
         objects = tuple(self._scene.objects)
         if same_objects(objects, self._enclosed) and self._proxy_actor.present:
-            return
+            return False
         self._enclosed = objects
         if isinstance(self._scene, Scene):  # a document stays in its own window, at its origin
             self._proxy_actor.place(self._scene.origin)
         self._proxy_actor.enclose(box(cast(Sequence[SceneObject], objects)) if objects else None)
+        return bool(objects)
 
     def apply(self, actor: Any, *, follow: bool = False, crease_angle: float = CREASE_ANGLE) -> None:
         """Show the decals on an actor of VTK; see `DecalsComponent.apply`."""
@@ -461,9 +462,20 @@ class SubplotRenderer:
 
     def _begin_frame(self) -> None:
         if self.scene is not None:
-            self._enclose_objects(box_around)  # an edited document may change with every frame
+            if self._enclose_objects(box_around):  # an edited document may change with every frame
+                self._widen_clipping_range()
             self._warn_of_unsupported()
         self.applied.begin_frame()
+
+    def _widen_clipping_range(self) -> None:
+        """Reset the camera's near and far planes if an edit has moved objects beyond them."""
+        camera = self.vtk_renderer.camera
+        sides = np.reshape(self._proxy_actor.actor.GetBounds(), (3, 2))
+        corners = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 3)
+        depths = (corners - camera.position) @ camera.GetDirectionOfProjection()
+        near, far = camera.clipping_range
+        if depths.min() < near or depths.max() > far:
+            self.vtk_renderer.ResetCameraClippingRange()
 
     def _end_frame(self) -> None:
         self.applied.end_frame()

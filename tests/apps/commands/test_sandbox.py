@@ -1,6 +1,10 @@
 """``implicit-decals sandbox`` without a browser: what it opens, and what it says."""
 
+import argparse
+import asyncio
 import sys
+import unittest.mock
+import webbrowser
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +28,7 @@ class Server:
     port = 8123
 
     def __init__(self) -> None:
+        self.cli = argparse.ArgumentParser()
         self.controller = self
         self.on_server_ready = self
         self.ready: list[Any] = []
@@ -43,7 +48,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Server, EditWindow]]:
     """Return the list of servers and windows that `sandbox` opens."""
     pages: list[tuple[Server, EditWindow]] = []
     toolkit = (lambda *_, **__: Server()), lambda server, window, **_: pages.append((server, window))
-    monkeypatch.setattr(sandbox_module, "_toolkit", lambda: toolkit)
+    monkeypatch.setattr(sandbox_module, "_toolkit", lambda _: toolkit)
     return pages
 
 
@@ -58,6 +63,85 @@ def test_the_sandbox_opens_models_and_serves_this_machine_only(
     assert (server.options["host"], server.options["port"]) == ("127.0.0.1", 0)
     assert server.options["open_browser"] is False
     assert "http://127.0.0.1:8123/" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("host", "shown"),
+    [
+        ("127.0.0.1", None),
+        ("localhost", None),
+        ("::1", None),
+        ("0.0.0.0", ""),
+        ("192.168.0.9", "192.168.0.9"),
+    ],
+)
+def test_other_machines_need_a_token(
+    host: str,
+    shown: str | None,
+    folder: Path,
+    opened: list[tuple[Server, EditWindow]],
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    urls: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", urls.append)
+    assert run(["sandbox", "--host", host, "--port", "0"]) == 0
+    server = opened[0][0]
+    assert server.options["host"] == host
+    token = server.cli.get_default("authKey")
+    assert server.options["open_browser"] is (shown is None)
+    if shown is None:
+        assert (token, urls) == (None, [])
+        return
+    assert len(token) > 30
+    assert not token.isdigit()
+    assert urls[0].endswith(f":8123/?secret={token}")
+    assert shown in urls[0]
+    assert urls[0] in capsys.readouterr().err
+
+
+def test_a_server_refuses_clients_without_its_token() -> None:
+    pytest.importorskip("trame")
+    from trame.app import get_server
+    from trame_server.client import Client
+
+    async def connected(url: str, **config: Any) -> bool:
+        client = Client(url)
+        task = asyncio.create_task(client.connect(**config))
+        while not task.done():
+            await asyncio.sleep(0.01)
+            if client.connected:
+                await client.disconnect()
+                await task
+                return True
+        return task.exception() is None
+
+    async def serve() -> list[bool]:
+        server = get_server("token", client_type="vue3")
+        token = sandbox_module._protect(server, "10.0.0.9").removeprefix("?secret=")
+        task = server.start(
+            exec_mode="task", host="127.0.0.1", port=0, timeout=0, open_browser=False, disable_logging=True
+        )
+        await server.ready
+        url = f"ws://127.0.0.1:{server.port}/ws"
+        results = [await connected(url, secret=secret) for secret in ("wslink-secret", "", token)]
+        await server.stop()
+        await task
+        return results
+
+    with unittest.mock.patch.object(sys, "argv", ["implicit-decals"]):
+        assert asyncio.run(serve()) == [False, False, True]
+
+
+def test_a_window_of_its_own_needs_pywebview(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, opened: list[tuple[Server, EditWindow]], capsys: Capture
+) -> None:
+    monkeypatch.setattr(sandbox_module, "find_spec", lambda _: None)
+    assert run(["sandbox", "--desktop"]) == 2
+    assert "pip install 'pywebview[qt]'" in capsys.readouterr().err
+    monkeypatch.setattr(sandbox_module, "find_spec", lambda _: object())
+    assert run(["sandbox", "--desktop"]) == 0
+    assert opened[0][0].options["exec_mode"] == "desktop"
 
 
 def test_unsaved_changes_are_kept(

@@ -87,6 +87,17 @@ def test_a_former_mode_keeps_no_mesh(sandbox: Sandbox, shared: EditWindow) -> No
         shared.subplot.remove(actor)
 
 
+def test_near_and_far_planes_follow_a_growing_model(sandbox: Sandbox, shared: EditWindow) -> None:
+    camera = shared.subplot.vtk_renderer.camera
+    near, far = camera.clipping_range
+    sandbox.select("0/1")
+    sandbox.set_component("center", [2], -60.0)
+    finish(shared)
+    shared.plotter.render()
+    assert camera.clipping_range[1] > far
+    assert camera.clipping_range[0] <= near
+
+
 def test_overlays_follow_edits(sandbox: Sandbox, shared: EditWindow) -> None:
     sandbox.set_display("overlay", "seeds")
     settle(sandbox, shared)

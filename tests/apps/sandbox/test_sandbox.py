@@ -68,6 +68,24 @@ def test_of_waiting_slider_steps_only_the_newest_is_carried_out(window: EditWind
     assert (tree.children[0].radius, tree.children[1].radius) == (0.9, 0.8)
 
 
+def test_lessons_are_started_and_left(window: EditWindow) -> None:
+    started: list[int] = []
+    sandbox = Sandbox(window, start=True, lessons=["One", "Two"], start_lesson=started.append)
+    assert sandbox.values()["start"]["lessons"] == ["One", "Two"]
+    wrong: list[Any] = [2, -1, True, None, "0", []]
+    for number in wrong:
+        sandbox.open_lesson(number)
+        assert "lesson: expected one from 0 to 1" in sandbox.status
+    assert (started, sandbox.in_lesson, sandbox.values()["start"]["open"]) == ([], False, True)
+    sandbox.open_lesson(1)
+    assert (started, sandbox.in_lesson, sandbox.values()["start"]["open"]) == ([1], True, False)
+    sandbox.close_lesson()
+    assert not sandbox.in_lesson
+    sandbox.open_lesson(0)
+    sandbox.new_model()
+    assert not sandbox.in_lesson
+
+
 def shapes(window: EditWindow) -> list[str]:
     return [row["label"] for row in outline(window.document) if "/" in row["key"] or row["key"].isdigit()]
 
