@@ -6,7 +6,7 @@ They cannot prove a claim, but a wrong function seldom passes.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Any
 
@@ -132,12 +132,12 @@ def _try_single_precision(
     """Check that distances survive float32, in which devices compute."""
     for q, c in zip(queries, closest_points, strict=True):
         arguments = [_in_single(value) for value in (tuple(q), *values.values())]
-        where = f"q = {_format(q)} and {values}, in single precision,"
+        where = partial(_in_single_precision, q, values)
         other = result_of(source, closest, arguments, where, 3)
         one, two = np.linalg.norm(q - c), np.linalg.norm(q - other)
         if abs(one - two) > SINGLE_TOLERANCE * (1.0 + np.abs(q).max() + np.abs(c).max()):
             raise source.refusal(
-                f"for {where} it returns {_format(other)}, in double precision {_format(c)}; "
+                f"for {where()} it returns {_format(other)}, in double precision {_format(c)}; "
                 "avoid differences of large numbers and divisions by small ones"
             )
 
@@ -158,6 +158,10 @@ def _try_convexity(
                 f"convex: {_format(one)} and {_format(other)} belong to the skeleton, but the middle between "
                 f"them is {apart:.6g} away from it{f', with {values}' if values else ''}"
             )
+
+
+def _in_single_precision(q: Floats, values: dict[str, Any]) -> str:
+    return f"q = {_format(q)} and {values}, in single precision,"
 
 
 def _in_single(value: Any) -> Any:
@@ -201,23 +205,29 @@ def _queries(rng: np.random.Generator, arguments: list[Any]) -> Floats:
 def _point(
     source: CustomSource, closest: Callable[..., Any], q: Any, arguments: list[Any], values: dict[str, Any]
 ) -> Floats:
-    where = f"q = {_format(q)} and {values}"
-    return result_of(source, closest, [vector(*q), *arguments], where, 3)
+    return result_of(source, closest, [vector(*q), *arguments], lambda: f"q = {_format(q)} and {values}", 3)
 
 
 def result_of(
-    source: CustomSource, function: Callable[..., Any], arguments: list[Any], where: str, size: int
+    source: CustomSource,
+    function: Callable[..., Any],
+    arguments: list[Any],
+    where: Callable[[], str],
+    size: int,
 ) -> Floats:
-    """Return the result of a function as `size` numbers; raise `InvalidDefinition` otherwise."""
+    """Return the result of a function as `size` numbers; raise `InvalidDefinition` otherwise.
+
+    `where` says for errors at which arguments it is called.
+    """
     try:
         with np.errstate(all="ignore"):
             result = np.asarray(function(*arguments), np.float64)
     except ArithmeticError as error:
-        raise source.refusal(f"for {where}: {error}; every point q needs a closest point") from error
+        raise source.refusal(f"for {where()}: {error}; every point q needs a closest point") from error
     except Exception as error:  # the function is the user's own
-        raise source.refusal(f"for {where} it fails: {type(error).__name__}: {error}") from error
+        raise source.refusal(f"for {where()} it fails: {type(error).__name__}: {error}") from error
     if result.shape != (size,) or not np.isfinite(result).all():
-        raise source.refusal(f"for {where} it returns {_format(result)}; expected {size} finite numbers")
+        raise source.refusal(f"for {where()} it returns {_format(result)}; expected {size} finite numbers")
     return result
 
 
@@ -259,7 +269,7 @@ class _Trial:
         directions = [vector(*gradient, precision=self.precision) for gradient in self.gradients]
         parameters = map(self.precision, self.parameters)
         arguments = [self.precision(a), self.precision(b), *directions, *parameters]
-        return result_of(self.source, self.function, arguments, self.call(a, b), 3)
+        return result_of(self.source, self.function, arguments, lambda: self.call(a, b), 3)
 
     def value(self, a: float, b: float) -> float:
         return float(self.at(a, b)[0])
@@ -267,16 +277,13 @@ class _Trial:
     def bounds(self, max_a: float, max_b: float) -> Floats:
         """Return the claimed bounds of |∂F/∂a| and |∂F/∂b| for operands up to these."""
         arguments = [np.float64(x) for x in (max_a, max_b, *self.parameters)]
-        where = f"steepest of {self.call(max_a, max_b)}"
-        return result_of(self.source, self.steepest, arguments, where, 2)
+        return result_of(
+            self.source, self.steepest, arguments, lambda: f"steepest of {self.call(max_a, max_b)}", 2
+        )
 
     def call(self, *operands: float) -> str:
         numbers = [f"{float(x):.6g}" for x in operands]
         return f"F({', '.join([*numbers, *map(_format, (*self.gradients, *self.parameters))])})"
-
-    def require(self, holds: bool, reason: str) -> None:
-        if not holds:
-            raise self.source.refusal(reason)
 
 
 def check_operator(source: CustomSource, parameters: tuple[Parameter, ...], claims: Claims) -> None:
@@ -335,23 +342,25 @@ def _try_envelope(
 
     def bounds(a: float, b: float) -> Floats:
         arguments = [np.float64(x) for x in (a, b, *trial.parameters)]
-        return result_of(trial.source, envelope, arguments, f"the envelope at ({a:.6g}, {b:.6g})", 2)
+        where = partial("the envelope at ({:.6g}, {:.6g})".format, a, b)
+        return result_of(trial.source, envelope, arguments, where, 2)
 
     for a, b in operands.tolist():
         value, (low, high) = trial.value(a, b), bounds(a, b)
         slack = VALUE_TOLERANCE * (1.0 + abs(value))
-        trial.require(
-            low - slack <= value <= high + slack,
-            f"{trial.call(a, b)} = {value:.6g}, outside its envelope [{low:.6g}, {high:.6g}]",
-        )
+        if not (low - slack <= value <= high + slack):
+            raise trial.source.refusal(
+                f"{trial.call(a, b)} = {value:.6g}, outside its envelope [{low:.6g}, {high:.6g}]"
+            )
         more = float(rng.uniform(0.0, 1.0))
         with_b = (a, b - min(more, b)) if falls_with_b else (a, b + more)
         for pair in ((a + more, b), with_b):
-            trial.require(
-                bool((bounds(*pair) >= [low - slack, high - slack]).all()),
-                f"envelope: it is {_format(bounds(*pair))} at {_format(pair)}, and {_format((low, high))} at "
-                f"{_format((a, b))}; it must be monotone",
-            )
+            moved = bounds(*pair)
+            if (moved < [low - slack, high - slack]).any():
+                raise trial.source.refusal(
+                    f"envelope: it is {_format(moved)} at {_format(pair)}, and {_format((low, high))} at "
+                    f"{_format((a, b))}; it must be monotone"
+                )
 
 
 def _try_turned(trial: _Trial, operands: Floats, rng: np.random.Generator) -> None:
@@ -360,10 +369,11 @@ def _try_turned(trial: _Trial, operands: Floats, rng: np.random.Generator) -> No
     other = replace(trial, gradients=turned)
     for a, b in operands[:10].tolist():
         change = abs(other.value(a, b) - trial.value(a, b))
-        trial.require(
-            change <= LARGEST_JUMP * (1.0 + a + b),
-            f"{trial.call(a, b)} changes by {change:.6g} where gradients turn by 1e-7; it must be continuous",
-        )
+        if change > LARGEST_JUMP * (1.0 + a + b):
+            raise trial.source.refusal(
+                f"{trial.call(a, b)} changes by {change:.6g} where gradients turn by 1e-7; "
+                "it must be continuous"
+            )
 
 
 def _operands(rng: np.random.Generator) -> Floats:
@@ -381,25 +391,26 @@ def _try_values(trial: _Trial, operands: Floats, claims: Claims) -> None:
     """Check that F ≥ 0, and its value where an operand is absent."""
     for a, b in [*operands.tolist(), [0.0, 0.5], [0.5, 0.0], [1.0, 1.0], [0.5, 0.5]]:
         value = trial.value(a, b)
-        trial.require(
-            value >= 0.0,
-            f"{trial.call(a, b)} = {value:.6g} is negative, and a field is not; write wp.max(…, 0.0)",
-        )
+        if value < 0.0:
+            raise trial.source.refusal(
+                f"{trial.call(a, b)} = {value:.6g} is negative, and a field is not; write wp.max(…, 0.0)"
+            )
     if claims.like is None:
         value = trial.value(0.0, 0.0)
-        trial.require(
-            value == 0.0, f"{trial.call(0, 0)} = {value:.6g}; where both operands are absent it must be 0"
-        )
+        if value != 0.0:
+            raise trial.source.refusal(
+                f"{trial.call(0, 0)} = {value:.6g}; where both operands are absent it must be 0"
+            )
         return
     for x in np.abs(operands[:, 0]).tolist():
         with_left = x if claims.like in ("blend", "difference") else 0.0
         with_right = x if claims.like == "blend" else 0.0
         for pair, expected in (((x, 0.0), with_left), ((0.0, x), with_right)):
             value = trial.value(*pair)
-            trial.require(
-                _near(value, expected),
-                f"{trial.call(*pair)} = {value:.6g}, but like={claims.like!r} says {expected:.6g}",
-            )
+            if not _near(value, expected):
+                raise trial.source.refusal(
+                    f"{trial.call(*pair)} = {value:.6g}, but like={claims.like!r} says {expected:.6g}"
+                )
 
 
 def _try_partials(trial: _Trial, operands: Floats) -> None:
@@ -417,16 +428,16 @@ def _try_partials(trial: _Trial, operands: Floats) -> None:
             scale = SLOPE_TOLERANCE * (1.0 + abs(partials[number]))
             smooth = abs(right - left) <= 10.0 * scale
             kinks += not smooth
-            trial.require(
-                not smooth or abs(partials[number] - 0.5 * (right + left)) <= scale,
-                f"∂F/∂{name} of {trial.call(a, b)} is {0.5 * (right + left):.6g} by differences, "
-                f"but {partials[number]:.6g} is returned",
-            )
+            if smooth and abs(partials[number] - 0.5 * (right + left)) > scale:
+                raise trial.source.refusal(
+                    f"∂F/∂{name} of {trial.call(a, b)} is {0.5 * (right + left):.6g} by differences, "
+                    f"but {partials[number]:.6g} is returned"
+                )
         _try_steepness(trial, a, b, partials)
-    trial.require(
-        kinks <= MAX_KINK_SHARE * 2 * len(operands),
-        f"F has kinks at {kinks} of {2 * len(operands)} samples, so its derivatives cannot be tried",
-    )
+    if kinks > MAX_KINK_SHARE * 2 * len(operands):
+        raise trial.source.refusal(
+            f"F has kinks at {kinks} of {2 * len(operands)} samples, so its derivatives cannot be tried"
+        )
 
 
 def _try_continuity(trial: _Trial, operands: Floats, rng: np.random.Generator) -> None:
@@ -435,11 +446,11 @@ def _try_continuity(trial: _Trial, operands: Floats, rng: np.random.Generator) -
     for one, other in zip(operands, np.abs(operands + steps), strict=True):
         bounds = trial.bounds(*np.maximum(one, other).tolist())
         change = abs(trial.value(*one) - trial.value(*other))
-        trial.require(
-            change <= float(bounds @ np.abs(one - other)) + VALUE_TOLERANCE * (1.0 + change),
-            f"{trial.call(*one)} and {trial.call(*other)} are {change:.6g}, farther apart than "
-            f"steepest = {bounds.tolist()} allows; F must be continuous and its partial derivatives right",
-        )
+        if change > float(bounds @ np.abs(one - other)) + VALUE_TOLERANCE * (1.0 + change):
+            raise trial.source.refusal(
+                f"{trial.call(*one)} and {trial.call(*other)} are {change:.6g}, farther apart than "
+                f"steepest = {bounds.tolist()} allows; F must be continuous and its partial derivatives right"
+            )
 
 
 def _steepest(claim: float | CustomSource) -> Callable[..., Any]:
@@ -450,11 +461,11 @@ def _steepest(claim: float | CustomSource) -> Callable[..., Any]:
 
 def _try_steepness(trial: _Trial, a: float, b: float, partials: list[float]) -> None:
     bounds = trial.bounds(a, b).tolist()
-    for name, partial, bound in zip("ab", partials, bounds, strict=True):
-        trial.require(
-            abs(partial) <= bound * (1.0 + VALUE_TOLERANCE),
-            f"|∂F/∂{name}| of {trial.call(a, b)} is {abs(partial):.6g}, more than steepest = {bound:.6g}",
-        )
+    for name, slope, bound in zip("ab", partials, bounds, strict=True):
+        if abs(slope) > bound * (1.0 + VALUE_TOLERANCE):
+            raise trial.source.refusal(
+                f"|∂F/∂{name}| of {trial.call(a, b)} is {abs(slope):.6g}, more than steepest = {bound:.6g}"
+            )
 
 
 def _try_tiny_operands(trial: _Trial) -> None:
@@ -462,10 +473,10 @@ def _try_tiny_operands(trial: _Trial) -> None:
     single = replace(trial, precision=np.float32)
     for a, b in product((1e-38, 1e-30, 1e-19, 1e-9, 0.5), repeat=2):
         f, *partials = single.at(a, b).tolist()
-        trial.require(
-            _near(f, trial.value(a, b)),
-            f"{trial.call(a, b)} is {f:.6g} in single precision, {trial.value(a, b):.6g} in double",
-        )
+        if not _near(f, trial.value(a, b)):
+            raise trial.source.refusal(
+                f"{trial.call(a, b)} is {f:.6g} in single precision, {trial.value(a, b):.6g} in double"
+            )
         _try_steepness(trial, a, b, partials)
 
 
@@ -473,26 +484,26 @@ def _try_monotone(trial: _Trial, rng: np.random.Generator, *, falls_with_b: bool
     for a, b, more in (rng.uniform(0.0, 1.0, (SAMPLES, 3)) * rng.choice([1.0, 3.0], (SAMPLES, 1))).tolist():
         least, with_a, with_b = trial.value(a, b), trial.value(a + more, b), trial.value(a, b + more)
         slack = VALUE_TOLERANCE * (1.0 + least)
-        trial.require(
-            with_a >= least - slack,
-            f"monotone: {trial.call(a, b)} = {least:.6g} but {trial.call(a + more, b)} = {with_a:.6g}",
-        )
-        trial.require(
-            with_b <= least + slack if falls_with_b else with_b >= least - slack,
-            f"monotone: {trial.call(a, b)} = {least:.6g} but {trial.call(a, b + more)} = {with_b:.6g}",
-        )
+        if with_a < least - slack:
+            raise trial.source.refusal(
+                f"monotone: {trial.call(a, b)} = {least:.6g} but {trial.call(a + more, b)} = {with_a:.6g}"
+            )
+        if with_b > least + slack if falls_with_b else with_b < least - slack:
+            raise trial.source.refusal(
+                f"monotone: {trial.call(a, b)} = {least:.6g} but {trial.call(a, b + more)} = {with_b:.6g}"
+            )
 
 
 def _try_order(trial: _Trial, rng: np.random.Generator) -> None:
     for a, b, c in rng.uniform(0.0, 1.5, (SAMPLES, 3)).tolist():
         one, other = trial.value(a, b), trial.value(b, a)
-        trial.require(
-            _near(one, other),
-            f"order_free: {trial.call(a, b)} = {one:.6g} but {trial.call(b, a)} = {other:.6g}",
-        )
+        if not _near(one, other):
+            raise trial.source.refusal(
+                f"order_free: {trial.call(a, b)} = {one:.6g} but {trial.call(b, a)} = {other:.6g}"
+            )
         left, right = trial.value(one, c), trial.value(a, trial.value(b, c))
-        trial.require(
-            _near(left, right),
-            f"order_free: with a, b, c = {a:.6g}, {b:.6g}, {c:.6g}, F(F(a, b), c) = {left:.6g} but "
-            f"F(a, F(b, c)) = {right:.6g}",
-        )
+        if not _near(left, right):
+            raise trial.source.refusal(
+                f"order_free: with a, b, c = {a:.6g}, {b:.6g}, {c:.6g}, F(F(a, b), c) = {left:.6g} but "
+                f"F(a, F(b, c)) = {right:.6g}"
+            )

@@ -13,6 +13,7 @@ model = Point((0, 0, 0), radius=1.0, falloff=Linear)
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -118,7 +119,8 @@ def _sampled(source: CustomSource) -> Sampled:
 
     def sampled(distances: Floats) -> Floats:
         results = [
-            result_of(source, lambda d: np.ravel(reference(d)), [d], f"d = {d:.6g}", 1) for d in distances
+            result_of(source, lambda d: np.ravel(reference(d)), [d], partial("d = {:.6g}".format, d), 1)
+            for d in distances
         ]
         return np.concatenate(results)
 
@@ -167,8 +169,8 @@ def _check_single(source: CustomSource, distances: Floats, expected: Floats) -> 
     """Check that results survive float32, in which devices compute."""
     reference = source.reference(np.float32)
     for d, value in zip(distances, expected, strict=True):
-        arguments = [np.float32(d)]
-        single = result_of(source, lambda x: np.ravel(reference(x)), arguments, f"d = {d:.6g}", 1)[0]
+        arguments, where = [np.float32(d)], partial("d = {:.6g}".format, d)
+        single = result_of(source, lambda x: np.ravel(reference(x)), arguments, where, 1)[0]
         if abs(single - value) > SLOPE_TOLERANCE * (1.0 + abs(value)):
             raise source.refusal(
                 f"for d = {d:.6g} it returns {single:.6g} in single precision, {value:.6g} in double"

@@ -48,17 +48,23 @@ class _Trial:
     def call(self, function: CustomSource, leading: tuple[Any, ...], precision: Precision) -> Float64Array:
         """Return the results of a function as numbers (k,)."""
         arguments = [_typed(value, precision) for value in (*leading, *self.values.values())]
-        shown = ", ".join(f"{name} = {_shown(value)}" for name, value in self.values.items())
-        where = f"q = {_shown(leading[0])}" if leading else "these parameters"
-        where += f" with {shown}" if shown else ""
         try:
             with np.errstate(all="ignore"):
                 result = np.atleast_1d(np.asarray(function.reference(precision)(*arguments), np.float64))
         except Exception as error:  # the function is the user's own
-            raise function.refusal(f"for {where} it fails: {type(error).__name__}: {error}") from error
+            raise function.refusal(
+                f"for {self.where(leading)} it fails: {type(error).__name__}: {error}"
+            ) from error
         if result.ndim != 1 or not np.isfinite(result).all():
-            raise function.refusal(f"for {where} it returns {_shown(result)}; expected finite numbers")
+            raise function.refusal(
+                f"for {self.where(leading)} it returns {_shown(result)}; expected finite numbers"
+            )
         return result
+
+    def where(self, leading: tuple[Any, ...]) -> str:
+        shown = ", ".join(f"{name} = {_shown(value)}" for name, value in self.values.items())
+        point = f"q = {_shown(leading[0])}" if leading else "these parameters"
+        return point + (f" with {shown}" if shown else "")
 
     def at(self, q: Float64Array, precision: Precision = np.float64) -> Float64Array:
         """Return (f,), or (f, ∂x, ∂y, ∂z)."""

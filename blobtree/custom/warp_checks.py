@@ -53,9 +53,14 @@ class _Trial:
     ) -> Float64Array:
         """Return the result of a function, whose own parameters follow the leading arguments."""
         arguments = [_typed(value, precision) for value in (*leading, *self.values.values())]
-        where = f"{_shown(leading[0]) if leading else ''} {self.values or ''}".strip()
         plain = function.reference(precision)
-        return result_of(function, lambda *given: np.atleast_1d(plain(*given)), arguments, where, size)
+        return result_of(
+            function,
+            lambda *given: np.atleast_1d(plain(*given)),
+            arguments,
+            lambda: f"{_shown(leading[0]) if leading else ''} {self.values or ''}".strip(),
+            size,
+        )
 
     def at(self, q: Float64Array, precision: Precision = np.float64) -> Float64Array:
         """Return T(q)."""
