@@ -8,6 +8,61 @@ import blobtree.kernels as kernels
 from blobtree.custom import definition
 from decals.rendering.gl_libraries import missing_gl_libraries
 
+LONG_FILES = (
+    "docs/test_pages.py",
+    "docs/test_examples.py",
+    "blobtree/tape/test_evaluate.py",
+    "blobtree/nodes/test_primitives.py",
+    "decals/window/test_on_screen.py",
+    "blobtree/nodes/test_profiles.py",
+    "blobtree/cells/test_sparse_cells.py",
+    "blobtree/custom/test_custom_kinds.py",
+    "decals/vtk/test_old_contexts.py",
+    "decals/surfaces/test_pressed_solids.py",
+    "apps/lab/test_lab.py",
+    "apps/commands/test_define.py",
+    "decals/rendering/test_partial.py",
+    "decals/scattering/test_scatter.py",
+    "decals/field/test_mapping.py",
+    "decals/field/test_parity.py",
+    "decals/glsl/test_parity.py",
+    "decals/glsl/test_tapes.py",
+    "apps/test_gallery.py",
+    "decals/vtk/test_subplot.py",
+    "decals/vtk/test_undisturbed.py",
+    "test_processes.py",
+    "blobtree/nodes/test_values.py",
+    "blobtree/nodes/test_parameter_gradient.py",
+    "blobtree/tape/test_data_region.py",
+    "decals/editing/test_primitive_commands.py",
+    "decals/editing/test_tree_commands.py",
+    "decals/scattering/test_invariants.py",
+    "decals/surfaces/test_vtk_process.py",
+    "decals/index/test_change_log.py",
+    "decals/vtk/test_show.py",
+    "apps/commands/test_render.py",
+    "decals/vtk/test_composition.py",
+    "decals/vtk/test_injection.py",
+    "decals/window/test_window.py",
+    "decals/window/test_waiting.py",
+    "decals/window/test_overlay.py",
+    "decals/window/test_unsaved.py",
+    "blobtree/meshing/test_reuse.py",
+    "blobtree/nodes/test_deformations.py",
+    "decals/editing/test_invalid_input.py",
+    "blobtree/tracing/test_tree_cells.py",
+    "apps/commands/test_cli.py",
+    "decals/editing/test_fuzz.py",
+)
+"""Files of several seconds begin first, so that no worker ends long before another."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Sort files; without ``--no-loadscope-reorder`` xdist sorts them anew, by their numbers of tests."""
+    order = {f"tests/{name}": place for place, name in enumerate(LONG_FILES)}
+    items.sort(key=lambda item: order.get(item.nodeid.partition("::")[0], len(order)))
+
 
 def pytest_collection_finish() -> None:
     """Each worker collects all tests, so modules of tests must not compute when they are imported."""

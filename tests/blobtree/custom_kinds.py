@@ -3,9 +3,11 @@
 They share one instruction set, so that their kernels compile once for all tests.
 """
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree import (
     Node,
@@ -17,6 +19,9 @@ from blobtree import (
     define_warp,
 )
 from blobtree._typing import Float64Array
+from blobtree.nodes.parameters import Parameter, Quantity
+from blobtree.nodes.primitives import Columns
+from blobtree.validation import Vector
 from tests.blobtree.custom.field_kernels import lump, lump_slope, waves, waves_interval, waves_slope
 from tests.blobtree.custom.warp_kernels import sway, sway_pullback, sway_stretch, swirl, swirl_stretch
 from tests.blobtree.kernels import (
@@ -37,6 +42,7 @@ from tests.blobtree.kernels import (
     tent,
     tent_slope,
 )
+from tests.blobtree.tape.kernels import PAIR
 from tests.blobtree.trees import MoreKinds, RandomTrees, triple
 
 SOFTEST = 4.0
@@ -79,6 +85,25 @@ Swirl = define_warp(
 )
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Pair(Point):
+    """Two balls, whose centres are in the data region."""
+
+    skeleton = PAIR
+
+    other: Annotated[Vector, Parameter(Quantity.POINT, "centre of the second ball")] = (0.0, 0.0, 0.0)
+
+    @property
+    def data(self) -> NDArray[Any]:
+        return np.array([(*self.center, 0.0), (*self.other, 0.0)])
+
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        texels = np.zeros((len(influences), 1, 4))
+        texels[:, 0, 3] = influences[:, 0]
+        return texels
+
+
 def random_custom_leaf(rng: np.random.Generator) -> Node:
     radius, color = float(rng.uniform(0.15, 0.5)), triple(rng.uniform(0.0, 1.0, 3))
     place, way, more = rng.uniform(-1.0, 1.0, (3, 3))
@@ -114,6 +139,7 @@ def everything() -> Node:
     bars = Swirl(Sway(GivenSway(Bar(0.5, radius=0.2), 0.4, 2.0), 0.4, 2.0), (0.1, 0, 0.5), 3)
     fields = Lump((0, 0, 0), (1, 1, 1), (0, 0, 0), 0.5) + Waves((0, 0, 0), (1, 1, 1), 4.0)
     balls = Point((0, 0, 0), radius=0.2, falloff=Staircase) + Point((0, 0, 0), radius=0.2, falloff=Tent)
+    balls += Pair((0, 0, 0), radius=0.2, other=(0.5, 0, 0))
     return Swell(
         (
             stewed,

@@ -1,44 +1,18 @@
 """The data region of tapes: layout, and the same texels in cells, meshes and rays."""
 
-from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from blobtree import Node, Point, Polygonizer, Union, polygonize
-from blobtree._typing import Float64Array
 from blobtree.cells import sparse_cells
 from blobtree.cells.grid import aligned_grid
 from blobtree.cells.sparse_cells import build_cells, split_tape
-from blobtree.nodes.parameters import Parameter, Quantity
-from blobtree.nodes.primitives import Columns
 from blobtree.tape.data_region import DataRegion
 from blobtree.tracing.trace import trace
-from blobtree.validation import Vector
-from tests.blobtree.custom_kinds import Stew
-from tests.blobtree.tape.kernels import PAIR
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Pair(Point):
-    """Two balls, whose centres are in the data region."""
-
-    skeleton = PAIR
-
-    other: Annotated[Vector, Parameter(Quantity.POINT, "centre of the second ball")] = (0.0, 0.0, 0.0)
-
-    @property
-    def data(self) -> NDArray[Any]:
-        return np.array([(*self.center, 0.0), (*self.other, 0.0)])
-
-    @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        texels = np.zeros((len(influences), 1, 4))
-        texels[:, 0, 3] = influences[:, 0]
-        return texels
-
+from tests.blobtree.custom_kinds import Pair, Stew
 
 PAIRS: Node = Pair((-1, 0, 0), radius=0.5, other=(1, 0, 0)) | Pair((0, -1, 0), radius=0.5, other=(0, 1, 0))
 

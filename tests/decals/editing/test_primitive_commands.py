@@ -1,5 +1,6 @@
 """Commands for primitives: moves through maps, and decals that follow."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,14 +32,17 @@ NESTED = (A + B.translate((0.5, 0, 0)).scale(2)) - (C.rotate((0, 0, 1), 90) | A)
 
 
 def session_of(tree: Any, count: int = 80) -> Any:
+    return EditSession(scene_of(tree, count))
+
+
+@cache
+def scene_of(tree: Any, count: int) -> Scene:
     item = TreeObject("tree", tree)
-    return EditSession(
-        Scene(
-            objects=(item,),
-            decals=scatter([item.surface], count=count),
-            images=(DecalImage.load("scale"),),
-            camera=Camera.framing(item.bounds),
-        )
+    return Scene(
+        objects=(item,),
+        decals=scatter([item.surface], count=count),
+        images=(DecalImage.load("scale"),),
+        camera=Camera.framing(item.bounds),
     )
 
 

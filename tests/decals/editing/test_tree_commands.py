@@ -20,6 +20,7 @@ from blobtree.nodes.surgery import (
 from decals.editing import (
     AddPrimitive,
     DuplicatePrimitive,
+    EditSession,
     JoinPrimitive,
     RemovePrimitive,
 )
@@ -226,6 +227,11 @@ def test_the_decals_of_what_becomes_a_tool_go_and_the_others_stay_on_the_surface
     assert on_surface(session).max() < 1e-4
 
 
+@pytest.fixture(scope="module")
+def unchanged() -> EditSession:
+    return session_of(A + B, 10)
+
+
 @pytest.mark.parametrize(
     ("command", "error", "message"),
     [
@@ -247,9 +253,10 @@ def test_the_decals_of_what_becomes_a_tool_go_and_the_others_stay_on_the_surface
         (JoinPrimitive(0, (0, 0), Join.UNION), InvalidNode, "path"),
     ],
 )
-def test_an_invalid_command_is_refused_and_changes_nothing(command: Any, error: Any, message: Any) -> None:
-    session = session_of(A + B, 10)
-    before = digest(session.document)
+def test_an_invalid_command_is_refused_and_changes_nothing(
+    unchanged: EditSession, command: Any, error: Any, message: Any
+) -> None:
+    before = digest(unchanged.document)
     with pytest.raises(error, match=message):
-        session.do(command)
-    assert digest(session.document) == before
+        unchanged.do(command)
+    assert digest(unchanged.document) == before

@@ -1,15 +1,19 @@
-"""Open a window, drive it and close it, as a program: ``python -m tests.decals.window.on_screen [off]``.
+"""Open windows one after another, as a program: ``python -m tests.decals.window.on_screen PART …``.
 
-With "off" it does without a screen; otherwise DISPLAY names one, such as a virtual one.
+Parts are the keys of `PARTS`. All but "off" need a screen; DISPLAY names one, such as a virtual one.
 """
 
 import sys
 
 import numpy as np
 
+from decals import Camera, MeshObject, Scene
 from decals.window import EditWindow
-from tests.decals.editing.scenes import scene
+from tests.decals.editing.scenes import box, one, scene
+from tests.decals.window import x_events
 from tests.decals.window.driver import Driver
+
+SIZE = (180, 120)
 
 
 def user(window: EditWindow) -> None:
@@ -31,16 +35,17 @@ def user(window: EditWindow) -> None:
     print("the first picture came back")
 
 
-def main() -> None:
-    """Open, drive and close."""
-    off_screen = "off" in sys.argv[1:]
-    window = EditWindow(scene(), off_screen=off_screen, size=(180, 120))
+def without_a_screen() -> None:
+    window = EditWindow(scene(), off_screen=True, size=SIZE)
+    window.show()
+    user(window)
+    window.close()
+
+
+def at_its_first_tick() -> None:
+    """Drive a window from its own timer, in VTK's event loop."""
+    window = EditWindow(scene(), size=SIZE)
     interactor = window.plotter.iren.interactor
-    if off_screen:
-        window.show()
-        user(window)
-        window.close()
-        return
     failures: list[BaseException] = []
     completed = False
 
@@ -62,5 +67,35 @@ def main() -> None:
         sys.exit("the window never received a timer event; is the display reachable?")
 
 
+def asked_to_close() -> None:
+    """Let the window manager ask a window with unsaved changes to close, twice."""
+    cube = MeshObject("cube", *box((-1, -1, -1), (1, 1, 1)))
+    window = EditWindow(
+        Scene(objects=(cube,), decals=one(images=[-1]), camera=Camera((0, 0, 6))), size=(120, 80)
+    )
+    interactor = window.plotter.iren.interactor
+    ticks: list[bool] = []
+
+    def tick(*_: object) -> None:
+        ticks.append(window.actions.state.prompt.asking)
+        if len(ticks) == 3:
+            window.tools.key("a", 0, 0, ctrl=True)
+            window.tools.key("d", 0, 0)
+        if len(ticks) in (3, 6):
+            interactor.ExitCallback()  # as VTK does when the window manager asks
+
+    interactor.AddObserver("TimerEvent", tick)
+    window.show()
+    print("ticks", ticks[:6], "open" if window._host.open else "closed")
+
+
+PARTS = {
+    "off": without_a_screen,
+    "tick": at_its_first_tick,
+    "asked": asked_to_close,
+    "events": x_events.main,
+}
+
 if __name__ == "__main__":
-    main()
+    for part in sys.argv[1:]:
+        PARTS[part]()
