@@ -200,8 +200,8 @@ CHECKS: dict[str, Callable[[Session], None]] = {
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures of no other size and samples are small and coarse."""
     _size, _samples, *others = (field.default for field in fields(RenderOptions))
-    monkeypatch.setattr(RenderOptions.__init__, "__defaults__", ((400, 300), 1, *others))
-    assert RenderOptions() == RenderOptions(size=(400, 300), samples=1)
+    monkeypatch.setattr(RenderOptions.__init__, "__defaults__", ((240, 180), 1, *others))
+    assert RenderOptions() == RenderOptions(size=(240, 180), samples=1)
 
 
 @pytest.mark.usefixtures("small_pictures")

@@ -1,6 +1,5 @@
 """The command as a whole: version, help, interrupts."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -46,14 +45,15 @@ print({"numpy", "warp", "vtkmodules", "pyvista", "moderngl"} & set(sys.modules),
         assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == "set()\n"
 
 
-def test_bash_completes_commands_options_and_values(folder: Path) -> None:
+def test_bash_completes_commands_options_and_values(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
     bash = shutil.which("bash")
     if bash is None:
         pytest.skip("bash is not installed")
-    command = [sys.executable, "-m", "decals", "--install-completion", "--shell", "bash"]
-    environment = {**os.environ, "HOME": str(folder)}
-    ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert str(folder / ".bashrc") in ran.stdout
+    monkeypatch.setenv("HOME", str(folder))
+    assert run(["--install-completion", "--shell", "bash"]) == 0
+    assert str(folder / ".bashrc") in capsys.readouterr().out
 
     def complete(*words: str) -> set[str]:
         typed = " ".join(f"'{word}'" for word in words)
@@ -63,9 +63,7 @@ COMP_WORDS=({typed}) COMP_CWORD={len(words) - 1}
 $(complete -p implicit-decals | sed 's/.*-F \\([^ ]*\\).*/\\1/')
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
-        done = subprocess.run(
-            [bash, "-c", script], env=environment, capture_output=True, text=True, check=True
-        )
+        done = subprocess.run([bash, "-c", script], capture_output=True, text=True, check=True)
         return set(done.stdout.split())
 
     assert complete("implicit-decals", "re") == {"render"}

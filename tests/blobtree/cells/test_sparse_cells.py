@@ -53,13 +53,13 @@ SEEDS = [("built_in", 0), ("built_in", 1), *((kinds, 0) for kinds in MORE if MOR
 @pytest.mark.parametrize(("kinds", "seed"), SEEDS)
 def test_sparse_and_dense_give_the_same_quads(kinds: str, seed: int) -> None:
     surfaces = 0
-    for tree in random_trees(seed, 6, more=MORE[kinds]):
+    for tree in random_trees(seed, 4, more=MORE[kinds]):
         assert_same_surface(tree)
         mesh = polygonize(tree, resolution=20)
         assert_valid(mesh)
         assert_closed(mesh)
         surfaces += len(mesh.faces) > 0
-    assert surfaces >= 3
+    assert surfaces >= 2
 
 
 @pytest.mark.slow

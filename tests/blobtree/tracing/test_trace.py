@@ -88,7 +88,7 @@ def test_a_capsule() -> None:
     assert np.abs(on_surface - 0.4).max() <= 2.0 * trace_tolerance(capsule.support)
 
 
-STEPS = 1500
+RAYS, STEPS = 40, 1500
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
@@ -97,11 +97,11 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     rng = np.random.default_rng(seed)
     hits = 0
     for tree in random_trees(seed=20 + seed, count=6, depth=3):
-        origins, directions = rays_through(rng, tree, 60)
+        origins, directions = rays_through(rng, tree, RAYS)
         reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
         places = np.linspace(0.0, reach, STEPS)
         samples = origins[:, None] + places[:, None] * directions[:, None]
-        field = oracle.value(tree, samples.reshape(-1, 3)).reshape(60, STEPS)
+        field = oracle.value(tree, samples.reshape(-1, 3)).reshape(RAYS, STEPS)
         first = np.where(
             (field > 0.5 + 1e-5).any(axis=1), places[(field > 0.5 + 1e-5).argmax(axis=1)], np.inf
         )
@@ -114,7 +114,7 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
         # two tolerances before the surface at most, or past it at an edge that the ray crosses
         assert (np.abs(oracle.value(tree, points) - 0.5) <= 4.0 * tolerance * steepest + 2e-5).all()
         hits += int(hit.sum())
-    assert hits > 40
+    assert hits > 25
 
 
 @pytest.mark.parametrize("degrees", [120.0, 400.0])

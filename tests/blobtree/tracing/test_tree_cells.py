@@ -43,7 +43,7 @@ def test_the_table_matches_the_field(name: str | int) -> None:
     cells = tracing_cells(tree, device="cpu")
     blocks = table(cells)
     rng = np.random.default_rng(0)
-    places = rng.uniform(0.0, cells.counts, (15_000, 3))
+    places = rng.uniform(0.0, cells.counts, (8_000, 3))
     points = (cells.lower + places * cells.block_size).astype(np.float32)
     known = blocks[tuple(places.astype(int).T)]
     value = oracle.value(tree, points.astype(np.float64))

@@ -230,7 +230,7 @@ def test_invalid_arguments_raise(options: dict[str, Any], message: str) -> None:
         scatter(plane(), **options)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.integers(0, 10_000), st.integers(0, 40), st.integers(1, 6))
 def test_random_triangles_get_the_exact_count(number: int, count: int, triangles: int) -> None:
     rng = np.random.default_rng(number)

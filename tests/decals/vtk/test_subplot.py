@@ -223,7 +223,7 @@ def test_frames_drawn_in_part_are_those_drawn_whole(
         documents.append(document)
     subplots = pl.decals.subplots
     shot(pl)
-    for step in range(6):
+    for step in range(4):
         editor = documents[step % 2].decals
         number = int(rng.choice(editor.numbers))
         editor.change(number, positions=editor[number].positions + np.float32(0.1), tints=[(1.0, 0.3, 0.2)])

@@ -135,7 +135,8 @@ def picture(plotter: Factory, mode: str, *, ours: bool) -> tuple[Plotter, np.nda
     for _ in range(2):
         shot(pl)  # VTK's axes take a few frames to find their places
     seen = shot(pl)
-    np.testing.assert_array_equal(seen, shot(pl))
+    if ours:
+        np.testing.assert_array_equal(seen, shot(pl))
     return pl, seen
 
 
