@@ -229,7 +229,8 @@ def test_the_decals_of_what_becomes_a_tool_go_and_the_others_stay_on_the_surface
 
 @pytest.fixture(scope="module")
 def unchanged() -> EditSession:
-    return session_of(A + B, 10)
+    session: EditSession = session_of(A + B, 10)
+    return session
 
 
 @pytest.mark.parametrize(
