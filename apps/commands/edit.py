@@ -58,7 +58,7 @@ def edit(
     size
         Width and height of the window in pixels.
     contact
-        Contact mode at the beginning, as for render; a scene does not store it. P changes it in the window.
+        Contact mode at the beginning, as for render. P changes it in the window; a saved scene keeps it.
     stiffness
         Stiffness of elastic contact at the beginning, likewise. Shift + P changes it.
     mapping

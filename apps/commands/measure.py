@@ -60,7 +60,7 @@ def measure(
     scene
         A saved scene in JSON.
     contact
-        Contact mode: product, min, radial or elastic. Default: elastic.
+        Contact mode: product, min, radial or elastic. Default: that of the scene, as for the next two.
     stiffness
         Stiffness of elastic contact, from 1 to 64.
     mapping

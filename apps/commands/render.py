@@ -17,9 +17,7 @@ from decals.apps.commands.options import (
     OptionalWhole,
     Stiffness,
     Trust,
-    Whole,
     check_count,
-    given,
     parse_size,
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
@@ -29,8 +27,7 @@ from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output
 from decals.apps.views import UPRIGHT, frame, parse_view
 from decals.errors import InvalidInput
-from decals.rendering import Picture, Renderer
-from decals.rendering.options import RenderOptions
+from decals.rendering import Drawing, Picture, Renderer
 
 
 def render(
@@ -43,7 +40,7 @@ def render(
     camera: str | None = None,
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "1200x900",
-    samples: Whole = 2,
+    samples: OptionalWhole = None,
     contact: ContactName = None,
     stiffness: Stiffness = None,
     mapping: MappingName = None,
@@ -78,17 +75,17 @@ def render(
     size
         Width and height of the picture in pixels.
     samples
-        Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine.
+        Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine. Default: that of a saved scene, or 2.
     contact
         Contact mode: elastic (compresses images at contact lines; never folds one), product (equation 5 of
-        the paper), min (only the strongest push counts), or radial (scales images along rays). Default:
-        elastic.
+        the paper), min (only the strongest push counts), or radial (scales images along rays). Default: that
+        of a saved scene, as for all options of drawing, or elastic.
     stiffness
         Stiffness of elastic contact, from 1 to 64: how close to contact lines images are compressed.
-        Default: 2.
+        Default: that of a saved scene, or 2.
     mapping
         Image mapping: corrected for the curvature of the surface, or chord (the paper's projection).
-        Default: corrected.
+        Default: that of a saved scene, or corrected.
     seed
         Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
@@ -104,9 +101,10 @@ def render(
     """
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
-    check_count("--samples", samples, 1, MAX_SAMPLES)
-    modes = given(contact=contact, stiffness=stiffness, mapping=mapping)
-    drawing = RenderOptions(size=pixels, samples=samples, **modes)
+    if samples is not None:
+        check_count("--samples", samples, 1, MAX_SAMPLES)
+    options = {"samples": samples, "contact": contact, "stiffness": stiffness, "mapping": mapping}
+    Drawing().overridden(**options)  # checked before anything slow
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
         check_output(save, (".json",))
@@ -117,13 +115,14 @@ def render(
         loaded = load_models(model, trust=trust, crease_angle=crease_angle)
         if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
             raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
-        options = ScatterOptions.from_arguments(decals, image, seed)
+        scattering = ScatterOptions.from_arguments(decals, image, seed)
         # The renderer comes first: without graphics the command fails before the long work.
         renderer = stack.enter_context(Renderer(max_tile=TILE))
-        scene = loaded if isinstance(loaded, Scene) else options.scene(loaded, view, pixels, progress)
+        scene = loaded if isinstance(loaded, Scene) else scattering.scene(loaded, view, pixels, progress)
         if isinstance(loaded, Scene) and (camera is not None or up is not None):
             scene = scene.replace(camera=frame(scene.objects, view, pixels))
+        scene = scene.replace(drawing=scene.drawing.overridden(**options))
         if save is not None:
             save_scene(scene, save)
         progress("drawing", 0.0)
-        Picture(renderer.render(scene, drawing)).save(output)
+        Picture(renderer.render(scene, scene.drawing.at(pixels))).save(output)

@@ -2,7 +2,7 @@
 
 import colorsys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
@@ -26,8 +26,10 @@ from decals.apps.models.samples import axes_of
 from decals.apps.output import check_output
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
+from decals.rendering import Drawing
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
 from decals.scenes.origin import WORLD, Origin
+from decals.scenes.recipe import Recipe
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
 SUFFIXES = (".json", ".csv")
@@ -125,28 +127,29 @@ def scatter(
         density = None
         if painted is not None:
             density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
-        decals = scatter_decals(
-            surfaces,
-            count=count,
-            spacing=spacing,
-            density=density,
-            regularity=regularity,
-            sizing=sizing,
-            factor=factor,
-            direction=along,
-            images=len(pictures),
-            choice=choice,
-            seed=seed,
-            progress=progress,
-        )
+        options: dict[str, Any] = {
+            "count": count,
+            "spacing": spacing,
+            "regularity": regularity,
+            "sizing": sizing,
+            "factor": factor,
+            "direction": along,
+            "images": len(pictures),
+            "choice": choice,
+        }
+        decals = scatter_decals(surfaces, density=density, seed=seed, progress=progress, **options)
         if output.suffix.lower() == ".csv":
             write_table(decals, output, objects[0].origin)
             return
         if isinstance(loaded, Scene):
-            camera = loaded.camera
+            camera, drawing = loaded.camera, loaded.drawing
         else:
-            camera = frame(objects, parse_view(None, axes_of(model[0])), ASPECT)
-        save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals), output)
+            camera, drawing = frame(objects, parse_view(None, axes_of(model[0])), ASPECT), Drawing()
+        if painted is not None:
+            options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
+        recipe = Recipe.of("decals.scatter", seed=seed, models=[item.name for item in objects], **options)
+        kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
+        save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
 
 
 def write_table(decals: Decals, path: Path, origin: Origin = WORLD) -> None:

@@ -9,6 +9,7 @@ from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, c
 from decals.apps.commands.progress_bars import PREPARING
 from decals.apps.views import Size, View, frame
 from decals.scenes.objects import SceneObject
+from decals.scenes.recipe import Recipe
 
 DEFAULT_COUNT = 500
 
@@ -34,7 +35,15 @@ class ScatterOptions:
     def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
         """Return a scene of the objects covered with decals, and a camera that shows them."""
         progress(PREPARING, 0.0)
+        recipe = Recipe.of(
+            "decals.scatter",
+            seed=self.seed,
+            models=[item.name for item in objects],
+            count=self.count,
+            images=[image.source for image in self.images],
+        )
         return Scene(
+            recipe=recipe,
             objects=tuple(objects),
             camera=frame(objects, view, size),
             images=self.images,

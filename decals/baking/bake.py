@@ -21,13 +21,13 @@ from decals.images.load import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
-from decals.rendering.options import SceneLike
+from decals.record import Contact
+from decals.rendering.options import Drawing, SceneLike, drawing_of
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
 from decals.surfaces.convert import Model
-from decals.validation import describe, member, optional_package, stiffness_number, whole_number
+from decals.validation import describe, optional_package, whole_number
 
 SUFFIX = ".glb"
 
@@ -45,9 +45,9 @@ def bake(
     size: int = 2048,
     samples: int = 2,
     vertex_colors: bool = False,
-    contact: Contact | str = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: ImageMapping | str = ImageMapping.CORRECTED,
+    contact: Contact | str | None = None,
+    stiffness: float | None = None,
+    mapping: ImageMapping | str | None = None,
     resolution: int | None = None,
     creases: bool = False,
     progress: Progress | None = None,
@@ -73,12 +73,12 @@ def bake(
     vertex_colors : bool
         Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
         not needed.
-    contact : Contact or str
+    contact : Contact or str, optional
         Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
-        paper), ``"min"`` or ``"radial"``.
-    stiffness : float
+        paper), ``"min"`` or ``"radial"``. Default: that of the scene, as for stiffness and mapping.
+    stiffness : float, optional
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
-    mapping : ImageMapping or str
+    mapping : ImageMapping or str, optional
         Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
     resolution : int, optional
         Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64.
@@ -112,17 +112,17 @@ def bake(
     path = _checked_path(path)
     size = whole_number("size", size, MIN_SIZE, MAX_SIZE, InvalidScene)
     samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
-    contact = member("contact", contact, Contact, InvalidScene)
-    mapping = member("mapping", mapping, ImageMapping, InvalidScene)
-    stiffness = stiffness_number(stiffness, InvalidScene)
+    modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
+    Drawing().overridden(**modes)  # checked before a model is read
     for package in ("trimesh",) if vertex_colors else ("trimesh", "xatlas"):
         optional_package(package, "bake")
     with reporting(progress, cancel) as report:
-        objects, decals, images = _parts(scene)
+        objects, decals, images, drawing = _parts(scene)
+        drawing = drawing.overridden(**modes)
         if not objects:
             raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
         meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
-        colors = SurfaceColors(meshes, decals, images, contact, mapping, stiffness)
+        colors = SurfaceColors(meshes, decals, images, drawing.contact, drawing.mapping, drawing.stiffness)
         texture = None
         if vertex_colors:
             nodes = _colored_nodes(meshes, colors, report)
@@ -208,12 +208,13 @@ def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Pr
     return nodes
 
 
-def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[UInt8Array]]:
-    """Return objects, decals and images of a scene, of models or of the file of either."""
+def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[UInt8Array], Drawing]:
+    """Return objects, decals, images and drawing of a scene, of models or of the file of either."""
     known = scene_or_objects(scene)
     if isinstance(known, list):
-        return known, Decals.empty(), []
-    return known.objects, known.decals, [image.pixels for image in known.images]
+        return known, Decals.empty(), [], Drawing()
+    pixels = [image.pixels for image in known.images]
+    return known.objects, known.decals, pixels, drawing_of(known)
 
 
 def _checked_path(path: str | os.PathLike[str]) -> Path:

@@ -26,7 +26,7 @@ Cursor = Callable[[], SurfacePick | None]
 
 
 class DrawModes(Protocol):
-    """Modes in which a window draws decals; a scene does not store them."""
+    """Modes in which a window draws decals; the edited document keeps them."""
 
     contact: Contact
     mapping: ImageMapping

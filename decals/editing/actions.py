@@ -208,7 +208,7 @@ class Actions:
     @action(
         "next_contact",
         "p",
-        summary="contact mode: product, min, radial, elastic (not saved)",
+        summary="contact mode: product, min, radial, elastic",
         group=Group.SCENE,
     )
     def next_contact(self, _cursor: Cursor) -> None:
@@ -220,7 +220,7 @@ class Actions:
     @action(
         "next_stiffness",
         "Shift+p",
-        summary="stiffness of elastic contact: 1, 1.5, 2, 3, 6 (not saved)",
+        summary="stiffness of elastic contact: 1, 1.5, 2, 3, 6",
         group=Group.SCENE,
     )
     def next_stiffness(self, _cursor: Cursor) -> None:
@@ -232,7 +232,7 @@ class Actions:
     @action(
         "next_mapping",
         "u",
-        summary="image mapping of the window: corrected, chord (not saved)",
+        summary="image mapping of the window: corrected, chord",
         group=Group.SCENE,
     )
     def next_mapping(self, _cursor: Cursor) -> None:

@@ -350,7 +350,7 @@ class DuplicateDecals(DecalCommand):
 
 @dataclass(frozen=True, eq=False)
 class ReplaceScene:
-    """Replace all objects, decals and images, and the camera, by those of another scene.
+    """Replace all objects, decals and images, the camera and the drawing by those of another scene.
 
     Parameters
     ----------
@@ -384,6 +384,8 @@ class ReplaceScene:
             objects=scene.objects,
             images=scene.images,
             camera=scene.camera,
+            drawing=scene.drawing,
+            recipes=() if scene.recipe is None else (scene.recipe,),
         )
         return document.compute_deletion(document.decals.numbers).then(addition)
 

@@ -4,7 +4,7 @@ An edit holds the state of a document before and after, so that undo is exact.
 """
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -13,9 +13,11 @@ from blobtree._typing import BoolArray, Int64Array
 from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.model import Decals
+from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD, Origin
+from decals.scenes.recipe import Recipe
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import instance, whole_number
 
@@ -82,16 +84,18 @@ NO_DECALS = DecalStates.deleted(np.zeros(0, np.int64))
 
 @dataclass(frozen=True, eq=False)
 class SceneParts:
-    """Objects, images and camera that an edit replaces; None for parts that stay."""
+    """Parts of a scene that an edit replaces; None for parts that stay."""
 
     objects: Any = None
     images: Any = None
     camera: Any = None
+    drawing: Any = None
+    recipes: Any = None
 
     def overlaid_on(self, other: "SceneParts") -> "SceneParts":
         """Return these parts, and the other ones where these are None."""
-        pairs = ((getattr(self, name), getattr(other, name)) for name in ("objects", "images", "camera"))
-        return SceneParts(*(theirs if own is None else own for own, theirs in pairs))
+        given = {name: part for name, part in vars(self).items() if part is not None}
+        return replace(other, **given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +109,7 @@ class Edit:
     before, after
         States of the edited decals.
     parts_before, parts_after
-        Replaced objects, images and camera.
+        Replaced parts of the scene.
     """
 
     before: DecalStates = NO_DECALS
@@ -116,7 +120,7 @@ class Edit:
     @property
     def empty(self) -> bool:
         """True if the edit changes nothing."""
-        parts = (self.parts_after.objects, self.parts_after.images, self.parts_after.camera)
+        parts = vars(self.parts_after).values()
         return not len(self.after.numbers) and all(part is None for part in parts)
 
     def then(self, later: "Edit") -> "Edit":
@@ -140,7 +144,8 @@ class ForkFamily:
 class Document:
     """A scene whose decals keep their numbers while they are edited; renderers draw it in place.
 
-    Only `apply` changes a document. The ``compute_…`` methods return an `Edit` and change nothing.
+    Only `apply` changes a document, and `draw_as` how it is drawn. The ``compute_…`` methods return an `Edit`
+    and change nothing.
 
     Parameters
     ----------
@@ -154,6 +159,10 @@ class Document:
         The decals by number.
     family
         The family of the document that this one is a fork of. Default: a new family.
+    drawing
+        How the scene is drawn.
+    recipe
+        How its decals were made, if that is known.
 
     Examples
     --------
@@ -173,8 +182,12 @@ class Document:
         camera: Camera,
         decals: DecalEditor,
         family: ForkFamily | None = None,
+        drawing: Drawing | None = None,
+        recipe: Recipe | None = None,
     ) -> None:
         self._objects, self._images, self._camera, self._decals = objects, images, camera, decals
+        self._first_drawing = self._drawing = Drawing() if drawing is None else drawing
+        self._recipes = () if recipe is None else (recipe,)
         self._family = ForkFamily() if family is None else family
 
     @classmethod
@@ -187,7 +200,8 @@ class Document:
             The argument is not a `Scene`.
         """
         instance("scene to edit", scene, Scene, InvalidScene, "decals.cover makes one")
-        return cls(scene.objects, scene.images, scene.camera, DecalEditor(scene.decals))
+        editor = DecalEditor(scene.decals)
+        return cls(scene.objects, scene.images, scene.camera, editor, None, scene.drawing, scene.recipe)
 
     @property
     def objects(self) -> tuple[SceneObject, ...]:
@@ -203,6 +217,25 @@ class Document:
     def camera(self) -> Camera:
         """Camera of the scene."""
         return self._camera
+
+    @property
+    def drawing(self) -> Drawing:
+        """How the scene is drawn."""
+        return self._drawing
+
+    def draw_as(self, drawing: Drawing) -> None:
+        """Draw the scene in another way from now on; that is no edit, and saved with the next one."""
+        self._drawing = instance("drawing", drawing, Drawing, InvalidScene, "a scene has .drawing")
+
+    @property
+    def recipe(self) -> Recipe | None:
+        """How the decals were made, if that is known."""
+        return self._recipes[0] if self._recipes else None
+
+    @property
+    def recipes(self) -> tuple[Recipe, ...]:
+        """The recipe, if it is known, in a tuple: the part of the scene that edits replace."""
+        return self._recipes
 
     @property
     def origin(self) -> Origin:
@@ -222,7 +255,14 @@ class Document:
     @property
     def scene(self) -> Scene:
         """Immutable copy; its decals are in the order of their numbers."""
-        return Scene(objects=self.objects, images=self.images, camera=self.camera, decals=self.decals.decals)
+        return Scene(
+            objects=self.objects,
+            images=self.images,
+            camera=self.camera,
+            decals=self.decals.decals,
+            drawing=self.drawing,
+            recipe=self.recipe,
+        )
 
     def object(self, number: int) -> SceneObject:
         """Return an object by its index, or raise `InvalidEdit`."""
@@ -232,11 +272,15 @@ class Document:
 
     def fork(self) -> "Document":
         """Return an independent copy; objects and images are shared."""
-        return Document(self._objects, self._images, self._camera, self._decals.copy(), self._family)
+        kept = self._family, self._drawing, self.recipe
+        return Document(self._objects, self._images, self._camera, self._decals.copy(), *kept)
 
     def adopt(self, fork: "Document") -> None:
         """Take over the state of a fork, which must not be used afterwards; renderers keep this document."""
         self._objects, self._images, self._camera = fork._objects, fork._images, fork._camera
+        self._recipes = fork._recipes
+        if fork._drawing is not fork._first_drawing:
+            self._drawing = fork._drawing
         self._decals.adopt(fork._decals)
 
     def prepare_surfaces(self) -> None:
@@ -293,3 +337,7 @@ class Document:
             self._images = parts.images
         if parts.camera is not None:
             self._camera = parts.camera
+        if parts.drawing is not None:
+            self._drawing = parts.drawing
+        if parts.recipes is not None:
+            self._recipes = parts.recipes

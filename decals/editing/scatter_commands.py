@@ -18,6 +18,7 @@ from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names, relative_to
+from decals.scenes.recipe import Recipe
 from decals.validation import describe, finite_vector, whole_number
 
 SPACING = 3.0**0.5 / 1.03
@@ -54,6 +55,8 @@ class ReplaceDecals:
         The new decals.
     expected_objects
         The objects for which the decals were made. The command is refused if they changed meanwhile.
+    recipe
+        How they were made. Default: the scene keeps its recipe.
 
     Examples
     --------
@@ -69,6 +72,7 @@ class ReplaceDecals:
     objects: tuple[int, ...]
     decals: Decals
     expected_objects: tuple[SceneObject, ...] = ()
+    recipe: Recipe | None = None
     label: ClassVar[str] = "scatter"
 
     def compute(self, document: Document) -> Edit:
@@ -78,7 +82,8 @@ class ReplaceDecals:
         if any(item is not expected for item, expected in pairs):
             raise InvalidEdit("an object changed while its new decals were computed; scatter again")
         deletion = document.compute_deletion(decals_on(document, self.objects))
-        return deletion.then(document.compute_addition(self.decals))
+        edit = deletion.then(document.compute_addition(self.decals))
+        return edit if self.recipe is None else edit.then(document.compute_parts(recipes=(self.recipe,)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +148,9 @@ class ScatterDecals:
             progress=progress,
             cancel=cancel,
         )
-        return ReplaceDecals(self.objects, decals, covered)
+        names = [item.name for item in covered]
+        recipe = Recipe.of("decals.scatter", seed=self.seed, models=names, count=self.count, images=images)
+        return ReplaceDecals(self.objects, decals, covered, recipe)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit, which may take long."""

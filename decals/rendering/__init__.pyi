@@ -1,6 +1,6 @@
 from .context import Context
 from .lights import Light, Lighting
-from .options import STUDIO, TRANSPARENT, Background, RenderOptions, SceneLike, Size
+from .options import STUDIO, TRANSPARENT, Background, Drawing, RenderOptions, SceneLike, Size
 from .picture import Buffers, Picture
 from .renderer import Renderer
 from .uploads import Drawable, register
@@ -13,6 +13,7 @@ __all__ = [
     "Buffers",
     "Context",
     "Drawable",
+    "Drawing",
     "Light",
     "Lighting",
     "Picture",

@@ -1,8 +1,8 @@
 """Options of a picture, and what the renderer reads of a scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
 from blobtree._typing import UInt8Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
@@ -67,14 +67,12 @@ TRANSPARENT = Background((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
 """No background: alpha is the part of a pixel that objects cover."""
 
 
-@dataclass(frozen=True)
-class RenderOptions:
-    """Everything that decides a picture besides its scene and viewpoint.
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """How a scene is drawn, in pictures of any size; a scene and its file keep it.
 
     Parameters
     ----------
-    size : (int, int)
-        Width and height in pixels.
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
     contact : Contact or str
@@ -96,12 +94,12 @@ class RenderOptions:
 
     Examples
     --------
-    >>> from decals.rendering import RenderOptions
-    >>> RenderOptions(size=(320, 240), samples=4).sample_size
-    (1280, 960)
+    >>> import decals
+    >>> drawing = decals.rendering.Drawing(contact="elastic", samples=4)
+    >>> drawing.overridden(samples=None, contact="radial").contact
+    <Contact.RADIAL: 2>
     """
 
-    size: Size = (800, 600)
     samples: int = 2
     contact: Contact = DEFAULT_CONTACT
     mapping: ImageMapping = ImageMapping.CORRECTED
@@ -113,7 +111,7 @@ class RenderOptions:
 
         def __init__(
             self,
-            size: Size = (800, 600),
+            *,
             samples: int = 2,
             contact: Contact | str = DEFAULT_CONTACT,
             mapping: ImageMapping | str = ImageMapping.CORRECTED,
@@ -124,7 +122,6 @@ class RenderOptions:
 
     def __post_init__(self) -> None:
         checked = {
-            "size": _size(self.size),
             "samples": whole_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
             "contact": member("contact", self.contact, Contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
@@ -136,10 +133,68 @@ class RenderOptions:
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
+    def overridden(self, **options: Any) -> Self:
+        """Return the same with those of these options that are not None; errors are those of the class."""
+        return replace(self, **{name: value for name, value in options.items() if value is not None})
+
+    def at(self, size: Size) -> "RenderOptions":
+        """Return the options of a picture of a size, drawn like this."""
+        return RenderOptions(size, **{field.name: getattr(self, field.name) for field in fields(Drawing)})
+
+
+@dataclass(frozen=True)
+class RenderOptions(Drawing):
+    """Everything that decides a picture besides its scene and viewpoint: a `Drawing`, and the size.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    **drawing
+        The parameters of `Drawing`.
+
+    Raises
+    ------
+    InvalidScene
+        If an option is of another type, or out of range.
+
+    Examples
+    --------
+    >>> from decals.rendering import RenderOptions
+    >>> RenderOptions(size=(320, 240), samples=4).sample_size
+    (1280, 960)
+    """
+
+    size: Size = (800, 600)
+
+    if TYPE_CHECKING:  # names of modes are converted
+
+        def __init__(
+            self,
+            size: Size = (800, 600),
+            *,
+            samples: int = 2,
+            contact: Contact | str = DEFAULT_CONTACT,
+            mapping: ImageMapping | str = ImageMapping.CORRECTED,
+            background: Background = STUDIO,
+            lights: Lighting | None = None,
+            stiffness: float = DEFAULT_STIFFNESS,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "size", _size(self.size))
+
     @property
     def sample_size(self) -> Size:
         """Width and height in samples."""
         return self.size[0] * self.samples, self.size[1] * self.samples
+
+
+def drawing_of(scene: object) -> Drawing:
+    """Return how a scene says that it is drawn; the default for models and other scenes."""
+    drawing = getattr(scene, "drawing", None)
+    return drawing if isinstance(drawing, Drawing) else Drawing()
 
 
 def _size(size: Any) -> Size:

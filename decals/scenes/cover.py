@@ -16,6 +16,7 @@ from decals.scattering.scatter import scatter
 from decals.scenes.camera import THREE_QUARTER, Camera, Vector
 from decals.scenes.files import load_model
 from decals.scenes.objects import SceneObject, as_objects
+from decals.scenes.recipe import Recipe
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
 from decals.surfaces.normals import CREASE_ANGLE
@@ -97,7 +98,17 @@ def cover(
             progress=report,
         )
         camera = fitting_camera(objects, direction=view_direction)
-    return Scene(objects=tuple(objects), camera=camera, decals=decals, images=pictures)
+    recipe = Recipe.of(
+        "decals.cover",
+        seed=seed,
+        models=[item.name for item in objects],
+        count=count,
+        images=[picture.source for picture in pictures],
+        direction=direction,
+        view_direction=view_direction,
+        crease_angle=crease_angle,
+    )
+    return Scene(objects=tuple(objects), camera=camera, decals=decals, images=pictures, recipe=recipe)
 
 
 def fitting_camera(

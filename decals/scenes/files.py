@@ -8,6 +8,8 @@
       "objects": [{"type": "mesh", ...}, {"type": "tree", ...}],
       "images": ["scale", "pictures/moss.png"],
       "camera": {"position": [x, y, z], ...},
+      "drawing": {"contact": "elastic", "stiffness": 2.0, "mapping": "corrected", "samples": 2, ...},
+      "recipe": {"function": "decals.cover", "parameters": {"count": 500, ...}, "seed": 0, "versions": {...}},
       "decals": [
         {"position": [x, y, z], "normal": ..., "tangent": ..., "radius": r, "image": 0, "spill": false,
          "interaction": "overlap", "layer": 1, "tint": [r, g, b], "opacity": 1.0},
@@ -16,6 +18,7 @@
     }
 
 The last four of a decal are written where they are not contact, 0, white and 1. Image -1 is the plain tint.
+A file without "drawing" was drawn in the contact mode "product"; "recipe" is there if it is known.
 
 Numbers are the shortest decimals that give the same float32 again. Paths are relative to the scene file.
 """
@@ -35,7 +38,9 @@ from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
+from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawing_record
 from decals.scenes.objects import SceneObject, as_object
+from decals.scenes.recipe import Recipe
 from decals.scenes.records import (
     TRUST_ADVICE,
     DecalRecord,
@@ -78,6 +83,13 @@ class _CameraRecord(Struct, forbid_unknown_fields=True):
     fov: float
 
 
+class _RecipeRecord(Struct, forbid_unknown_fields=True):
+    function: str
+    parameters: dict[str, Any]
+    seed: int
+    versions: dict[str, str]
+
+
 class _SceneRecord(Struct, forbid_unknown_fields=True):
     format: Literal["implicit-decals-scene"]
     version: Literal[1]
@@ -85,6 +97,8 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
     images: list[str]
     camera: _CameraRecord
     decals: list[DecalRecord]
+    drawing: DrawingRecord | None = None
+    recipe: _RecipeRecord | None = None
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
@@ -191,8 +205,11 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "objects": _lines(record_of(item, folder) for item in scene.objects),
         "images": [_image_source(image, folder) for image in scene.images],
         "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
+        "drawing": drawing_record(scene.drawing),
         "decals": decals,
     }
+    if scene.recipe is not None:
+        parts["recipe"] = vars(scene.recipe)
     fields = [
         b"  %b: %b" % (msgspec.json.encode(key), msgspec.json.encode(value)) for key, value in parts.items()
     ]
@@ -213,6 +230,8 @@ def from_json(
         camera=_camera(record.camera),
         decals=decals_of(record.decals),
         images=_images(record.images, folder, trust),
+        drawing=drawing_of_record(record.drawing),
+        recipe=None if record.recipe is None else Recipe(**msgspec.structs.asdict(record.recipe)),
     )
 
 

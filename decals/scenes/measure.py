@@ -14,7 +14,7 @@ from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of, tangent_axes
 from decals.field.mapping import ImageMapping
 from decals.model import Decals, Interaction
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import Contact
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
 from decals.scenes.objects import MeshObject, SceneObject
@@ -139,9 +139,9 @@ def _finite(value: float) -> float | None:
 def measure(
     scene: Scene,
     *,
-    contact: Contact | str = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: ImageMapping | str = ImageMapping.CORRECTED,
+    contact: Contact | str | None = None,
+    stiffness: float | None = None,
+    mapping: ImageMapping | str | None = None,
     samples: int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
@@ -157,8 +157,8 @@ def measure(
     ----------
     scene : Scene
         The scene.
-    contact, stiffness, mapping
-        Modes, as for `decals.evaluate`.
+    contact, stiffness, mapping : optional
+        Modes, as for `decals.evaluate`; by default those of the scene's ``drawing``.
     samples : int, optional
         Number of points. Default: 200 for each decal, from 20,000 to 1,000,000.
     seed : int
@@ -195,7 +195,8 @@ def measure(
     seed = whole_number("seed", seed, 0, None, InvalidScene)
     if not scene.objects:
         raise InvalidScene("expected a scene with an object to measure, got none; add one")
-    modes = {"contact": contact, "stiffness": stiffness, "mapping": mapping}
+    drawing = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
+    modes = {name: getattr(drawing, name) for name in ("contact", "stiffness", "mapping")}
     with reporting(progress) as report:
         report("measuring", 0.0)
         domain = Domain([item.surface for item in scene.objects], seed)

@@ -5,9 +5,9 @@ from typing import cast
 
 from blobtree.progress import reporting
 from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import Contact
 from decals.rendering.lights import Lighting
-from decals.rendering.options import STUDIO, Background, RenderOptions, SceneLike, Size, is_scene_like
+from decals.rendering.options import Background, Drawing, SceneLike, Size, drawing_of, is_scene_like
 from decals.rendering.picture import Picture
 from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Viewpoint
@@ -20,17 +20,18 @@ def render(
     scene: SceneLike | SceneObject | Model | Sequence[SceneObject | Model],
     *,
     size: Size = (800, 600),
-    samples: int = 2,
-    contact: Contact | str = DEFAULT_CONTACT,
-    stiffness: float = DEFAULT_STIFFNESS,
-    mapping: ImageMapping | str = ImageMapping.CORRECTED,
-    background: Background = STUDIO,
+    samples: int | None = None,
+    contact: Contact | str | None = None,
+    stiffness: float | None = None,
+    mapping: ImageMapping | str | None = None,
+    background: Background | None = None,
     lights: Lighting | None = None,
     viewpoint: Viewpoint | None = None,
 ) -> Picture:
     """Draw a scene, or a model without decals.
 
-    Each call makes an OpenGL context. For many pictures, keep a `decals.rendering.Renderer`.
+    A scene is drawn as its ``drawing`` says; options that are given are used in place of its own. Each call
+    makes an OpenGL context. For many pictures, keep a `decals.rendering.Renderer`.
 
     Parameters
     ----------
@@ -39,16 +40,16 @@ def render(
         scene.
     size : (int, int)
         Width and height in pixels.
-    samples : int
+    samples : int, optional
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
-    contact : Contact or str
+    contact : Contact or str, optional
         Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
         paper), ``"min"`` or ``"radial"``.
-    stiffness : float
+    stiffness : float, optional
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
-    mapping : ImageMapping or str
+    mapping : ImageMapping or str, optional
         Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
-    background : Background
+    background : Background, optional
         Colours behind the objects, such as `decals.rendering.TRANSPARENT`.
     lights : Lighting, optional
         Lights in place of the studio light.
@@ -80,10 +81,18 @@ def render(
     >>> decals.render(scene, size=(64, 48))
     Picture(64 × 48 pixels)
     """
-    options = RenderOptions(size, samples, contact, mapping, background, lights, stiffness)
-    width, height = options.size
+    given: dict[str, object] = {
+        "samples": samples,
+        "contact": contact,
+        "mapping": mapping,
+        "background": background,
+        "lights": lights,
+        "stiffness": stiffness,
+    }
+    width, height = Drawing().overridden(**given).at(size).size  # checked before a model is read
     with reporting() as report:
         report("drawing", 0.0)
         drawn = cast(SceneLike, scene) if is_scene_like(scene) else as_scene(scene, aspect=width / height)
+        options = drawing_of(drawn).overridden(**given).at(size)
         with Renderer() as renderer:
             return Picture(renderer.render(drawn, options, viewpoint=viewpoint))

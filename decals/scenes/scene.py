@@ -18,6 +18,7 @@ from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names, with_common_origin
 from decals.scenes.origin import WORLD, Origin
+from decals.scenes.recipe import Recipe
 from decals.surfaces.convert import Model
 from decals.validation import describe, instance, require_rgba
 
@@ -114,6 +115,10 @@ class Scene:
     images : sequence of images
         The images that ``decals.images`` indexes, or a single one; index -1 is a plain tint and needs no
         image.
+    drawing : Drawing
+        How the scene is drawn where nothing else is said: contact mode, samples, background, lights.
+    recipe : Recipe, optional
+        How its decals were made.
 
     Raises
     ------
@@ -140,6 +145,8 @@ class Scene:
     camera: Camera
     decals: Decals = field(default_factory=Decals.empty)
     images: tuple[DecalImage, ...] = ()
+    drawing: rendering.Drawing = field(default_factory=lambda: rendering.Drawing())
+    recipe: Recipe | None = None
 
     if TYPE_CHECKING:  # models and images of any kind are converted
 
@@ -150,6 +157,8 @@ class Scene:
             camera: Camera,
             decals: Decals = ...,
             images: AnyImage | Iterable[AnyImage] = ...,
+            drawing: rendering.Drawing = ...,
+            recipe: Recipe | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -164,6 +173,11 @@ class Scene:
         object.__setattr__(self, "images", as_images(self.images))
         instance("camera", self.camera, Camera, InvalidScene, "Camera.framing makes one")
         instance("decals", self.decals, Decals, InvalidScene, "decals.scatter makes some")
+        instance(
+            "drawing", self.drawing, rendering.Drawing, InvalidScene, "decals.rendering.Drawing() is one"
+        )
+        if self.recipe is not None:
+            instance("recipe", self.recipe, Recipe, InvalidScene, "leave it out")
         check_names(self.objects)
         check_camera(self.camera, self.origin)
         last = int(self.decals.images.max(initial=-1))
@@ -206,7 +220,7 @@ class Scene:
         decals.save_scene(self, path, progress=progress)
 
     def render(self, **options: Any) -> rendering.Picture:
-        """Draw the scene; options and errors are those of `decals.render`.
+        """Draw the scene as its `drawing` says; options and errors are those of `decals.render`.
 
         Examples
         --------
@@ -241,7 +255,7 @@ class Scene:
         """Return a PNG file for notebooks; None, so that they show text, without OpenGL."""
         try:
             with rendering.Renderer() as renderer:
-                pixels = renderer.render(self, rendering.RenderOptions(size=NOTEBOOK_SIZE))
+                pixels = renderer.render(self, self.drawing.at(NOTEBOOK_SIZE))
         except NoGraphics:
             return None
         return rendering.Picture(pixels)._repr_png_()
@@ -253,7 +267,16 @@ class Scene:
         camera: Camera | None = None,
         decals: Decals | None = None,
         images: AnyImage | Sequence[AnyImage] | None = None,
+        drawing: rendering.Drawing | None = None,
+        recipe: Recipe | None = None,
     ) -> "Scene":
         """Return the same scene with some parts replaced."""
-        given = {"objects": objects, "camera": camera, "decals": decals, "images": images}
-        return replace(self, **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
+        given: dict[str, Any] = {
+            "objects": objects,
+            "camera": camera,
+            "decals": decals,
+            "images": images,
+            "drawing": drawing,
+            "recipe": recipe,
+        }
+        return replace(self, **{key: value for key, value in given.items() if value is not None})

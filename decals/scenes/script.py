@@ -3,6 +3,8 @@
 import io
 import os
 import sys
+from dataclasses import fields
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,8 @@ from blobtree.nodes.values import fields_of, left_out
 from decals.errors import InvalidScene
 from decals.images.builtin import is_builtin
 from decals.model import Decals
+from decals.rendering.lights import Lighting
+from decals.rendering.options import Background, Drawing
 from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.origin import WORLD
 from decals.scenes.scene import DecalImage, Scene
@@ -117,6 +121,7 @@ class _Script:
             f"    images=[{', '.join(images)}],",
             "    camera=camera,",
             f"    decals={decals},",
+            *([] if scene.drawing == Drawing() else [f"    drawing={_drawing_text(scene.drawing)},"]),
             ")",
             "",
             'if __name__ == "__main__":',
@@ -221,6 +226,28 @@ def _number_text(values: Any) -> str:
     if array.ndim:
         return f"[{', '.join(map(_number_text, array))}]"
     return str(array.item()) if array.dtype != np.float32 else repr(float(str(array[()])))
+
+
+def _drawing_text(drawing: Drawing) -> str:
+    """Return the expression of how a scene is drawn; options with their default are left out."""
+    given = {field.name: getattr(drawing, field.name) for field in fields(Drawing)}
+    standard = Drawing()
+    texts = [
+        f"{name}=decals.{type(value).__name__}.{value.name}"
+        if isinstance(value, Enum)
+        else f"{name}={_value_text(value)}"
+        for name, value in given.items()
+        if value != getattr(standard, name)
+    ]
+    return f"decals.rendering.Drawing({', '.join(texts)})"
+
+
+def _value_text(value: Any) -> str:
+    """Return the text of a number, of a background, or of lights."""
+    if isinstance(value, Lighting):
+        lights = "".join(f"decals.rendering.{light!r}, " for light in value.lights)
+        return f"decals.rendering.Lighting(({lights}), {value.frame!r})"
+    return f"decals.rendering.{value!r}" if isinstance(value, Background) else repr(value)
 
 
 def _origin(item: SceneObject) -> str:

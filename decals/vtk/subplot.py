@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from typing import Any, cast
 
@@ -20,17 +20,17 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import Contact
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.lights import Lighting
-from decals.rendering.options import check_scene
+from decals.rendering.options import Drawing, check_scene, drawing_of
 from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
-from decals.validation import finite_number, member, stiffness_number, whole_number
+from decals.validation import finite_number, member, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.injection import InjectedDecals
@@ -167,8 +167,7 @@ class SubplotRenderer:
     ) -> None:
         self.plotter, self.vtk_renderer = plotter, renderer
         self._samples, self._draw_scale = 2, 1.0
-        self._mapping, self._contact = ImageMapping.CORRECTED, DEFAULT_CONTACT
-        self._stiffness = DEFAULT_STIFFNESS
+        self._settings: dict[str, Any] = {}
         self._lights = Lights.SCENE
         self.wait_for_gpu = self.keep_previous_frame = False
         self.status = FrameStatus.EMPTY
@@ -259,31 +258,46 @@ class SubplotRenderer:
         self._samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
 
     @property
+    def drawing(self) -> Drawing:
+        """How the scene is drawn: as it says, with the modes that were set here in place of its own."""
+        return replace(drawing_of(self._scene), **self._settings)
+
+    def _draw_with(self, name: str, value: Any) -> None:
+        """Set a mode: of an edited document in the document itself, which saves it."""
+        drawing = replace(self.drawing, **{name: value})
+        draw_as = getattr(self._scene, "draw_as", None)
+        if draw_as is not None:
+            draw_as(drawing)
+            self._settings.pop(name, None)
+        else:
+            self._settings[name] = getattr(drawing, name)
+
+    @property
     def mapping(self) -> ImageMapping:
         """Image mapping; see `decals.ImageMapping`."""
-        return self._mapping
+        return self.drawing.mapping
 
     @mapping.setter
     def mapping(self, mapping: ImageMapping | str) -> None:
-        self._mapping = member("mapping", mapping, ImageMapping, InvalidScene)
+        self._draw_with("mapping", mapping)
 
     @property
     def contact(self) -> Contact:
         """Contact mode; see `decals.Contact`."""
-        return self._contact
+        return self.drawing.contact
 
     @contact.setter
     def contact(self, contact: Contact | str) -> None:
-        self._contact = member("contact", contact, Contact, InvalidScene)
+        self._draw_with("contact", contact)
 
     @property
     def stiffness(self) -> float:
         """Stiffness of elastic contact, from 1: how close to contact lines images are compressed."""
-        return self._stiffness
+        return self.drawing.stiffness
 
     @stiffness.setter
     def stiffness(self, stiffness: float) -> None:
-        self._stiffness = stiffness_number(stiffness, InvalidScene)
+        self._draw_with("stiffness", stiffness)
 
     @property
     def lights(self) -> Lights:
@@ -306,7 +320,9 @@ class SubplotRenderer:
 
     def lighting(self) -> Lighting | None:
         """Return the lights for the renderer; None for the studio light."""
-        return vtk_lighting(self.vtk_renderer, self.world_matrix()) if self.lights is Lights.VTK else None
+        if self.lights is Lights.VTK:
+            return vtk_lighting(self.vtk_renderer, self.world_matrix())
+        return self.drawing.lights
 
     @property
     def actor(self) -> vtkActor:
@@ -343,9 +359,7 @@ class SubplotRenderer:
         inside = 0 <= column - left < width and 0 <= row - low < height
         if self.scene is None or not inside:
             return None
-        options = RenderOptions(
-            size=(width, height), mapping=self.mapping, contact=self.contact, stiffness=self.stiffness
-        )
+        options = self.drawing.at((width, height))
         with self.current():
             buffers = self.renderer.buffers_at(
                 self.scene, column - left, row - low, options, viewpoint=self.viewpoint()
@@ -537,9 +551,7 @@ class SubplotRenderer:
         return FrameOptions(self._render_options(size, 1 if supersampled else samples))
 
     def _render_options(self, size: Size, samples: int) -> RenderOptions:
-        return RenderOptions(
-            size, samples, self.contact, self.mapping, lights=self.lighting(), stiffness=self.stiffness
-        )
+        return replace(self.drawing, samples=samples, lights=self.lighting()).at(size)
 
     def prepare(self, samples: int, seconds: float) -> float | None:
         """Draw a slice of a later frame of the window's size, without showing it.

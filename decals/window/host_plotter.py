@@ -17,7 +17,7 @@ from decals.editing.document import Document
 from decals.editing.pointer_tools import Ray
 from decals.errors import InvalidScene, NoGraphics
 from decals.rendering.gl_libraries import require_gl
-from decals.rendering.options import STUDIO
+from decals.rendering.options import STUDIO, Background
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
@@ -83,6 +83,8 @@ class HostPlotter:
 
     def add_scene(self, scene: Scene) -> None:
         """Show a scene; a provided plotter keeps a camera that was set."""
+        if not self.provided:
+            show_background(self.plotter, scene.drawing.background)
         keep_camera = self.provided and self.plotter.renderer.camera_set
         self.plotter.decals.add_scene(scene, camera=not keep_camera)
 
@@ -109,6 +111,11 @@ class HostPlotter:
     def resume(self) -> None:
         """Go on to handle events."""
         self.plotter.iren.start()
+
+
+def show_background(plotter: Any, background: Background) -> None:
+    """Show a background behind all objects of a window."""
+    plotter.set_background(background.bottom[:3], top=background.top[:3])
 
 
 def ray_through(subplot: SubplotRenderer, x: float, y: float) -> Ray | None:
@@ -151,12 +158,16 @@ class SubplotBackup:
         self._wait, self._keep = subplot.wait_for_gpu, subplot.keep_previous_frame
 
     def restore(self, document: Document) -> None:
-        """Restore settings and scene; a scene that was edited is replaced by the result."""
+        """Restore settings and scene; a scene that was edited is replaced by the result. Modes stay."""
         subplot = self._subplot
         subplot.draw_scale, subplot.samples = self._scale, self._samples
         subplot.wait_for_gpu, subplot.keep_previous_frame = self._wait, self._keep
         if subplot.scene is document:
             subplot.scene = document.scene if isinstance(self._scene, Scene) else self._scene
+        for name in ("contact", "mapping", "stiffness"):
+            mode = getattr(document.drawing, name)
+            if getattr(subplot, name) != mode:
+                setattr(subplot, name, mode)
 
 
 def edits_at(subplot: SubplotRenderer, x: int, y: int) -> bool:
@@ -223,7 +234,7 @@ def new_plotter(off_screen: bool, size: tuple[int, int]) -> Any:
         require_screen()
     plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title=TITLE)
     plotter.disable_anti_aliasing()
-    plotter.set_background(STUDIO.bottom[:3], top=STUDIO.top[:3])
+    show_background(plotter, STUDIO)
     return plotter
 
 

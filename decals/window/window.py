@@ -19,7 +19,7 @@ from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
 from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import Contact
 from decals.rendering.gl_libraries import require_gl
 from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
@@ -81,7 +81,8 @@ class EditWindow:
         Reads the recovery file that an earlier window left beside ``path``, such as `decals.load_scene`. Its
         changes become one undo entry. Default: a recovery file is ignored.
     contact : Contact or str, optional
-        Contact mode at the beginning; a scene does not store it. Default: that of the plotter's subplot.
+        Contact mode at the beginning. Default: that of the scene, or of the plotter's subplot if it was set
+        there. Scenes that the window saves keep the present one.
     mapping : ImageMapping or str, optional
         Image mapping at the beginning, likewise.
     stiffness : float, optional
@@ -160,12 +161,8 @@ class EditWindow:
         self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
         self.actions.files.leave = self._host.leave
         self.actions.state.modes = self.subplot
-        if contact is not None:
-            self.subplot.contact = contact
-        if mapping is not None:
-            self.subplot.mapping = mapping
-        if stiffness is not None:
-            self.subplot.stiffness = stiffness
+        for name, mode in (("contact", contact), ("mapping", mapping), ("stiffness", stiffness)):
+            setattr(self.subplot, name, getattr(self.subplot, name) if mode is None else mode)
         self.actions.state.view = lambda: eye_and_target(self.subplot)
         self.tools = PointerTools(
             self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
@@ -410,9 +407,9 @@ def edit(
     *,
     path: str | os.PathLike[str] | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
-    contact: Contact | str = DEFAULT_CONTACT,
-    mapping: ImageMapping | str = ImageMapping.CORRECTED,
-    stiffness: float = DEFAULT_STIFFNESS,
+    contact: Contact | str | None = None,
+    mapping: ImageMapping | str | None = None,
+    stiffness: float | None = None,
 ) -> Scene:
     """Open a window to edit a scene, and return the edited scene when the window is closed.
 
@@ -426,11 +423,11 @@ def edit(
         opened, as one undo entry.
     size : (int, int)
         Width and height of the window in pixels.
-    contact : Contact or str
-        Contact mode at the beginning; a scene does not store it.
-    mapping : ImageMapping or str
+    contact : Contact or str, optional
+        Contact mode at the beginning. Default: that of the scene's ``drawing``, which the editor changes.
+    mapping : ImageMapping or str, optional
         Image mapping at the beginning, likewise.
-    stiffness : float
+    stiffness : float, optional
         Stiffness of elastic contact at the beginning, likewise.
 
     Returns

@@ -22,8 +22,9 @@ OF_PACKAGES = {
     "field": ["Neighbors", "Samples"],
     "index": ["DecalEditor", "DecalIndex"],
     "rendering": [
-        "Background", "Buffers", "Context", "Drawable", "Light", "Lighting", "Picture", "Projection",
-        "RenderOptions", "Renderer", "STUDIO", "SceneLike", "Size", "TRANSPARENT", "Viewpoint", "register",
+        "Background", "Buffers", "Context", "Drawable", "Drawing", "Light", "Lighting", "Picture",
+        "Projection", "RenderOptions", "Renderer", "STUDIO", "SceneLike", "Size", "TRANSPARENT",
+        "Viewpoint", "register",
     ],
     "scattering": [
         "Creases", "Cylindrical", "ImageChoice", "Jitter", "Orientation", "PaintedImage", "Planar",

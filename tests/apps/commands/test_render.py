@@ -42,15 +42,15 @@ def test_pictures_depend_on_the_seed_only(folder: Path) -> None:
 def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
     pv.Sphere().save(folder / "ball.stl")
     Image.new("RGB", (8, 8), (200, 30, 30)).save(folder / "red.png")
-    models = ("ball.stl", "knot", "spheres")
-    assert (
-        run([*small(*models), "--image", "red.png", "--image", "eye", "--save", "s.json", "-o", "a.png"]) == 0
-    )
-    assert run(["render", "s.json", "--size", "64x48", "--samples", "1", "-o", "b.png"]) == 0
+    models, saved = ("ball.stl", "knot", "spheres"), ("--save", "s.json", "-o", "a.png")
+    assert run([*small(*models), "--image", "red.png", "--image", "eye", "--contact", "radial", *saved]) == 0
+    assert run(["render", "s.json", "--size", "64x48", "-o", "b.png"]) == 0
     assert np.array_equal(picture(folder / "a.png"), picture(folder / "b.png"))
     written = json.loads((folder / "s.json").read_text())
     assert [item.get("source") for item in written["objects"]] == ["ball.stl", "sample:knot", None]
     assert len(written["decals"]) == 30
+    assert (written["drawing"]["contact"], written["drawing"]["samples"]) == ("radial", 1)
+    assert (written["recipe"]["function"], written["recipe"]["parameters"]["count"]) == ("decals.scatter", 30)
 
 
 def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:

@@ -56,7 +56,8 @@ def test_a_scene_of_the_first_version(tmp_path: Path) -> None:
     again = decals.load_model(path)
     assert isinstance(again, decals.Scene)
     assert again.decals.packed().tobytes() == scene.decals.packed().tobytes()
-    assert b"contact" not in path.read_bytes()
+    assert b'"interaction":"contact"' not in path.read_bytes()
+    assert scene.drawing.contact is again.drawing.contact is decals.Contact.PRODUCT
 
 
 def test_a_tree_of_the_first_version(tmp_path: Path) -> None:

@@ -11,12 +11,14 @@ import pytest
 import decals
 from blobtree import BlendGraph, Node, Point, Polyline, from_sdf
 from decals.errors import InvalidScene
+from decals.rendering import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
 from decals.scenes.script import COLUMNS, write_script
 from tests.blobtree.custom_kinds import Ring
 from tests.decals.editing.scenes import box
+from tests.decals.scenes.test_drawing import LOOK
 
 BALL = Point((0.1, 0, 0), radius=1 / 3, color="tomato", attributes={"wet": 0.5})
 
@@ -69,6 +71,7 @@ def test_the_script_gives_the_same_scene(count: int, tmp_path: Path) -> None:
         camera=Camera((0, 1 / 3, 8), fov=41.5),
         images=["scale", DecalImage("mine", pixels)],
         decals=decals_at_random(count),
+        drawing=LOOK if count else Drawing(),
     )
     again = rebuilt(scene, tmp_path / "scene.py")
     for item, other in zip(scene.objects, again.objects, strict=True):
@@ -79,7 +82,7 @@ def test_the_script_gives_the_same_scene(count: int, tmp_path: Path) -> None:
             assert (item.vertices == other.vertices).all()
             assert (item.faces == other.faces).all()
             assert (item.color, item.crease_angle) == (other.color, other.crease_angle)
-    assert again.camera == scene.camera
+    assert (again.camera, again.drawing) == (scene.camera, scene.drawing)
     for image, other in zip(scene.images, again.images, strict=True):
         assert (image.pixels == other.pixels).all()
         assert image.source == other.source

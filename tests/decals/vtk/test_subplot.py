@@ -10,7 +10,7 @@ from decals.errors import InvalidPoints, InvalidScene, NoGraphics
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.record import Contact
-from decals.rendering import TRANSPARENT
+from decals.rendering import TRANSPARENT, Drawing
 from decals.rendering.options import RenderOptions
 from decals.vtk.subplot import SubplotRenderer
 from tests.decals.vtk.conftest import Factory, Plotter
@@ -95,6 +95,7 @@ def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
         lambda pl: setattr(pl.decals.subplot, "draw_scale", 0.5),
         lambda pl: setattr(pl.decals.subplot, "mapping", ImageMapping.CHORD),
         lambda pl: setattr(pl.decals.subplot, "contact", Contact.MIN),
+        lambda pl: pl.decals.add_scene(both().replace(drawing=Drawing(contact="radial"))),
         lambda pl: setattr(pl.decals, "scene", both().replace(decals=both().decals[:60])),
         lambda pl: setattr(pl.decals, "scene", both().replace(objects=both().objects[:1])),
         lambda pl: setattr(pl, "window_size", (150, 120)),

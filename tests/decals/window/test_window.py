@@ -149,11 +149,14 @@ def test_p_and_u_change_how_the_window_draws_and_picks(driver: Driver) -> None:
     same = [pick is not None and pick.owner == own for pick, own in zip(picks, owners, strict=True)]
     assert np.mean(same) > 0.98
     assert driver.session.labels == ()
+    kept = driver.document.scene.drawing
+    assert (kept.contact, kept.mapping, kept.stiffness) == (Contact.RADIAL, ImageMapping.CHORD, 3.0)
 
 
 def test_a_window_opens_with_the_given_modes(opened: Any) -> None:
-    subplot = opened(contact="min", mapping=ImageMapping.CHORD).window.subplot
-    assert (subplot.contact, subplot.mapping) == (Contact.MIN, ImageMapping.CHORD)
+    window = opened(contact="min", mapping=ImageMapping.CHORD).window
+    assert (window.subplot.contact, window.subplot.mapping) == (Contact.MIN, ImageMapping.CHORD)
+    assert window.document.drawing.contact is Contact.MIN
 
 
 @pytest.mark.parametrize("key", ["n", "l"])
