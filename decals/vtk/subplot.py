@@ -259,18 +259,20 @@ class SubplotRenderer:
 
     @property
     def drawing(self) -> Drawing:
-        """How the scene is drawn: as it says, with the modes that were set here in place of its own."""
-        return replace(drawing_of(self._scene), **self._settings)
+        """How the scene is drawn: as it says, with the modes that were set here in place of its own.
+
+        A document that is edited takes over these modes, and can change them.
+        """
+        drawing = drawing_of(self._scene)
+        return drawing if hasattr(self._scene, "draw_as") else replace(drawing, **self._settings)
 
     def _draw_with(self, name: str, value: Any) -> None:
-        """Set a mode: of an edited document in the document itself, which saves it."""
+        """Set a mode, also of an edited document, which saves it."""
         drawing = replace(self.drawing, **{name: value})
         draw_as = getattr(self._scene, "draw_as", None)
         if draw_as is not None:
             draw_as(drawing)
-            self._settings.pop(name, None)
-        else:
-            self._settings[name] = getattr(drawing, name)
+        self._settings[name] = getattr(drawing, name)
 
     @property
     def mapping(self) -> ImageMapping:

@@ -158,16 +158,12 @@ class SubplotBackup:
         self._wait, self._keep = subplot.wait_for_gpu, subplot.keep_previous_frame
 
     def restore(self, document: Document) -> None:
-        """Restore settings and scene; a scene that was edited is replaced by the result. Modes stay."""
+        """Restore settings and scene; a scene that was edited is replaced by the result."""
         subplot = self._subplot
         subplot.draw_scale, subplot.samples = self._scale, self._samples
         subplot.wait_for_gpu, subplot.keep_previous_frame = self._wait, self._keep
         if subplot.scene is document:
             subplot.scene = document.scene if isinstance(self._scene, Scene) else self._scene
-        for name in ("contact", "mapping", "stiffness"):
-            mode = getattr(document.drawing, name)
-            if getattr(subplot, name) != mode:
-                setattr(subplot, name, mode)
 
 
 def edits_at(subplot: SubplotRenderer, x: int, y: int) -> bool:

@@ -154,6 +154,7 @@ class EditWindow:
         self.subplot: SubplotRenderer = self.plotter.decals.subplot
         self._backup = SubplotBackup(self.subplot)
         self._host.add_scene(self.document.scene)
+        modes = self.subplot.contact, self.subplot.mapping, self.subplot.stiffness
         self.subplot.scene = self.document
         self.frames = FrameController(self.subplot, samples, self.plotter.render, self._content_version)
         self.warmup = Warmup(self.subplot, weak_callback(self._show_status), self.frames.give_up)
@@ -161,8 +162,9 @@ class EditWindow:
         self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
         self.actions.files.leave = self._host.leave
         self.actions.state.modes = self.subplot
-        for name, mode in (("contact", contact), ("mapping", mapping), ("stiffness", stiffness)):
-            setattr(self.subplot, name, getattr(self.subplot, name) if mode is None else mode)
+        given = contact, mapping, stiffness
+        for name, mode, present in zip(("contact", "mapping", "stiffness"), given, modes, strict=True):
+            setattr(self.subplot, name, present if mode is None else mode)
         self.actions.state.view = lambda: eye_and_target(self.subplot)
         self.tools = PointerTools(
             self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
