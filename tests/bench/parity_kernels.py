@@ -4,12 +4,13 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import rim_distance
 from decals.field.ownership import NO_OWNER, complement_at, owner_at, single_layer_at, uv_at
 from decals.index.lookup import IndexedDecals
 from tests.oracles.parallel import Members, rim_of, wide
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 ZERO = wp.constant(wp.float64(0.0))
 ONE = wp.constant(wp.float64(1.0))

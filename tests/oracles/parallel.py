@@ -13,7 +13,9 @@ import math
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from blobtree.kernels import KERNEL_OPTIONS
+
+wp.set_module_options(KERNEL_OPTIONS)
 
 RIM = wp.constant(wp.float64(math.sqrt(1 - 0.5 ** (1 / 3))))
 ZERO = wp.constant(wp.float64(0.0))

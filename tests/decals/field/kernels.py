@@ -2,13 +2,14 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import add_push, contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import image_distance, in_image, tangent_coordinates, unroll, unroll_step
 from decals.field.ownership import NO_OWNER, complement_at, owner_at, single_layer_at
 from decals.index.lookup import IndexedDecals
 from decals.record import NO_FIELD, RECORD, RIM_RADIUS, field_complement, xyz
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 STEPS = 6
 

@@ -2,12 +2,13 @@
 
 import warp as wp
 
+from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import tangent_coordinates, unroll
 from decals.index.lookup import IndexedDecals, cell_hash, cell_range
 from decals.record import field_complement
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.kernel
