@@ -70,6 +70,14 @@ def kinds() -> dict[str, type[Node]]:
     return built_in_kinds() | custom
 
 
+def checked_kind(name: object) -> type[Node]:
+    """Return the class of a name, or raise `InvalidEdit`."""
+    known = kinds()
+    if not isinstance(name, str) or name not in known:
+        raise InvalidEdit(f"kind: expected one of {', '.join(known)}, got {describe(name)}")
+    return known[name]
+
+
 def operand_count(kind: type[Node]) -> int:
     """Return the smallest number of operands of a class: 0 for primitives, 1 for warps."""
     return sum(2 if several else 1 for several in _operand_fields(kind).values())
@@ -125,10 +133,7 @@ def new_node(
     InvalidNode
         The class refuses the values.
     """
-    known = kinds()
-    if not isinstance(name, str) or name not in known:
-        raise InvalidEdit(f"kind: expected one of {', '.join(known)}, got {describe(name)}")
-    kind = known[name]
+    kind = checked_kind(name)
     least, most = operand_count(kind), most_operands(kind)
     if not least <= len(operands) <= most:
         raise InvalidEdit(f"{name}: expected {least} or more operands, at most {most:g}, got {len(operands)}")

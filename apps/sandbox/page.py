@@ -37,6 +37,20 @@ ROW_ICONS = (
 )
 
 
+ROW_CHANGES = {
+    "duplicate": "mdi-content-duplicate",
+    "group": "mdi-group",
+    "remove": "mdi-delete-outline",
+}
+"""Icons of what can be done with the selected rows."""
+
+OPEN_MENU = (
+    "menu = {open: true, x: $event.clientX, y: $event.clientY, key: row.key, label: row.label, "
+    "object: ['object', 'mesh'].includes(row.kind), image: ['image', 'more'].includes(row.kind)}"
+)
+"""Open the menu of a row at the pointer."""
+
+
 class Page:
     """The page of one sandbox.
 
@@ -57,6 +71,7 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
         renamed, dropped = {"key": "", "name": ""}, None
+        server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "object": False, "image": False}
         server.state.update({**constants, **self.values(), "renamed": renamed, "dropped": dropped})
         server.state.change("dropped")(self._take_dropped)
         server.controller.trigger("rename")(lambda key, name: self.sandbox.change_row(key, "rename", name))
@@ -186,9 +201,10 @@ class Page:
                 key="row.key",
                 title=("row.label",),
                 prepend_icon=(ROW_ICONS,),
-                active=("row.key === selected",),
+                active=("row.key === selected || marked.includes(row.key)",),
                 style=("`padding-left: ${8 + 14 * row.depth}px`",),
-                click=(self.sandbox.select, "[row.key === selected ? '' : row.key]"),
+                click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey, selected]"),
+                contextmenu=f"$event.preventDefault(); {OPEN_MENU}",
                 draggable=True,
                 dragstart="$event.dataTransfer.setData('text/plain', row.key)",
                 dragover="$event.preventDefault()",
@@ -197,9 +213,10 @@ class Page:
                     "[($event.preventDefault(), $event.dataTransfer.getData('text/plain')), 'move', row.key]",
                 ),
                 dblclick=(self._rename, "[row.key, row.label, row.kind]"),
-                __events=["dragstart", "dragover", "drop", "dblclick"],
+                __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
                 __properties=["draggable"],
             )
+        self._build_row_menu()
         with html.Div(v_if="renamed.key", classes="d-flex ga-2 pa-2"):
             vuetify3.VTextField(v_model="renamed.name", raw_attrs=named("'new name'"), **FIELD)
             vuetify3.VBtn(
@@ -208,13 +225,45 @@ class Page:
                 click="trigger('rename', [renamed.key, renamed.name]); renamed = {key: '', name: ''}",
             )
         with html.Div(v_if="selected", classes="d-flex ga-1 px-2"):
-            for change, icon in (("duplicate", "mdi-content-duplicate"), ("remove", "mdi-delete-outline")):
+            for change, icon in ROW_CHANGES.items():
                 panels.icon_button(
                     icon,
-                    f"{change} the selected row",
+                    f"{change} what is selected",
                     (self.sandbox.change_row, f"[selected, '{change}']"),
                     variant="text",
                 )
+
+    def _build_row_menu(self) -> None:
+        """Build the menu of a row, where the pointer was."""
+        change = self.sandbox.change_row
+        with (
+            vuetify3.VMenu(
+                model_value=("menu.open",),
+                update_modelValue="menu = {...menu, open: $event}",
+                target=("[menu.x, menu.y]",),
+            ),
+            vuetify3.VList(density="compact"),
+        ):
+            for title, shown, event in (
+                ("Rename", "menu.object", (self._rename, "[menu.key, menu.label, 'object']")),
+                ("Duplicate", "!menu.image", (change, "[menu.key, 'duplicate']")),
+                ("Group", "!menu.object && !menu.image", (change, "[menu.key, 'group']")),
+                ("Remove", "!menu.image", (change, "[menu.key, 'remove']")),
+                ("Frame", "!menu.image", (self._frame, "[menu.key]")),
+            ):
+                vuetify3.VListItem(title=title, v_if=shown, click=event)
+
+    def _frame(self, key: str) -> None:
+        """Select a row, and show it as large as it fits."""
+        self.sandbox.select(key)
+        self.sandbox.move_camera("frame")
+
+    def _click(self, key: str, several: bool, selected: str) -> None:
+        """Select a row, deselect the selected one, or mark several."""
+        if several:
+            self.sandbox.mark(key)
+        else:
+            self.sandbox.select("" if key == selected else key)
 
     def _build_panel(self) -> None:
         with html.Div(v_if="panel.kind", classes="pa-3"):

@@ -14,6 +14,7 @@ from typing import Any
 
 from PIL import Image
 
+from blobtree import Node
 from blobtree.custom.definition import custom_kinds
 from blobtree.nodes.paths import Path as TreePath
 from blobtree.progress import Cancel, Progress
@@ -109,6 +110,7 @@ class Sandbox:
         self.schedule: Callable[[], None] = self.take_step
         self._step: Callable[[], None] | None = None
         self._rows: list[dict[str, Any]] = []
+        self._marked: list[str] = []
         self._objects: Any = None
         self._images: Any = None
         self._measured: tuple[object, float] = None, 1.0
@@ -126,6 +128,7 @@ class Sandbox:
             "busy": window.busy,
             "outline": self._outline(),
             "selected": "" if state.primitive is None else key_of(*state.primitive),
+            "marked": self._marked,
             "panel": self._panel(),
             "done": list(session.labels[-MAX_HISTORY:]),
             "undone": list(session.undone_labels[:MAX_HISTORY]),
@@ -177,7 +180,9 @@ class Sandbox:
         """Return the rows of the outline; they change only with the objects and images."""
         document = self._window.document
         if self._objects is not document.objects or self._images is not document.images:
-            self._rows = outline(document)
+            rows = outline(document)
+            if rows != self._rows:  # a key may stand for another node now
+                self._rows, self._marked = rows, []
             self._objects, self._images = document.objects, document.images
         return self._rows
 
@@ -203,14 +208,28 @@ class Sandbox:
 
     # -- events -----------------------------------------------------------------------------------------
 
+    def mark(self, key: str) -> None:
+        """Mark the node of a row too, or no longer; marked nodes are grouped and removed together."""
+        with self._reported():
+            number, path = self._row(key)
+            self._window.actions.trees.select_node(number, path)
+            self._outline()  # forgets the marks of a former tree
+            key = key_of(number, path)
+            self._marked = [k for k in self._marked if k != key and self._row(k)[0] == number] + (
+                [] if key in self._marked else [key]
+            )
+
     def select(self, key: str) -> None:
         """Select the node of a row; the row of an object selects its root, "" selects nothing."""
+        self._marked = []
         with self._reported():
             trees = self._window.actions.trees
             if key == "":
                 self._window.actions.state.primitive = None
                 return
-            trees.select_node(*self._row(key))
+            number, path = self._row(key)
+            trees.select_node(number, path)
+            self._marked = [key_of(number, path)]
 
     def set_value(self, name: str, raw: Any, last: bool = True) -> None:
         """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`."""
@@ -259,16 +278,21 @@ class Sandbox:
     def add(self, kind: str) -> None:
         """Add a primitive of a kind: blended to the selected node, or as an object."""
         with self._reported():
-            center, size = self._window.actions.trees.place_of_new_node()
-            self._window.actions.trees.add_node(catalog.new_node(kind, center=center, size=size))
+            name = catalog.checked_kind(kind).__name__
+            self._window.actions.trees.add_node(
+                name, lambda center, size: catalog.new_node(name, center=center, size=size)
+            )
 
     def wrap(self, kind: str) -> None:
         """Put the selected node under a new node with one operand, such as a warp."""
         with self._reported():
-            node = self._window.actions.trees.selected_node
-            low, high = node.bounds
-            size = float((high - low).max())
-            self._window.actions.trees.replace_node(catalog.new_node(kind, (node,), size=size))
+            catalog.checked_kind(kind)
+
+            def wrapped(node: Node) -> Node:
+                low, high = node.bounds
+                return catalog.new_node(kind, (node,), size=float((high - low).max()))
+
+            self._window.actions.trees.replace_node(wrapped)
 
     def combine(self, kind: str) -> None:
         """Combine the operands of the selected node in another way."""
@@ -278,7 +302,7 @@ class Sandbox:
                 raise InvalidEdit(
                     f"select a node with two or more operands; a {type(node).__name__} has fewer"
                 )
-            self._window.actions.trees.replace_node(catalog.new_node(kind, node.children))
+            self._window.actions.trees.replace_node(lambda node: catalog.new_node(kind, node.children))
 
     def unwrap(self) -> None:
         """Replace the selected node by its only operand."""
@@ -288,7 +312,7 @@ class Sandbox:
                 raise InvalidEdit(
                     f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
                 )
-            self._window.actions.trees.replace_node(node.children[0])
+            self._window.actions.trees.replace_node(lambda node: node.children[0])
 
     def perform(self, action: str) -> None:
         """Carry out an action of the key table at the middle of the view."""
@@ -462,7 +486,9 @@ class Sandbox:
             set_mode(self._window.actions.state, name, raw)
 
     def change_row(self, key: str, change: str, value: Any = None) -> None:
-        """Change what a row of the outline stands for: "rename", "remove", "duplicate" or "move" it.
+        """Change what a row of the outline stands for: "rename", "remove", "duplicate", "group" or "move" it.
+
+        If the row is one of several marked ones, all are removed or grouped.
 
         Parameters
         ----------
@@ -476,8 +502,13 @@ class Sandbox:
         with self._reported():
             actions = self._window.actions
             is_object = isinstance(key, str) and key.startswith("object ")
+            marked = self._marked if key in self._marked else [key]
             number, path = self._row(key)
             match change:
+                case "group" if not is_object:
+                    actions.trees.group_nodes(number, [self._row(other)[1] for other in marked])
+                case "remove" if len(marked) > 1:
+                    actions.trees.delete_nodes(number, [self._row(other)[1] for other in marked])
                 case "rename" if is_object:
                     actions.state.run(RenameObject(number, value))
                 case "remove" if is_object:

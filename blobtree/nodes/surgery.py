@@ -3,6 +3,7 @@
 A branch is a node that is an operand of a combination, with the maps above it; a `Path` leads to it.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum
 from typing import Any
@@ -189,13 +190,48 @@ def _matrix(tree: Node, path: Path, first: int) -> Float64Array:
 def _without(tree: Node, path: Path, placed: Node) -> tuple[Node, Path]:
     """Remove the branch at a path, and return the path of another node in the rest."""
     rest = remove_branch(tree, path)
-    pending: list[tuple[Path, Node]] = [((), rest)]
+    return rest, path_of(rest, placed)
+
+
+def path_of(tree: Node, wanted: Node) -> Path:
+    """Return a path of a node in a tree; `InvalidNode` if it is not in it."""
+    pending: list[tuple[Path, Node]] = [((), tree)]
     while pending:
         found, node = pending.pop()
-        if node is placed:
-            return rest, found
+        if node is wanted:
+            return found
         pending.extend(((*found, step), child) for step, child in enumerate(node.children))
-    raise InvalidNode("path: expected a branch that leaves other parts")  # removed with its old place
+    raise InvalidNode("expected a node of the tree; it was removed with another one")
+
+
+def group_operands(tree: Node, path: Path, steps: Sequence[int]) -> tuple[Node, Path]:
+    """Put operands of the combination at a path under one of the same kind, where the first one was.
+
+    The shape stays, so only sums, Ricci blends, unions and intersections can be grouped.
+
+    Returns
+    -------
+    tuple[Node, Path]
+        The new tree, and the path of the group in it.
+
+    Raises
+    ------
+    InvalidNode
+        The node at the path is no such combination, or has no two such operands and another one.
+    """
+    parent: Any = node_at(tree, path)
+    chosen = sorted(set(steps))
+    if JOIN_OF_KIND.get(type(parent), Join.DIFFERENCE) is Join.DIFFERENCE:
+        raise InvalidNode(
+            f"path: expected a sum, Ricci blend, union or intersection, got a {type(parent).__name__}"
+        )
+    count = len(parent.operands)
+    if not 2 <= len(chosen) < count or chosen[0] < 0 or chosen[-1] >= count:
+        raise InvalidNode(f"steps: expected 2 to {count - 1} of {count} operands, got {chosen}")
+    group = replace(parent, operands=tuple(parent.operands[step] for step in chosen))
+    operands = [node for step, node in enumerate(parent.operands) if step not in chosen]
+    operands.insert(chosen[0], group)
+    return with_node(tree, path, replace(parent, operands=tuple(operands))), (*path, chosen[0])
 
 
 def duplicate_branch(tree: Node, path: Path, offset: ArrayLike) -> tuple[Node, Path]:

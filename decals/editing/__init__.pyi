@@ -24,6 +24,7 @@ from .session import EditSession, UndoEntry
 from .tree_commands import (
     AddPrimitive,
     DuplicatePrimitive,
+    GroupOperands,
     JoinPrimitive,
     MoveBranch,
     MovePrimitive,
@@ -48,6 +49,7 @@ __all__ = [
     "DuplicateDecals",
     "DuplicatePrimitive",
     "EditSession",
+    "GroupOperands",
     "JoinPrimitive",
     "MapValues",
     "MoveBranch",

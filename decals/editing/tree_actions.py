@@ -1,5 +1,6 @@
 """Actions on objects and on the primitives of BlobTrees: select, move, add, resize, join and remove."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from blobtree import Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
-from blobtree.nodes.surgery import Join, dominant_primitive, join_of, world_space_path
+from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, world_space_path
 from decals.editing.action_state import ActionState, Cursor, require_pick
 from decals.editing.background import Step
 from decals.editing.decal_actions import TINTS
@@ -20,6 +21,7 @@ from decals.editing.session import EditSession
 from decals.editing.tree_commands import (
     AddPrimitive,
     DuplicatePrimitive,
+    GroupOperands,
     JoinPrimitive,
     MoveBranch,
     MovePrimitive,
@@ -31,7 +33,7 @@ from decals.editing.tree_commands import (
     StructureCommand,
 )
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.scenes.objects import TreeObject, bounds_of
+from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
 
@@ -211,42 +213,69 @@ class TreeActions:
         if last:
             self.end_drag()
 
-    def place_of_new_node(self) -> tuple[Float64Array, float]:
-        """Return centre (3,) and size for a new node: on the selected one, or at the camera's target."""
-        state = self._state
-        if state.primitive is not None:
-            number, path = state.primitive
-            low, high = node_in_world(self._tree(number), path).bounds
-            size = float((high - low).max()) * NEW_NODE_SIZE
-            return np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2], np.float64), size
-        eye, target = (np.asarray(point, np.float64) for point in state.view())
-        if state.session.document.objects:
-            low, high = bounds_of(state.session.document.objects)
-            size = float((high - low).max()) * NEW_NODE_SIZE
-            return np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size
-        return target, FIRST_OBJECT_RADIUS * float(np.linalg.norm(eye - target))
+    def add_node(self, kind: str, make: Callable[[Float64Array, float], Node]) -> None:
+        """Blend a new node into the selected one and select it; without a selected one it is an object.
 
-    def add_node(self, node: Node, join: Join = Join.BLEND) -> None:
-        """Join a node, given in the world, to the selected one and select it; without one it is an object."""
-        if self._state.primitive is None:
-            self._add_tree(type(node).__name__.lower(), node, np.zeros(3, np.float32))
+        Parameters
+        ----------
+        kind
+            Name of its class.
+        make
+            Returns the node, in the world, for a centre, shape (3,), and a size. It runs in the background.
+        """
+        state, middle = self._state, np.zeros(3, np.float32)
+        if state.primitive is None:
+            objects, view = state.session.document.objects, state.view()
+            self._add_tree(kind.lower(), lambda: make(*_place_of_object(objects, *view)), middle)
             return
-        number, path = self._state.primitive
-        above = world_space_path(self._tree(number), path)
-        self._restructure(AddPrimitive(number, above, node, join), handle_offset=np.zeros(3, np.float32))
+        number, path = state.primitive
+        tree = self._tree(number)
 
-    def replace_node(self, node: Node) -> None:
-        """Put a node in the place of the selected one, and select it."""
-        self.selected_node  # noqa: B018  # raises without a selected node
+        def command() -> tuple[StructureCommand, ...]:
+            node = make(*_place_on(node_in_world(tree, path)))
+            return (AddPrimitive(number, world_space_path(tree, path), node),)
+
+        self._restructure_later(AddPrimitive.label, command, middle)
+
+    def replace_node(self, make: Callable[[Node], Node]) -> None:
+        """Put what a function returns for the selected node in its place, and select it.
+
+        The function runs in the background.
+        """
+        node = self.selected_node
         assert self._state.primitive is not None
-        command = ReplaceNode(*self._state.primitive, node)
-        self._restructure(command, handle_offset=np.zeros(3, np.float32))
+        number, path = self._state.primitive
+        self._restructure_later(
+            ReplaceNode.label, lambda: (ReplaceNode(number, path, make(node)),), np.zeros(3, np.float32)
+        )
 
     def move_node(self, target: Path) -> None:
         """Move the selected node to another place in its tree, and keep it selected; see `MoveBranch`."""
         self.selected_node  # noqa: B018  # raises without a selected node
         assert self._state.primitive is not None
         self._restructure(MoveBranch(*self._state.primitive, target))
+
+    def group_nodes(self, number: int, paths: Sequence[Path]) -> None:
+        """Put operands of one combination of an object under a group, and select it; see `GroupOperands`."""
+        parents = {path[:-1] for path in paths if path}
+        if len(parents) != 1 or len(paths) < 2 or () in paths:
+            raise InvalidEdit("select two or more operands of one combination (with Ctrl), then group them")
+        self._restructure(GroupOperands(number, parents.pop(), tuple(path[-1] for path in paths)))
+
+    def delete_nodes(self, number: int, paths: Sequence[Path]) -> None:
+        """Remove branches of an object's tree, as one entry."""
+        tops = [path for path in paths if not any(path[: len(o)] == o != path for o in paths)]
+        nodes = [node_at(self._tree(number), path) for path in tops]
+
+        def step(session: EditSession) -> str:
+            with session.stroke(RemovePrimitive.label):
+                for node in nodes:
+                    item = session.document.objects[number]
+                    assert isinstance(item, TreeObject)
+                    session.do(RemovePrimitive(number, path_of(item.tree, node)))
+            return RemovePrimitive.label
+
+        self._state.background.edit(RemovePrimitive.label, step)
 
     def report(self, pick: SurfacePick) -> dict[str, str]:
         """Return what is at a surface point, in plain words."""
@@ -358,15 +387,24 @@ class TreeActions:
         self._restructure(RemovePrimitive(*self._state.primitive))
 
     def _restructure(self, *commands: StructureCommand, handle_offset: Float32Array | None = None) -> None:
-        """Carry out the first command that leaves a visible surface, and select its primitive.
+        """Carry out the first command that leaves a visible surface, and select its primitive."""
+        self._restructure_later(commands[0].label, lambda: commands, handle_offset)
 
-        The edit builds a new surface, so it runs in the background.
+    def _restructure_later(
+        self,
+        label: str,
+        commands: Callable[[], tuple[StructureCommand, ...]],
+        handle_offset: Float32Array | None,
+    ) -> None:
+        """Do the same for what a function returns.
+
+        The function may take long, and the edit builds a new surface, so both run in the background.
         """
         result: list[tuple[int, Path]] = []
 
         def step(session: EditSession) -> str:
             failure: Exception | None = None
-            for command in commands:
+            for command in commands():
                 try:
                     _, path = command.restructure(command.tree(session.document))
                     session.do(command)
@@ -382,7 +420,7 @@ class TreeActions:
             for number, path in result:
                 self._state.select_primitive(number, path, handle_offset)
 
-        self._state.background.edit(commands[0].label, step, select)
+        self._state.background.edit(label, step, select)
 
     # -- objects ----------------------------------------------------------------------------------------
 
@@ -403,7 +441,8 @@ class TreeActions:
             radius = FIRST_OBJECT_RADIUS * float(np.linalg.norm(eye - target))
         up = unit_rows((eye - target)[None])[0] if pick is None else pick.normal
         center = target if pick is None else pick.position + radius * up
-        self._add_tree("ball", Point(_coordinates(center), radius=radius), radius * up)
+        ball = Point(_coordinates(center), radius=radius)
+        self._add_tree("ball", lambda: ball, radius * up)
 
     def _add_first_limb(self) -> None:
         """Add a segment as the first object, at the target of the camera."""
@@ -411,18 +450,21 @@ class TreeActions:
         radius = FIRST_LIMB_RADIUS * float(np.linalg.norm(eye - target))
         half = 0.5 * LIMB_LENGTH / LIMB_RADIUS * radius * np.eye(3)[np.abs(eye - target).argmin()]
         limb = Segment(_coordinates(target - half), _coordinates(target + half), radius=radius)
-        self._add_tree("limb", limb, radius * unit_rows((eye - target)[None])[0])
+        self._add_tree("limb", lambda: limb, radius * unit_rows((eye - target)[None])[0])
 
-    def _add_tree(self, kind: str, tree: Node, handle_offset: Float32Array) -> None:
-        """Add a tree as an object with a new name, and select it."""
-        names = {item.name for item in self._state.session.document.objects}
+    def _add_tree(self, kind: str, make: Callable[[], Node], handle_offset: Float32Array) -> None:
+        """Add the tree that a function returns as an object with a new name, and select it."""
+        document = self._state.session.document
+        names, origin = {item.name for item in document.objects}, document.origin
         name = next(name for n in range(1, len(names) + 2) if (name := f"{kind} {n}") not in names)
 
         def select() -> None:
             last = len(self._state.session.document.objects) - 1
             self._state.select_primitive(last, (), handle_offset)
 
-        self._state.run(AddObject(TreeObject(name, tree, self._state.session.document.origin)), select)
+        self._state.background.compute(
+            AddObject.label, lambda *_: AddObject(TreeObject(name, make(), origin)), select
+        )
 
     @action(
         "remove_object",
@@ -448,6 +490,25 @@ def _surface_check(number: int) -> Step:
         return ""
 
     return step
+
+
+def _place_on(node: Node) -> tuple[Float64Array, float]:
+    """Return centre (3,) and size for a new node on top of another one."""
+    low, high = node.bounds
+    size = float((high - low).max()) * NEW_NODE_SIZE
+    return np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2], np.float64), size
+
+
+def _place_of_object(
+    objects: Sequence[SceneObject], eye: ArrayLike, target: ArrayLike
+) -> tuple[Float64Array, float]:
+    """Return centre (3,) and size for a new object: beside the others, or at the camera's target."""
+    if objects:
+        low, high = bounds_of(objects)
+        size = float((high - low).max()) * NEW_NODE_SIZE
+        return np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size
+    center = np.asarray(target, np.float64)
+    return center, FIRST_OBJECT_RADIUS * float(np.linalg.norm(np.asarray(eye, np.float64) - center))
 
 
 def _thickness(node: Node) -> float:

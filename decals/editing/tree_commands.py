@@ -484,6 +484,39 @@ class MoveBranch(StructureCommand):
 
 
 @dataclass(frozen=True, eq=False)
+class GroupOperands(StructureCommand):
+    """Put operands of a combination under a combination of the same kind; the shape stays.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of a sum, Ricci blend, union or intersection in the object's tree.
+    steps
+        Indices of two or more of its operands, but not all.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, GroupOperands
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6) + Point((2, 0, 0), radius=0.5)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(GroupOperands(0, (), (0, 2)))
+    >>> [len(child.children) for child in session.document.objects[0].tree.children]
+    [2, 0]
+    """
+
+    steps: tuple[int, ...]
+    label: ClassVar[str] = "group"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the group in it."""
+        return surgery.group_operands(tree, tuple(self.path), self.steps)
+
+
+@dataclass(frozen=True, eq=False)
 class RenameObject:
     """Give an object another name.
 

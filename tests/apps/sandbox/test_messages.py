@@ -25,6 +25,8 @@ OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "parallel", "axes"
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
 ALL: dict[str, list[list[Any]]] = {
     "select": [KEYS_OF_ROWS],
+    "mark": [KEYS_OF_ROWS],
+    "open_lesson": [[0, 1]],
     "set_value": [NAMES, [0.2, 0.9, 3.0, [0, 0, 1], "#ff0000"], [True, False]],
     "set_component": [NAMES, [[0], [1], [], [9]], [0.1, "2"]],
     "add": [KINDS],
@@ -38,7 +40,7 @@ ALL: dict[str, list[list[Any]]] = {
     "set_decals": [NAMES, [0.1, 0.5, 2, "overlap", "tint alone", "#0000ff", True], [True, False]],
     "set_brush": [["brush", "radius", "density"], ["select", "scatter", "push", 0.3]],
     "set_mode": [["contact", "mapping", "stiffness"], ["product", "elastic", "chord", 2.0]],
-    "change_row": [KEYS_OF_ROWS, ["rename", "remove", "duplicate", "move"], ["name", "0/1", "0"]],
+    "change_row": [KEYS_OF_ROWS, ["rename", "remove", "duplicate", "move", "group"], ["name", "0/1", "0"]],
     "open_file": [["../x.json", "none.json", "a\0.json"]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3]],

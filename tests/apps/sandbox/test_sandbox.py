@@ -24,6 +24,7 @@ from tests.decals.editing.scenes import box, digest, tree_of
 
 TREE = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 CAMERA = Camera((0, 0, 8))
+POINTS = np.random.default_rng(1).uniform(-2, 2, (500, 3))
 
 
 @pytest.fixture
@@ -84,6 +85,38 @@ def test_lessons_are_started_and_left(window: EditWindow) -> None:
     sandbox.open_lesson(0)
     sandbox.new_model()
     assert not sandbox.in_lesson
+
+
+def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.select("0")
+    sandbox.add("Torus")
+    finish(window)
+    field, at = tree_of(window.document)(POINTS), digest(window.document)
+    sandbox.mark("0/0")
+    sandbox.change_row("0/0", "group")
+    assert "select two or more operands" in sandbox.status
+    sandbox.mark("0/2")
+    assert sandbox.values()["marked"] == ["0/0", "0/2"]
+    sandbox.change_row("0/2", "group")
+    finish(window)
+    assert shapes(window) == ["Sum", "Sum", "Point", "Torus", "Point"]
+    assert sandbox.values()["selected"] == "0/0"
+    np.testing.assert_allclose(tree_of(window.document)(POINTS), field, atol=1e-6)
+    sandbox.values()
+    for key in ("0/0/0", "0/0/1", "0/1"):
+        sandbox.mark(key)
+    sandbox.change_row("0/0/1", "remove")
+    finish(window)
+    assert "last visible part" in sandbox.status
+    sandbox.mark("0/1")
+    sandbox.change_row("0/0/0", "remove")  # the group goes with its operands
+    finish(window)
+    assert shapes(window) == ["Point"]
+    sandbox.go_to(1)
+    assert digest(window.document) == at
+    sandbox.mark("image 0")
+    assert "row: expected" in sandbox.status
 
 
 def shapes(window: EditWindow) -> list[str]:
