@@ -5,8 +5,8 @@ cache on disk, under a hash of the source. `loaded` does more than that:
 
 * Kernels that were compiled ahead of time lie in the installed package (`SHIPPED`). They are copied to the
   cache. Their names hold Warp's version and the hash, so kernels of other sources are never taken.
-* Where there are none, all files of kernels that the package of the launched kernel has imported compile at
-  the same time, one per core, and report their progress.
+* Where there are none, the files of all kernels that an operation names (`load_together`) compile at the same
+  time, one per core, and report their progress.
 * Processes that start together share the work: each file of kernels is compiled by one of them.
 * A damaged file of the cache is removed, and its kernels are compiled again.
 * Warp's own headers are parsed once per machine, not once per thread of every process (`_kept_headers`).
@@ -16,7 +16,6 @@ import hashlib
 import logging
 import os
 import shutil
-import sys
 import tempfile
 import threading
 import time
@@ -43,6 +42,8 @@ Kernels that call whole formulas in unrolled loops compile several times as long
 holds for functions that are inlined beyond this threshold; below it, kernels run slower. Code for the
 instruction set of one processor runs no faster either, and could not be shipped to others.
 """
+
+wp.set_module_options({**KERNEL_OPTIONS, "block_dim": 1})  # as of all modules loaded for processors
 
 SHIPPED = Path(__file__).with_name("compiled")
 """Folder of kernels compiled ahead of time: ``<Warp version>/<module and hash>/``, as in Warp's cache."""
@@ -103,6 +104,9 @@ def loaded(kernel: wp.Kernel, device: Any = None) -> wp.Kernel:
 def load_together(kernels: Iterable[wp.Kernel], device: Any = None) -> None:
     """Load kernels on `device`; those to compile are compiled at the same time, one file of them per core.
 
+    Long work names the kernels that it is sure to launch, those that compile longest first. All other files
+    of kernels compile at their first launch.
+
     Raises
     ------
     UnusableCache
@@ -114,10 +118,9 @@ def load_together(kernels: Iterable[wp.Kernel], device: Any = None) -> None:
     if not unloaded:
         return
     with _state.lock:
-        related = {other.name: other for module in unloaded for other in _neighbors(module)}
-        missing = [other for other in related.values() if not _is_cached(other, warp_device)]
+        missing = [module for module in unloaded if not _is_cached(module, warp_device)]
         if missing:
-            _compile([*unloaded, *(other for other in missing if other not in unloaded)], warp_device)
+            _compile(missing, warp_device)
         for module in unloaded:
             _load(module, warp_device)
             _state.loaded[module.name, str(warp_device)] = _module_hash(module, warp_device)
@@ -138,18 +141,6 @@ def _module_hash(module: wp.Module, device: wp.Device) -> bytes:
 
 def _folder_name(module: wp.Module, device: wp.Device) -> str:
     return str(module.get_module_identifier(_block_size(module, device)))
-
-
-def _neighbors(module: wp.Module) -> list[wp.Module]:
-    """Return `module`, and the other modules with kernels that its Python package has imported."""
-    package = module.name.rpartition(".")[0]
-    found = {module.name: module}
-    for name, python_module in list(sys.modules.items()):
-        if name.rpartition(".")[0] == package:
-            for value in list(vars(python_module).values()):
-                if isinstance(value, wp.Kernel) and value.module.name == name:
-                    found[name] = value.module
-    return list(found.values())
 
 
 def _is_cached(module: wp.Module, device: wp.Device) -> bool:
@@ -221,14 +212,32 @@ def _kept_headers() -> Iterator[None]:
     if folder_of_thread is None:
         yield
         return
-    installation = hashlib.sha256(str(Path(wp.__file__).resolve().parent).encode()).hexdigest()[:12]
-    kept, used = kernel_cache() / HEADERS / installation, Path(folder_of_thread)
+    kept, used = _headers_folder(), Path(folder_of_thread)
     _copy_newer(kept, used)
     yield
     for file in kept.glob("*.pch"):
         if not (used / file.name).exists():
             file.unlink(missing_ok=True)
     _copy_newer(used, kept)
+
+
+def _headers_folder() -> Path:
+    """Return the folder of the headers that were parsed for this installation of Warp."""
+    installation = hashlib.sha256(str(Path(wp.__file__).resolve().parent).encode()).hexdigest()[:12]
+    return kernel_cache() / HEADERS / installation
+
+
+@wp.kernel
+def _no_operation() -> None:
+    """Do nothing: to compile this kernel is to parse Warp's headers, with the options of all others."""
+
+
+def _parse_headers() -> None:
+    """Parse Warp's headers, if none are kept, before several threads would each do so."""
+    if any(_headers_folder().glob("*.pch")):
+        return
+    with _cache_errors(), tempfile.TemporaryDirectory() as folder, _kept_headers():
+        wp.compile_aot_module(_no_operation.module, device="cpu", module_dir=folder)
 
 
 def _copy_newer(source: Path, target: Path) -> None:
@@ -249,6 +258,8 @@ def _compile(modules: list[wp.Module], device: wp.Device) -> None:
     total = _state.compiled + len(modules)
     with reporting() as report, ThreadPoolExecutor(os.cpu_count() or 1, "blobtree compiler") as threads:
         _report(report, total)
+        if device.is_cpu and len(modules) > 1:
+            _parse_headers()
         pending = {threads.submit(_load, module, device) for module in modules}
         while pending:
             done, pending = wait(pending, return_when=FIRST_COMPLETED)

@@ -28,6 +28,7 @@ from blobtree.cells.refine_kernels import (
     refine_children,
 )
 from blobtree.cells.scan import DeviceArray, arange, exclusive_scan, where_negative
+from blobtree.cells.scan_kernels import summarize
 from blobtree.device import demand_memory, known_device, launch
 from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.formulas.operators import DIFFERENCE, RICCI, SUM, UNION
@@ -51,8 +52,8 @@ MIN_CULLED_TEXELS = 4096
 MIN_CULLED_SHARE = 0.9
 """Smallest share of a tape in runs that culling can shorten; all other texels are copied to every block."""
 
-CELL_KERNELS = (refine_children,)
-"""Kernels of every refinement that read the instruction set, for `load_together`."""
+CELL_KERNELS = (refine_children, summarize)
+"""Kernels of every refinement, for `load_together`."""
 
 _NEUTRAL_OPERATORS = (SUM, RICCI, UNION, DIFFERENCE)
 """Operators that return their first operand if the second is 0."""

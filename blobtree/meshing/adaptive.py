@@ -14,10 +14,16 @@ import numpy as np
 
 from blobtree._typing import Float32Array, IndexArray, Int64Array
 from blobtree.cells.sparse_cells import SparseCells
+from blobtree.meshing.adaptive_cell_kernels import write_polygons
 from blobtree.meshing.adaptive_cells import AdaptiveCells
+from blobtree.meshing.adaptive_kernels import place_on_surface
 from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
 from blobtree.meshing.block_tree import BlockTree
+from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.progress import Progress
+
+ADAPTIVE_KERNELS = (place_on_surface, write_polygons, sample_blocks)
+"""Kernels of every adaptive mesh, for `load_together`."""
 
 ALLOWED_SHARE = 0.8
 """Largest error of a triangle's samples, over the allowed one: it may be more between samples."""

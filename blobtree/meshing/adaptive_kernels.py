@@ -9,8 +9,9 @@ from blobtree.cells.grid import CHILDREN
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.adaptive_cell_kernels import base_block, cell_in_block
+from blobtree.meshing.bisection_kernels import HALVINGS
 from blobtree.meshing.distance_kernels import CONVERGED, NEWTON_STEPS
-from blobtree.meshing.vertex_kernels import HALVINGS, VertexArrays, is_unconverged, write_vertex
+from blobtree.meshing.vertex_kernels import VertexArrays, is_unconverged, write_vertex
 from blobtree.tape.evaluate_kernels import project_to_surface
 from blobtree.tape.interpreter import field_color, field_gradient, field_value
 

@@ -30,6 +30,7 @@ from blobtree.meshing.adaptive_cell_kernels import LeafArrays, choose_leaf_rows,
 from blobtree.meshing.adaptive_cells import CORNERS, OCTANT_OF_CELL, OCTANTS, SIMPLE, AdaptiveCells, Leaves
 from blobtree.meshing.adaptive_kernels import measure_distances, place_on_surface
 from blobtree.meshing.block_tree import on_device
+from blobtree.meshing.crease_kernels import find_choices, move_onto_creases, turn_diagonals
 from blobtree.meshing.mesh import Mesh, cell_patches, patch_tables, vertex_arrays
 from blobtree.meshing.patches import EDGES, FLIPPED, MAX_PATCHES, PATCH_COUNT, PATCH_OF_EDGE
 from blobtree.progress import Progress
@@ -287,9 +288,6 @@ class AdaptiveMesher:
         report: Progress,
     ) -> None:
         """Move vertices onto the creases that their patches contain, as `creases.sharpened` does."""
-        # Imported here, because all imported kernels of a package compile together; these are the largest.
-        from blobtree.meshing.crease_kernels import find_choices, move_onto_creases
-
         device = self._device
         for size in np.unique(leaves.sizes[owners]):
             listed = np.flatnonzero(leaves.sizes[owners] == size)
@@ -330,8 +328,6 @@ class AdaptiveMesher:
 
     def _with_turned_diagonals(self, mesh: AdaptiveMesh) -> AdaptiveMesh:
         """Return the mesh with the diagonals that lie nearer to the surface at creases."""
-        from blobtree.meshing.crease_kernels import turn_diagonals
-
         device, faces = self._device, mesh.faces.copy()
         quads = faces[: 2 * mesh.quads].reshape(-1, 6)
         sizes = mesh.leaves.sizes[mesh.owners][quads].max(axis=1, initial=0)

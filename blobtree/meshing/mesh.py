@@ -22,6 +22,7 @@ from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, wh
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import demand_memory, launch, prefaulted_array
 from blobtree.errors import InvalidFile
+from blobtree.meshing.bisection_kernels import bisect_unconverged
 from blobtree.meshing.dual_kernels import (
     SAMPLES,
     CellPatches,
@@ -34,7 +35,6 @@ from blobtree.meshing.dual_kernels import (
 from blobtree.meshing.patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
 from blobtree.meshing.vertex_kernels import (
     VertexArrays,
-    bisect_unconverged,
     count_listed,
     list_patches,
     place_vertices,

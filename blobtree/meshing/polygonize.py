@@ -14,7 +14,7 @@ have one size.
 import logging
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -25,17 +25,16 @@ from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
 from blobtree.kernels import load_together
-from blobtree.meshing.creases import sharpened
+from blobtree.meshing.adaptive import ADAPTIVE_KERNELS, AdaptivePasses
+from blobtree.meshing.creases import CREASE_KERNELS, sharpened
 from blobtree.meshing.crumbs import without_crumbs
+from blobtree.meshing.distance_kernels import measure_triangles
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.validation import LARGEST_NUMBER, shown, truth
-
-if TYPE_CHECKING:
-    pass
 
 DEFAULT_RESOLUTION = 64
 
@@ -190,6 +189,14 @@ def polygonize(
         return within(tree, chord_error, int(max_triangles), creases, device, report)
 
 
+def _load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:
+    """Load kernels of meshing, and those for cells and creases, so that they compile at the same time."""
+    instruction_set = tree.tape.instruction_set
+    for_creases = CREASE_KERNELS if creases and not instruction_set.reads_gradients else ()
+    together = (*for_creases, *kernels, *CELL_KERNELS)
+    load_together(map(instruction_set.kernel_for, together), known_device(device))
+
+
 def _within_chord_error(
     tree: ImplicitModel,
     chord_error: float,
@@ -201,6 +208,7 @@ def _within_chord_error(
     """Return the mesh of the first pass whose triangles lie within `chord_error` of the surface."""
     passes: list[tuple[float, float]] = []
     size = _cell_size(tree, FIRST_RESOLUTION, None)
+    _load_kernels(tree, device, creases, sample_blocks, place_vertices, measure_triangles)
     for number in range(1, MAX_PASSES + 1):
         pass_report = _numbered(report, number)
         polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=pass_report)
@@ -229,9 +237,7 @@ def _adaptive_within_chord_error(
     report: Progress,
 ) -> Mesh:
     """Return a mesh of adaptive cells whose triangles lie within `chord_error` of the surface."""
-    # Imported here, because all imported kernels of a package compile together.
-    from blobtree.meshing.adaptive import AdaptivePasses
-
+    _load_kernels(tree, device, creases, *ADAPTIVE_KERNELS)
     wish = f"chord_error: {chord_error:g}"
     size = _cell_size(tree, FIRST_RESOLUTION, None)
     passes: AdaptivePasses | None = None
@@ -262,9 +268,6 @@ def _adaptive_within_chord_error(
 
 def _largest_chord_error(mesh: DeviceMesh, report: Progress) -> float:
     """Return the largest distance of the samples on the triangles to the surface."""
-    # Imported here, because all imported kernels of a package compile together.
-    from blobtree.meshing.distance_kernels import measure_triangles
-
     device, count = mesh.cells.device, len(mesh.faces)
     errors = wp.zeros(count, dtype=wp.float32, device=device)
     kernel = mesh.cells.tape.instruction_set.kernel_for(measure_triangles)
@@ -387,9 +390,8 @@ class Polygonizer:
         self._device = device
         self._creases = truth("creases", creases, InvalidResolution)
         self._cell_size = _cell_size(tree, resolution, cell_size)
-        kernels = (*CELL_KERNELS, sample_blocks, place_vertices)
         with reporting(progress, cancel) as report:
-            load_together(map(tree.tape.instruction_set.kernel_for, kernels), known_device(device))
+            _load_kernels(tree, device, self._creases, sample_blocks, place_vertices)
             self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
         self._tree = tree
         self._mesh: Mesh | None = None

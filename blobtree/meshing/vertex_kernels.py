@@ -12,12 +12,9 @@ from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.dual_kernels import SAMPLES, CellPatches, corner_sample, sample_index
 from blobtree.meshing.patches import EDGES, MAX_PATCHES
 from blobtree.tape.evaluate_kernels import STALLED, project_to_surface
-from blobtree.tape.interpreter import field_color, field_gradient, field_value
+from blobtree.tape.interpreter import field_color
 
 wp.set_module_options(KERNEL_OPTIONS)
-
-HALVINGS = 30
-"""Bisection steps along an edge: more than float32 can resolve."""
 
 EDGE_FIRST = wp.types.vector(length=12, dtype=wp.int32)(*(a for a, _ in EDGES))
 EDGE_LAST = wp.types.vector(length=12, dtype=wp.int32)(*(b for _, b in EDGES))
@@ -127,39 +124,6 @@ def place_vertices(
     write_vertex(vertices, patch.vertex, p, f, field_color(p, cells.tape, span))
 
 
-@wp.kernel
-def bisect_unconverged(
-    first: wp.int32,
-    identifiers: wp.array(dtype=wp.int32),
-    listed: wp.array(dtype=wp.int32),
-    cells: CellBlocks,
-    values: wp.array(dtype=wp.float32),
-    patches: CellPatches,
-    vertices: VertexArrays,
-) -> None:
-    """Move each unconverged vertex to the edge crossing of its patch nearest to the mean of these."""
-    patch = patch_of(identifiers[first + wp.tid()], listed, patches)
-    span = cells.spans[patch.block]
-    corner = block_corner(patch.block, cells)
-    mean = crossing_mean(patch, values, patches)
-    position = vertices.positions[patch.vertex]
-    value = field_value(position, cells.tape, span)
-    if not is_unconverged(value, position, corner + mean * cells.cell, cells.cell):
-        return
-    nearest = float(wp.inf)
-    best = wp.vec3(0.0, 0.0, 0.0)
-    for edge in range(12):
-        if int(patches.patch_of_edge[patch.row * 12 + edge]) == patch.number:
-            crossing = bisect_edge(patch, edge, corner, cells, values)
-            distance = wp.length(crossing - mean)
-            if distance < nearest:
-                nearest = distance
-                best = crossing
-    p = corner + best * cells.cell
-    f = field_gradient(p, cells.tape, span)
-    write_vertex(vertices, patch.vertex, p, f, field_color(p, cells.tape, span))
-
-
 @wp.func
 def is_unconverged(value: wp.float32, p: wp.vec3, start: wp.vec3, cell: wp.float32) -> wp.bool:
     """Return True if Newton's method missed the surface, or left the cells in which the tape is valid."""
@@ -184,25 +148,6 @@ def crossing_mean(patch: Patch, values: wp.array(dtype=wp.float32), patches: Cel
             total += corner_offset(patch.cell, a) * (1.0 - t) + corner_offset(patch.cell, b) * t
             crossings += 1.0
     return total / crossings
-
-
-@wp.func
-def bisect_edge(
-    patch: Patch, edge: wp.int32, corner: wp.vec3, cells: CellBlocks, values: wp.array(dtype=wp.float32)
-) -> wp.vec3:
-    """Return the inner end of the interval where an edge crosses the surface, in cells from `corner`."""
-    a = EDGE_FIRST[edge]
-    inner = corner_offset(patch.cell, a)
-    outer = corner_offset(patch.cell, EDGE_LAST[edge])
-    if values[patch.slot * SAMPLES + corner_sample(patch.cell, a)] < ISO:
-        inner, outer = outer, inner
-    for _halving in range(HALVINGS):
-        middle = 0.5 * (inner + outer)
-        if field_value(corner + middle * cells.cell, cells.tape, cells.spans[patch.block]) >= ISO:
-            inner = middle
-        else:
-            outer = middle
-    return inner
 
 
 @wp.func

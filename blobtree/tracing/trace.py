@@ -13,7 +13,8 @@ from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints
 from blobtree.kernels import load_together
 from blobtree.tape.model import ImplicitModel
-from blobtree.tracing.ray_kernels import shade_hits, trace_rays
+from blobtree.tracing.ray_kernels import trace_rays
+from blobtree.tracing.shade_kernels import shade_hits
 from blobtree.tracing.tree_cells import device_cells
 from blobtree.validation import points_or_point
 
@@ -109,7 +110,7 @@ def trace_arrays(tree: ImplicitModel, origins: Any, directions: Any) -> tuple[An
 def _load(tree: ImplicitModel, rays: list[Any], *kernels: wp.Kernel) -> None:
     """Load kernels for rays, and those for cells, so that they compile at the same time."""
     kernel_for = tree.tape.instruction_set.kernel_for
-    load_together([kernel_for(kernel) for kernel in (*CELL_KERNELS, *kernels)], rays[0].device)
+    load_together([kernel_for(kernel) for kernel in (*kernels, *CELL_KERNELS)], rays[0].device)
 
 
 def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> list[Any]:

@@ -3,23 +3,36 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import warp as wp
 from numpy.typing import ArrayLike
 
+from blobtree.kernels import load_together
 from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScattering
+from decals.index.build_kernels import list_cells
 from decals.model import Decals
 from decals.scattering.appearance import Appearance
 from decals.scattering.domain import Density, Mask, as_surfaces
 from decals.scattering.orientation import Direction
 from decals.scattering.polish import CLOSE_DISTANCE
 from decals.scattering.relaxation import Relaxation
+from decals.scattering.repulsion_kernels import repel
+from decals.scattering.search_kernels import sample_around
 from decals.scattering.sizing import Sizing
+from decals.scattering.step_kernels import propose_moves
 from decals.scattering.variation import ImageChoice, Jitter
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.mesh_kernels import closest_points
 from decals.surfaces.surface import Surface
+from decals.surfaces.tree_kernels import project_with_mesh
 from decals.validation import function_or_none, real_number
 
 if TYPE_CHECKING:  # pyvista takes long to import
     from decals.surfaces.convert import HasSurface, Model
+
+SCATTER_KERNELS = (repel, sample_around, propose_moves, list_cells)
+"""Kernels that scattering launches, for `load_together`, and those of an index of its decals."""
 
 RELAXATION_SHARE = 0.8
 """Share of the relaxation in the whole work, for progress bars."""
@@ -127,6 +140,7 @@ def scatter(
     function_or_none("progress", progress, InvalidScattering)
     Appearance(sizing, factor, direction, images, weights, choice, jitter)  # check before the long work
     with reporting(progress) as report:
+        load_together([*_projections(checked_surfaces), *SCATTER_KERNELS], device)
         relaxation = Relaxation(
             checked_surfaces,
             count=count,
@@ -156,3 +170,11 @@ def scatter(
         )
         report("measuring radii", 1.0)
     return decals
+
+
+def _projections(surfaces: Sequence[Surface]) -> list[wp.Kernel]:
+    """Return the kernels that project points onto surfaces."""
+    trees = [surface.tree for surface in surfaces if isinstance(surface, ImplicitSurface)]
+    kernels = [tree.tape.instruction_set.kernel_for(project_with_mesh) for tree in trees]
+    has_mesh = any(isinstance(surface, MeshSurface) for surface in surfaces)
+    return [*kernels, closest_points] if has_mesh else kernels

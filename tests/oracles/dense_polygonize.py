@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from blobtree import Mesh, Node
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.formulas.falloff import ISO
+from blobtree.meshing.bisection_kernels import HALVINGS
 from blobtree.meshing.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
-from blobtree.meshing.vertex_kernels import HALVINGS
 from blobtree.tape.evaluate_kernels import STALLED
 from blobtree.tape.model import colors_at, project, values_at
 
