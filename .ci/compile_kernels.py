@@ -38,7 +38,7 @@ def compile_all(cache: Path) -> None:
 
     from blobtree.device import start_warp
     from blobtree.formulas.gradient_blends import GRADIENT_BLEND
-    from blobtree.tape.instruction_set import BUILT_IN, LIBRARY, instruction_set_for
+    from blobtree.tape.instruction_set import BUILT_IN, instruction_set_for, library
 
     start_warp()
     kernels = [
@@ -51,9 +51,9 @@ def compile_all(cache: Path) -> None:
         instruction_set_for(
             base.skeletons, (*base.operators, GRADIENT_BLEND), base.warps, base.fields, base.falloffs
         )
-        for base in (BUILT_IN, LIBRARY)
+        for base in (BUILT_IN, library())
     ]
-    instances = [LIBRARY.kernel_for(kernel) for kernel in kernels]
+    instances = [library().kernel_for(kernel) for kernel in kernels]
     instances += [
         blends.kernel_for(kernel)
         for blends in with_gradients

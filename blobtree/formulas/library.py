@@ -1,7 +1,7 @@
 """Library kinds: the rows of all built-in kinds beyond the core tables.
 
 Kernels for the core tables alone stay small and fast. A tree with a library kind uses kernels for the core
-and the library together (`tape.instruction_set.LIBRARY`). A new family of kinds is a file of formulas that
+and the library together (`tape.instruction_set.library`). A new family of kinds is a file of formulas that
 ends in a tuple of rows, and one name here.
 """
 

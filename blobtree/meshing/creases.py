@@ -17,18 +17,9 @@ from blobtree._typing import Float32Array, IndexArray
 from blobtree.cells.grid import CHILDREN
 from blobtree.device import launch
 from blobtree.errors import InvalidPoints
-from blobtree.meshing.crease_kernels import (
-    SMOOTH_VERTEX,
-    find_choices,
-    move_onto_creases,
-    turn_diagonals,
-)
 from blobtree.meshing.mesh import DeviceMesh, Mesh, patch_tables, vertex_arrays
 from blobtree.progress import Progress
 from blobtree.tape.model import ImplicitModel, checked_tree
-
-CREASE_KERNELS = (move_onto_creases,)
-"""Kernels of every mesh with creases, for `load_together`."""
 
 INWARD_FRACTION = 0.05
 """Fraction of the way from a corner to the middle of its triangle at which the side's normal is taken."""
@@ -46,6 +37,13 @@ def sharpened(mesh: DeviceMesh, report: Progress) -> tuple[DeviceMesh, NDArray[n
     """
     if mesh.cells.tape.instruction_set.reads_gradients:
         return mesh, np.ones(len(mesh.vertices), np.uint8)
+    from blobtree.meshing.crease_kernels import (  # imported here: most meshes need none
+        SMOOTH_VERTEX,
+        find_choices,
+        move_onto_creases,
+        turn_diagonals,
+    )
+
     report("finding creases", 0.0)
     cells, device, kernel = mesh.cells.arrays, mesh.cells.device, mesh.cells.tape.instruction_set.kernel_for
     count = len(mesh.cells.leaves)

@@ -25,10 +25,8 @@ from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
 from blobtree.kernels import load_together
-from blobtree.meshing.adaptive import ADAPTIVE_KERNELS, AdaptivePasses
-from blobtree.meshing.creases import CREASE_KERNELS, sharpened
+from blobtree.meshing.creases import sharpened
 from blobtree.meshing.crumbs import without_crumbs
-from blobtree.meshing.distance_kernels import measure_triangles
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
@@ -192,8 +190,11 @@ def polygonize(
 def _load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:
     """Load kernels of meshing, and those for cells and creases, so that they compile at the same time."""
     instruction_set = tree.tape.instruction_set
-    for_creases = CREASE_KERNELS if creases and not instruction_set.reads_gradients else ()
-    together = (*for_creases, *kernels, *CELL_KERNELS)
+    together = [*kernels, *CELL_KERNELS]
+    if creases and not instruction_set.reads_gradients:
+        from blobtree.meshing.crease_kernels import move_onto_creases  # imported here: most meshes need none
+
+        together.insert(0, move_onto_creases)
     load_together(map(instruction_set.kernel_for, together), known_device(device))
 
 
@@ -206,6 +207,8 @@ def _within_chord_error(
     report: Progress,
 ) -> Mesh:
     """Return the mesh of the first pass whose triangles lie within `chord_error` of the surface."""
+    from blobtree.meshing.distance_kernels import measure_triangles  # imported here: most meshes need none
+
     passes: list[tuple[float, float]] = []
     size = _cell_size(tree, FIRST_RESOLUTION, None)
     _load_kernels(tree, device, creases, sample_blocks, place_vertices, measure_triangles)
@@ -237,6 +240,8 @@ def _adaptive_within_chord_error(
     report: Progress,
 ) -> Mesh:
     """Return a mesh of adaptive cells whose triangles lie within `chord_error` of the surface."""
+    from blobtree.meshing.adaptive import ADAPTIVE_KERNELS, AdaptivePasses  # imported here, as above
+
     _load_kernels(tree, device, creases, *ADAPTIVE_KERNELS)
     wish = f"chord_error: {chord_error:g}"
     size = _cell_size(tree, FIRST_RESOLUTION, None)
@@ -268,6 +273,8 @@ def _adaptive_within_chord_error(
 
 def _largest_chord_error(mesh: DeviceMesh, report: Progress) -> float:
     """Return the largest distance of the samples on the triangles to the surface."""
+    from blobtree.meshing.distance_kernels import measure_triangles
+
     device, count = mesh.cells.device, len(mesh.faces)
     errors = wp.zeros(count, dtype=wp.float32, device=device)
     kernel = mesh.cells.tape.instruction_set.kernel_for(measure_triangles)

@@ -2,8 +2,8 @@
 
 Kernels are written against the tables of core kinds; a tree of core kinds has BUILT_IN, whose kernels are
 those in the files. For any other set of kinds the same kernels are instantiated (`transpile.specialize`). A
-tree with library kinds has LIBRARY: the core rows, then those of `formulas.library`. A tree with custom kinds
-has a set of its own: the rows of BUILT_IN or LIBRARY, then the custom ones.
+tree with library kinds has `library`: the core rows, then those of `formulas.library`. A tree with custom
+kinds has a set of its own: the rows of BUILT_IN or `library`, then the custom ones.
 """
 
 import hashlib
@@ -20,13 +20,6 @@ import warp as wp
 
 from blobtree.formulas.falloff import FALLOFFS, Falloff
 from blobtree.formulas.fields import FIELDS, FieldKind
-from blobtree.formulas.library import (
-    LIBRARY_FALLOFFS,
-    LIBRARY_FIELDS,
-    LIBRARY_OPERATORS,
-    LIBRARY_SKELETONS,
-    LIBRARY_WARPS,
-)
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
@@ -165,16 +158,32 @@ def _python_function(typed: wp.Function | wp.Kernel) -> FunctionType:
 BUILT_IN = InstructionSet(SKELETONS, OPERATORS, WARPS, FIELDS)
 """The instruction set of trees of core kinds."""
 
-LIBRARY = InstructionSet(
-    (*SKELETONS, *LIBRARY_SKELETONS),
-    (*OPERATORS, *LIBRARY_OPERATORS),
-    (*WARPS, *LIBRARY_WARPS),
-    (*FIELDS, *LIBRARY_FIELDS),
-    (*FALLOFFS, *LIBRARY_FALLOFFS),
-)
-"""The instruction set of trees with library kinds."""
+_created: list[InstructionSet] = []
+"""The other instruction sets."""
 
-_INSTRUCTION_SETS: list[InstructionSet] = [BUILT_IN, LIBRARY]
+
+@cache
+def library() -> InstructionSet:
+    """Return the instruction set of trees with library kinds, whose formulas take long to import."""
+    from blobtree.formulas.library import (
+        LIBRARY_FALLOFFS,
+        LIBRARY_FIELDS,
+        LIBRARY_OPERATORS,
+        LIBRARY_SKELETONS,
+        LIBRARY_WARPS,
+    )
+
+    with _LOCK:
+        if not _created:
+            first = InstructionSet(
+                (*SKELETONS, *LIBRARY_SKELETONS),
+                (*OPERATORS, *LIBRARY_OPERATORS),
+                (*WARPS, *LIBRARY_WARPS),
+                (*FIELDS, *LIBRARY_FIELDS),
+                (*FALLOFFS, *LIBRARY_FALLOFFS),
+            )
+            _created.append(first)
+        return _created[0]
 
 
 def instruction_set_for(
@@ -187,20 +196,23 @@ def instruction_set_for(
     """Return an instruction set that has these rows.
 
     That is the smallest existing one, so that a tree with fewer kinds than an earlier tree compiles nothing.
-    If none fits, a new one has the rows of BUILT_IN or LIBRARY, and then the custom rows in a fixed order.
+    If none fits, a new one has the rows of BUILT_IN or `library`, and then the custom rows in a fixed order.
     """
     needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps), tuple(fields), tuple(falloffs))
     rows = set(needed.rows)
+    if rows.issubset(BUILT_IN.rows):
+        return BUILT_IN
+    with_library = library()
     with _LOCK:
         fitting = [
             existing
-            for existing in _INSTRUCTION_SETS
+            for existing in _created
             if rows.issubset(existing.rows) and existing.reads_gradients == needed.reads_gradients
         ]
         if fitting:
             return min(fitting, key=lambda existing: len(existing.rows))
-        custom = rows.difference(LIBRARY.rows)
-        base = BUILT_IN if rows.issubset({*BUILT_IN.rows, *custom}) else LIBRARY
+        custom = rows.difference(with_library.rows)
+        base = BUILT_IN if rows.issubset({*BUILT_IN.rows, *custom}) else with_library
         created = InstructionSet(
             _extended(base.skeletons, needed.skeletons),
             _extended(base.operators, needed.operators),
@@ -208,7 +220,7 @@ def instruction_set_for(
             _extended(base.fields, needed.fields),
             _extended(base.falloffs, needed.falloffs),
         )
-        _INSTRUCTION_SETS.append(created)
+        _created.append(created)
         return created
 
 

@@ -17,14 +17,6 @@ from blobtree import Node
 from blobtree._typing import Float64Array
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.tape.codes import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
-from blobtree.tape.directed import DIRECTED_BOUND, DIRECTED_COLOR
-from blobtree.tape.directed_along import (
-    combine_along,
-    leaf_along,
-    profiled_leaf_along,
-    pullback_affine_along,
-    pullback_warp_along,
-)
 from blobtree.tape.dispatch import (
     directed_partials,
     directed_slope,
@@ -80,12 +72,6 @@ _EVALUATORS: dict[str, tuple[Evaluator, str]] = {
     "color": (COLOR, "vec4"),
 }
 """The evaluators that a ray needs, and their types in GLSL."""
-
-_DIRECTED_EVALUATORS: dict[str, tuple[Evaluator, str]] = {
-    "directed_bound": (DIRECTED_BOUND, "mat2x4"),
-    "directed_color": (DIRECTED_COLOR, "mat2x4"),
-}
-"""The same for trees with operators that read gradients; ``directed.glsl`` adds the gradient."""
 
 _ALONG: dict[Any, tuple[str, ...]] = {
     directed_partials: ("a", "b", "direction_a", "direction_b"),
@@ -154,7 +140,12 @@ def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) ->
 
 
 def _evaluators(kinds: Kinds) -> dict[str, tuple[Evaluator, str]]:
-    return _DIRECTED_EVALUATORS if kinds.directed else _EVALUATORS
+    """Return the evaluators; where operators read gradients, ``directed.glsl`` adds the gradient to them."""
+    if not kinds.directed:
+        return _EVALUATORS
+    from blobtree.tape.directed import DIRECTED_BOUND, DIRECTED_COLOR  # imported here: it takes long
+
+    return {"directed_bound": (DIRECTED_BOUND, "mat2x4"), "directed_color": (DIRECTED_COLOR, "mat2x4")}
 
 
 def _library(kinds: Kinds) -> str:
@@ -184,12 +175,14 @@ def _library(kinds: Kinds) -> str:
 
 def _functions_along(kinds: Kinds, skeletons: list[Skeleton]) -> Iterable[Any]:
     """Yield the functions of `_interpreter_along`."""
+    from blobtree.tape import directed_along as along  # imported here: it takes long
+
     yield from (directional_derivative(skeleton.closest, ["q"]) for skeleton in skeletons)
-    yield from (leaf_along, pullback_affine_along, combine_along)
+    yield from (along.leaf_along, along.pullback_affine_along, along.combine_along)
     if kinds.falloffs:
-        yield profiled_leaf_along
+        yield along.profiled_leaf_along
     if kinds.warps:
-        yield pullback_warp_along
+        yield along.pullback_warp_along
     if kinds.fields:
         yield directional_derivative(direct_value_gradient, ["q"])
 
@@ -284,7 +277,7 @@ def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) 
             "PULLBACK_WARP": evaluator.pullback_warp.key,
             "COMBINE": evaluator.combine.key,
             "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)"
-            if evaluator in (COLOR, DIRECTED_COLOR)
+            if name in ("color", "directed_color")
             else "vec4(0.0)",
         },
         slots={
@@ -327,15 +320,17 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
 
 def _interpreter_along(kinds: Kinds) -> Source:
     """Return the loop of ``interpreter.glsl`` for the derivative of (value, direction) along `direction`."""
+    from blobtree.tape import directed_along as along
+
     return compose(
         "interpreter.glsl",
         version=None,
         defines={
             "INTERPRET": "interpret_along",
             "FIELD": "mat2x4",
-            "PULLBACK_AFFINE": _key(pullback_affine_along),
-            "PULLBACK_WARP": _key(pullback_warp_along),
-            "COMBINE": _key(combine_along),
+            "PULLBACK_AFFINE": _key(along.pullback_affine_along),
+            "PULLBACK_WARP": _key(along.pullback_warp_along),
+            "COMBINE": _key(along.combine_along),
         },
         slots={
             "registers": "".join(
@@ -361,16 +356,18 @@ def _key(function: Any) -> str:
 
 def _run_cases_along(kinds: Kinds) -> Iterable[str]:
     """Return the cases of `_run_cases` for derivatives; `local_direction` is the velocity of the point."""
+    from blobtree.tape import directed_along as along
+
     for code in kinds.skeletons:
         skeleton = kinds.instruction_set.skeletons[code]
         closest = directional_derivative(skeleton.closest, ["q"]).key
         yield _RUN_ALONG.format(
-            code=code, stride=skeleton.parameters + 1, closest=closest, leaf=_key(leaf_along)
+            code=code, stride=skeleton.parameters + 1, closest=closest, leaf=_key(along.leaf_along)
         )
         if kinds.stretched:
-            field = f"{_key(leaf_along)}(local, velocity, c, drift)"
+            field = f"{_key(along.leaf_along)}(local, velocity, c, drift)"
             if kinds.falloffs:
-                profiled = f"{_key(profiled_leaf_along)}(local, velocity, c, drift, profile)"
+                profiled = f"{_key(along.profiled_leaf_along)}(local, velocity, c, drift, profile)"
                 field = f"profile.z == 0.0 ? {field} : {profiled}"
             yield _STRETCHED_RUN_ALONG.format(
                 code=code + STRETCHED,

@@ -5,7 +5,7 @@ import pytest
 
 from blobtree import Box, Node, Point, Polyline, Segment, Superquadric, from_sdf
 from blobtree.formulas.blends import BLENDS
-from blobtree.tape.instruction_set import LIBRARY
+from blobtree.tape.instruction_set import library
 from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
@@ -76,7 +76,7 @@ def read_tape(
 def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
     assert {code for tree in TREES for code in tree.tape.skeletons} == set(ALL_KINDS.skeletons)
     drawn = {code for tree in (*TREES, *LIBRARY_TREES) for code in tree.tape.skeletons}
-    assert drawn == set(range(len(LIBRARY.skeletons)))
+    assert drawn == set(range(len(library().skeletons)))
     assert {code for tree in TREES for code in tree.tape.operators} == set(ALL_KINDS.operators)
     assert 2 <= max(tree.tape.registers for tree in TREES) <= ALL_KINDS.registers
     assert sum(tree.tape.stretched for tree in TREES) > 5
@@ -99,13 +99,13 @@ def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> N
 
 
 def test_contacts_are_the_same_in_both_languages(context: Context) -> None:
-    names = {LIBRARY.operators[code].name for tree in CONTACT_TREES for code in tree.tape.operators}
+    names = {library().operators[code].name for tree in CONTACT_TREES for code in tree.tape.operators}
     assert {"press", "rated_union"} <= names
     assert_same_in_both_languages(context, CONTACT_TREES, kinds_of(CONTACT_TREES))
 
 
 def test_blends_are_the_same_in_both_languages(context: Context) -> None:
-    used = {LIBRARY.operators[code] for tree in BLEND_TREES for code in tree.tape.operators}
+    used = {library().operators[code] for tree in BLEND_TREES for code in tree.tape.operators}
     assert set(BLENDS) <= used
     assert_same_in_both_languages(context, BLEND_TREES, kinds_of(BLEND_TREES))
 
@@ -130,7 +130,7 @@ def test_gradient_blends_are_the_same_in_both_languages(context: Context, name: 
 def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: MoreKinds) -> None:
     trees = random_trees(seed=35, count=6, more=more)
     kinds = kinds_of(trees)
-    assert kinds.falloffs == tuple(range(len(LIBRARY.falloffs)))
+    assert kinds.falloffs == tuple(range(len(library().falloffs)))
     assert_same_in_both_languages(context, trees, kinds)
 
 
