@@ -157,18 +157,21 @@ def scatter(
                 until=None if regularity == 1.0 else regularity * CLOSE_DISTANCE,
                 cancel=cancel,
             )
-        report("measuring radii", RELAXATION_SHARE)
-        decals = relaxation.to_decals(
-            seed=seed,
-            sizing=sizing,
-            factor=factor,
-            direction=direction,
-            images=images,
-            weights=weights,
-            choice=choice,
-            jitter=jitter,
-        )
-        report("measuring radii", 1.0)
+        with reporting(
+            lambda stage, fraction: report(stage, RELAXATION_SHARE + (1.0 - RELAXATION_SHARE) * fraction)
+        ) as report_radii:
+            report_radii("measuring radii", 0.0)
+            decals = relaxation.to_decals(
+                seed=seed,
+                sizing=sizing,
+                factor=factor,
+                direction=direction,
+                images=images,
+                weights=weights,
+                choice=choice,
+                jitter=jitter,
+            )
+            report_radii("measuring radii", 1.0)
     return decals
 
 

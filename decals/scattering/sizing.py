@@ -9,6 +9,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
 from blobtree.formulas.falloff import RIM
+from blobtree.progress import reporting
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import FacingTree
@@ -195,12 +196,14 @@ def covering_radii(
     owned = owned.peaks(PEAK_FRACTION * radii)
     owned = owned.joined(_find_owners(tree, project(_circumcenters(owned, decals)), decals))
     _grow(radii, owned, decals, limits)
-    for spread in TRIAL_SPREADS:
-        least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
-        owned = owned.peaks(least)
-        trials = _random_points_around(owned.points, spread * sample_distance, rng)
-        owned = owned.joined(_find_owners(tree, project(trials), decals))
-        _grow(radii, owned, decals, limits)
+    with reporting() as report:
+        for done, spread in enumerate(TRIAL_SPREADS, start=2):
+            report("measuring radii", done / (len(TRIAL_SPREADS) + 2))
+            least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
+            owned = owned.peaks(least)
+            trials = _random_points_around(owned.points, spread * sample_distance, rng)
+            owned = owned.joined(_find_owners(tree, project(trials), decals))
+            _grow(radii, owned, decals, limits)
     return (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
 
 
