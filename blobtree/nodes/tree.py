@@ -709,7 +709,7 @@ class Node(ImplicitModel):
 
     @Lazy
     def _rest_tape(self) -> Tape:
-        return rest_tape(self._program)
+        return rest_tape(self.tape, self._program)
 
     def rest_coordinates(self, points: ArrayLike) -> Float32Array:
         """Return where points lie in the leaves' own spaces, behind all maps and warps above them.

@@ -1,8 +1,7 @@
 """Attributes of leaves at points, blended with the weights of colours; and rest coordinates.
 
 Both read a copy of the tape. For an attribute, the texels of colours hold its values, so that the evaluation
-of colours blends them. For rest coordinates, each primitive under a map carries the map, so that evaluation
-knows the point in the primitive's own space.
+of colours blends them. For rest coordinates, they hold indices of maps to the primitives' own spaces.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.tape.data_region import DataRegion
 from blobtree.tape.model import colors_at, evaluate
-from blobtree.tape.program import WORLD, Instruction, Run, distinct_placements
+from blobtree.tape.program import Instruction, Run, distinct_placements
 from blobtree.tape.rest_kernels import evaluate_rest_coordinates
-from blobtree.tape.tape import Tape, compile_tape
+from blobtree.tape.tape import Tape
 
 CHANNELS = 3
 """Numbers that a texel of colour holds."""
@@ -82,23 +82,26 @@ def labels_at(
     return np.where(weights.max(axis=1) > 0.0, chosen, default)
 
 
-def rest_tape(program: list[Instruction]) -> Tape:
-    """Return the tape on which each primitive under a map carries the map."""
-    return compile_tape([_carrying_maps(step) for step in program])
+def rest_tape(tape: Tape, program: list[Instruction]) -> Tape:
+    """Return a tape with maps of primitives in its data region, for `rest_kernels.own_position`."""
+    region, indices = DataRegion(), np.full(len(_attributes(program)), -1.0)
+    first = 0
+    for run in (step for step in program if isinstance(step, Run)):
+        count = len(run.primitives)
+        if isinstance(run.kind, Skeleton) and not run.stretched:  # others carry their maps
+            placements, placed_by = distinct_placements(run.primitives)
+            maps = [region.add(np.linalg.inv(placement.matrix)[:3]) for placement in placements]
+            indices[first : first + count] = tape.start + np.array(maps)[placed_by]
+        first += count
+    channels = np.pad(indices[:, None], ((0, 0), (0, CHANNELS - 1)))
+    indexed, moved = _with_channels(tape, program, channels), len(region.texels)
+    data = np.insert(indexed.data, tape.start, region.texels, axis=0)
+    return replace(indexed, data=data, start=tape.start + moved, headers=tape.headers + moved)
 
 
 def rest_coordinates_at(tape: Tape, points: ArrayLike) -> Float32Array:
     """Return blended rest coordinates (n, 3) at `points` (n, 3), NaN where the field is 0."""
-    rest = evaluate(evaluate_rest_coordinates, tape, points)
-    return np.where(rest[:, :1] != 0.0, rest[:, 1:], np.float32(np.nan))
-
-
-def _carrying_maps(step: Instruction) -> Instruction:
-    if not isinstance(step, Run) or not isinstance(step.kind, Skeleton):
-        return step
-    placements, _ = distinct_placements(step.primitives)
-    at_home = all(np.array_equal(placement.matrix, WORLD.matrix) for placement in placements)
-    return step if at_home else replace(step, stretched=True)
+    return evaluate(evaluate_rest_coordinates, tape, points)[:, 1:]
 
 
 def _with_channels(tape: Tape, program: list[Instruction], channels: Float64Array) -> Tape:

@@ -13,7 +13,7 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
 * `scale_speed(kind, q, speed, reach, tape, at)`: a bound on the speed behind the warp with parameters at
   tape[at] of a point that moves at most at `speed` in front of it;
 * `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field;
-* `paint(q, color)`: the colour of a leaf at q in its own space, for the three functions of leaves.
+* `paint(q, c, color, tape)`: the colour of a leaf at q, from its texel, for the three functions of leaves.
 
 Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): along q + u ·
 direction for u from 0 to `reach`, per unit of u. Behind an affine map the ray is still a line, along the
@@ -577,7 +577,7 @@ def color_combine(
 
 
 @wp.func
-def own_color(q: wp.vec3, color: wp.vec4) -> wp.vec4:
+def own_color(q: wp.vec3, c: wp.vec4, color: wp.vec4, tape: wp.array(dtype=wp.vec4)) -> wp.vec4:
     """Return the colour of a leaf."""
     return color
 

@@ -73,7 +73,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             c = closest(code, point, tape, at)
             rate = speed / min_influence(code, tape, at)
             at += texels
-            f = leaf(point, c, paint(point, tape[at - 1]), v, reach, rate)
+            f = leaf(point, c, paint(point, c, tape[at - 1], tape), v, reach, rate)
             accumulator = combine(operator, accumulator, f, reach, header[3], tape)
         return accumulator
 
@@ -102,7 +102,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             profile = tape[at + 3]
             rate = speed * profile[0] / min_influence(kind, tape, at + PREFIX)
             end = at + PREFIX + stride(kind)
-            color = paint(local, tape[end - 1])
+            color = paint(local, c, tape[end - 1], tape)
             f = empty()
             if profile[2] == 0.0:
                 f = leaf(local, c, color, v, reach, rate)
@@ -132,7 +132,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
             local = to_local(point, tape, at)
             v = direction_to_local(direction, tape, at)
             end = at + PREFIX + direct_stride(kind)
-            color = paint(local, tape[end - 1])
+            color = paint(local, wp.vec4(local[0], local[1], local[2], 1.0), tape[end - 1], tape)
             f = direct(kind, local, tape, at + PREFIX, color, v, reach, speed * tape[at + 3][0])
             accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
