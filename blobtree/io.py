@@ -54,11 +54,21 @@ class NodeRecord(
         return self.node_kind(**values)
 
 
-class CustomSkeletonRecord(NodeRecord, frozen=True, tag="custom_skeleton"):
-    """A primitive around a custom skeleton."""
+class CustomRecord(NodeRecord, frozen=True):
+    """A node of a custom kind, which must be defined."""
 
     kind: str
     values: dict[str, CustomValue] = msgspec.field(name="parameters")
+
+    def make(self, values: dict[str, Any]) -> Node:
+        """Return the node of its kind."""
+        return _custom_node(self.node_kind, values)
+
+
+class CustomSkeletonRecord(CustomRecord, frozen=True, tag="custom_skeleton"):
+    """A primitive around a custom skeleton."""
+
+    node_kind = CustomPrimitive
     radius: float
     color: Vector
     attributes: dict[str, AttributeValue] = {}
@@ -66,51 +76,32 @@ class CustomSkeletonRecord(NodeRecord, frozen=True, tag="custom_skeleton"):
     width: float | None = None
     weight: float = 1.0
 
-    def make(self, values: dict[str, Any]) -> Node:
-        """Return the node; its kind must be defined."""
-        return _custom_node(CustomPrimitive, values)
 
-
-class CustomFieldRecord(NodeRecord, frozen=True, tag="custom_field"):
+class CustomFieldRecord(CustomRecord, frozen=True, tag="custom_field"):
     """A field in a box by a custom function."""
 
-    kind: str
-    values: dict[str, CustomValue] = msgspec.field(name="parameters")
+    node_kind = CustomField
     center: Vector
     size: Vector
     fade: float
     color: Vector
     attributes: dict[str, AttributeValue] = {}
 
-    def make(self, values: dict[str, Any]) -> Node:
-        """Return the node; its kind must be defined."""
-        return _custom_node(CustomField, values)
 
-
-class CustomOperatorRecord(NodeRecord, frozen=True, tag="custom_operator"):
+class CustomOperatorRecord(CustomRecord, frozen=True, tag="custom_operator"):
     """A combination by a custom operator."""
 
+    node_kind = CustomCombination
     references = ("operands",)
-    kind: str
-    values: dict[str, CustomValue] = msgspec.field(name="parameters")
     operands: tuple[int, ...]
 
-    def make(self, values: dict[str, Any]) -> Node:
-        """Return the node; its kind must be defined."""
-        return _custom_node(CustomCombination, values)
 
-
-class CustomWarpRecord(NodeRecord, frozen=True, tag="custom_warp"):
+class CustomWarpRecord(CustomRecord, frozen=True, tag="custom_warp"):
     """A node under a custom warp."""
 
+    node_kind = CustomWarp
     references = ("child",)
-    kind: str
-    values: dict[str, CustomValue] = msgspec.field(name="parameters")
     child: int
-
-    def make(self, values: dict[str, Any]) -> Node:
-        """Return the node; its kind must be defined."""
-        return _custom_node(CustomWarp, values)
 
 
 class OldCustomSkeletonRecord(CustomSkeletonRecord, frozen=True, tag="own skeleton"):

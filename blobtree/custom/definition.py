@@ -4,7 +4,7 @@ import copyreg
 import importlib
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -91,6 +91,19 @@ class CustomKind(type):
     kind: str
     digest: str
     parameters: tuple[Any, ...]
+
+
+class CustomNode(metaclass=CustomKind):
+    """A node of a user's function: what the classes of all definitions share."""
+
+    kind: ClassVar[str]
+    digest: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The function's parameters by name."""
+        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
 
 
 _KINDS: dict[str, CustomKind] = {}

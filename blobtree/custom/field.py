@@ -13,12 +13,12 @@ rely on the claimed slope, so checks look for samples that contradict it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import warp as wp
 
-from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
 from blobtree.custom.field_checks import FieldClaims, check_field
 from blobtree.custom.source import (
     CustomSource,
@@ -41,7 +41,7 @@ ROUNDING = 4e-6
 """Widening of a custom field's range, for the rounding errors of the user's function."""
 
 
-class CustomField(BoxedField, metaclass=CustomKind):
+class CustomField(CustomNode, BoxedField):
     """A field in a box by a user's function: the base of the classes that `define_field` returns.
 
     Examples
@@ -56,10 +56,6 @@ class CustomField(BoxedField, metaclass=CustomKind):
     True
     """
 
-    kind: ClassVar[str]
-    digest: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-
     if TYPE_CHECKING:
 
         def __init__(
@@ -71,11 +67,6 @@ class CustomField(BoxedField, metaclass=CustomKind):
             color: Vector = ...,
             **named: Any,
         ) -> None: ...
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """The function's parameters by name."""
-        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
 
 
 @dataclass(frozen=True)

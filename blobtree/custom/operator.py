@@ -14,12 +14,12 @@ A missing claim costs speed only: fewer cells are pruned.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, cast, get_args
+from typing import Annotated, Any, Literal, cast, get_args
 
 import warp as wp
 
 from blobtree.custom.checks import Claims, check_directed_operator, check_operator
-from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
 from blobtree.formulas.gradient_blends import UNBOUNDED
 from blobtree.formulas.operators import (
@@ -40,7 +40,7 @@ from blobtree.validation import finite_number
 Like = Literal["blend", "intersection", "difference"]
 
 
-class CustomCombination(AssociativeCombination, metaclass=CustomKind):
+class CustomCombination(CustomNode, AssociativeCombination):
     """A combination by a custom operator: the base of the classes that `define_operator` returns.
 
     Examples
@@ -56,15 +56,6 @@ class CustomCombination(AssociativeCombination, metaclass=CustomKind):
     >>> Mean((Point((0, 0, 0), radius=1), Point((1, 0, 0), radius=1))).kind
     'mean'
     """
-
-    kind: ClassVar[str]
-    digest: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """The operator's parameters by name."""
-        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
 
 
 def define_operator(

@@ -17,7 +17,7 @@ a map carries that map on the tape. Offsets change its radius.
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 import warp as wp
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from blobtree.custom.bounds_kernels import skeleton_boxes
 from blobtree.custom.checks import check_skeleton
-from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import (
@@ -42,7 +42,7 @@ from blobtree.validation import Vector
 Floats = NDArray[np.float64]
 
 
-class CustomPrimitive(Primitive, metaclass=CustomKind):
+class CustomPrimitive(CustomNode, Primitive):
     """A primitive around a custom skeleton: the base of the classes that `define_skeleton` returns.
 
     Examples
@@ -59,18 +59,9 @@ class CustomPrimitive(Primitive, metaclass=CustomKind):
     {'half': 1.0}
     """
 
-    kind: ClassVar[str]
-    digest: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-
     if TYPE_CHECKING:
 
         def __init__(self, *parameters: Any, radius: float, color: Vector = ..., **named: Any) -> None: ...
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """The skeleton's parameters by name."""
-        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
 
     @classmethod
     def hulls(cls, primitives: Sequence[ProgramPrimitive]) -> Floats:

@@ -15,13 +15,13 @@ import inspect
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import warp as wp
 
 from blobtree._typing import Box, Float64Array
-from blobtree.custom.definition import CustomKind, Limits, custom_parameters, register, registered
+from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
 from blobtree.custom.warp_checks import WarpClaims, check_warp
 from blobtree.errors import InvalidNode
@@ -36,7 +36,7 @@ FIRST_NUMBER = 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CustomWarp(Placed, metaclass=CustomKind):
+class CustomWarp(CustomNode, Placed):
     """A node under a user's warp: the base of the classes that `define_warp` returns.
 
     Examples
@@ -51,18 +51,9 @@ class CustomWarp(Placed, metaclass=CustomKind):
     True
     """
 
-    kind: ClassVar[str]
-    digest: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-
     if TYPE_CHECKING:
 
         def __init__(self, child: Node, *parameters: Any, **named: Any) -> None: ...
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """The function's parameters by name."""
-        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
 
     @property
     def warp_parameters(self) -> tuple[float, ...]:
