@@ -15,6 +15,7 @@ from .scenes.cover import cover
 from .scenes.files import load_model, load_scene, save_scene
 from .scenes.measure import measure
 from .scenes.objects import MeshObject, TreeObject
+from .scenes.pose import pose, skin
 from .scenes.render import render
 from .scenes.scene import DecalImage, Scene
 from .vtk import show
@@ -48,6 +49,7 @@ __all__ = [
     "load_model",
     "load_scene",
     "measure",
+    "pose",
     "render",
     "rendering",
     "save_scene",
@@ -55,6 +57,7 @@ __all__ = [
     "scattering",
     "scenes",
     "show",
+    "skin",
     "surfaces",
     "vtk",
     "window",

@@ -1,10 +1,17 @@
 // The decal pass, body of pixels.frag and pixels.comp: for every pixel of the G-buffer the decals that cover it, over
-// the object's own colour. DECALS: there are decals; the slot holds decals.glsl. TWO_TARGETS: also write owner, field and uv.
+// the object's own colour. DECALS: there are decals; the slot holds decals.glsl. POSED: some objects are posed, and the
+// textures of rest.frag say where their pixels lie in the rest pose. TWO_TARGETS: also write owner, field and uv.
 //@ include camera.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
 uniform sampler2D g_color;
+#ifdef POSED
+uniform sampler2D r_position;
+uniform sampler2D r_normal;
+uniform sampler2D r_right;
+uniform sampler2D r_up;
+#endif
 
 //@ slot decals optional
 
@@ -15,8 +22,19 @@ Pixel pixel_at(ivec2 texel) {
     vec4 buffers = vec4(-1.0, 0.0, 0.0, 0.0);
 #ifdef DECALS
     if (pixel.color.w > 0.0) {
-        vec3 position = texelFetch(g_position, texel, 0).xyz;
+        vec4 visible = texelFetch(g_position, texel, 0);
+        vec3 position = visible.xyz;
         vec3 normal = texelFetch(g_normal, texel, 0).xyz;
+#ifdef POSED
+        vec4 rest = texelFetch(r_position, texel, 0);
+        is_posed = rest.w == visible.w;
+        if (is_posed) {
+            position = rest.xyz;
+            normal = texelFetch(r_normal, texel, 0).xyz;
+            rest_right = texelFetch(r_right, texel, 0).xyz;
+            rest_up = texelFetch(r_up, texel, 0).xyz;
+        }
+#endif
         DecalHit hit = decal_at(position, normal);
         vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
         pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;

@@ -11,6 +11,13 @@ uniform int decal_mapping;
 uniform float decal_stiffness;
 uniform sampler2DArray decal_images;  // linear, premultiplied
 
+#ifdef POSED
+// Steps of this pixel in the rest pose, where decals lie; `is_posed` is false on objects without one.
+bool is_posed;
+vec3 rest_right;
+vec3 rest_up;
+#endif
+
 const float OPAQUE = 0.9999;  // alpha under which no further decal is searched
 
 //@ slot functions
@@ -59,8 +66,16 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
         float s = decal_texel(4 * hit.owner).w;
         vec3 n_p = decal_texel(4 * hit.owner + 1).xyz;
         float scale = 0.5 / (RIM * s);
-        vec2 dx = scale * tangent_coordinates(unroll_step(surface_step(q, n, ray, ray_right.xyz), n_p, n), n_p, u.xyz);
-        vec2 dy = scale * tangent_coordinates(unroll_step(surface_step(q, n, ray, ray_up.xyz), n_p, n), n_p, u.xyz);
+        vec3 right = surface_step(q, n, ray, ray_right.xyz);
+        vec3 up = surface_step(q, n, ray, ray_up.xyz);
+#ifdef POSED
+        if (is_posed) {
+            right = rest_right;
+            up = rest_up;
+        }
+#endif
+        vec2 dx = scale * tangent_coordinates(unroll_step(right, n_p, n), n_p, u.xyz);
+        vec2 dy = scale * tangent_coordinates(unroll_step(up, n_p, n), n_p, u.xyz);
         color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
     }
     return tint.w * color * vec4(tint.rgb, 1.0);

@@ -8,6 +8,8 @@ out vec3 position;
 out vec3 normal;
 out vec3 color;
 
+invariant gl_Position;  // rest.vert draws at equal depths
+
 void main() {
     position = vertex_position;
     normal = vertex_normal;

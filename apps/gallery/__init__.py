@@ -19,6 +19,7 @@ Example = Literal[
     "by_hand",
     "particles",
     "deforming",
+    "posing",
     "painted",
     "models",
     "dragon",

@@ -15,6 +15,7 @@ from decals.apps.models.shapes import rounded_box
 from decals.apps.views import frame, parse_view
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
+from decals.scenes.pose import PosedScene
 
 __all__ = [
     "CLAY",
@@ -50,7 +51,7 @@ GAP = 4
 class Panel:
     """A scene and the modes in which its decals are drawn."""
 
-    scene: Scene
+    scene: Scene | PosedScene
     contact: Contact = RenderOptions.contact
     mapping: ImageMapping = ImageMapping.CORRECTED
 

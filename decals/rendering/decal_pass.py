@@ -19,12 +19,11 @@ from decals.rendering.pixel_pass import (
     set_uniform,
     use_textures,
 )
+from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.uploads import DecalData, ImageArray
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 
 BODY = "decal_pass.glsl"
-FIRST_DECAL_UNIT = 3
-"""Texture unit of the images. Lower units hold the G-buffer, higher ones the decals' data."""
 
 
 class DecalPass:
@@ -46,7 +45,7 @@ class DecalPass:
         self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
         self._framebuffer = context.gl.framebuffer(self._targets)
         self._context = context
-        self._passes: dict[str, PixelPass] = {}
+        self._passes: dict[tuple[str, bool], PixelPass] = {}
 
     def draw(
         self,
@@ -57,31 +56,36 @@ class DecalPass:
         mapping: ImageMapping,
         contact: Contact,
         stiffness: float,
+        rest: RestBuffer | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours."""
-        painting = self._pass("" if decals is None else decal_library(contact, layered=decals.layered))
+        library = "" if decals is None else decal_library(contact, layered=decals.layered)
+        painting = self._pass(library, posed=rest is not None)
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
+        textures |= rest.textures if rest is not None else {}
         use_textures(program, textures)
         if decals is not None and images is not None:
-            images.use(FIRST_DECAL_UNIT)
-            set_uniform(program, "decal_images", FIRST_DECAL_UNIT)
+            unit = len(textures)
+            images.use(unit)
+            set_uniform(program, "decal_images", unit)
             set_uniform(program, "decal_mapping", int(mapping))
             set_uniform(program, "decal_stiffness", stiffness)
-            decals.use(program, FIRST_DECAL_UNIT + 1)
+            decals.use(program, unit + 1)
         painting.run(rectangle.rows(part))
 
     def read_decal(self, tile: Tile) -> Float32Array:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""
         return read_floats(self._framebuffer, 1, tile)
 
-    def _pass(self, library: str) -> PixelPass:
+    def _pass(self, library: str, *, posed: bool) -> PixelPass:
         """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
-        if library not in self._passes:
-            program = decal_program(self._context, library, len(self._targets))
-            self._passes[library] = PixelPass(self._context.gl, program, self._targets)
-        return self._passes[library]
+        key = library, posed
+        if key not in self._passes:
+            program = decal_program(self._context, library, len(self._targets), posed=posed)
+            self._passes[key] = PixelPass(self._context.gl, program, self._targets)
+        return self._passes[key]
 
     def release(self) -> None:
         """Release the memory."""
@@ -92,10 +96,11 @@ class DecalPass:
             target.release()
 
 
-def decal_program(context: Context, library: str, targets: int = 1) -> Program:
+def decal_program(context: Context, library: str, targets: int = 1, *, posed: bool = False) -> Program:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
     slots = {"decals": "//@ include decals.glsl", "functions": library} if library else {}
-    return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines={"DECALS": bool(library)}))
+    defines = {"DECALS": bool(library), "POSED": posed and bool(library)}
+    return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines=defines))
 
 
 LIBRARY_FUNCTIONS = (

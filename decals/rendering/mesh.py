@@ -1,6 +1,8 @@
 """Triangle meshes in the G-buffer: rasterised, with normals that are smooth up to the crease angle."""
 
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
+from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
@@ -10,10 +12,11 @@ from blobtree._typing import Float32Array
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import attach_camera, set_uniform
+from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
-from decals.surfaces.normals import CREASE_ANGLE, SplitMesh, split_at_creases
+from decals.surfaces.normals import CREASE_ANGLE, SplitMesh, split_at_creases, vertex_normals
 
 
 @runtime_checkable
@@ -31,11 +34,19 @@ class ColoredMesh(Protocol):
     def color(self) -> ArrayLike: ...  # noqa: D102
 
 
+@runtime_checkable
+class PosedColoredMesh(ColoredMesh, Protocol):
+    """A mesh object in a pose: its vertices have places in a rest pose, where its decals lie."""
+
+    @property
+    def rest(self) -> ColoredMesh: ...  # noqa: D102
+
+
 class MeshDrawable:
     """A mesh's vertices and faces on the GPU."""
 
-    def __init__(self, context: Context, mesh: ColoredMesh) -> None:
-        split = split_mesh(mesh)
+    def __init__(self, context: Context, mesh: ColoredMesh, split: SplitMesh | None = None) -> None:
+        split = split or split_mesh(mesh)
         rows, faces = mesh_rows(mesh, split), np.ascontiguousarray(split.faces, np.int32)
         self._faces = len(faces)
         self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
@@ -72,6 +83,66 @@ class MeshDrawable:
         """Release the memory."""
         for resource in (self._array, self._vertices, self._indices):
             resource.release()
+
+
+class PosedMeshDrawable(MeshDrawable):
+    """A posed mesh on the GPU, with the rest pose that its decals lie on.
+
+    It is split where its rest pose has creases, so that triangles have the same corners in all poses.
+    """
+
+    def __init__(self, context: Context, mesh: PosedColoredMesh) -> None:
+        rest_split = _rest_split(mesh.rest)
+        positions = np.asarray(mesh.vertices, np.float32)[rest_split.rows]
+        super().__init__(
+            context, mesh, replace(rest_split, normals=vertex_normals(positions, rest_split.faces))
+        )
+        rest_rows = np.asarray(mesh.rest.vertices, np.float32)[rest_split.rows]
+        self._rest_rows = context.gl.buffer(np.hstack([rest_rows, rest_split.normals]).tobytes())
+        self._rest_program = _rest_program(context)
+        layout = [
+            (self._vertices, "3f 6x4", "vertex_position"),
+            (self._rest_rows, "3f 3f", "vertex_rest_position", "vertex_rest_normal"),
+        ]
+        self._rest_array = context.gl.vertex_array(self._rest_program, layout, self._indices)
+
+    @staticmethod
+    def warmup(context: Context, _mesh: ColoredMesh) -> WarmupPlan:
+        """Return the slow first-time work of a drawable."""
+        tasks = (
+            WarmupTask(SHADERS, lambda: _program(context)),
+            WarmupTask(SHADERS, lambda: _rest_program(context)),
+        )
+        return WarmupPlan("posed mesh", tasks)
+
+    def draw_rest(self, object_id: int, tile: Tile, rest: RestBuffer, part: Part = WHOLE) -> None:
+        """Rasterise the rest pose of the faces, or a part of them, where they are visible."""
+        rest.use(tile.width, tile.height)
+        set_uniform(self._rest_program, "object_id", object_id)
+        first, last = part.of(self._faces)
+        if last > first:
+            self._rest_array.render(first=3 * first, vertices=3 * (last - first))
+
+    def release(self) -> None:
+        """Release the memory."""
+        for resource in (self._rest_array, self._rest_rows):
+            resource.release()
+        super().release()
+
+
+_rest_splits: WeakKeyDictionary[ColoredMesh, SplitMesh] = WeakKeyDictionary()
+
+
+def _rest_split(rest: ColoredMesh) -> SplitMesh:
+    """Return the split of a rest pose, which all poses share."""
+    split = _rest_splits.get(rest)
+    if split is None:
+        split = _rest_splits[rest] = split_mesh(rest)
+    return split
+
+
+def _rest_program(context: Context) -> moderngl.Program:
+    return attach_camera(context.program(compose("rest.vert"), compose("rest.frag")))
 
 
 def _program(context: Context) -> moderngl.Program:

@@ -25,7 +25,8 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
 from decals.rendering.options import RenderOptions, SceneLike, Size
 from decals.rendering.pixel_pass import GROUP
-from decals.rendering.uploads import UploadedScene
+from decals.rendering.rest_buffer import PosedDrawable, RestBuffer
+from decals.rendering.uploads import Drawable, UploadedScene
 from decals.rendering.viewpoint import Bounds, Part, PictureView, Rectangle, Step, Tile, Viewpoint
 
 Regions = tuple[Rectangle, ...]
@@ -241,13 +242,25 @@ class Targets:
         self.state: TargetState | None = None
         self.frame: object = None
         self.gbuffer = GBuffer(context, size)
+        self._context = context
+        self._rest: RestBuffer | None = None
         self.decal_pass = DecalPass(context, size, buffers=buffers)
         self.light_pass = LightPass(context, size)
         self.resolve = ResolvePass(context, size)
 
+    def rest_for(self, drawables: Sequence[Drawable]) -> RestBuffer | None:
+        """Return the rest buffer if some drawables are posed, else None."""
+        if not any(isinstance(drawable, PosedDrawable) for drawable in drawables):
+            return None
+        if self._rest is None:
+            self._rest = RestBuffer(self._context, self.gbuffer)
+        return self._rest
+
     def release(self) -> None:
         """Release the memory."""
         self.state = self.frame = None
+        if self._rest is not None:
+            self._rest.release()
         self.gbuffer.release()
         self.decal_pass.release()
         self.light_pass.release()
@@ -367,7 +380,7 @@ def plan_frame(
     dirty = state.dirty(previous, tile)
     steps = _surface_steps(uploaded, tile, targets, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
-    modes = options.mapping, options.contact, options.stiffness
+    modes = options.mapping, options.contact, options.stiffness, targets.rest_for(uploaded.drawables)
     decal_arguments = gbuffer, uploaded.decals, uploaded.images, *modes
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
@@ -386,6 +399,14 @@ def _surface_steps(uploaded: UploadedScene, tile: Tile, targets: Targets, *, dep
     ]
     if depth and not all(drawable.rasterised for drawable in uploaded.drawables):
         steps.append(partial(gbuffer.complete_depth, tile.width, tile.height))
+    rest = targets.rest_for(uploaded.drawables)
+    if rest is not None:
+        steps.append(partial(rest.clear, tile.width, tile.height))
+        steps += [
+            partial(drawable.draw_rest, number, tile, rest)
+            for number, drawable in objects
+            if isinstance(drawable, PosedDrawable)
+        ]
     return steps
 
 

@@ -20,7 +20,7 @@ from decals.rendering.decal_pass import decal_library, decal_program
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.gl_libraries import is_forked
 from decals.rendering.light_pass import light_file, light_program, resolve_program
-from decals.rendering.mesh import ColoredMesh, MeshDrawable
+from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
 from decals.rendering.options import RenderOptions, SceneLike, check_scene, viewpoint_of
 from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend
@@ -52,6 +52,7 @@ from decals.validation import instance, whole_number
 
 DEFAULT_OPTIONS = RenderOptions()
 
+register(PosedColoredMesh, PosedMeshDrawable, PosedMeshDrawable.warmup)
 register(ColoredMesh, MeshDrawable, MeshDrawable.warmup)
 register(TreeHolder, TreeDrawable, TreeDrawable.warmup)
 

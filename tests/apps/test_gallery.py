@@ -24,7 +24,7 @@ TOLERANCE = 2
 """Levels of 255 by which a pixel may differ."""
 MAX_DIFFERENT = 0.002
 """Fraction of pixels that may differ more: at equal fields, rounding decides the owner."""
-SCATTERED = ("particles", "deforming", "painted", "models", "dragon")
+SCATTERED = ("particles", "deforming", "posing", "painted", "models", "dragon")
 """Examples that depend on scattering: better scattering changes their pictures."""
 
 

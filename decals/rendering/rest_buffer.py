@@ -1,0 +1,63 @@
+"""The rest pose behind every pixel of posed meshes, beside the G-buffer."""
+
+from typing import Protocol, runtime_checkable
+
+import moderngl
+
+from decals.rendering.context import Context
+from decals.rendering.gbuffer import GBuffer
+from decals.rendering.pixel_pass import scissor_of
+from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
+
+
+class RestBuffer:
+    """Place and normal in the rest pose, and two steps to the next pixels: see ``shaders/rest.frag``.
+
+    It shares the depth of a G-buffer. Where objects that are not rasterised hide a posed mesh, the numbers of
+    objects in the two buffers differ.
+
+    Parameters
+    ----------
+    context
+        Where to make the textures.
+    gbuffer
+        The G-buffer, already drawn when this is.
+    """
+
+    def __init__(self, context: Context, gbuffer: GBuffer) -> None:
+        names = "r_position", "r_normal", "r_right", "r_up"
+        self.textures = {name: context.texture(gbuffer.size, "f4") for name in names}
+        for texture in self.textures.values():
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._framebuffer = context.gl.framebuffer(list(self.textures.values()), gbuffer.depth)
+        self._gl = context.gl
+
+    def use(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Restrict the next draws to these rows of the lower left part of this size."""
+        self._framebuffer.viewport = (0, 0, width, height)
+        self._framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
+        self._framebuffer.use()
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "<="
+
+    def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Clear these rows of the lower left part of this size; the depth stays."""
+        self.use(width, height, part)
+        self._framebuffer.depth_mask = False
+        self._framebuffer.clear(0.0, 0.0, 0.0, 0.0)
+        self._framebuffer.depth_mask = True
+
+    def release(self) -> None:
+        """Release the memory."""
+        self._framebuffer.release()
+        for texture in self.textures.values():
+            texture.release()
+
+
+@runtime_checkable
+class PosedDrawable(Protocol):
+    """A drawable whose decals lie on its rest pose."""
+
+    def draw_rest(self, object_id: int, tile: Tile, rest: RestBuffer, part: Part = WHOLE) -> None:
+        """Put the object, or a part of it, into the rest buffer where it is visible."""
+        ...

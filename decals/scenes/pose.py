@@ -1,0 +1,277 @@
+"""Posed scenes: meshes that deform, with decals that stretch with them.
+
+Decals lie on the rest pose. Each pixel of a posed mesh finds its place in the rest pose, and decals and their
+contact are evaluated there. Nothing is attached: a decal keeps its place, and its neighbours, in every pose.
+This removes the limitation that section 3.5 of the paper states.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree.validation import real
+from decals.errors import InvalidScene
+from decals.model import Decals
+from decals.scenes.camera import Camera
+from decals.scenes.objects import Box, Color, MeshObject, SceneObject
+from decals.scenes.origin import Origin
+from decals.scenes.scene import DecalImage, Scene
+from decals.validation import describe, instance
+
+WEIGHT_ERROR = 1e-3
+"""Largest difference of a vertex's summed skin weights from 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosedMesh:
+    """A mesh object in another pose; its decals lie on its rest pose. `pose` makes some.
+
+    Attributes
+    ----------
+    rest : MeshObject
+        The mesh in its rest pose.
+    vertices : float32[n, 3]
+        Positions of its vertices in this pose, relative to the origin of the rest pose.
+    """
+
+    rest: MeshObject
+    vertices: Float32Array
+
+    @property
+    def name(self) -> str:
+        """Name of the object."""
+        return self.rest.name
+
+    @property
+    def faces(self) -> Int32Array:
+        """Corner indices, int32[m, 3]."""
+        return self.rest.faces
+
+    @property
+    def color(self) -> Color:
+        """Colour between the decals."""
+        return self.rest.color
+
+    @property
+    def crease_angle(self) -> float:
+        """Least angle in degrees between two faces of the rest pose at which their edge is drawn sharp."""
+        return self.rest.crease_angle
+
+    @property
+    def origin(self) -> Origin:
+        """Point that vertices are relative to."""
+        return self.rest.origin
+
+    @property
+    def bounds(self) -> Box:
+        """Lower and upper corner of this pose, float32[3] each."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class PosedScene:
+    """A scene of which some meshes are posed, for `decals.render` and `decals.rendering.Renderer`.
+
+    Attributes
+    ----------
+    objects : tuple of MeshObject, TreeObject or PosedMesh
+    decals : Decals
+        Decals, in the rest pose.
+    images : tuple of DecalImage
+    camera : Camera
+    """
+
+    objects: tuple[SceneObject | PosedMesh, ...]
+    decals: Decals
+    images: tuple[DecalImage, ...]
+    camera: Camera
+
+
+def pose(
+    scene: Scene, poses: Mapping[str, ArrayLike], *, rigid: bool = False, camera: Camera | None = None
+) -> PosedScene:
+    """Pose meshes of a scene; its decals stretch with them.
+
+    Decals are evaluated in the rest pose, so a point of the mesh has the same owner, contact and image place
+    in all poses. Objects that are not posed are drawn as they are.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with meshes in their rest pose, and decals on them.
+    poses : mapping from str to float[n, 3]
+        For some mesh objects, by name: new positions of all vertices.
+    rigid : bool
+        True for decals that keep their shape: each moves and turns with the nearest triangle of a posed mesh,
+        and meets its neighbours in the new pose.
+    camera : Camera, optional
+        Camera in place of the scene's.
+
+    Returns
+    -------
+    PosedScene
+
+    Raises
+    ------
+    InvalidScene
+        No mesh has such a name, or the positions are not as many as its vertices.
+
+    See Also
+    --------
+    skin : positions from joints, by linear blend skinning.
+    decals.Relaxation : particles that follow a surface whose triangles change.
+
+    Examples
+    --------
+    >>> import pyvista
+    >>> import decals
+    >>> tube = pyvista.Cylinder(radius=0.3, height=2).triangulate().clean().subdivide(2)
+    >>> scene = decals.cover(decals.MeshObject("tube", tube.points, tube.regular_faces), count=60)
+    >>> bent = tube.points + [[0, 0, 1]] * tube.points[:, :1] ** 2
+    >>> decals.render(decals.pose(scene, {"tube": bent}), size=(64, 48))
+    Picture(64 × 48 pixels)
+    """
+    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    if not isinstance(poses, Mapping):
+        raise InvalidScene(f"poses: expected positions by the names of objects, got {describe(poses)}")
+    meshes = {item.name: item for item in scene.objects if isinstance(item, MeshObject)}
+    for name in poses:
+        if name not in meshes:
+            known = ", ".join(repr(mesh) for mesh in meshes) or "none"
+            raise InvalidScene(
+                f"poses: expected names of meshes of the scene ({known}), got {describe(name)}"
+            )
+    posed = {name: _posed_mesh(meshes[name], vertices) for name, vertices in poses.items()}
+    view = camera or scene.camera
+    if rigid:
+        return PosedScene(
+            tuple(_as_object(posed.get(item.name, item)) for item in scene.objects),
+            _carried(scene, posed),
+            scene.images,
+            view,
+        )
+    objects = tuple(posed.get(item.name, item) for item in scene.objects)
+    return PosedScene(objects, scene.decals, scene.images, view)
+
+
+def _as_object(item: SceneObject | PosedMesh) -> SceneObject:
+    """Return a posed mesh as a mesh without another pose; other objects as they are."""
+    if not isinstance(item, PosedMesh):
+        return item
+    rest = item.rest
+    return MeshObject(rest.name, item.vertices, rest.faces, rest.color, None, rest.crease_angle, rest.origin)
+
+
+def _carried(scene: Scene, posed: Mapping[str, PosedMesh]) -> Decals:
+    """Return decals that have moved and turned with the nearest triangles of posed meshes.
+
+    Decals that are nearer to another object stay.
+    """
+    decals = scene.decals
+    positions, normals, tangents = decals.positions.copy(), decals.normals.copy(), decals.tangents.copy()
+    distances = [
+        np.linalg.norm(item.surface.project(decals.positions)[0] - decals.positions, axis=1)
+        for item in scene.objects
+    ]
+    nearest = np.argmin(distances, axis=0) if len(decals) else np.zeros(0, np.int64)
+    for number, item in enumerate(scene.objects):
+        own = np.flatnonzero(nearest == number)
+        if item.name not in posed or not len(own) or not isinstance(item, MeshObject):
+            continue
+        faces, weights = item.surface.locate(decals.positions[own])
+        before, after = (
+            vertices.astype(np.float64)[item.faces[faces]]
+            for vertices in (item.vertices, posed[item.name].vertices)
+        )
+        offsets = decals.positions[own] - np.einsum("nc,nca->na", weights, before)
+        turns = _frames(after) @ _frames(before).transpose(0, 2, 1)
+        moved = np.einsum("nc,nca->na", weights, after) + np.einsum("nab,nb->na", turns, offsets)
+        positions[own] = moved
+        normals[own] = np.einsum("nab,nb->na", turns, decals.normals[own])
+        tangents[own] = np.einsum("nab,nb->na", turns, decals.tangents[own])
+    return decals.replace(positions=positions, normals=normals, tangents=tangents)
+
+
+def _frames(corners: Float64Array) -> Float64Array:
+    """Return orthonormal frames of triangles float64[n, 3, 3]: the first edge, the normal, and their product.
+
+    The frames are columns.
+    """
+    edge = corners[:, 1] - corners[:, 0]
+    normal = np.cross(edge, corners[:, 2] - corners[:, 0])
+    units = [
+        axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300) for axis in (edge, normal)
+    ]
+    frames: Float64Array = np.stack([*units, np.cross(*units)], axis=2)
+    return frames
+
+
+def _posed_mesh(rest: MeshObject, vertices: ArrayLike) -> PosedMesh:
+    advice = "a pose has the vertices of the rest pose"
+    positions = _numbers(f"pose of {rest.name!r}", vertices, rest.vertices.shape, advice)
+    return PosedMesh(rest, (positions - np.asarray(rest.origin)).astype(np.float32))
+
+
+def skin(vertices: ArrayLike, weights: ArrayLike, transforms: ArrayLike) -> Float64Array:
+    """Return vertices moved by joints: linear blend skinning, as in glTF.
+
+    Parameters
+    ----------
+    vertices : float[n, 3]
+        Positions in the rest pose.
+    weights : float[n, j]
+        Weights of j joints for each vertex, from 0, whose sum is 1.
+    transforms : float[j, 4, 4]
+        Matrices of the joints, from the rest pose to the new one, for column vectors.
+
+    Returns
+    -------
+    float64[n, 3]
+
+    Raises
+    ------
+    InvalidScene
+        Arrays of other shapes, values that are not finite, negative weights, or sums other than 1.
+
+    Examples
+    --------
+    >>> import numpy
+    >>> import decals
+    >>> shift = numpy.eye(4)
+    >>> shift[0, 3] = 2.0
+    >>> decals.skin([[0, 0, 0], [1, 0, 0]], [[1, 0], [0.5, 0.5]], [numpy.eye(4), shift]).tolist()
+    [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
+    """
+    points = _numbers("vertices", vertices, (-1, 3), "give one row per vertex")
+    matrices = _numbers("transforms", transforms, (-1, 4, 4), "give one matrix per joint")
+    advice = "give one row per vertex, one column per joint"
+    shares = _numbers("weights", weights, (len(points), len(matrices)), advice)
+    off = np.abs(shares.sum(axis=1) - 1.0)
+    if shares.min(initial=0.0) < 0.0 or off.max(initial=0.0) > WEIGHT_ERROR:
+        worst = int(off.argmax())
+        raise InvalidScene(
+            "weights: expected numbers from 0 whose sum is 1 for each vertex, "
+            f"got {shares[worst].tolist()} at vertex {worst}; divide each row by its sum"
+        )
+    moved = np.einsum("jab,nb->nja", matrices[:, :3, :3], points) + matrices[:, :3, 3]
+    result: Float64Array = np.einsum("nj,nja->na", shares, moved)
+    return result
+
+
+def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...], advice: str) -> Float64Array:
+    """Return finite numbers of a shape (-1: any length), or raise InvalidScene."""
+    lengths = ", ".join("n" if length == -1 else str(length) for length in shape)
+    try:
+        array = np.asarray(real(values), np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidScene(f"{name}: expected numbers of shape [{lengths}], got {describe(values)}") from None
+    fits = array.ndim == len(shape) and all(e in (-1, s) for s, e in zip(array.shape, shape, strict=True))
+    if not fits:
+        raise InvalidScene(f"{name}: expected shape [{lengths}], got {list(array.shape)}; {advice}")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise InvalidScene(f"{name}: expected finite numbers, got {array[row].tolist()} in row {row}")
+    return array
