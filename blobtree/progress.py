@@ -293,7 +293,7 @@ def _new_line() -> _Line:
     """Return where work is shown by default."""
     if max(_logger.level, _PACKAGE_LOGGER.level) > logging.INFO:
         return _Line()
-    if _in_notebook():
+    if in_notebook():
         return _NotebookLine()
     if _logger.hasHandlers():
         return _LoggedLine()
@@ -304,6 +304,7 @@ def _is_terminal() -> bool:
     return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
-def _in_notebook() -> bool:
+def in_notebook() -> bool:
+    """Return True in a kernel of Jupyter, which shows pages and pictures below its cells."""
     shell = sys.modules.get("IPython")
     return shell is not None and getattr(shell.get_ipython(), "kernel", None) is not None

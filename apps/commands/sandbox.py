@@ -50,6 +50,7 @@ def sandbox(
     trust: Trust = False,
     lab: Annotated[bool, Parameter(negative=())] = False,
     lessons: Path | None = None,
+    done: Annotated[bool, Parameter(negative=())] = False,
 ) -> None:
     """Open models or a scene in the sandbox, a page in the browser.
 
@@ -90,6 +91,8 @@ def sandbox(
         Open the contact lab: six lessons on decals and solids in contact.
     lessons
         A folder of other lessons for the lab.
+    done
+        Show a button that saves and ends, and print the URL alone, as notebooks need it.
     """
     check_options(decals, seed, save)
     check_count("--port", port, 0, MAX_PORT)
@@ -110,7 +113,11 @@ def sandbox(
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
             in_lesson = lab or lessons is not None
-            page(server, window, in_lesson=in_lesson, start=not model and not in_lesson)
+            page(server, window, in_lesson=in_lesson, start=not model and not in_lesson, done=done)
+            if done:
+                server.controller.on_server_ready.add(
+                    lambda **_: print(_url(host, server.port, ""), flush=True)
+                )
             query = _protect(server, host)
             own_browser = browser and not desktop and bool(query)  # trame's knows no token
             server.controller.on_server_ready.add(
@@ -168,10 +175,14 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+def _url(host: str, port: int, query: str) -> str:
+    shown = socket.gethostname() if host in ANY_ADDRESS else f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/{query}"
+
+
 def _announce(host: str, port: int, query: str, *, open_browser: bool) -> None:
     """Print the URL of the page, and open it if trame does not."""
-    shown = socket.gethostname() if host in ANY_ADDRESS else f"[{host}]" if ":" in host else host
-    url = f"http://{shown}:{port}/{query}"
+    url = _url(host, port, query)
     Console(stderr=True, soft_wrap=True).print(
         f"sandbox at {url} (Ctrl + C ends it)", highlight=False, markup=False
     )

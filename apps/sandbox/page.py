@@ -60,12 +60,14 @@ class Page:
         The trame server.
     window
         The edited window; its plotter is drawn off screen.
+    done
+        Show a button that saves and ends the server.
     options
         Options of the `Sandbox`.
     """
 
-    def __init__(self, server: Any, window: EditWindow, **options: Any) -> None:
-        self._server, self._window = server, window
+    def __init__(self, server: Any, window: EditWindow, *, done: bool = False, **options: Any) -> None:
+        self._server, self._window, self._ends = server, window, done
         self.sandbox = Sandbox(window, **options)
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
@@ -118,6 +120,13 @@ class Page:
             while True:
                 self.refresh()
                 await asyncio.sleep(REFRESH_SECONDS)
+
+    async def _finish(self) -> None:
+        """Save, then end the server."""
+        self.sandbox.perform("save")
+        while self._window.background.saving:
+            await asyncio.sleep(REFRESH_SECONDS)
+        await self._server.stop()
 
     # -- layout -----------------------------------------------------------------------------------------
 
@@ -177,6 +186,8 @@ class Page:
             for action, icon in TOOLBAR.items():
                 text = f"{gestures[action].summary} ({format_gestures(gestures[action])})"
                 panels.icon_button(icon, text, (self.sandbox.perform, f"['{action}']"))
+            if self._ends:
+                vuetify3.VBtn("Done", color="primary", variant="flat", size="small", click=self._finish)
             theme = "theme = theme === 'light' ? 'dark' : 'light'"
             panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
 

@@ -11,7 +11,7 @@ import pyvista as pv
 
 import decals.vtk  # noqa: F401  (registers `plotter.decals`)
 from blobtree._typing import Float32Array
-from blobtree.progress import displayed
+from blobtree.progress import displayed, in_notebook
 from decals.editing.actions import Actions
 from decals.editing.background import BackgroundJobs
 from decals.editing.document import Document
@@ -415,6 +415,9 @@ def edit(
 ) -> Scene:
     """Open a window to edit a scene, and return the edited scene when the window is closed.
 
+    In a notebook, the page of the sandbox appears below the cell instead, until its Done is pressed. There,
+    modes are chosen in the page.
+
     Parameters
     ----------
     scene : Scene, EditSession, SceneObject or Model
@@ -452,6 +455,10 @@ def edit(
     >>> edited = decals.edit(scene)  # doctest: +SKIP
     """
     edited = scene if isinstance(scene, EditSession) else as_scene(scene)
+    if isinstance(edited, Scene) and in_notebook():
+        from decals.window.notebook import edit_in_notebook
+
+        return edit_in_notebook(edited, None if path is None else Path(path))
     with EditWindow(
         edited,
         path=path,

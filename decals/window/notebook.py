@@ -1,0 +1,83 @@
+"""Editing in a notebook: the page of the sandbox, served by a process of its own, below the cell."""
+
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from decals.editing.recovery import recovery_path
+from decals.errors import InvalidScene
+from decals.scenes.files import load_scene, save_scene
+from decals.scenes.scene import Scene
+
+COMMAND = (sys.executable, "-m", "decals", "sandbox")
+"""Begins the page as a program, because `decals` does not import the apps."""
+OPTIONS = ("--port", "0", "--no-browser", "--trust", "--done")
+
+HEIGHT = 720
+"""Height of the page below the cell, in pixels."""
+
+STOP_SECONDS = 15.0
+"""Time in which an interrupted page must have kept its changes."""
+
+
+def edit_in_notebook(scene: Scene, path: Path | None) -> Scene:
+    """Show the page below the cell until its Done is pressed, and return the edited scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    path
+        File to save to; None for a temporary one.
+
+    Raises
+    ------
+    InvalidScene
+        The page ended with an error.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.json" if path is None else path
+        save_scene(scene, file)
+        with _served(file) as (process, url):
+            _display(url)
+            process.wait()
+        unsaved = recovery_path(file)
+        return load_scene(unsaved if unsaved.exists() else file, trust=True)
+
+
+@contextmanager
+def _served(file: Path) -> Iterator[tuple[Any, str]]:
+    """Yield a process that serves the page, and its URL; an interrupt of the kernel ends it."""
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        subprocess.Popen(
+            [*COMMAND, file.name, *OPTIONS], cwd=file.parent, stdout=subprocess.PIPE, stderr=errors, text=True
+        ) as process,
+    ):
+        assert process.stdout is not None
+        try:
+            url = next((line.strip() for line in process.stdout if line.startswith("http://")), "")
+            if not url:
+                process.wait()
+                errors.seek(0)
+                raise InvalidScene(f"expected a page to edit in, got: {errors.read().strip()[-500:]}")
+            with suppress(KeyboardInterrupt):  # the recovery file keeps the changes
+                yield process, url
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(STOP_SECONDS)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _display(url: str) -> None:
+    shown: Any = import_module("IPython.display")  # a notebook has it
+    shown.display(shown.IFrame(url, "100%", HEIGHT))
