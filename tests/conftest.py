@@ -59,9 +59,15 @@ LONG_FILES = (
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort files; without ``--no-loadscope-reorder`` xdist sorts them anew, by their numbers of tests."""
+    """Put the files that take longest in front."""
     order = {f"tests/{name}": place for place, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: order.get(item.nodeid.partition("::")[0], len(order)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config) -> None:
+    """Keep this order among workers: by default xdist 3.8 sorts files by their numbers of tests."""
+    config.option.loadscopereorder = False
 
 
 def pytest_collection_finish() -> None:

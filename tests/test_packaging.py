@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from tests.conftest import LONG_FILES
 from tests.import_graph import FOLDERS, ROOT, cycles, imported_names, module_graph, modules, package_graph
 
 DRAWING = {"moderngl", "vtk", "vtkmodules", "pyvista"}
@@ -137,3 +138,7 @@ def test_only_files_of_kernels_are_excused_from_types() -> None:
             re.search(r"^\s*@(wp\.(func|kernel|struct)|unrolled)", text, re.MULTILINE) for text in sources
         ]
         assert any(typed), name
+
+
+def test_files_that_begin_first_exist() -> None:
+    assert [name for name in LONG_FILES if not (ROOT / "tests" / name).is_file()] == []
