@@ -3,6 +3,7 @@ from ._version import __version__
 from .baking.bake import bake
 from .errors import ImplicitDecalsError
 from .field.evaluate import evaluate
+from .field.law import ContactLaw, define_contact
 from .field.mapping import ImageMapping
 from .images import load_image
 from .model import NO_IMAGE, Decals, Interaction
@@ -25,6 +26,7 @@ __all__ = [
     "NO_IMAGE",
     "Camera",
     "Contact",
+    "ContactLaw",
     "DecalImage",
     "Decals",
     "ImageMapping",
@@ -38,6 +40,7 @@ __all__ = [
     "__version__",
     "bake",
     "cover",
+    "define_contact",
     "edit",
     "editing",
     "errors",

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from decals import Camera, Contact, DecalImage, Decals, ImageMapping, MeshObject, Scene
+from decals import Camera, DecalImage, Decals, ImageMapping, MeshObject, Scene
 from decals.apps.gallery import SIDE
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.models.shapes import rounded_box
 from decals.apps.views import frame, parse_view
+from decals.field.law import AnyContact
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
 from decals.scenes.pose import PosedScene
@@ -52,7 +53,7 @@ class Panel:
     """A scene and the modes in which its decals are drawn."""
 
     scene: Scene | PosedScene
-    contact: Contact = RenderOptions.contact
+    contact: AnyContact = RenderOptions.contact
     mapping: ImageMapping = ImageMapping.CORRECTED
 
 

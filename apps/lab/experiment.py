@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.errors import InvalidLesson
 from decals.editing.queries import nearest_points
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
-from decals.record import Contact
 from decals.scenes.camera import Camera
 from decals.scenes.objects import SceneObject
 
@@ -93,7 +93,7 @@ class Experiment:
 
     objects: tuple[SceneObject, ...]
     decals: Decals
-    contact: Contact
+    contact: AnyContact
     stiffness: float
     mapping: ImageMapping
     probe: tuple[float, float, float]

@@ -16,12 +16,12 @@ from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.texture import BLOCK_SAMPLES, bake_texture
 from decals.errors import InvalidScene
 from decals.field.evaluate import evaluate
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.record import Contact
 from decals.rendering.options import Drawing, SceneLike, drawing_of
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
@@ -45,7 +45,7 @@ def bake(
     size: int = 2048,
     samples: int = 2,
     vertex_colors: bool = False,
-    contact: Contact | str | None = None,
+    contact: AnyContact | str | None = None,
     stiffness: float | None = None,
     mapping: ImageMapping | str | None = None,
     resolution: int | None = None,
@@ -163,7 +163,7 @@ class SurfaceColors:
         meshes: Sequence[BakeMesh],
         decals: Decals | DecalEditor,
         images: Sequence[UInt8Array],
-        contact: Contact,
+        contact: AnyContact,
         mapping: ImageMapping,
         stiffness: float,
     ) -> None:

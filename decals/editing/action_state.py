@@ -17,8 +17,9 @@ from decals.editing.queries import SurfacePick
 from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure
 from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.validation import instance
 
 Cursor = Callable[[], SurfacePick | None]
@@ -28,7 +29,7 @@ Cursor = Callable[[], SurfacePick | None]
 class DrawModes(Protocol):
     """Modes in which a window draws decals; the edited document keeps them."""
 
-    contact: Contact
+    contact: AnyContact
     mapping: ImageMapping
     stiffness: float
 
@@ -37,7 +38,7 @@ class DrawModes(Protocol):
 class DefaultModes:
     """Modes without a window."""
 
-    contact: Contact = DEFAULT_CONTACT
+    contact: AnyContact = DEFAULT_CONTACT
     mapping: ImageMapping = ImageMapping.CORRECTED
     stiffness: float = DEFAULT_STIFFNESS
 

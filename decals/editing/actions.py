@@ -214,7 +214,7 @@ class Actions:
     def next_contact(self, _cursor: Cursor) -> None:
         """Draw with the next contact mode."""
         modes = self.state.modes
-        modes.contact = Contact((modes.contact + 1) % len(Contact))
+        modes.contact = Contact((int(modes.contact) + 1) % len(Contact))
         self.state.message = f"contact mode: {modes.contact.name.lower()}"
 
     @action(

@@ -9,8 +9,9 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from decals.editing.document import Document
 from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 
 INSIDE = 0.5
 """Distance of a rim from the middle of its image, in image coordinates."""
@@ -45,7 +46,7 @@ def sample_surface(
     normals: Float32Array,
     faces: Int32Array,
     *,
-    contact: Contact = DEFAULT_CONTACT,
+    contact: AnyContact = DEFAULT_CONTACT,
     mapping: ImageMapping = ImageMapping.CORRECTED,
     stiffness: float = DEFAULT_STIFFNESS,
 ) -> SurfaceSamples:

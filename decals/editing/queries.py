@@ -11,9 +11,10 @@ from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
 from decals.field.evaluate import evaluate
+from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
-from decals.record import DEFAULT_CONTACT, Contact
+from decals.record import DEFAULT_CONTACT
 from decals.scattering.mean_normals import mean_normals
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.surfaces.implicit import project_without_mesh
@@ -217,7 +218,11 @@ class SurfacePick:
 
 
 def pick(
-    document: Document, origin: ArrayLike, direction: ArrayLike, *, contact: Contact | str = DEFAULT_CONTACT
+    document: Document,
+    origin: ArrayLike,
+    direction: ArrayLike,
+    *,
+    contact: AnyContact | str = DEFAULT_CONTACT,
 ) -> SurfacePick | None:
     """Return the first surface point along a ray and its owner, or None for a miss.
 
@@ -269,7 +274,7 @@ def outline(
     document: Document,
     number: int,
     *,
-    contact: Contact | str = DEFAULT_CONTACT,
+    contact: AnyContact | str = DEFAULT_CONTACT,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
 ) -> Float32Array:
     """Return the line around the visible part of a decal.
@@ -315,7 +320,7 @@ def outlines(
     document: Document,
     numbers: ArrayLike,
     *,
-    contact: Contact | str = DEFAULT_CONTACT,
+    contact: AnyContact | str = DEFAULT_CONTACT,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
     angles: int = ANGLES,
 ) -> Float32Array:
@@ -333,7 +338,7 @@ def outlines(
         Directions in which each outline is sampled.
     """
     mapping = member("mapping", mapping, ImageMapping, InvalidEdit)
-    modes = member("contact", contact, Contact, InvalidEdit), mapping
+    modes = contact_mode(contact, InvalidEdit), mapping
     numbers = np.asarray(numbers, np.int64)
     decals = document.decals.take(numbers)
     if not len(decals):
@@ -399,7 +404,7 @@ def _visible_fractions(
     centers: Float64Array,
     spokes: Float64Array,
     fractions: Float64Array,
-    modes: tuple[Contact, ImageMapping],
+    modes: tuple[AnyContact, ImageMapping],
 ) -> Float64Array:
     """Return per spoke the largest fraction up to which its decal shows without a gap, else the first one.
 

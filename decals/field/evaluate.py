@@ -14,13 +14,14 @@ from blobtree.kernels import loaded
 from blobtree.validation import real
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.jacobian import image_jacobians
+from decals.field.law import AnyContact, ContactLaw, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
 from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH, RECORD, RIM_RADIUS, Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH, RECORD, RIM_RADIUS
 from decals.validation import describe, member, stiffness_number
 
 
@@ -85,7 +86,7 @@ def evaluate(
     normals: ArrayLike,
     *,
     mapping: ImageMapping | str = ImageMapping.CORRECTED,
-    contact: Contact | str = DEFAULT_CONTACT,
+    contact: AnyContact | str = DEFAULT_CONTACT,
     stiffness: float = DEFAULT_STIFFNESS,
     index: DecalIndex | None = None,
     images: AnyImage | Iterable[AnyImage] | None = None,
@@ -106,7 +107,7 @@ def evaluate(
         Geometric normals of the surface there, of any length. A zero normal faces every decal.
     mapping : ImageMapping or str, optional
         Image mapping: CORRECTED (default) or CHORD.
-    contact : Contact or str, optional
+    contact : Contact, str or ContactLaw, optional
         Contact mode: ELASTIC (default), PRODUCT, MIN or RADIAL.
     stiffness : float, optional
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
@@ -161,7 +162,7 @@ def evaluate(
     [[[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]]
     """
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
-    contact = member("contact", contact, Contact, InvalidScene)
+    contact = contact_mode(contact, InvalidScene)
     stiffness = stiffness_number(stiffness, InvalidScene)
     device = known_device(device)
     positions, facings = _as_rows("points", points), _as_rows("normals", normals)
@@ -187,12 +188,17 @@ def evaluate(
         int(contact),
         indexed,
     ]
-    wp.launch(loaded(sample_points, device), count, inputs, [owner, uv, field], device=device)
-    color = None if images is None else _colors(decals, _each_pixels(images), [*inputs, owner], device)
+    wp.launch(
+        loaded(_with_law(sample_points, contact), device), count, inputs, [owner, uv, field], device=device
+    )
+    color = (
+        None if images is None else _colors(decals, _each_pixels(images), [*inputs, owner], contact, device)
+    )
     derivative = None
     if jacobian:
-        derivative = _jacobians(positions, facings, inputs[2:], (owner.numpy(), uv.numpy()), turns, device)
-    near = _neighbors(decals, inputs, owner, device) if neighbors else None
+        center = owner.numpy(), uv.numpy()
+        derivative = _jacobians(positions, facings, inputs[2:], center, turns, contact, device)
+    near = _neighbors(decals, inputs, owner, contact, device) if neighbors else None
     return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near)
 
 
@@ -202,6 +208,7 @@ def _jacobians(
     modes: list[Any],
     center: tuple[Int32Array, Float32Array],
     normal_derivatives: Float64Array | None,
+    contact: AnyContact,
     device: Any,
 ) -> Float64Array:
     """Return derivatives of image coordinates; `modes` are mapping, contact mode and indexed decals."""
@@ -210,22 +217,31 @@ def _jacobians(
     owned = center[0] >= 0
     radii[owned] = RIM_RADIUS * spheres[center[0][owned]]
 
+    kernel = _with_law(sample_points, contact)
+
     def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
         owner: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
         uv: Any = wp.zeros(len(points), dtype=wp.vec2, device=device)
         field: Any = wp.zeros(len(points), dtype=wp.float32, device=device)
         given: list[Any] = [wp.array(rows, dtype=wp.vec3, device=device) for rows in (points, normals)]
-        wp.launch(sample_points, len(points), [*given, *modes], [owner, uv, field], device=device)
+        wp.launch(kernel, len(points), [*given, *modes], [owner, uv, field], device=device)
         return owner.numpy(), uv.numpy()
 
     return image_jacobians(sampled, points, normals, radii, center, normal_derivatives)
 
 
-def _neighbors(decals: Decals | DecalEditor, inputs: list[Any], owner: Any, device: Any) -> Neighbors:
+def _with_law(kernel: Any, contact: AnyContact) -> Any:
+    """Return a kernel for a contact mode, or with the formulas of a contact law."""
+    return contact.formulas.kernel(kernel) if isinstance(contact, ContactLaw) else kernel
+
+
+def _neighbors(
+    decals: Decals | DecalEditor, inputs: list[Any], owner: Any, contact: AnyContact, device: Any
+) -> Neighbors:
     """Return all decals with a field at points; the index lists whole influences, not only reaches."""
     from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
 
-    points, normals, _, contact, indexed = inputs
+    points, normals, _, mode, indexed = inputs
     if isinstance(decals, DecalEditor):
         rows, known = decals.decals, decals.numbers
     else:
@@ -237,8 +253,8 @@ def _neighbors(decals: Decals | DecalEditor, inputs: list[Any], owner: Any, devi
     empty: list[Any] = [wp.zeros(0, dtype=kind, device=device) for kind in (wp.int32, wp.float32)]
     counts: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
     placed: Any = wp.array(np.where(owners >= 0, kept, owners), dtype=wp.int32, device=device)
-    given = [points, normals, contact, wide, placed]
-    kernel = loaded(list_neighbors, device)
+    given = [points, normals, mode, wide, placed]
+    kernel = loaded(_with_law(list_neighbors, contact), device)
     wp.launch(kernel, len(points), [*given, empty[0]], [counts, empty[0], empty[1], empty[1]], device=device)
     offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
     starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
@@ -298,7 +314,11 @@ def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any
 
 
 def _colors(
-    decals: Decals | DecalEditor, images: Sequence[UInt8Array], inputs: list[Any], device: Any
+    decals: Decals | DecalEditor,
+    images: Sequence[UInt8Array],
+    inputs: list[Any],
+    contact: AnyContact,
+    device: Any,
 ) -> Float32Array:
     rows = decals.decals if isinstance(decals, DecalEditor) else decals
     min_count = int(rows.images.max(initial=NO_IMAGE)) + 1
@@ -312,7 +332,8 @@ def _colors(
         wp.array(extents, dtype=wp.vec3i, device=device),
         wp.array(texels, dtype=wp.vec4, device=device),
     ]
-    wp.launch(loaded(color_points, device), len(inputs[0]), [*inputs, *arrays], [colors], device=device)
+    kernel = loaded(_with_law(color_points, contact), device)
+    wp.launch(kernel, len(inputs[0]), [*inputs, *arrays], [colors], device=device)
     result: Float32Array = colors.numpy()
     return result
 

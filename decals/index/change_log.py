@@ -105,7 +105,7 @@ class DirtyBalls:
         return np.concatenate(balls) if balls else np.zeros((0, 4), np.float32)
 
 
-def affected_balls(balls: Float32Array, contact: Contact, max_influence: float) -> Float64Array | None:
+def affected_balls(balls: Float32Array, contact: object, max_influence: float) -> Float64Array | None:
     """Grow influence balls of changed decals to the balls in which points may show something else.
 
     In radial contact a decal stretches the images of its neighbours along whole rays, from the rim of the
@@ -117,7 +117,7 @@ def affected_balls(balls: Float32Array, contact: Contact, max_influence: float) 
     ----------
     balls : float32[n, 4]
         Centres and influence radii.
-    contact : Contact
+    contact : Contact or ContactLaw
         Contact mode of the picture.
     max_influence : float
         Largest influence radius of any decal.

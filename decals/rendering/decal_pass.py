@@ -1,10 +1,12 @@
 """The decal pass: colours all pixels at once, for any number of decals and objects."""
 
 from functools import cache
+from typing import Any
 
 from blobtree._typing import Float32Array
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
+from decals.field.law import AnyContact, ContactLaw
 from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import complement_at, owner_at, owner_below, single_layer_at, uv_at
 from decals.index.lookup import next_number_below
@@ -54,7 +56,7 @@ class DecalPass:
         decals: DecalData | None,
         images: ImageArray | None,
         mapping: ImageMapping,
-        contact: Contact,
+        contact: AnyContact,
         stiffness: float,
         rest: RestBuffer | None = None,
         part: Part = WHOLE,
@@ -118,17 +120,18 @@ LIBRARY_FUNCTIONS = (
 
 
 @cache
-def decal_library(contact: Contact, *, layered: bool) -> str:
-    """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode."""
+def decal_library(contact: AnyContact, *, layered: bool) -> str:
+    """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
     constants = (
         f"const float RIM = {float(RIM)!r};\n"
         f"const int decal_contact = {int(contact)};\n"
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )
-    return constants + _translated_functions()
+    return constants + _translated_functions(contact if isinstance(contact, ContactLaw) else None)
 
 
 @cache
-def _translated_functions() -> str:
-    return translate_library(LIBRARY_FUNCTIONS)
+def _translated_functions(law: ContactLaw | None) -> str:
+    functions: tuple[Any, ...] = LIBRARY_FUNCTIONS
+    return translate_library(functions if law is None else map(law.formulas.function, functions))

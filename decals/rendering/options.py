@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 from blobtree._typing import UInt8Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
+from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.model import Decals
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
 from decals.validation import describe, instance, member, stiffness_number, whole_number
@@ -75,7 +76,7 @@ class Drawing:
     ----------
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
-    contact : Contact or str
+    contact : Contact, str or ContactLaw
         Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
         paper), ``"min"`` or ``"radial"``.
     mapping : ImageMapping or str
@@ -101,7 +102,7 @@ class Drawing:
     """
 
     samples: int = 2
-    contact: Contact = DEFAULT_CONTACT
+    contact: AnyContact = DEFAULT_CONTACT
     mapping: ImageMapping = ImageMapping.CORRECTED
     background: Background = STUDIO
     lights: Lighting | None = None
@@ -113,7 +114,7 @@ class Drawing:
             self,
             *,
             samples: int = 2,
-            contact: Contact | str = DEFAULT_CONTACT,
+            contact: AnyContact | str = DEFAULT_CONTACT,
             mapping: ImageMapping | str = ImageMapping.CORRECTED,
             background: Background = STUDIO,
             lights: Lighting | None = None,
@@ -123,7 +124,7 @@ class Drawing:
     def __post_init__(self) -> None:
         checked = {
             "samples": whole_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
-            "contact": member("contact", self.contact, Contact, InvalidScene),
+            "contact": contact_mode(self.contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
             "stiffness": stiffness_number(self.stiffness, InvalidScene),
         }
@@ -174,7 +175,7 @@ class RenderOptions(Drawing):
             size: Size = (800, 600),
             *,
             samples: int = 2,
-            contact: Contact | str = DEFAULT_CONTACT,
+            contact: AnyContact | str = DEFAULT_CONTACT,
             mapping: ImageMapping | str = ImageMapping.CORRECTED,
             background: Background = STUDIO,
             lights: Lighting | None = None,

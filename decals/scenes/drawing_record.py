@@ -5,6 +5,7 @@ from typing import Literal
 from msgspec import Struct
 
 from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.field.law import LAWS, ContactLaw
 from decals.field.mapping import ImageMapping
 from decals.record import DEFAULT_STIFFNESS, Contact
 from decals.rendering.lights import Light, Lighting
@@ -45,6 +46,7 @@ class DrawingRecord(Struct, forbid_unknown_fields=True):
     samples: int = 2
     background: _BackgroundRecord | None = None
     lights: _LightingRecord | None = None
+    law: str | None = None
 
 
 def drawing_record(drawing: Drawing) -> DrawingRecord:
@@ -56,7 +58,7 @@ def drawing_record(drawing: Drawing) -> DrawingRecord:
         each = (_LightRecord(*(getattr(light, name) for name in names)) for light in lights.lights)
         described = _LightingRecord(tuple(each), tuple(lights.frame))
     return DrawingRecord(
-        contact=drawing.contact.name.lower(),  # type: ignore[arg-type]  # the names of its members
+        contact=Contact(int(drawing.contact)).name.lower(),  # type: ignore[arg-type]  # names of members
         stiffness=drawing.stiffness,
         mapping=drawing.mapping.name.lower(),  # type: ignore[arg-type]
         samples=drawing.samples,
@@ -64,6 +66,7 @@ def drawing_record(drawing: Drawing) -> DrawingRecord:
         if drawing.background == STUDIO
         else _BackgroundRecord(drawing.background.top, drawing.background.bottom),
         lights=described,
+        law=drawing.contact.name if isinstance(drawing.contact, ContactLaw) else None,
     )
 
 
@@ -89,7 +92,7 @@ def drawing_of_record(record: DrawingRecord | None) -> Drawing:
             lights = Lighting(tuple(each), record.lights.frame)
         return Drawing(
             samples=record.samples,
-            contact=Contact[record.contact.upper()],
+            contact=Contact[record.contact.upper()] if record.law is None else _law(record.law),
             mapping=ImageMapping[record.mapping.upper()],
             background=STUDIO
             if record.background is None
@@ -99,3 +102,12 @@ def drawing_of_record(record: DrawingRecord | None) -> Drawing:
         )
     except ImplicitDecalsError as error:
         raise InvalidScene(f"drawing: {error}") from error
+
+
+def _law(name: str) -> ContactLaw:
+    if name not in LAWS:
+        raise InvalidScene(
+            f"expected a contact law that is defined in this process, got {name!r}; import the module that "
+            "defines it first (--define on the command line)"
+        )
+    return LAWS[name]

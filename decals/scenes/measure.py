@@ -12,9 +12,9 @@ from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScene
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of, tangent_axes
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.model import Decals, Interaction
-from decals.record import Contact
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
 from decals.scenes.objects import MeshObject, SceneObject
@@ -139,7 +139,7 @@ def _finite(value: float) -> float | None:
 def measure(
     scene: Scene,
     *,
-    contact: Contact | str | None = None,
+    contact: AnyContact | str | None = None,
     stiffness: float | None = None,
     mapping: ImageMapping | str | None = None,
     samples: int | None = None,

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import cast
 
 from blobtree.progress import reporting
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background, Drawing, SceneLike, Size, drawing_of, is_scene_like
 from decals.rendering.picture import Picture
@@ -21,7 +21,7 @@ def render(
     *,
     size: Size = (800, 600),
     samples: int | None = None,
-    contact: Contact | str | None = None,
+    contact: AnyContact | str | None = None,
     stiffness: float | None = None,
     mapping: ImageMapping | str | None = None,
     background: Background | None = None,

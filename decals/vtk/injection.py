@@ -14,8 +14,8 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
 from decals.rendering import Renderer, SceneLike
 from decals.rendering.decal_pass import decal_library
 from decals.rendering.pixel_pass import CameraBuffer
@@ -76,7 +76,7 @@ class InjectionTarget(Protocol):
     @property
     def mapping(self) -> ImageMapping: ...  # noqa: D102
     @property
-    def contact(self) -> Contact: ...  # noqa: D102
+    def contact(self) -> AnyContact: ...  # noqa: D102
     @property
     def stiffness(self) -> float: ...  # noqa: D102
     def world_matrix(self) -> Float64Array: ...  # noqa: D102
@@ -118,7 +118,7 @@ class Injection:
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
         self._additions = ShaderAdditions(actor)
-        self._variant: tuple[Contact, bool] | None = None
+        self._variant: tuple[AnyContact, bool] | None = None
         self._code: dict[ShaderTag, str] = {}
         self._written = False
         injection = weakref.ref(self)

@@ -19,8 +19,8 @@ from vtkmodules.vtkRenderingCore import vtkActor
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Drawing, check_scene, drawing_of
@@ -284,12 +284,12 @@ class SubplotRenderer:
         self._draw_with("mapping", mapping)
 
     @property
-    def contact(self) -> Contact:
+    def contact(self) -> AnyContact:
         """Contact mode; see `decals.Contact`."""
         return self.drawing.contact
 
     @contact.setter
-    def contact(self, contact: Contact | str) -> None:
+    def contact(self, contact: AnyContact | str) -> None:
         self._draw_with("contact", contact)
 
     @property

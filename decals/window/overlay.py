@@ -14,8 +14,8 @@ from blobtree.nodes.paths import Path
 from decals.editing.actions import KEYS, Actions
 from decals.editing.document import Document
 from decals.editing.queries import ANGLES, outlines
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
 from decals.scenes.objects import bounds_of
 from decals.vtk.adapters import weak_callback
 
@@ -98,7 +98,7 @@ class Overlay:
         self._help.SetVisibility(False)
 
     def outline(
-        self, document: Document, numbers: tuple[int, ...], contact: Contact, mapping: ImageMapping
+        self, document: Document, numbers: tuple[int, ...], contact: AnyContact, mapping: ImageMapping
     ) -> None:
         """Outline the visible parts of decals."""
         key = (document.objects, document.decals.version, numbers, contact, mapping) if numbers else ()

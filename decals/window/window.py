@@ -18,8 +18,8 @@ from decals.editing.document import Document
 from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
+from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.record import Contact
 from decals.rendering.gl_libraries import require_gl
 from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
@@ -131,7 +131,7 @@ class EditWindow:
         samples: int = 2,
         plotter: pv.BasePlotter | None = None,
         recover: Callable[[Path], Scene] | None = None,
-        contact: Contact | str | None = None,
+        contact: AnyContact | str | None = None,
         mapping: ImageMapping | str | None = None,
         stiffness: float | None = None,
     ) -> None:
@@ -206,7 +206,7 @@ class EditWindow:
         unsaved = self.actions.files.recovery.pending
         return not self._closed and (self.background.busy or coarse or unsaved or self.subplot.warming_up)
 
-    def _content_version(self) -> tuple[float, ...]:
+    def _content_version(self) -> tuple[object, ...]:
         subplot, document = self.subplot, self.document
         modes = subplot.contact, subplot.mapping, subplot.stiffness
         return id(document.objects), id(document.images), document.decals.version, *modes
@@ -409,7 +409,7 @@ def edit(
     *,
     path: str | os.PathLike[str] | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
-    contact: Contact | str | None = None,
+    contact: AnyContact | str | None = None,
     mapping: ImageMapping | str | None = None,
     stiffness: float | None = None,
 ) -> Scene:

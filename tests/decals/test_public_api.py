@@ -13,10 +13,10 @@ PACKAGES = [
     "window",
 ]  # fmt: skip
 NAMES = [
-    "Camera", "Contact", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError", "Interaction",
-    "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__", "bake", "cover",
-    "edit", "evaluate", "load_image", "load_model", "load_scene", "measure",
-    "render", "save_scene", "scatter", "show",
+    "Camera", "Contact", "ContactLaw", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError",
+    "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
+    "bake", "cover", "define_contact", "edit", "evaluate", "load_image", "load_model", "load_scene",
+    "measure", "render", "save_scene", "scatter", "show",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["Neighbors", "Samples"],
