@@ -193,6 +193,13 @@ class ContactLaw:
         Digest of all of that.
     formulas : Formulas
         The formulas of decals with g and h in them.
+
+    Examples
+    --------
+    >>> import decals
+    >>> law = decals.define_contact("gaussian", combine="min")
+    >>> law.name, law.base
+    ('gaussian', <Contact.MIN: 1>)
     """
 
     name: str

@@ -22,7 +22,7 @@ from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.apps.cli import app
 from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
-from decals.rendering.options import RenderOptions
+from decals.rendering.options import Drawing, RenderOptions
 from tests.decals.baking.glb import need
 from tests.docs import published
 
@@ -199,8 +199,10 @@ CHECKS: dict[str, Callable[[Session], None]] = {
 @pytest.fixture
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures of no other size and samples are small and coarse."""
-    _size, _samples, *others = (field.default for field in fields(RenderOptions))
-    monkeypatch.setattr(RenderOptions.__init__, "__defaults__", ((240, 180), 1, *others))
+    monkeypatch.setattr(RenderOptions.__init__, "__defaults__", ((240, 180),))
+    coarse = {field.name: field.default for field in fields(Drawing)} | {"samples": 1}
+    for kind in (Drawing, RenderOptions):
+        monkeypatch.setattr(kind.__init__, "__kwdefaults__", coarse)
     assert RenderOptions() == RenderOptions(size=(240, 180), samples=1)
 
 

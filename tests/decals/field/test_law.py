@@ -126,7 +126,7 @@ def test_the_paper_s_functions_give_the_paper_s_mode() -> None:
         np.bincount(np.repeat(np.arange(1000), np.diff(near.offsets)), near.pushes, 1000)
         for near in (own.neighbors, paper.neighbors)
     ]
-    np.testing.assert_allclose(*sums, atol=1e-4)
+    np.testing.assert_allclose(sums[0], sums[1], atol=1e-4)
     assert np.array_equal(own.owner, paper.owner)
     np.testing.assert_allclose(own.uv, paper.uv, atol=1e-4)
 
