@@ -15,6 +15,7 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.validation import real
 from decals.errors import InvalidScene
 from decals.model import Decals
+from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, Color, MeshObject, SceneObject
 from decals.scenes.origin import Origin
@@ -82,12 +83,15 @@ class PosedScene:
         Decals, in the rest pose.
     images : tuple of DecalImage
     camera : Camera
+    drawing : Drawing
+        How the scene is drawn.
     """
 
     objects: tuple[SceneObject | PosedMesh, ...]
     decals: Decals
     images: tuple[DecalImage, ...]
     camera: Camera
+    drawing: Drawing
 
 
 def pose(
@@ -152,9 +156,10 @@ def pose(
             _carried(scene, posed),
             scene.images,
             view,
+            scene.drawing,
         )
     objects = tuple(posed.get(item.name, item) for item in scene.objects)
-    return PosedScene(objects, scene.decals, scene.images, view)
+    return PosedScene(objects, scene.decals, scene.images, view, scene.drawing)
 
 
 def _as_object(item: SceneObject | PosedMesh) -> SceneObject:

@@ -16,7 +16,7 @@ NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
     "bake", "cover", "define_contact", "edit", "evaluate", "load_image", "load_model", "load_scene",
-    "measure", "render", "save_scene", "scatter", "show",
+    "measure", "pose", "render", "save_scene", "scatter", "show", "skin",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["Neighbors", "Samples"],
