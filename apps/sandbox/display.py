@@ -111,6 +111,7 @@ class Display:
             "slice_position": options.slice_position,
             "parallel": bool(self._window.subplot.vtk_renderer.camera.parallel_projection),
             "axes": self._axes,
+            "snap": self._window.actions.state.snap,
             "bookmarks": [name for name, _ in self.bookmarks],
             "busy": self._worker.busy,
             "message": self.message,
@@ -119,7 +120,7 @@ class Display:
     # -- modes ------------------------------------------------------------------------------------------
 
     def set_option(self, name: str, value: Any) -> None:
-        """Set an option of `DisplayOptions` by name, or "parallel" or "axes".
+        """Set an option of `DisplayOptions` by name, or "parallel", "axes" or "snap".
 
         Raises
         ------
@@ -138,6 +139,12 @@ class Display:
             value = min(max(finite_number(name, value, InvalidEdit), 0.0), 1.0)
         elif name == "parallel":
             self._window.subplot.vtk_renderer.camera.parallel_projection = bool(value)
+            return
+        elif name == "snap":
+            distance = finite_number(name, value, InvalidEdit)
+            if distance < 0.0:
+                raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
+            self._window.actions.state.snap = distance
             return
         elif name == "axes":
             self._show_axes(bool(value))

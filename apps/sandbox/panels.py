@@ -224,6 +224,13 @@ def build_view_menu(sandbox: Sandbox) -> None:
                 update_modelValue=(sandbox.set_display, "['slice_position', $event]"),
                 **COMPACT,
             )
+            vuetify3.VTextField(
+                label="snap of dragged primitives, model units",
+                model_value=("display.snap",),
+                change=(sandbox.set_display, "['snap', Number($event.target.value)]"),
+                classes="mb-2",
+                **FIELD,
+            )
             with html.Div(classes="d-flex"):
                 for name, label in (("parallel", "orthographic"), ("axes", "axes")):
                     vuetify3.VSwitch(

@@ -79,6 +79,8 @@ class ActionState:
         Contact mode, image mapping and stiffness of the window.
     brush
         The brush that a drag uses.
+    snap
+        A dragged primitive moves by multiples of this along each axis; 0 for any distance.
     view
         Returns the eye and its target. Default: the document camera's.
     background
@@ -95,6 +97,7 @@ class ActionState:
         self.prompt = PromptLine(self.show)
         self.modes: DrawModes = DefaultModes()
         self.brush = BrushSettings()
+        self.snap = 0.0
         self.view: Callable[[], tuple[ArrayLike, ArrayLike]] = self._document_view
         self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
         self._series: tuple[str, object] | None = None

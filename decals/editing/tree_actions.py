@@ -150,7 +150,9 @@ class TreeActions:
         """
         if self._state.primitive is None:
             return
-        self._drag_to(MovePrimitive(*self._state.primitive, offset, quick=True))
+        snap = self._state.snap
+        moved = np.round(np.asarray(offset, np.float64) / snap) * snap if snap else offset
+        self._drag_to(MovePrimitive(*self._state.primitive, moved, quick=True))
 
     def _drag_to(self, command: MovePrimitive | SetParameter) -> None:
         """Replace the edit of the open stroke by that of a command."""

@@ -77,6 +77,25 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
     assert "triangles folded" in sandbox.status
 
 
+def test_dragged_primitives_snap(sandbox: Sandbox, shared: EditWindow) -> None:
+    sandbox.select("0/1")
+    sandbox.set_display("snap", 0.25)
+    trees = shared.actions.trees
+    before = np.array(trees.selected_node.center)  # type: ignore[attr-defined]
+    trees.begin_drag()
+    trees.drag((0.3, -0.1, 0.4))
+    trees.end_drag()
+    finish(shared)
+    after = np.array(trees.selected_node.center)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(after - before, (0.25, 0.0, 0.5), atol=1e-6)
+    wrong: list[Any] = [-1.0, float("nan"), "far", None]
+    for value in wrong:
+        sandbox.set_display("snap", value)
+        assert "snap: expected" in sandbox.status
+    sandbox.set_display("snap", 0.0)
+    assert sandbox.values()["display"]["snap"] == 0.0
+
+
 def test_a_former_mode_keeps_no_mesh(sandbox: Sandbox, shared: EditWindow) -> None:
     sandbox.set_display("mode", "polygonized")
     settle(sandbox, shared)
