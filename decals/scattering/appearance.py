@@ -10,6 +10,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, 
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.gap_filling import EVEN
 from decals.scattering.mean_normals import mean_normals
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii, turned_normals
@@ -156,7 +157,8 @@ class Appearance:
         expected = EXPECTED_RADIUS * spacings.astype(np.float64)
         normals = turned_normals(points, own, samples, expected)
         points = OrientedPoints(points.positions, normals, points.surface_ids)
-        return points, covering_radii(points, samples, project, _stream(seed, _TRIAL_STREAM))
+        even = bool(spacings.max() <= EVEN * spacings.min())
+        return points, covering_radii(points, samples, project, _stream(seed, _TRIAL_STREAM), even=even)
 
     def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
         if self.choice is ImageChoice.SIZE:

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Float64Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.progress import reporting
 from decals.model import FACING_LIMIT
@@ -52,10 +52,35 @@ MAX_TURN = 20.0
 CORNER_TOLERANCE = 1.02
 """Ratio of the distances from two decals up to which a point is a corner of both Voronoi cells."""
 
+CANDIDATES = 4
+"""Nearest decals that face a point and may own it, whatever their radii."""
+
+ARC_REACH = 1.2
+"""Ratio of the distances of two decals from a point up to which the length to the farther one is measured."""
+
+SPARE = 0.015
+"""Share of its radius by which a decal grows beyond a bare point."""
+
+SEARCHES = ((0.5, 0.94), (0.3, 0.95), (0.2, 0.96), (0.1, 0.97), (0.05, 0.98))
+"""Rounds that look for bare points: spread of random points in mean distances of the samples, and distance of
+the points around which they lie from their owners, in the owners' radii. The last round is repeated."""
+
+MAX_SEARCHES, CLEAN_SEARCHES = 24, 3
+"""Largest number of rounds, and rounds without a bare point after which they end."""
+
+TRIALS_PER_RISK = 16
+"""Random points around each such point in each round."""
+
+EVEN_RADIUS_RATIO = 1.495
+"""Ratio of a radius to the median at even density, beyond which other decals grow first."""
+
+SPECK = 0.01
+"""Share of its radius by which an image may end before a point that only such a decal could cover."""
+
 TRIALS_PER_PEAK = 6
 """Random points around each peak in each round."""
 
-TRIAL_SPREADS = (1.0, 0.6, 0.3, 0.15)
+TRIAL_SPREADS = (1.0, 0.6, 0.3)
 """Standard deviation of the random points of each round, in mean distances of the samples."""
 
 
@@ -157,6 +182,8 @@ def covering_radii(
     samples: OrientedPoints,
     project: Project,
     seed: int,
+    *,
+    even: bool = False,
 ) -> Float64Array:
     """Return the least radii, up to a small margin, at which decals cover the surfaces they lie on.
 
@@ -165,6 +192,10 @@ def covering_radii(
     centre of the circle through its three decals and random trials approach it. The paper's rule, influence
     radius = distance D of the farthest Delaunay neighbour, leaves gaps: a perfect hexagonal tiling already
     needs s = D / (sqrt(3) 0.4542) = 1.271 D.
+
+    Where radii are unlike or the surface bends, contact by cells (`decals.field.radial`) gives a point to
+    another decal than the nearest, and its image may end before the point. The decal grows that must grow
+    least.
 
     Two kinds of points stay bare. No decal among the last of `NEIGHBOR_COUNTS` nearest faces the first kind.
     The second would make a decal outsized (`MAX_BARE_SHARE`, `MAX_RADIUS_RATIO`), such as a lone folded face
@@ -181,30 +212,46 @@ def covering_radii(
         Projects trial points onto their surfaces.
     seed
         Seed of the trials.
+    even
+        True if the decals should be of about equal size: before one becomes outsized, others grow.
 
     Returns
     -------
     float64[n], above zero.
     """
     tree = FacingTree(decals.positions, decals.normals)
+
+    def find(trials: OrientedPoints) -> _OwnedPoints:
+        return _find_owners(tree, project(trials), decals)
+
     owned = _find_owners(tree, samples, decals)
     limits = _max_radii(owned, len(decals))
     radii = np.zeros(len(decals))
-    _grow(radii, owned, decals, limits)
+    _grow(radii, owned, limits)
     rng = np.random.default_rng(seed)
     sample_distance = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
+    first = owned
     owned = owned.peaks(PEAK_FRACTION * radii)
-    owned = owned.joined(_find_owners(tree, project(_circumcenters(owned, decals)), decals))
-    _grow(radii, owned, decals, limits)
+    owned = owned.joined(find(_circumcenters(owned, decals)))
+    _grow(radii, owned, limits)
     with reporting() as report:
         for done, spread in enumerate(TRIAL_SPREADS, start=2):
-            report("measuring radii", done / (len(TRIAL_SPREADS) + 2))
+            report("measuring radii", done / (len(TRIAL_SPREADS) + 3))
             least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
             owned = owned.peaks(least)
-            trials = _random_points_around(owned.points, spread * sample_distance, rng)
-            owned = owned.joined(_find_owners(tree, project(trials), decals))
-            _grow(radii, owned, decals, limits)
-    return (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
+            trials = _random_points_around(owned.points, TRIALS_PER_PEAK, spread * sample_distance, rng)
+            owned = owned.joined(find(trials))
+            _grow(radii, owned, limits)
+        report("measuring radii", (len(TRIAL_SPREADS) + 2) / (len(TRIAL_SPREADS) + 3))
+    stages = [(limits, 0.0)]
+    if even:
+        largest = EVEN_RADIUS_RATIO * float(np.median(radii))
+        radii, stages = np.minimum(radii, largest), [(np.minimum(limits, largest), 0.0), (limits, SPECK)]
+    radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
+    owned = owned.joined(first)
+    for limits, speck in stages:
+        owned = _close_gaps(radii, owned, (1.0 + RADIUS_MARGIN) * limits, speck, find, sample_distance, rng)
+    return radii
 
 
 def touching_radii(decals: OrientedPoints) -> Float64Array:
@@ -238,15 +285,39 @@ def _with_median(radii: Float64Array) -> Float64Array:
 
 @dataclass(frozen=True)
 class _OwnedPoints:
-    """Points, and the three nearest decals that face each, ``[n, 3]``: distances and indices, -1 for none.
+    """Points, and the nearest `CANDIDATES` decals that face each: distances and indices, -1 for none.
 
-    `lengths` are the distances along the surface from the nearest decal, ``[n]``.
+    `lengths` are the distances along the surface, at which images end; straight ones for decals beyond
+    `ARC_REACH`. All three are ``[n, k]``.
     """
 
     points: OrientedPoints
     lengths: Float64Array
     distances: Float64Array
     decals: Int64Array
+
+    def __getitem__(self, rows: Int64Array) -> "_OwnedPoints":
+        return _OwnedPoints(self.points[rows], self.lengths[rows], self.distances[rows], self.decals[rows])
+
+    def powers(self, radii: Float64Array) -> Float64Array:
+        """Return the powers of points, which decide between cells (`decals.field.radial`); ∞ for no decal."""
+        return np.where(self.decals >= 0, self.distances**2 - radii[self.decals] ** 2, np.inf)
+
+    def shares(self, radii: Float64Array) -> Float64Array:
+        """Return the distance from the owner in its radii, ``[n]``; above 1 the point is bare."""
+        columns = self.powers(radii).argmin(axis=1)[:, None]
+        lengths, owners = (np.take_along_axis(a, columns, 1)[:, 0] for a in (self.lengths, self.decals))
+        result: Float64Array = np.where(owners >= 0, lengths, 0.0) / radii[owners]
+        return result
+
+    def risky(self, radii: Float64Array, share: float) -> "_OwnedPoints":
+        """Return the points nearest to bare of each three decals that meet, beyond a share of the radius."""
+        shares = self.shares(radii)
+        rows = np.flatnonzero(shares > share)
+        nearest = np.argsort(self.powers(radii)[rows], axis=1)[:, :3]
+        corners = np.take_along_axis(self.decals[rows], nearest, axis=1)
+        order = np.lexsort((-shares[rows], *corners.T))
+        return self[rows[order[_firsts(corners[order])]]]
 
     def joined(self, other: "_OwnedPoints") -> "_OwnedPoints":
         """Return the points of both."""
@@ -264,26 +335,28 @@ class _OwnedPoints:
         holds a distance for each decal.
         """
         owners = self.decals[:, 0]
-        outer = np.flatnonzero((owners >= 0) & (self.lengths > least[owners]))
-        corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:], axis=1)])
-        order = np.lexsort((-self.lengths[outer], *corners.T))
-        sorted_corners = corners[order]
-        is_first = np.ones(len(order), np.bool_)
-        is_first[1:] = (sorted_corners[1:] != sorted_corners[:-1]).any(axis=1)
-        rows = outer[order[is_first]]
-        return _OwnedPoints(self.points[rows], self.lengths[rows], self.distances[rows], self.decals[rows])
+        outer = np.flatnonzero((owners >= 0) & (self.lengths[:, 0] > least[owners]))
+        corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:3], axis=1)])
+        order = np.lexsort((-self.lengths[outer, 0], *corners.T))
+        return self[outer[order[_firsts(corners[order])]]]
+
+
+def _firsts(rows: Int64Array) -> BoolArray:
+    """Return True for rows that differ from the one before."""
+    first = np.ones(len(rows), np.bool_)
+    first[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return first
 
 
 def _find_owners(tree: FacingTree, points: OrientedPoints, decals: OrientedPoints) -> _OwnedPoints:
-    distances, indices = tree.nearest(points.positions, points.normals, count=3)
-    lengths = _lengths_to(decals, indices[:, 0], points)
-    return _OwnedPoints(points, np.where(indices[:, 0] >= 0, lengths, np.inf), distances, indices)
-
-
-def _lengths_to(decals: OrientedPoints, rows: Int64Array, points: OrientedPoints) -> Float64Array:
-    """Return the length along the surface from a decal to each point, at which images end."""
-    offsets = points.positions.astype(np.float64) - decals.positions[rows]
-    return _arc_lengths(offsets, decals.normals[rows].astype(np.float64), points.normals.astype(np.float64))
+    distances, indices = tree.nearest(points.positions, points.normals, count=CANDIDATES)
+    close = np.isfinite(distances) & (distances <= ARC_REACH * distances[:, :1])
+    rows, owners = np.nonzero(close)[0], indices[close]
+    offsets = points.positions[rows].astype(np.float64) - decals.positions[owners]
+    n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
+    lengths = distances.copy()
+    lengths[close] = _arc_lengths(offsets, n_p, n_q)
+    return _OwnedPoints(points, lengths, distances, indices)
 
 
 def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
@@ -304,8 +377,9 @@ def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float
 
 def _circumcenters(peaks: _OwnedPoints, decals: OrientedPoints) -> OrientedPoints:
     """Return the centre of the circle through the three decals of each peak, as a guess of its corner."""
-    whole = np.flatnonzero((peaks.decals >= 0).all(axis=1))
-    a, b, c = np.moveaxis(decals.positions[peaks.decals[whole]].astype(np.float64), 1, 0)
+    corners = peaks.decals[:, :3]
+    whole = np.flatnonzero((corners >= 0).all(axis=1))
+    a, b, c = np.moveaxis(decals.positions[corners[whole]].astype(np.float64), 1, 0)
     ab, ac = b - a, c - a
     normal = np.cross(ab, ac)
     square = np.einsum("ni,ni->n", normal, normal)
@@ -334,20 +408,59 @@ def _max_radii(owned: _OwnedPoints, count: int) -> Float64Array:
     return MAX_RADIUS_RATIO * np.maximum(trimmed, median)
 
 
-def _grow(radii: Float64Array, owned: _OwnedPoints, decals: OrientedPoints, limits: Float64Array) -> None:
+def _grow(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array) -> None:
     """Grow the radius of every decal, up to its limit, to all points that it owns or nearly owns.
 
     Images end at their radius along the surface, so the length of the arc counts, not that of the chord.
     """
     close = (owned.decals >= 0) & (owned.distances <= CORNER_TOLERANCE * owned.distances[:, :1])
     close &= owned.distances <= limits[owned.decals]
-    points, owners = np.nonzero(close)[0], owned.decals[close]
-    np.maximum.at(radii, owners, _lengths_to(decals, owners, owned.points[points]))
+    np.maximum.at(radii, owned.decals[close], owned.lengths[close])
 
 
-def _random_points_around(points: OrientedPoints, spread: float, rng: np.random.Generator) -> OrientedPoints:
-    """Return normally distributed points around each point."""
-    repeated = points[np.repeat(np.arange(len(points)), TRIALS_PER_PEAK)]
+def _close_gaps(
+    radii: Float64Array,
+    owned: _OwnedPoints,
+    limits: Float64Array,
+    speck: float,
+    find: Callable[[OrientedPoints], _OwnedPoints],
+    sample_distance: float,
+    rng: np.random.Generator,
+) -> _OwnedPoints:
+    """Grow radii, up to limits, until searches find no bare point; return the points nearest to bare."""
+    clean = 0
+    for turn in range(MAX_SEARCHES):
+        spread, share = SEARCHES[min(turn, len(SEARCHES) - 1)]
+        owned = owned.risky(radii, share)
+        trials = _random_points_around(owned.points, TRIALS_PER_RISK, spread * sample_distance, rng)
+        owned = owned.joined(find(trials))
+        clean = 0 if _cover(radii, owned, limits, speck) else clean + 1
+        if turn >= len(SEARCHES) and clean >= CLEAN_SEARCHES:
+            break
+    return owned
+
+
+def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck: float) -> bool:
+    """Grow, for every bare point, the decal that must grow least to own and reach it; return True for any."""
+    bare = owned[np.flatnonzero(owned.shares(radii) > 1.0 + speck)]
+    powers = bare.powers(radii)
+    lowest = np.sort(powers, axis=1)
+    others = np.minimum(np.where(powers == lowest[:, :1], lowest[:, 1:2], lowest[:, :1]), 0.0)
+    needed = np.maximum(bare.lengths, np.sqrt(np.maximum(bare.distances**2 - others, 0.0)))
+    possible = (bare.decals >= 0) & (needed <= limits[bare.decals])
+    needed = np.minimum((1.0 + SPARE) * needed, limits[bare.decals])
+    factors = np.where(possible, needed / radii[bare.decals], np.inf)
+    best = factors.argmin(axis=1)
+    rows = np.flatnonzero(possible.any(axis=1))
+    np.maximum.at(radii, bare.decals[rows, best[rows]], needed[rows, best[rows]])
+    return len(rows) > 0
+
+
+def _random_points_around(
+    points: OrientedPoints, count: int, spread: float, rng: np.random.Generator
+) -> OrientedPoints:
+    """Return so many normally distributed points around each point."""
+    repeated = points[np.repeat(np.arange(len(points)), count)]
     offsets = rng.normal(0.0, spread, repeated.positions.shape).astype(np.float32)
     return OrientedPoints(repeated.positions + offsets, repeated.normals, repeated.surface_ids)
 

@@ -55,24 +55,25 @@ def test_smooth_surfaces_keep_their_normals() -> None:
 @pytest.mark.parametrize("name", ["gear", "knob"])
 def test_images_bend_over_the_edges_of_parts(name: str) -> None:
     mesh = FAULT_MODELS[name]()
-    found = distortion(decals.scatter(mesh, count=300, seed=1), mesh, 20_000)
+    found = distortion(decals.scatter(mesh, count=300, seed=1), mesh, 100_000)
     assert found.stretched <= 0.003
     assert found.folded <= 5e-4
-    assert found.bare < 1e-4  # images end at the arc, which is longer than the chord
+    assert found.bare == 0  # though images end at the arc, which is longer than the chord
 
 
-@pytest.mark.parametrize(("name", "largest"), [("cup", 1.56), ("bowl", 1.5)])
-def test_lips_and_ragged_borders_get_no_outsized_decals(name: str, largest: float) -> None:
+@pytest.mark.parametrize("name", ["cup", "bowl"])
+def test_lips_and_ragged_borders_get_no_outsized_decals(name: str) -> None:
     """A cup's wall is thinner than the spacing: its floor faces decals outside, its lip few decals."""
     mesh = FAULT_MODELS[name]()
     relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*mesh), count=300, seed=1)
     relaxation.run()
     layout = relaxation.to_decals(seed=1)
-    assert layout.radii.max() <= largest * np.median(layout.radii)
+    assert layout.radii.max() <= 1.5 * np.median(layout.radii)
     assert relaxation.statistics().rho >= 0.87
     found = distortion(layout, mesh, 30_000)
-    assert found.stretched <= 0.003
+    assert found.stretched <= 0.0035
     assert found.folded <= 5e-4
+    assert found.bare == 0
 
 
 def test_few_large_decals_leave_no_pinhole() -> None:
