@@ -64,8 +64,10 @@ class ImageArray:
             region = (0, 0, layer, self.width, self.height, 1)
             self.texture.write(texels.astype(np.float16).tobytes(), viewport=region)
         self.texture.repeat_x = self.texture.repeat_y = False
-        self.texture.build_mipmaps()
-        self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        if max(self.height, self.width) > 1:  # the first mip levels of a context cost llvmpipe 70 ms
+            self.texture.build_mipmaps()
+            self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self.texture.anisotropy = context.anisotropy
 
     def use(self, unit: int) -> None:
