@@ -40,6 +40,10 @@ EMPTY = -3
 
 The entry of another block is SURELY_INSIDE, or the texel in front of its tape, which is not negative."""
 
+HIT_STEPS = 4
+HIT_GAP = 1e-3
+"""Field values from the surface at which Newton's method ends, and its most steps, for a hit."""
+
 BLOCK_OVERLAP = 0.1
 """Distance behind the boundary of two blocks, in tolerances, at which a ray is in the next one."""
 
@@ -77,9 +81,10 @@ def first_hit(
 ) -> wp.float32:
     """Return the distance along the unit `direction` to the first point inside in [t_min, t_max], or MISS.
 
-    A point is a hit if it lies inside, or if a Newton step along the gradient takes it to the surface within
-    a tolerance: ISO − f ≤ tolerance · |∇f|. A slope bound alone is no hit, because behind warps it may be far
-    above the slope. A ray that starts inside hits at t_min.
+    A point is a hit if it lies inside, or if Newton's method along the gradient takes it to the surface in
+    few steps of at most a tolerance: ISO − f ≤ tolerance · |∇f|. One step is not enough, for a steep field
+    may be flat behind it. A slope bound alone is no hit, because behind warps it may be far above the slope.
+    A ray that starts inside hits at t_min.
 
     No step is shorter than a tolerance, or than several after many steps. So rays miss only parts in which
     they stay inside for less than such a step. A step that ends inside is cut by linear interpolation.
@@ -99,10 +104,23 @@ def first_hit(
         if bound[1] * reach > gap:
             free = gap / bound[1]
             if free <= tolerance:
-                f = field_gradient(origin + direction * t, tape, span)
-                slope = wp.vec3(f[1], f[2], f[3])
-                if gap <= tolerance * wp.length(slope):
-                    return t + newton_step(gap, wp.dot(slope, direction), tolerance)
+                q = origin + direction * t
+                rise = float(0.0)
+                at_surface = bool(False)
+                for newton in range(HIT_STEPS):
+                    f = field_gradient(q, tape, span)
+                    slope = wp.vec3(f[1], f[2], f[3])
+                    steepness = wp.length(slope)
+                    if newton == 0:
+                        rise = wp.dot(slope, direction)
+                    if ISO - f[0] > tolerance * steepness:
+                        break
+                    if ISO - f[0] <= HIT_GAP:
+                        at_surface = True
+                        break
+                    q += slope * ((ISO - f[0]) / (steepness * steepness))
+                if at_surface:
+                    return t + newton_step(gap, rise, tolerance)
             free = wp.max(free, tolerance * wp.max(1.0, float(step) / STEPS_PER_TOLERANCE))
         t += free
         last_gap = gap

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from blobtree import InvalidPoints, Node, Point, Segment
+from blobtree import Cone, InvalidPoints, Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.tracing.ray_kernels import MAX_DISTANCE, box_interval, exit_distance, reciprocal
 from blobtree.tracing.trace import trace
@@ -301,3 +301,12 @@ def test_exit_distances() -> None:
 def test_reciprocals_are_finite() -> None:
     seen = call(reciprocal, direction=np.array([[0.0, -0.0, 1e-45], [-1e-38, 2.0, -0.5]], np.float32))
     np.testing.assert_allclose(seen, [[0.0, 0.0, MAX_DISTANCE], [-MAX_DISTANCE, 0.5, -2.0]], rtol=1e-6)
+
+
+def test_rays_do_not_hit_beside_steep_bands() -> None:
+    """A taper in a thin band: one step along its gradient seems to reach the surface, and does not."""
+    cone = Cone((-0.87, -0.7355, 0.682), (-1.135, -0.1557, 0.441), radius=0.483, end_radius=0.3894)
+    tree = cone.taper(2.06, (0.04784, 0.04863)).stretch(0.5693, (0.013292, 0.112812))
+    start = np.array([2.159329, -6.895301, -3.779844]) + np.random.default_rng(0).normal(size=(400, 3)) * 0.02
+    hits = tree.raycast(start, np.tile([[-0.480698, 0.761076, 0.435537]], (400, 1)))
+    np.testing.assert_allclose(tree(hits.positions[hits.hit]), 0.5, atol=1e-3)
