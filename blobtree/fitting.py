@@ -5,6 +5,7 @@ numbers of a tree, with the exact Jacobian of `parameter_gradient`. The structur
 does not depend on the length of a direction; one more equation for each keeps that length.
 """
 
+import reprlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,7 +28,7 @@ from blobtree.nodes.parameters import Quantity
 from blobtree.nodes.tree import Node
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
-from blobtree.validation import point_array
+from blobtree.validation import items, point_array, positive_number, real, shown
 
 MAX_EVALUATIONS = 60
 TOLERANCE = 1e-9
@@ -145,7 +146,7 @@ def fit(
     Raises
     ------
     InvalidNode
-        No parameter is free, or `fixed` names what the tree does not have.
+        No parameter is free, `fixed` names what the tree does not have, or an option is out of range.
     InvalidPoints
         The samples are not n rows of finite numbers, fewer numbers than parameters, or all out of reach.
     Cancelled
@@ -165,6 +166,8 @@ def fit(
 
     checked_tree(tree)
     samples = _Samples(point_array(points), values, normals, normal_weight)
+    if isinstance(max_evaluations, bool) or not isinstance(max_evaluations, int) or max_evaluations < 1:
+        raise InvalidNode(f"max_evaluations: expected a whole number from 1, got {shown(max_evaluations)}")
     free = _free(tree, fixed)
     if samples.count < len(free):
         raise InvalidPoints(
@@ -211,11 +214,16 @@ class _Samples:
         self, points: Float32Array, values: ArrayLike | None, normals: ArrayLike | None, weight: float
     ) -> None:
         self.points = points
-        self.weight = weight
-        self.values = np.full(len(points), ISO) if values is None else np.asarray(values, np.float64)
+        self.weight = positive_number("normal_weight", weight)
+        try:
+            self.values = np.asarray(
+                real(np.full(len(points), ISO) if values is None else values), np.float64
+            )
+        except (TypeError, ValueError, OverflowError):
+            self.values = np.empty((0, 0))
         if self.values.shape != (len(points),) or not np.isfinite(self.values).all():
             raise InvalidPoints(
-                f"values: expected {len(points)} finite numbers, got shape {self.values.shape}; "
+                f"values: expected {len(points)} finite numbers, got {reprlib.repr(values)}; "
                 "give one field value per point"
             )
         self.normals: Float64Array | None = None
@@ -336,8 +344,13 @@ def _free(tree: Node, fixed: Iterable[Selection] | None) -> tuple[NumericParamet
     if fixed is None:
         kept = {p for p in parameters if p.declaration.quantity is Quantity.MATRIX}
     else:
+        selections = items(fixed)
+        if selections is None or not all(
+            isinstance(one, NumericParameter) or items(one) is not None for one in selections
+        ):
+            raise InvalidNode(f"fixed: expected names of parameters or paths of nodes, got {shown(fixed)}")
         kept = set()
-        for selection in fixed:
+        for selection in selections:
             chosen = {parameter for parameter in parameters if _selects(selection, parameter)}
             if not chosen:
                 names = ", ".join(sorted({parameter.name for parameter in parameters}))

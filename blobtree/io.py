@@ -34,7 +34,7 @@ from blobtree.nodes.tree import Node
 from blobtree.nodes.values import OPTIONAL, fields_of
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
-from blobtree.validation import Vector
+from blobtree.validation import Vector, shown
 
 VERSION: Literal[1] = 1
 
@@ -271,6 +271,8 @@ def save(root: Node, path: str | os.PathLike[str]) -> None:
     ------
     InvalidNode
         `root` is not a node.
+    InvalidFile
+        `path` is not the path of a file.
     OSError
         The file cannot be written.
 
@@ -283,7 +285,7 @@ def save(root: Node, path: str | os.PathLike[str]) -> None:
     >>> load(path)
     Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8))
     """
-    write_atomically(path, to_json(root))
+    write_atomically(_checked_path(path), to_json(root))
 
 
 def load(path: str | os.PathLike[str]) -> Node:
@@ -315,14 +317,19 @@ def load(path: str | os.PathLike[str]) -> Node:
     >>> load(path) == Point((0, 0, 0), radius=1.0)
     True
     """
-    if not isinstance(path, str | os.PathLike):
-        raise InvalidFile(f"path: expected the path of a file, got {path!r}")
+    path = _checked_path(path)
     try:
         return from_json(Path(path).read_bytes())
     except InvalidFile as error:
         raise InvalidFile(f"{path}: {error}") from None
     except ValueError:  # of the path; a text that is no tree is an InvalidFile
         raise InvalidFile(f"path: expected the path of a file, got {path!r}") from None
+
+
+def _checked_path(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidFile(f"path: expected the path of a file, got {shown(path)}")
+    return path
 
 
 def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:

@@ -15,7 +15,7 @@ from blobtree.errors import InvalidPoints, InvalidResolution, MissingPackage
 from blobtree.files import replacing, write_atomically
 from blobtree.formulas.falloff import ISO
 from blobtree.tape.model import ImplicitModel
-from blobtree.validation import finite_number, finite_vector
+from blobtree.validation import finite_number, finite_vector, items, shown
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -191,9 +191,10 @@ def _polydata(points: NDArray[Any], faces: NDArray[Any]) -> "pv.PolyData":
 
 
 def _levels(values: Iterable[float]) -> list[float]:
-    if not isinstance(values, Iterable):
-        raise InvalidPoints(f"values: expected several field values, got {values!r}; put it in a list")
-    levels = sorted({finite_number("values", value) for value in values})
+    found = items(values)
+    if found is None:
+        raise InvalidPoints(f"values: expected several field values, got {shown(values)}; put it in a list")
+    levels = sorted({finite_number("values", value) for value in found})
     if levels and levels[0] <= 0.0:
         raise InvalidPoints(
             f"values: expected field values above 0, got {levels[0]!r}; 0 is everywhere outside"

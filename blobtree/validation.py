@@ -17,6 +17,8 @@ Matrix = tuple[tuple[float, ...], ...]
 
 LARGEST_NUMBER = 1e18
 """Beyond it float32 squares overflow."""
+SMALLEST_NUMBER = 1e-18
+"""Below it float32 squares vanish."""
 LIMIT = f"none may be beyond {LARGEST_NUMBER:g}"
 
 
@@ -26,6 +28,14 @@ def shown(value: object) -> str:
         return repr(value)
     except Exception:  # of any kind, by a class of the user
         return f"a {type(value).__name__}"
+
+
+def items(value: object) -> tuple[Any, ...] | None:
+    """Return what an iterable holds; None for anything else, such as an array without axes."""
+    try:
+        return tuple(cast(Iterable[Any], value))
+    except TypeError:
+        return None
 
 
 def real(values: Any) -> NDArray[Any]:
@@ -63,9 +73,8 @@ def finite_points(name: str, value: object) -> tuple[Vector, ...]:
 
 def positive_numbers(name: str, value: object) -> tuple[float, ...]:
     """Return `value` as floats above 0, a single number as one; raise `InvalidNode` otherwise."""
-    try:
-        numbers = tuple(cast(Iterable[Any], value))
-    except TypeError:
+    numbers = items(value)
+    if numbers is None:
         return (positive_number(name, value),)
     return tuple(positive_number(f"{name}[{place}]", number) for place, number in enumerate(numbers))
 
@@ -102,6 +111,8 @@ def positive_vector(name: str, value: object) -> Vector:
     vector = finite_vector(name, value)
     if min(vector) <= 0.0:
         raise InvalidNode(f"{name}: expected three numbers above 0, got {shown(value)}")
+    for number in vector:
+        _check_size(name, number)
     return vector
 
 
@@ -110,7 +121,13 @@ def positive_number(name: str, value: object) -> float:
     number = finite_number(name, value)
     if number <= 0.0:
         raise InvalidNode(f"{name}: expected a number above 0, got {shown(value)}")
+    _check_size(name, number)
     return number
+
+
+def _check_size(name: str, number: float) -> None:
+    if number < SMALLEST_NUMBER:
+        raise InvalidNode(f"{name}: expected at least {SMALLEST_NUMBER:g}, got {number:g}; rescale the model")
 
 
 def finite_number(name: str, value: object) -> float:
@@ -144,10 +161,10 @@ def truth(name: str, value: object, error: type[ImplicitDecalsError]) -> bool:
 
 def texts(name: str, value: object) -> tuple[str, ...]:
     """Return several texts; raise `InvalidNode` if one is empty or no text."""
-    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (None,)
-    if not all(isinstance(item, str) and item for item in items):
+    found = None if isinstance(value, str) else items(value)
+    if found is None or not all(isinstance(item, str) and item for item in found):
         raise InvalidNode(f"{name}: expected texts that are not empty, got {shown(value)}")
-    return cast("tuple[str, ...]", items)
+    return found
 
 
 def affine_matrix(value: ArrayLike) -> Matrix:

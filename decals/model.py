@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.formulas.falloff import RIM
-from decals.errors import InvalidRow
+from blobtree.validation import items
+from decals.errors import InvalidDecals, InvalidRow
 from decals.images.load import decode_srgb
 from decals.validation import (
     bool_array,
@@ -18,6 +19,7 @@ from decals.validation import (
     color_array,
     describe,
     finite_array,
+    instance,
     member_array,
     one_or_each,
     orthogonal_vectors,
@@ -207,7 +209,10 @@ class Decals:
     @classmethod
     def concatenate(cls, parts: Iterable["Decals"]) -> Self:
         """Return all decals of all parts, in their order."""
-        sources = [cls.empty(), *parts]
+        found = items(parts)
+        sources = [cls.empty(), *((parts,) if found is None else found)]
+        for part in sources:
+            instance("parts", part, Decals, InvalidDecals, "concatenate takes several Decals")
         return cls.of_rows({name: np.concatenate([getattr(p, name) for p in sources]) for name in COLUMNS})
 
     @classmethod

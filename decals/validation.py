@@ -139,15 +139,19 @@ def function_values(
     name: str, function: Callable[..., ArrayLike], *arguments: Any, error: type[ImplicitDecalsError]
 ) -> Float64Array:
     """Return the numbers that a user's function returns; the error names a function that fails."""
+    return real_array(name, called(name, function, *arguments, error=error), error)
+
+
+def called(name: str, function: Callable[..., T], *arguments: Any, error: type[ImplicitDecalsError]) -> T:
+    """Return what a user's function returns; the error names a function that fails."""
     try:
-        values = function(*arguments)
+        return function(*arguments)
     except ImplicitDecalsError:
         raise
     except Exception as reason:
         raise error(
             f"{name}: expected numbers from the function, but it raised {type(reason).__name__}: {reason}"
         ) from reason
-    return real_array(name, values, error)
 
 
 def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = InvalidImage) -> UInt8Array:

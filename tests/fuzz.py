@@ -20,7 +20,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,16 +34,12 @@ import decals
 from blobtree import Point
 from blobtree.errors import ImplicitDecalsError
 from blobtree.files import PREFIX, write_atomically
-from blobtree.nodes.paths import primitive_paths
-from blobtree.progress import reporting
 from blobtree.pyvista_views import write_polydata
-from decals.editing import EditSession, ReplaceNode, SetParameter, SetValues
-from decals.index import DecalIndex
-from decals.rendering import Picture, RenderOptions
-from decals.scenes.objects import bounds_of
-from decals.surfaces import as_surface
+from decals.editing import EditSession
+from decals.rendering import Picture
 from tests.decals.editing.fuzz import RandomCommands
 from tests.decals.editing.scenes import digest, scene
+from tests.fuzz_calls import call_table, not_called
 from tests.test_hostile_calls import CALLS, HUGE, PLY
 
 HANG_SECONDS = 10.0
@@ -178,130 +174,6 @@ ODD: list[Any] = [
     "cuda:9", Path("nothing.ply"), lambda: 1, -0.0, [1e30, 0, 0],
 ]  # fmt: skip
 """Values of no use for most arguments."""
-
-
-def _report(progress: Any, cancel: Any) -> None:
-    """Report once; an exception of the caller's own function is the caller's."""
-    odd_function = callable(progress) or callable(cancel)
-    with suppress(TypeError) if odd_function else nullcontext(), reporting(progress, cancel) as report:
-        report("finding", 0.0)
-
-
-def call_table() -> dict[str, tuple[Callable[..., object], dict[str, Any]]]:
-    """Return functions by name, each with arguments that it accepts."""
-    tree = Point((0, 0, 0), radius=1.0)
-    whole = scene(8)
-    spots = whole.decals
-    number, path = next(
-        (number, primitive_paths(item.tree)[0])
-        for number, item in enumerate(whole.objects)
-        if isinstance(item, decals.TreeObject)
-    )
-    triangle = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    mesh, implicit = as_surface(triangle), as_surface(tree)
-    item = decals.TreeObject("ball", tree)
-    camera = decals.Camera((0, 0, 4), (0, 0, 0))
-    origin, axis = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-    points, directions = [[0.0, 0.0, 2.0]], [[0.0, 0.0, -1.0]]
-    pixels = np.zeros((2, 2, 4), np.uint8)
-    table: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
-        "Point": (Point, {"center": origin, "radius": 1.0, "color": (1, 1, 1)}),
-        "Segment": (blobtree.Segment, {"start": origin, "end": axis, "radius": 1.0}),
-        "scale": (tree.scale, {"factor": 2.0}),
-        "rotate": (tree.rotate, {"axis": axis, "degrees": 30.0}),
-        "translate": (tree.translate, {"offset": axis}),
-        "transform": (tree.transform, {"matrix": np.eye(4)}),
-        "from_json": (blobtree.from_json, {"text": blobtree.to_json(tree)}),
-        "to_json": (blobtree.to_json, {"root": tree}),
-        "polygonize": (blobtree.polygonize, {"tree": tree, "resolution": 8, "device": "cpu"}),
-        "polygonize by size": (blobtree.polygonize, {"tree": tree, "cell_size": 0.5}),
-        "Decals": (
-            decals.Decals,
-            {
-                "positions": spots.positions, "normals": spots.normals, "tangents": spots.tangents,
-                "radii": spots.radii, "images": spots.images, "tints": spots.tints,
-                "opacities": spots.opacities, "layers": spots.layers, "interactions": spots.interactions,
-                "spill": spots.spill,
-            },
-        ),
-        "rows": (lambda rows: spots[rows], {"rows": [0, 1]}),
-        "index": (DecalIndex.build, {"positions": spots.positions, "influence": spots.influence}),
-        "index of": (DecalIndex.of, {"decals": spots}),
-        "evaluate": (decals.evaluate, {"decals": spots, "points": points, "normals": directions}),
-        "bounds_of": (bounds_of, {"objects": [item]}),
-        "Camera": (decals.Camera, {"position": (0, 0, 4), "target": origin, "up": (0, 1, 0), "fov": 30}),
-        "framing": (decals.Camera.framing, {"bounds": item.bounds, "direction": axis, "aspect": 1.0}),
-        "fitting": (decals.Camera.fitting, {"points": points, "direction": axis, "margin": 1.0}),
-        "MeshObject": (
-            decals.MeshObject,
-            {"name": "a", "vertices": triangle[0], "faces": triangle[1], "color": (1, 1, 1), "source": "a"},
-        ),
-        "TreeObject": (decals.TreeObject, {"name": "a", "tree": tree}),
-        "DecalImage": (decals.DecalImage, {"source": "a", "pixels": pixels}),
-        "Scene": (
-            decals.Scene, {"objects": (item,), "camera": camera, "decals": spots[:0], "images": ()},
-        ),
-        "as_surface": (as_surface, {"model": triangle}),
-        "cover": (
-            lambda models, **rest: decals.cover(models, **rest),
-            {"models": tree, "count": 3, "images": ["scale"], "seed": 0},
-        ),
-        "scatter": (decals.scatter, {"surfaces": [mesh], "count": 3, "factor": 1.0, "seed": 0}),
-        "load_image": (decals.load_image, {"reference": "scale"}),
-        "load_model": (decals.load_model, {"path": "x.ply"}),
-        "load_scene": (decals.load_scene, {"path": "x.json"}),
-        "polygonize adaptively": (
-            blobtree.polygonize,
-            {"tree": tree, "resolution": 8, "adaptive": True, "creases": False, "max_triangles": 100_000},
-        ),
-        "polygonize to an error": (
-            blobtree.polygonize, {"tree": tree, "chord_error": 0.1, "adaptive": True},
-        ),
-        "reporting": (_report, {"progress": None, "cancel": None}),
-        "GradientBlend": (
-            blobtree.GradientBlend, {"operands": (tree, tree), "start_angle": 30.0, "full_angle": 90.0},
-        ),
-        "gradient of a blend": (
-            blobtree.GradientBlend((tree, tree.rotate(axis, 9)), start_angle=30.0, full_angle=90.0).gradient,
-            {"points": points},
-        ),
-        "sample": (blobtree.sample, {"tree": tree, "spacing": 0.25, "width": None, "color": (1, 1, 1)}),
-        "to_sdf": (blobtree.to_sdf, {"tree": tree, "points": points}),
-        "hessian": (tree.hessian, {"points": points}),
-        "set parameter": (
-            lambda **values: EditSession(whole).do(SetParameter(**values)),
-            {"object": number, "path": path, "name": "radius", "value": 0.9, "quick": False},
-        ),
-        "replace node": (
-            lambda **values: EditSession(whole).do(ReplaceNode(**values)),
-            {"object": number, "path": path, "node": tree},
-        ),
-        "elastic": (
-            decals.evaluate,
-            {
-                "decals": spots, "points": points, "normals": directions, "contact": "elastic",
-                "stiffness": 4.0,
-            },
-        ),
-        "RenderOptions": (
-            RenderOptions,
-            {"size": (8, 8), "samples": 1, "contact": "elastic", "stiffness": 4.0, "mapping": "chord"},
-        ),
-        "set values": (
-            lambda **values: EditSession(scene(8)).do(SetValues.each(**values)),
-            {"numbers": [0], "layers": 1, "opacities": 0.5},
-        ),
-    }  # fmt: skip
-    for name, surface in (("mesh", mesh), ("tree", implicit)):
-        table |= {
-            f"{name} project": (surface.project, {"points": points}),
-            f"{name} normal": (surface.normal, {"points": points}),
-            f"{name} contains": (surface.contains, {"points": points}),
-            f"{name} raycast": (surface.raycast, {"origins": points, "directions": directions}),
-            f"{name} sample": (surface.sample, {"count": 3, "seed": 0}),
-            f"{name} on": (getattr(surface, "on"), {"device": "cpu"}),  # noqa: B009 - not of the protocol
-        }
-    return table
 
 
 def call_case(seed: int) -> Case:
@@ -512,6 +384,7 @@ def fuzz(*, files: int, calls: int, commands: int, kills: int, seed: int) -> dic
         "fuzz_torn": len(torn),
         "seeded": seed,
         "cases": {"files": files, "calls": calls, "commands": commands, "kills": kills},
+        "not_called": not_called() if calls else [],
         "failures": {name: vars(outcome) for name, outcome in stages.items()} | {"torn": torn},
     }
 
@@ -534,7 +407,7 @@ def main() -> int:
     if options.json:
         print(json.dumps(figures, indent=1))
     else:
-        print("\n".join(f"{key:14} {figures[key]}" for key in keys))
+        print("\n".join(f"{key:14} {figures[key]}" for key in [*keys, "not_called"]))
         for name, failures in figures["failures"].items():
             print(f"{name}: {failures}")
     return int(any(figures[key] for key in keys))

@@ -10,9 +10,19 @@ import pytest
 import blobtree
 import decals
 from blobtree import Point
-from decals.editing import EditSession, SetParameter, SetValues
+from decals.editing import (
+    BrushDecals,
+    EditSession,
+    MapValues,
+    MoveBranch,
+    MovePrimitive,
+    SetParameter,
+    SetValues,
+    recovery_path,
+)
 from decals.errors import ImplicitDecalsError
 from decals.index import DecalIndex
+from decals.scattering import Creases
 from decals.scenes.objects import bounds_of
 from decals.surfaces import ImplicitSurface, MeshSurface, as_surface, read_mesh
 
@@ -70,6 +80,50 @@ CALLS: dict[str, Callable[[], object]] = {
     "surrogate as JSON": lambda: blobtree.from_json("\ud800"),
     "endless cell": lambda: blobtree.polygonize(BALL, cell_size=1e308),
     "fitting of none": lambda: decals.Camera.fitting(WRONG),
+    "small length": lambda: blobtree.ConvolutionSegment((0, 0, 0), (0, 0, 1), radius=1.0, end_radius=5e-324),
+    "small period": lambda: blobtree.Gyroid((0, 0, 0), (1, 1, 1), period=5e-324, thickness=0.1),
+    "number as tree": lambda: blobtree.numeric_parameters(WRONG),
+    "numbers of no tree": lambda: blobtree.numeric_values(WRONG, []),
+    "numbers of another tree": lambda: blobtree.numeric_values(
+        blobtree.Segment((0, 0, 0), (0, 0, 1), radius=1.0), blobtree.numeric_parameters(BALL)
+    ),
+    "no list of numbers": lambda: blobtree.with_numeric_values(BALL, WRONG, []),
+    "too few numbers": lambda: blobtree.with_numeric_values(BALL, blobtree.numeric_parameters(BALL), [1.0]),
+    "gradient by no parameters": lambda: BALL.parameter_gradient([[0, 0, 1]], WRONG),
+    "list as attribute": lambda: BALL.attribute([], [[0, 0, 1]]),  # type: ignore[arg-type]
+    "endless default": lambda: Point((0, 0, 0), radius=1.0, attributes={"a": 1}).attribute(
+        "a", [[0, 0, 1]], default=HUGE
+    ),
+    "number as attributes": lambda: BALL.to_pyvista(resolution=8, attributes=WRONG),
+    "rest coordinates": lambda: BALL.to_pyvista(resolution=8, rest_coordinates=np.zeros(3)),  # type: ignore[arg-type]
+    "texts as values": lambda: blobtree.fit(BALL, [[0, 0, 1]] * 4, ["x"] * 4),
+    "endless weight": lambda: blobtree.fit(
+        BALL, [[0, 0, 1]] * 4, normals=[[0, 0, 1]] * 4, normal_weight=HUGE
+    ),
+    "no evaluation": lambda: blobtree.fit(BALL, [[0, 0, 1]] * 4, max_evaluations=0),
+    "number as fixed": lambda: blobtree.fit(BALL, [[0, 0, 1]] * 4, fixed=WRONG),
+    "endless samples": lambda: blobtree.from_sdf([[[HUGE] * 2] * 2] * 2, (0, 0, 0), spacing=1.0, width=1.0),
+    "tree at no path": lambda: blobtree.save(BALL, WRONG),
+    "function of no call": lambda: EditSession(SCENE).do(MapValues([0], "layers", WRONG)),
+    "values of no name": lambda: EditSession(SCENE).do(MapValues([0], WRONG, lambda spots: spots.layers)),
+    "brush of a number": lambda: EditSession(SCENE).do(
+        BrushDecals((0, 0, 1), (0, 0, 1), 0.5, decal_radius=0.1, images=WRONG)
+    ),
+    "branch of no path": lambda: EditSession(SCENE).do(MoveBranch(0, WRONG, WRONG)),
+    "array as texts": lambda: BALL.to_pyvista(resolution=8, attributes=np.array("x")),
+    "array as values": lambda: BALL.slice(values=np.array("x")),
+    "object as fixed": lambda: blobtree.fit(BALL, [[0, 0, 1]] * 4, fixed=[WRONG]),
+    "large sample": lambda: blobtree.from_sdf(np.full((2, 2, 2), 1e308), (0, 0, 0), spacing=1.0, width=1.0),
+    "quick move": lambda: EditSession(SCENE).do(MovePrimitive(0, (), (0, 0, 1), quick=WRONG)),
+    "endless distance": lambda: decals.Relaxation(MeshSurface(*TRIANGLE), count=3).polish(close=1e308),
+    "vertex colours": lambda: decals.bake(SCENE, "a.glb", vertex_colors=np.zeros(0)),  # type: ignore[arg-type]
+    "array as surfaces": lambda: decals.Relaxation(np.array("x"), count=1),  # type: ignore[arg-type]
+    "decals of a number": lambda: decals.Decals.concatenate(WRONG),
+    "scene of a number": lambda: decals.save_scene(WRONG, "a.json"),
+    "recovery of a number": lambda: recovery_path(WRONG),
+    "recovery of nothing": lambda: recovery_path(""),
+    "boundary": lambda: Creases(MeshSurface(*TRIANGLE), boundary=np.zeros(3)),  # type: ignore[arg-type]
+    "fixed": lambda: decals.Relaxation(MeshSurface(*TRIANGLE), count=1).insert([0, 0, 0], fixed=WRONG),
     "layer of no decal": lambda: EditSession(SCENE).do(SetValues.each([], layers="x")),
     "number as source": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], source=3.5),  # type: ignore[arg-type]
     "surrogate as source": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], source="\ud800.ply"),

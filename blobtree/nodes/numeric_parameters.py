@@ -3,7 +3,8 @@
 Colours, whole numbers and names are no such parameters: the field does not change smoothly with them.
 """
 
-from collections.abc import Iterator, Sequence
+import reprlib
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
@@ -14,7 +15,9 @@ from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
 from blobtree.nodes.values import fields_of, left_out, parameter_values
+from blobtree.tape.model import checked_tree
 from blobtree.tape.program import ProgramNode
+from blobtree.validation import finite_numbers, items
 
 AnyNode = TypeVar("AnyNode", bound=ProgramNode)
 Path = tuple[int, ...]
@@ -75,7 +78,18 @@ def numeric_parameters(tree: ProgramNode) -> list[NumericParameter]:
     >>> [str(parameter) for parameter in numeric_parameters(pair)][3:6]
     ['0: radius', '1: center[0]', '1: center[1]']
     """
+    checked_tree(tree)
     return [parameter for path, node in nodes_with_paths(tree) for parameter in _numbers_of(path, node)]
+
+
+def checked_parameters(parameters: Iterable[NumericParameter]) -> tuple[NumericParameter, ...]:
+    """Return several parameters; raise `InvalidNode` for anything else."""
+    found = items(parameters)
+    if found is None or not all(isinstance(item, NumericParameter) for item in found):
+        raise InvalidNode(
+            f"parameters: expected some of numeric_parameters(tree), got {reprlib.repr(parameters)}"
+        )
+    return found
 
 
 def numeric_values(tree: ProgramNode, parameters: Sequence[NumericParameter]) -> Float64Array:
@@ -93,6 +107,11 @@ def numeric_values(tree: ProgramNode, parameters: Sequence[NumericParameter]) ->
     numpy.ndarray
         float64[p]: the values, in the units of the parameters.
 
+    Raises
+    ------
+    InvalidNode
+        The tree does not have one of the parameters.
+
     Examples
     --------
     >>> from blobtree import Point, numeric_parameters, numeric_values
@@ -100,7 +119,8 @@ def numeric_values(tree: ProgramNode, parameters: Sequence[NumericParameter]) ->
     >>> numeric_values(ball, numeric_parameters(ball)).tolist()
     [0.0, 0.0, 2.0, 1.0]
     """
-    return np.array([_number(getattr(node_along(tree, p.path), p.name), p.index) for p in parameters])
+    checked_tree(tree)
+    return np.array([_number(_value_of(tree, p), p.index) for p in checked_parameters(parameters)])
 
 
 def with_numeric_values(tree: AnyNode, parameters: Sequence[NumericParameter], values: ArrayLike) -> AnyNode:
@@ -123,7 +143,7 @@ def with_numeric_values(tree: AnyNode, parameters: Sequence[NumericParameter], v
     Raises
     ------
     InvalidNode
-        A node refuses its value.
+        A node refuses its value, or the tree does not have one of the parameters.
 
     Examples
     --------
@@ -133,12 +153,16 @@ def with_numeric_values(tree: AnyNode, parameters: Sequence[NumericParameter], v
     >>> with_numeric_values(ball, [radius], [2.5]).radius
     2.5
     """
+    checked_tree(tree)
+    parameters, numbers = checked_parameters(parameters), finite_numbers("values", values)
+    if len(numbers) != len(parameters):
+        raise InvalidNode(f"values: expected a number for each of {len(parameters)}, got {len(numbers)}")
     changed: dict[Path, dict[str, Any]] = {}
-    for parameter, value in zip(parameters, np.asarray(values, np.float64).tolist(), strict=True):
+    for parameter, value in zip(parameters, numbers, strict=True):
         own = changed.setdefault(parameter.path, {})
         old = own.get(parameter.name, None)
         if old is None:
-            old = getattr(node_along(tree, parameter.path), parameter.name)
+            old = _value_of(tree, parameter)
         own[parameter.name] = with_number(old, parameter.index, value)
     return rebuilt(tree, changed)
 
@@ -207,6 +231,16 @@ def _places(value: Any) -> Iterator[tuple[int, ...]]:
     elif isinstance(value, tuple):
         for i, item in enumerate(value):
             yield from ((i, *rest) for rest in _places(item))
+
+
+def _value_of(tree: ProgramNode, parameter: NumericParameter) -> Any:
+    """Return the value that holds a parameter; raise `InvalidNode` if it is a parameter of another tree."""
+    value = number = getattr(node_along(tree, parameter.path), parameter.name, None)
+    for i in parameter.index:
+        number = number[i] if isinstance(number, tuple) and 0 <= i < len(number) else None
+    if not isinstance(number, float):
+        raise InvalidNode(f"parameters: expected those of this tree, got {parameter}; list them again")
+    return value
 
 
 def _number(value: Any, index: tuple[int, ...]) -> float:

@@ -23,6 +23,7 @@ from blobtree.nodes.numeric_parameters import (
     AnyNode,
     NumericParameter,
     Path,
+    checked_parameters,
     node_along,
     numeric_parameters,
     numeric_values,
@@ -86,7 +87,7 @@ def parameter_gradient_of(
     model: ImplicitModel, points: Float32Array, parameters: Iterable[NumericParameter] | None = None
 ) -> ParameterGradient:
     """Return the derivatives of a tree's field by its parameters, see `Node.parameter_gradient`."""
-    chosen = tuple(numeric_parameters(model) if parameters is None else parameters)
+    chosen = checked_parameters(numeric_parameters(model) if parameters is None else parameters)
     return ParameterGradient(_derivatives(model, points, chosen, gradients=False)[:, :, 0], chosen)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
+from blobtree.validation import real
 
 FAST_COMPRESSION = 1
 
@@ -43,8 +44,9 @@ class Samples(msgspec.Struct, frozen=True):
             The array does not have three axes of at least two finite numbers, or too many.
         """
         try:
-            array = np.asarray(numbers, np.float32)
-        except (TypeError, ValueError):
+            with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused below
+                array = np.asarray(real(numbers), np.float32)
+        except (TypeError, ValueError, OverflowError):
             raise InvalidNode(
                 f"samples: expected an array of numbers, got {type(numbers).__name__}"
             ) from None

@@ -137,10 +137,10 @@ def move_branch(tree: Node, path: Path, target: Path) -> tuple[Node, Path]:
     InvalidNode
         The target lies in the branch, or nothing but the branch would be left.
     """
-    if tuple(target[: len(path)]) == tuple(path):
+    branch, parent = node_at(tree, path), node_at(tree, target)
+    path, target = tuple(path), tuple(target)
+    if target[: len(path)] == path:
         raise InvalidNode(f"target: expected a place outside the branch {path}, got {target}")
-    branch = node_at(tree, path)
-    parent = node_at(tree, target)
     if not (parent.combines and not _cuts(parent)) and target:
         above = node_at(tree, target[:-1])
         if above.combines and not _cuts(above):

@@ -59,6 +59,10 @@ from blobtree.validation import (
     finite_vector,
     point_array,
     points_or_point,
+    real,
+    shown,
+    texts,
+    truth,
 )
 
 if TYPE_CHECKING:
@@ -693,6 +697,8 @@ class Node(ImplicitModel):
         >>> pair.attribute("bone", [[0.2, 0, 0], [0.9, 0, 0]]).tolist()
         ['arm', 'hand']
         """
+        if not isinstance(name, str):
+            raise InvalidNode(f"name: expected the name of an attribute, got {shown(name)}")
         values = attribute_values(self._program, name)
         array, single = points_or_point(points)
         given = next(value for value in values if value is not None)
@@ -865,6 +871,9 @@ class Node(ImplicitModel):
         >>> mesh.is_manifold
         True
         """
+        names = (attributes,) if isinstance(attributes, str) else texts("attributes", attributes)
+        split_normals = truth("split_normals", split_normals, InvalidNode)
+        rest_coordinates = truth("rest_coordinates", rest_coordinates, InvalidNode)
         mesh = polygonize(
             self,
             resolution=resolution,
@@ -872,14 +881,14 @@ class Node(ImplicitModel):
             chord_error=chord_error,
             max_triangles=max_triangles,
             adaptive=adaptive,
-            creases=creases or split_normals,
+            creases=split_normals or creases,
             device=device,
             progress=progress,
             cancel=cancel,
         )
         surface = to_polydata(split_creases(self, mesh) if split_normals else mesh)
         if surface.n_points:
-            for name in (attributes,) if isinstance(attributes, str) else attributes:
+            for name in names:
                 surface.point_data[name] = self.attribute(name, surface.points)
             if rest_coordinates:
                 surface.point_data["rest_coordinates"] = self.rest_coordinates(surface.points)
@@ -1247,8 +1256,8 @@ def _passes(default: Any, check: Callable[[Any], Any]) -> bool:
 def _numbers(default: Any, size: int) -> NDArray[np.float64]:
     """Return the default of an attribute as one number or `size` numbers."""
     try:
-        numbers = np.asarray(0.0 if default is None else default, np.float64)
-    except (TypeError, ValueError):
+        numbers = np.asarray(real(0.0 if default is None else default), np.float64)
+    except (TypeError, ValueError, OverflowError):
         numbers = np.empty((0, 0))
     if numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
         raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}")

@@ -10,6 +10,7 @@ import numpy as np
 from blobtree._typing import Float32Array, Float64Array, UInt8Array
 from blobtree.files import write_atomically
 from blobtree.progress import Cancel, Progress, reporting
+from blobtree.validation import truth
 from decals.baking.atlas import Unwrapped, unwrap
 from decals.baking.glb import Node, glb_bytes
 from decals.baking.meshes import BakeMesh, bake_mesh
@@ -114,6 +115,8 @@ def bake(
     samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
     Drawing().overridden(**modes)  # checked before a model is read
+    vertex_colors = truth("vertex_colors", vertex_colors, InvalidScene)
+    creases = truth("creases", creases, InvalidScene)
     for package in ("trimesh",) if vertex_colors else ("trimesh", "xatlas"):
         optional_package(package, "bake")
     with reporting(progress, cancel) as report:

@@ -18,7 +18,7 @@ from decals.errors import InvalidEdit
 from decals.model import NO_IMAGE, Decals
 from decals.scattering.orientation import tangents
 from decals.scenes.objects import bounds_of
-from decals.validation import finite_number, finite_vector, whole_number
+from decals.validation import describe, finite_number, finite_vector, whole_number
 
 CLOSEST = 0.8
 """Least distance of new decals in spacings: random discs at full distance would leave two fifths bare."""
@@ -133,6 +133,11 @@ class BrushDecals:
         density = positive_number("density", self.density)
         if density > 1.0:
             raise InvalidEdit(f"density: expected a number above 0 and at most 1, got {density:g}")
+        if not isinstance(self.images, tuple | list):
+            raise InvalidEdit(
+                f"images: expected indices of images, such as (0, 2), got {describe(self.images)}"
+            )
+        whole_number("seed", self.seed, 0, None, InvalidEdit)
         images = self.images or tuple(range(len(document.images)))
         for image in images:
             whole_number("image", image, 0, len(document.images) - 1, InvalidEdit)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.validation import point_array
@@ -18,7 +18,15 @@ from decals.model import NO_IMAGE, Decals
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
-from decals.validation import color_values, describe, finite_number, finite_vector, instance, whole_number
+from decals.validation import (
+    called,
+    color_values,
+    describe,
+    finite_number,
+    finite_vector,
+    instance,
+    whole_number,
+)
 
 DUPLICATE_OFFSET = 1.0
 """Distance between a decal and its duplicate, in radii."""
@@ -188,7 +196,9 @@ class MapValues(DecalCommand):
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        values = {self.name: self.function(document.decals.take(self.numbers))}
+        taken = document.decals.take(self.numbers)
+        _array_named(taken, self.name)
+        values = {self.name: called("function", self.function, taken, error=InvalidEdit)}
         return SetValues(self.numbers, values, self.label).compute(document)
 
 
@@ -527,11 +537,16 @@ def _checked_point(position: ArrayLike, normal: ArrayLike) -> tuple[Float32Array
     return point_array(point[None]), unit_rows(direction[None])
 
 
+def _array_named(decals: Decals, name: str) -> NDArray[Any]:
+    present = getattr(decals, name, None) if isinstance(name, str) else None
+    if not isinstance(present, np.ndarray):
+        raise InvalidEdit(f"expected the name of an array of decals, such as 'layers', got {describe(name)}")
+    return present
+
+
 def _broadcast(decals: Decals, name: str, value: ArrayLike) -> Any:
     """Return a row of a value for each decal."""
-    present = getattr(decals, name, None)
-    if not isinstance(present, np.ndarray):
-        raise InvalidEdit(f"expected the name of an array of decals, such as 'layers', got {name!r}")
+    present = _array_named(decals, name)
     if name == "tints":
         value = color_values(name, value, InvalidEdit)
     try:

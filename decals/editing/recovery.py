@@ -14,6 +14,7 @@ from decals.editing.commands import ReplaceScene
 from decals.editing.session import EditSession
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.scenes.camera import Camera
+from decals.scenes.files import as_path
 from decals.scenes.scene import Scene
 
 AUTOSAVE_SECONDS = 5.0
@@ -40,6 +41,11 @@ def recovery_path(path: str | PathLike[str], *, number: int = 1) -> Path:
     number
         Number of the window, where several edit the same file.
 
+    Raises
+    ------
+    InvalidScene
+        `path` is not the path of a file.
+
     Examples
     --------
     >>> from decals.editing import recovery_path
@@ -49,7 +55,10 @@ def recovery_path(path: str | PathLike[str], *, number: int = 1) -> Path:
     'knot-2.recovery.json'
     """
     ending = "" if number == 1 else f"-{number}"
-    return Path(path).with_name(f"{Path(path).stem}{ending}{SUFFIX}")
+    scene = as_path(path)
+    if not scene.name:
+        raise InvalidScene(f"path: expected the path of a scene, got {str(path)!r}")
+    return scene.with_name(f"{scene.stem}{ending}{SUFFIX}")
 
 
 class RecoveryFile:

@@ -70,7 +70,7 @@ class PrimitiveCommand:
         before = self.tree(document)
         after = with_node(before, self.path, node)
         item = self._exchanged(document, after)
-        if not quick:
+        if not truth("quick", quick, InvalidEdit):
             item.surface  # noqa: B018  # raises for a tree without a visible surface
         objects = self._with_object(document, item)
         numbers, points = followers(
@@ -215,7 +215,7 @@ class SetParameter(PrimitiveCommand):
         node = self.changed_node(document)
         if parameters_of(type(node))[self.name].quantity in (Quantity.COLOR, Quantity.ATTRIBUTES):
             return self.compute_repainting(document, node)
-        return self.compute_exchange(document, node, quick=truth("quick", self.quick, InvalidEdit))
+        return self.compute_exchange(document, node, quick=self.quick)
 
     def changed_node(self, document: Document) -> Node:
         """Return the node with the new value; raise `InvalidEdit` or `InvalidNode` if it takes none such."""
@@ -480,7 +480,7 @@ class MoveBranch(StructureCommand):
 
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the node in it."""
-        return surgery.move_branch(tree, tuple(self.path), tuple(self.target))
+        return surgery.move_branch(tree, self.path, self.target)
 
 
 @dataclass(frozen=True, eq=False)

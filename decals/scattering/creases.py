@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
-from blobtree.validation import point_array
+from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.scattering.domain import MAX_PARTICLES
 from decals.surfaces.mesh import MeshSurface, edges_of
@@ -82,7 +82,8 @@ class Creases:
             lambda value: 0.0 < value < 180.0,
             InvalidScattering,
         )
-        self._vertices, self._edges = _sharp_edges(surface, angle, boundary)
+        ends = truth("boundary", boundary, InvalidScattering)
+        self._vertices, self._edges = _sharp_edges(surface, angle, ends)
         self.segments: Float64Array = self._vertices[self._edges]
 
     def __repr__(self) -> str:

@@ -1,6 +1,6 @@
 """The domain of a relaxation: visible area, density and mask of surfaces, apportionment, initial sampling."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeGuard
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
-from blobtree.validation import point_array
+from blobtree.validation import items, point_array
 from decals.errors import InvalidScattering
 from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
@@ -290,8 +290,11 @@ def as_surfaces(models: object) -> tuple[Surface, ...]:
         return several
     from decals.surfaces.convert import as_surface, is_model  # imports pyvista, which surfaces do not need
 
-    members = models if isinstance(models, Iterable) and not is_model(models) else (models,)
-    return tuple(as_surface(model, name="surfaces", error=InvalidScattering) for model in members)
+    members = None if is_model(models) else items(models)
+    return tuple(
+        as_surface(model, name="surfaces", error=InvalidScattering)
+        for model in ((models,) if members is None else members)
+    )
 
 
 def _is_surface(value: object) -> TypeGuard[Surface]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.progress import Progress, reporting
-from blobtree.validation import point_array
+from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.appearance import Appearance
@@ -263,7 +263,11 @@ class Relaxation:
         """Part the pairs that are closer than `close` spacings by trial, in at most so many rounds."""
         whole_number("rounds", rounds, 0, None, InvalidScattering)
         real_number(
-            "close", close, "a number of spacings from 0 upward", lambda value: value >= 0, InvalidScattering
+            "close",
+            close,
+            "a number of spacings from 0 to 100",
+            lambda value: 0 <= value <= 100,
+            InvalidScattering,
         )
         if self.count > 1:
             state = self._device_state()
@@ -352,17 +356,18 @@ class Relaxation:
         Raises
         ------
         InvalidScattering
-            If the closest point of the surfaces is hidden or masked.
+            If the closest point of the surfaces is hidden or masked, or an argument is of another type.
         """
         coordinates = real_array("point", point, InvalidScattering)
         if coordinates.shape != (3,):
             raise InvalidScattering(f"point: expected three numbers, got shape {list(coordinates.shape)}")
+        held = truth("fixed", fixed, InvalidScattering)
         inserted = self.domain.project_fixed(coordinates[None])
         if not self.domain.project(inserted)[1].all():
             raise InvalidScattering(f"expected a point that is neither hidden nor masked, got {point!r:.60}")
         row = int(np.searchsorted(self.surface_ids, inserted.surface_ids[0], side="right"))
         points = OrientedPoints.joined([self.points[:row], inserted, self.points[row:]])
-        self._fixed = np.insert(self._fixed, row, fixed)
+        self._fixed = np.insert(self._fixed, row, held)
         self._relax_near(points, inserted.positions[0])
         return row
 

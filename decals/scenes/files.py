@@ -56,7 +56,7 @@ from decals.scenes.records import (
     relative,
 )
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, is_file
+from decals.validation import describe, instance, is_file
 
 PART = 500
 """Decals that are described at a time."""
@@ -126,6 +126,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
     >>> decals.save_scene(scene, "ball.json")
     """
+    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
     path = as_path(path)
     folder = path.parent
     if not folder.is_dir():
