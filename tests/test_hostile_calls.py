@@ -118,6 +118,9 @@ CALLS: dict[str, Callable[[], object]] = {
     "endless distance": lambda: decals.Relaxation(MeshSurface(*TRIANGLE), count=3).polish(close=1e308),
     "vertex colours": lambda: decals.bake(SCENE, "a.glb", vertex_colors=np.zeros(0)),  # type: ignore[arg-type]
     "array as surfaces": lambda: decals.Relaxation(np.array("x"), count=1),  # type: ignore[arg-type]
+    "endless origin": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], origin=HUGE),
+    "complex origin": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], origin=np.zeros(3, complex)),
+    "device of scattering": lambda: decals.scatter(BALL, spacing=1.0, device="a\0b"),
     "decals of a number": lambda: decals.Decals.concatenate(WRONG),
     "scene of a number": lambda: decals.save_scene(WRONG, "a.json"),
     "recovery of a number": lambda: recovery_path(WRONG),

@@ -108,7 +108,7 @@ class Domain:
         function_or_none("mask", mask, InvalidScattering)
         self._seed, self._density, self._mask = seed, density, mask
         outside = self._outside_mask if mask is not None else None
-        self.projection = SurfaceProjection(self.surfaces, outside, device)
+        self.projection = SurfaceProjection(self.surfaces, outside, self.device)
         measures = [self._measure(index) for index in range(len(self.surfaces))]
         self.areas = np.array([area for area, _ in measures])
         """Visible area of each surface."""

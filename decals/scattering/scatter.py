@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import warp as wp
 from numpy.typing import ArrayLike
 
+from blobtree.device import known_device
 from blobtree.kernels import load_together
 from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScattering
@@ -140,6 +141,7 @@ def scatter(
     function_or_none("progress", progress, InvalidScattering)
     Appearance(sizing, factor, direction, images, weights, choice, jitter)  # check before the long work
     with reporting(progress) as report:
+        device = known_device(device)
         load_together([*_projections(checked_surfaces), *SCATTER_KERNELS], device)
         relaxation = Relaxation(
             checked_surfaces,

@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike
 
 from blobtree import Node
 from blobtree._typing import Float64Array
+from blobtree.validation import real
 from decals.errors import InvalidScene
+from decals.validation import describe
 
 Origin = tuple[float, float, float]
 """A point in the coordinates that models come in."""
@@ -45,11 +47,11 @@ def origin_near(low: Float64Array, high: Float64Array) -> Origin:
 def as_origin(origin: ArrayLike) -> Origin:
     """Return three finite coordinates, or raise InvalidScene."""
     try:
-        x, y, z = (float(value) for value in np.asarray(origin, np.float64))
-    except (TypeError, ValueError):
+        x, y, z = (float(value) for value in np.asarray(real(origin), np.float64))
+    except (TypeError, ValueError, OverflowError):
         x = y = z = np.nan
     if not np.isfinite([x, y, z]).all():
-        raise InvalidScene(f"origin: expected three finite coordinates, got {origin!r:.60}")
+        raise InvalidScene(f"origin: expected three finite coordinates, got {describe(origin)}")
     return x, y, z
 
 
