@@ -1,11 +1,13 @@
 """Fixtures for all tests."""
 
 import gc
+from collections.abc import Iterator
 
 import pytest
 
 import blobtree.kernels as kernels
 from blobtree.custom import definition
+from blobtree.formulas.falloffs import FALLOFF_NAMES
 from decals.rendering.gl_libraries import missing_gl_libraries
 
 LONG_FILES = (
@@ -79,9 +81,12 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(autouse=True)
-def own_kinds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give each test its own registry: pages and examples define kinds under names of other tests."""
+def own_kinds(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Give each test its own registries: pages and examples define kinds under names of other tests."""
     monkeypatch.setattr(definition, "_KINDS", dict(definition._KINDS))
+    falloffs = dict(FALLOFF_NAMES)
+    yield
+    FALLOFF_NAMES.update(falloffs)
 
 
 @pytest.fixture(scope="session")

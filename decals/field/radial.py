@@ -157,8 +157,8 @@ def comes_next(
 def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDecals) -> wp.int32:
     """Return the topmost contact decal whose cell contains q, given the one of least power at q.
 
-    Only decals nested with that one can share q with it. Those above it are tried from the topmost down: each
-    traversal finds whether q lies in the cell of one, and the next one.
+    Only decals nested with that one can share q with it. Those above it that face the surface well are tried
+    from the topmost down: each traversal finds whether q lies in the cell of one, and the next one.
     """
     rank = wp.int32(0)
     if index.layered:
@@ -170,8 +170,6 @@ def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDeca
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
         inside = bool(tried != closest)
-        if inside:
-            inside = lies_on_top(n_q, tried, index.records)
         lower = wp.int32(NO_OWNER)
         lower_size = wp.float32(0.0)
         for level in range(index.level_count):
@@ -185,8 +183,9 @@ def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDeca
                     if comes_next(
                         ball, decal, lower_size, lower, tried_ball[3], tried, closest_ball, closest
                     ):
-                        lower = decal
-                        lower_size = ball[3]
+                        if lies_on_top(n_q, decal, index.records):
+                            lower = decal
+                            lower_size = ball[3]
         if inside:
             return tried
         if lower < 0:

@@ -19,7 +19,6 @@ from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import WORLD
 from decals.surfaces.mesh_file import MeshArrays, read_mesh
 from decals.surfaces.normals import CREASE_ANGLE
-from decals.validation import describe
 
 SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""
@@ -61,10 +60,6 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     origin = None if item.origin == WORLD else item.origin
     if isinstance(item, TreeObject):
         return TreeRecord(item.name, to_tree_file(item.tree), origin)
-    if not isinstance(item, MeshObject):
-        raise InvalidScene(
-            f"expected meshes and trees to save, got {describe(item)}; save the scene of a rest pose"
-        )
     kept: dict[str, Any] = {"crease_angle": item.crease_angle, "origin": origin}
     if item.source is not None:
         return MeshRecord(item.name, item.color, source=relative(item.source, folder), **kept)

@@ -130,11 +130,14 @@ def test_what_lies_over_what_is_the_same_from_every_side(renderer: Renderer) -> 
         compare(view, buffers, ImageMapping.CORRECTED)
 
 
-def test_many_decals_on_one_point(renderer: Renderer) -> None:
+@pytest.mark.parametrize(("contact", "count"), [(Contact.PRODUCT, 300), (Contact.ELASTIC, 70)])
+def test_many_decals_on_one_point(renderer: Renderer, contact: Contact, count: int) -> None:
+    """In elastic contact the oracle compares each decal with each: its time grows with the square."""
     shape = torus()
-    decals = scattered(shape, 300, 3, radii=(0.1, 0.5)).replace(positions=np.full((300, 3), [0, -1.4, 0]))
+    decals = scattered(shape, count, 3, radii=(0.1, 0.5)).replace(positions=np.full((count, 3), [0, -1.4, 0]))
     view = view_of(decals, shape)
-    assert compare(view, renderer.buffers(view, RenderOptions(size=SIZE)), ImageMapping.CORRECTED).any()
+    buffers = renderer.buffers(view, RenderOptions(size=SIZE, contact=contact))
+    assert compare(view, buffers, ImageMapping.CORRECTED, contact).any()
 
 
 def test_graphics_and_warp_agree_bit_for_nearly_bit(renderer: Renderer) -> None:

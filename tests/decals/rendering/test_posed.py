@@ -169,7 +169,7 @@ def test_a_posed_scene_is_drawn_only() -> None:
     posed = decals.pose(covered(sheet(), count=3), {"sheet": sheet().vertices})
     with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
         decals.measure(cast(Any, posed))
-    with pytest.raises(InvalidScene, match="got a PosedMesh; save the scene of a rest pose"):
+    with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
         decals.save_scene(cast(Any, posed), "scene.json")
 
 
