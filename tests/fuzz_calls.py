@@ -87,6 +87,7 @@ def call_table() -> Calls:
     origin, axis = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
     points, directions = [[0.0, 0.0, 2.0]], [[0.0, 0.0, -1.0]]
     pixels = np.zeros((2, 2, 4), np.uint8)
+    poses = {one.name: one.vertices for one in whole.objects if isinstance(one, decals.MeshObject)}
     document, numbers = EditSession(whole).document, blobtree.numeric_parameters(tree)
     rated = Point((0, 0, 0), radius=1.0, attributes={"wetness": 1.0})
     ball = pv.Sphere(theta_resolution=6, phi_resolution=6)
@@ -188,6 +189,18 @@ def call_table() -> Calls:
                 "samples": 20,
                 "seed": 0,
             },
+        ),
+        "pose": (
+            decals.pose,
+            {"scene": whole, "poses": poses, "rigid": True, "camera": None},
+        ),
+        "skin": (
+            decals.skin,
+            {"vertices": [origin, axis], "weights": [[1, 0], [0.5, 0.5]], "transforms": [np.eye(4)] * 2},
+        ),
+        "define_contact": (
+            decals.define_contact,
+            {"field": "wyvill", "law": None, "combine": "product", "name": None},
         ),
         "render": (
             decals.render,
@@ -470,6 +483,7 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "DuplicateDecals": {"numbers": [0]},
         "DuplicatePrimitive": {**node, "offset": (1.0, 0.0, 0.0)},
         "JoinPrimitive": {**node, "join": "union"},
+        "GroupOperands": {"object": 0, "path": (), "steps": (0, 1)},
         "MapValues": {"numbers": [0], "name": "opacities", "function": lambda spots: spots.opacities},
         "MoveBranch": {**node, "target": ()},
         "MoveDecals": {"numbers": [0], "position": point, "normal": normal},

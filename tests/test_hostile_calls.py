@@ -13,9 +13,11 @@ from blobtree import Point
 from decals.editing import (
     BrushDecals,
     EditSession,
+    GroupOperands,
     MapValues,
     MoveBranch,
     MovePrimitive,
+    ScaleDecals,
     SetParameter,
     SetValues,
     recovery_path,
@@ -91,7 +93,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "too few numbers": lambda: blobtree.with_numeric_values(BALL, blobtree.numeric_parameters(BALL), [1.0]),
     "gradient by no parameters": lambda: BALL.parameter_gradient([[0, 0, 1]], WRONG),
     "list as attribute": lambda: BALL.attribute([], [[0, 0, 1]]),  # type: ignore[arg-type]
-    "endless default": lambda: Point((0, 0, 0), radius=1.0, attributes={"a": 1}).attribute(
+    "large default": lambda: Point((0, 0, 0), radius=1.0, attributes={"a": 1}).attribute(
         "a", [[0, 0, 1]], default=HUGE
     ),
     "number as attributes": lambda: BALL.to_pyvista(resolution=8, attributes=WRONG),
@@ -122,6 +124,15 @@ CALLS: dict[str, Callable[[], object]] = {
     "complex origin": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], origin=np.zeros(3, complex)),
     "device of scattering": lambda: decals.scatter(BALL, spacing=1.0, device="a\0b"),
     "decals of a number": lambda: decals.Decals.concatenate(WRONG),
+    "group at no path": lambda: EditSession(SCENE).do(GroupOperands(0, WRONG, (0, 1))),
+    "group of no numbers": lambda: EditSession(SCENE).do(GroupOperands(0, (), WRONG)),
+    "endless default": lambda: Point((0, 0, 0), radius=1.0, attributes={"wet": 1}).attribute(
+        "wet", [[0, 0, 1]], default=1e308
+    ),
+    "camera of a pose": lambda: decals.pose(SCENE, {}, camera=np.zeros((2, 3))),  # type: ignore[arg-type]
+    "rigid": lambda: decals.pose(SCENE, {}, rigid=np.zeros(3)),  # type: ignore[arg-type]
+    "name of a law": lambda: decals.define_contact(name=np.zeros(3)),  # type: ignore[arg-type]
+    "scale of decals": lambda: EditSession(SCENE).do(ScaleDecals([0], 1e308)),
     "scene of a number": lambda: decals.save_scene(WRONG, "a.json"),
     "recovery of a number": lambda: recovery_path(WRONG),
     "recovery of nothing": lambda: recovery_path(""),

@@ -35,7 +35,7 @@ from blobtree.nodes.tree import (
     Transform,
     Union,
 )
-from blobtree.validation import finite_vector
+from blobtree.validation import finite_vector, items, shown
 
 SOFTNESS = 3.0
 """Exponent of the Ricci blend that `Join.SOFT` makes: about half way from a sum to a union."""
@@ -220,7 +220,10 @@ def group_operands(tree: Node, path: Path, steps: Sequence[int]) -> tuple[Node, 
         The node at the path is no such combination, or has no two such operands and another one.
     """
     parent: Any = node_at(tree, path)
-    chosen = sorted(set(steps))
+    given = items(steps) or ()
+    if not all(isinstance(step, int) for step in given):
+        raise InvalidNode(f"steps: expected indices of operands, got {shown(steps)}")
+    chosen = sorted(set(given))
     if JOIN_OF_KIND.get(type(parent), Join.DIFFERENCE) is Join.DIFFERENCE:
         raise InvalidNode(
             f"path: expected a sum, Ricci blend, union or intersection, got a {type(parent).__name__}"

@@ -53,6 +53,8 @@ from blobtree.tape.program import Placement
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import Hits, raycast
 from blobtree.validation import (
+    LARGEST_NUMBER,
+    LIMIT,
     Matrix,
     affine_matrix,
     finite_number,
@@ -1259,8 +1261,8 @@ def _numbers(default: Any, size: int) -> NDArray[np.float64]:
         numbers = np.asarray(real(0.0 if default is None else default), np.float64)
     except (TypeError, ValueError, OverflowError):
         numbers = np.empty((0, 0))
-    if numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
-        raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}")
+    if numbers.shape not in ((), (size,)) or not (np.abs(numbers) <= LARGEST_NUMBER).all():
+        raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}; {LIMIT}")
     return numbers
 
 

@@ -236,7 +236,8 @@ class ScaleDecals(DecalCommand):
         """Return the edit."""
         factor = finite_number("factor", self.factor, InvalidEdit)
         before = document.decals.take(self.numbers)
-        radii = before.radii.astype(np.float64) * factor
+        with np.errstate(over="ignore"):  # Decals refuses radii that are not finite
+            radii = before.radii.astype(np.float64) * factor
         return document.compute_replacement(self.numbers, before.replace(radii=radii))
 
 

@@ -513,7 +513,7 @@ class GroupOperands(StructureCommand):
 
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the group in it."""
-        return surgery.group_operands(tree, tuple(self.path), self.steps)
+        return surgery.group_operands(tree, self.path, self.steps)
 
 
 @dataclass(frozen=True, eq=False)

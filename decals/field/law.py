@@ -280,7 +280,8 @@ def define_contact(
     _require_floats(g_source, 1, "the distance `d: wp.float32` as its only parameter")
     _require_floats(h_source, 2, "the fields `own: wp.float32, other: wp.float32` as its parameters")
     given = falloff.name if isinstance(falloff, Falloff) else g_source.name
-    kind = kind_name(h_source, name or (given if law is None else h_source.name))
+    default = given if law is None else h_source.name
+    kind = kind_name(h_source, default if name is None else name)
     digest = g_source.digest_with(kind, h_source.digest, int(base))
     known = LAWS.get(kind)
     if known is not None and known.digest == digest:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array
-from blobtree.validation import real
+from blobtree.validation import real, truth
 from decals.errors import InvalidScene
 from decals.model import Decals
 from decals.rendering.options import Drawing
@@ -149,8 +149,10 @@ def pose(
                 f"poses: expected names of meshes of the scene ({known}), got {describe(name)}"
             )
     posed = {name: _posed_mesh(meshes[name], vertices) for name, vertices in poses.items()}
-    view = camera or scene.camera
-    if rigid:
+    view = scene.camera
+    if camera is not None:
+        view = instance("camera", camera, Camera, InvalidScene, "leave it out for the scene's")
+    if truth("rigid", rigid, InvalidScene):
         return PosedScene(
             tuple(_as_object(posed.get(item.name, item)) for item in scene.objects),
             _carried(scene, posed),
