@@ -29,8 +29,8 @@ PICTURES = ("hero.png", "contact.png", "span.png")
 
 COUNT = 1100
 EYE_RADIUS = 0.23
-_EYE_CLEARANCE = 0.17
-"""Distance from an eye within which scales are removed; the eye fills the gap and pushes its neighbours."""
+_EYE_CLEARANCE = 0.24
+"""Distance from an eye within which scales are removed: nested with it, they would lie above it."""
 _EYES = np.array([[1.06, 2.29, 0.45], [1.06, 2.29, -0.45]], np.float32)
 """Positions of the creature's eyes, before they are projected onto its surface."""
 
