@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import RIM
-from decals import NO_IMAGE, Contact, Decals, MeshObject, Scene, TreeObject, evaluate
+from decals import NO_IMAGE, Contact, Decals, Interaction, MeshObject, Scene, TreeObject, evaluate
 from decals.apps.gallery.field import BLUE, line
 from decals.apps.gallery.helpers import CLAY, Panel, camera_above, camera_at, main, plane, ring_image
 
@@ -44,7 +44,7 @@ def _situation(distance: float) -> Scene:
         images=[NO_IMAGE] * 2,
         tints=[BLUE] * 2,
         opacities=[0.45] * 2,
-        interactions=[2] * 2,
+        interactions=[Interaction.INDEPENDENT] * 2,
     )
     images = Decals(
         positions=centers,

@@ -81,7 +81,7 @@ def image_jacobians(
 
 
 def _solved(ways: Float64Array, changes: Float64Array) -> Float64Array:
-    """Return the least matrices that lead from two ways to two changes of image coordinates."""
+    """Return the matrices of least norm that map two steps to two changes of image coordinates."""
     a, b = ways
     aa, bb, ab = (np.einsum("mi,mi->m", x, y)[:, None] for x, y in ((a, a), (b, b), (a, b)))
     determinant = np.where(aa * bb - ab * ab > 0.0, aa * bb - ab * ab, 1.0)

@@ -25,8 +25,9 @@ from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.specialize import rebind, referenced_values, warp_function
-from decals.errors import ImplicitDecalsError
+from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.field.contact import contact_push, push_of, rim_distance
+from decals.field.radial import RIM_SQUARED
 from decals.record import NEIGHBOR_REACH, RIM_RADIUS, Contact, field_complement
 from decals.validation import member
 
@@ -47,10 +48,9 @@ LARGEST_CUT = 5e-3
 """Largest change of F by a neighbour beyond the reach of the index, which is left out."""
 
 HALVINGS = 26
-"""Steps of the bisection that inverts g: one more than float32 has bits."""
+"""Steps of the bisection that inverts g: two more than a float32 has bits of precision."""
 
 FIELD_SCALE = 1.0
-RIM_SQUARED = RIM_RADIUS * RIM_RADIUS
 
 Floats = NDArray[np.float64]
 
@@ -265,8 +265,6 @@ def define_contact(
     >>> decals.evaluate(pair, [[-0.1, 0, 0]], [[0, 0, 1]], contact=law).field.round(2)
     array([0.76], dtype=float32)
     """
-    from decals.errors import InvalidScene
-
     base = member("combine", combine, Contact, InvalidScene)
     if base not in (Contact.PRODUCT, Contact.MIN):
         raise InvalidScene(f"combine: expected 'product' or 'min', got {base.name.lower()!r}")

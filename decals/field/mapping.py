@@ -45,8 +45,8 @@ MIN_TURN = 1.0e-20
 MIN_COSINE = 1.0e-4
 """Smallest cosine of half the angle between two normals; opposed normals define no arc."""
 MIN_REMAINDER = 1.0e-7
-RIM_SQUARED = 0.25001
-"""Squared distance of the image's rim from its centre, with a margin for rounding."""
+IMAGE_RADIUS_SQUARED = 0.25001
+"""Squared radius of an image in its own coordinates, with a margin for rounding."""
 
 
 @wp.func
@@ -130,7 +130,7 @@ def in_image(uv: wp.vec2) -> wp.bool:
     """Return True inside the image, a disc that ends at its radius along the surface."""
     x = uv[0] - 0.5
     y = uv[1] - 0.5
-    return x * x + y * y <= RIM_SQUARED
+    return x * x + y * y <= IMAGE_RADIUS_SQUARED
 
 
 @wp.func

@@ -28,7 +28,7 @@ from decals.record import (
 wp.set_module_options(KERNEL_OPTIONS)
 
 MIN_REMAINDER = 1.0e-6
-"""Smallest divisor 1 − t; on the rim no way is left."""
+"""Smallest divisor 1 − t, which is 0 on the rim."""
 
 
 @wp.func

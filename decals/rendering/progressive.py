@@ -23,9 +23,10 @@ from decals.rendering.context import DEPTH, Context
 from decals.rendering.decal_pass import DecalPass
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
+from decals.rendering.mesh import PosedMeshDrawable
 from decals.rendering.options import RenderOptions, SceneLike, Size
 from decals.rendering.pixel_pass import GROUP
-from decals.rendering.rest_buffer import PosedDrawable, RestBuffer
+from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.uploads import Drawable, UploadedScene
 from decals.rendering.viewpoint import Bounds, Part, PictureView, Rectangle, Step, Tile, Viewpoint
 
@@ -250,7 +251,7 @@ class Targets:
 
     def rest_for(self, drawables: Sequence[Drawable]) -> RestBuffer | None:
         """Return the rest buffer if some drawables are posed, else None."""
-        if not any(isinstance(drawable, PosedDrawable) for drawable in drawables):
+        if not any(isinstance(drawable, PosedMeshDrawable) for drawable in drawables):
             return None
         if self._rest is None:
             self._rest = RestBuffer(self._context, self.gbuffer)
@@ -405,7 +406,7 @@ def _surface_steps(uploaded: UploadedScene, tile: Tile, targets: Targets, *, dep
         steps += [
             partial(drawable.draw_rest, number, tile, rest)
             for number, drawable in objects
-            if isinstance(drawable, PosedDrawable)
+            if isinstance(drawable, PosedMeshDrawable)
         ]
     return steps
 

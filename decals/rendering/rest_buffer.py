@@ -1,13 +1,11 @@
 """The rest pose behind every pixel of posed meshes, beside the G-buffer."""
 
-from typing import Protocol, runtime_checkable
-
 import moderngl
 
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import scissor_of
-from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
+from decals.rendering.viewpoint import WHOLE, Part, Rectangle
 
 
 class RestBuffer:
@@ -52,12 +50,3 @@ class RestBuffer:
         self._framebuffer.release()
         for texture in self.textures.values():
             texture.release()
-
-
-@runtime_checkable
-class PosedDrawable(Protocol):
-    """A drawable whose decals lie on its rest pose."""
-
-    def draw_rest(self, object_id: int, tile: Tile, rest: RestBuffer, part: Part = WHOLE) -> None:
-        """Put the object, or a part of it, into the rest buffer where it is visible."""
-        ...

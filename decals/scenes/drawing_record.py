@@ -71,7 +71,7 @@ def drawing_record(drawing: Drawing) -> DrawingRecord:
 
 
 def drawing_of_record(record: DrawingRecord | None) -> Drawing:
-    """Return how a scene is drawn; a file without a word about it was drawn with equation 5.
+    """Return how a scene is drawn. Pictures of files without this record were drawn with equation 5.
 
     Raises
     ------

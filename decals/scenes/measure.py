@@ -13,7 +13,7 @@ from decals.errors import InvalidScene
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of, tangent_axes
 from decals.field.law import AnyContact
-from decals.field.mapping import ImageMapping
+from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
 from decals.model import Decals, Interaction
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
@@ -37,9 +37,6 @@ LINE_STEP = 0.05
 
 TURN_STEP = 1e-2
 """Step of the derivatives of normals, in visible radii."""
-
-IMAGE_RADIUS_SQUARED = 0.25001
-"""Squared radius of an image in its coordinates, with a margin for rounding (`decals.field.mapping`)."""
 
 STREAM = 9
 """Stream of random numbers that no scattering uses."""
@@ -217,7 +214,7 @@ def measure(
 def _drawn(
     item: SceneObject, points: Float32Array, normals: Float32Array, scene: Scene
 ) -> Iterator[tuple[Float32Array, Float32Array, Float64Array]]:
-    """Give points of an object in parts, the normals with which it is drawn, and their derivatives."""
+    """Yield points of an object in parts, the normals with which it is drawn, and their derivatives."""
     split = None
     if isinstance(item, MeshObject):
         split = split_at_creases(item.vertices, item.faces, item.crease_angle)

@@ -1,12 +1,12 @@
 """Posed scenes: meshes that deform, with decals that stretch with them.
 
 Decals lie on the rest pose. Each pixel of a posed mesh finds its place in the rest pose, and decals and their
-contact are evaluated there. Nothing is attached: a decal keeps its place, and its neighbours, in every pose.
+contact are evaluated there. So a decal keeps its place and its neighbours in every pose.
 This removes the limitation that section 3.5 of the paper states.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -168,8 +168,7 @@ def _as_object(item: SceneObject | PosedMesh) -> SceneObject:
     """Return a posed mesh as a mesh without another pose; other objects as they are."""
     if not isinstance(item, PosedMesh):
         return item
-    rest = item.rest
-    return MeshObject(rest.name, item.vertices, rest.faces, rest.color, None, rest.crease_angle, rest.origin)
+    return replace(item.rest, vertices=item.vertices, source=None)
 
 
 def _carried(scene: Scene, posed: Mapping[str, PosedMesh]) -> Decals:

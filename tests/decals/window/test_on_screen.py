@@ -23,7 +23,7 @@ def test_without_a_screen() -> None:
 
 
 def test_windows_on_a_virtual_display(display: str) -> None:
-    """One process opens them all: one drives itself, one is asked to close, one has a user with real keys."""
+    """One process opens three windows. A timer, a request to close and real keys end them."""
     try:
         ctypes.CDLL("libXtst.so.6")
         parts = ["tick", "asked", "events"]
