@@ -28,9 +28,6 @@ Operand = Callable[[Rng], Node]
 EXACT = 1e-4
 """Largest relative error of values and gradients, absolute below 1."""
 
-SINGLE_POINTS: dict[type[Node], float] = {blobtree.Stroke: 1e-3, blobtree.Triangle: 2e-4}
-"""The same for gradients of classes whose closest points, found in float32, exceed EXACT at single points."""
-
 AWAY = 2e-3
 """Field values between a point and the nearest kink, where gradients are compared."""
 
@@ -210,7 +207,7 @@ def _fields(node: Node, points: Any, what: str) -> Iterator[str]:
     expected = oracle.gradient(node, points[smooth])
     length = np.maximum(1.0, np.linalg.norm(expected, axis=1))
     error = np.linalg.norm(seen[smooth, 1:] - expected, axis=1) / length
-    if error.max(initial=0.0) > SINGLE_POINTS.get(type(node), EXACT):
+    if error.max(initial=0.0) > EXACT:
         yield f"{what}: gradient differs from float64 by {error.max():.3g}"
 
 

@@ -24,6 +24,14 @@ ROOT_TOLERANCE = 1e-7
 """Change of a root, for parameters from 0 to 1, that ends its iteration."""
 
 POLISH_STEPS = 3
+
+JOINT_YIELD = 4e-6
+"""Part of the influence by which a curve is weaker at a joint than the one that goes on there.
+
+The joint is not the closest point where the next curve has a closer one, but float32 may not show it in the
+distances: a closest point at a distance of 3e-4 along the curve has the same one.
+"""
+
 POLISH_LIMIT = 4e-3
 """Longest step of `polished`: beside a centre of curvature, a root in float32 is that far off."""
 
@@ -151,7 +159,9 @@ def extrema(c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.vec4:
 @wp.func
 def curve_point(t: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """Return the point of a curve, and the influence there."""
-    return tape[at] + (tape[at + 1] + (tape[at + 2] + tape[at + 3] * t) * t) * t
+    last = tape[at + 3]
+    cubic = wp.vec4(last[0], last[1], last[2], 0.0)
+    return tape[at] + (tape[at + 1] + (tape[at + 2] + cubic * t) * t) * t
 
 
 @wp.func
@@ -169,11 +179,13 @@ def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
     Its vectors cancel less than the coefficients of N. Lengths are in units of s(0), for squares overflow.
     """
     unit = 1.0 / tape[at][3]
+    last = tape[at + 3]
+    cubic = wp.vec4(last[0], last[1], last[2], 0.0)
     root = float(t)
     for _step in range(POLISH_STEPS):
         c = curve_point(root, tape, at)
-        slope = (tape[at + 1] + (tape[at + 2] * 2.0 + tape[at + 3] * (3.0 * root)) * root) * unit
-        bend = (tape[at + 2] * 2.0 + tape[at + 3] * (6.0 * root)) * unit
+        slope = (tape[at + 1] + (tape[at + 2] * 2.0 + cubic * (3.0 * root)) * root) * unit
+        bend = (tape[at + 2] * 2.0 + cubic * (6.0 * root)) * unit
         w = (wp.vec3(c[0], c[1], c[2]) - q) * unit
         s = c[3] * unit
         d = wp.vec3(slope[0], slope[1], slope[2])
@@ -194,6 +206,7 @@ def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
 def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """tape[at + k] = coefficient of tᵏ in (c(t), s(t)), k from 0 to 3; s is constant if that of t³ is not 0.
 
+    s has no term in t³. In its place stand the ends at which another curve goes on: 1 start, 2 end, 3 both.
     With c − q = w + b t + a t² + g t³ and s = 1 + s₁ t + s₂ t² in units of s(0), to which N is proportional,
     N = ½ (|c − q|²)' s − |c − q|² s'.
     """
@@ -240,7 +253,11 @@ def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) ->
             best = t
         low = high
     best = polished(best, q, tape, at)
-    return curve_point(best, tape, at)
+    c = curve_point(best, tape, at)
+    joints = tape[at + 3][3]
+    if (best == 0.0 and (joints == 1.0 or joints == 3.0)) or (best == 1.0 and joints >= 2.0):
+        c[3] = c[3] * (1.0 - JOINT_YIELD)
+    return c
 
 
 @wp.func

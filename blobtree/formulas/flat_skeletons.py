@@ -44,10 +44,19 @@ def closer(w: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec3:
 
 
 @wp.func
+def is_beside(w: wp.vec3, edge: wp.vec3, outward: wp.vec3) -> wp.bool:
+    """Return True if w lies outside the line segment from 0 to `edge`, between the normals at its ends."""
+    t = wp.dot(w, edge)
+    return wp.dot(w, outward) > 0.0 and t > 0.0 and t < wp.dot(edge, edge)
+
+
+@wp.func
 def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """tape[at] = (corner a, influence); tape[at + 1] = (b − a, 0); tape[at + 2] = (c − a, 0).
 
-    tape[at + 3] = (unit normal, 0), which float32 could not compute for slivers.
+    tape[at + 3] = (unit normal, 0), which float32 could not compute for slivers. A point outside has the
+    closest one inside an edge if it is beside this edge, which signs tell: distances to that point and to a
+    corner near it differ by less than float32 shows.
     """
     corner = tape[at]
     to_b = tape[at + 1]
@@ -58,11 +67,21 @@ def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32)
     ac = wp.vec3(to_c[0], to_c[1], to_c[2])
     bc = ac - ab
     n = wp.vec3(upright[0], upright[1], upright[2])
-    inside = wp.dot(wp.cross(n, ab), w) >= 0.0 and wp.dot(wp.cross(n, ac), w) <= 0.0
+    beyond_ab = wp.cross(ab, n)
+    beyond_ac = wp.cross(n, ac)
+    beyond_bc = wp.cross(bc, n)
+    outside = wp.dot(w, beyond_ab) > 0.0 or wp.dot(w, beyond_ac) > 0.0 or wp.dot(w - ab, beyond_bc) > 0.0
     c = w - n * wp.dot(w, n)
-    if not (inside and wp.dot(wp.cross(n, bc), w - ab) >= 0.0):
-        c = closer(w, foot_on_edge(w, ab), foot_on_edge(w, ac))
-        c = closer(w, c, ab + foot_on_edge(w - ab, bc))
+    if outside:
+        if is_beside(w, ab, beyond_ab):
+            c = foot_on_edge(w, ab)
+        elif is_beside(w, ac, beyond_ac):
+            c = foot_on_edge(w, ac)
+        elif is_beside(w - ab, bc, beyond_bc):
+            c = ab + foot_on_edge(w - ab, bc)
+        else:
+            c = closer(w, foot_on_edge(w, ab), foot_on_edge(w, ac))
+            c = closer(w, c, ab + foot_on_edge(w - ab, bc))
     return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], corner[3])
 
 

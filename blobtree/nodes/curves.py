@@ -1,8 +1,9 @@
 """Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from blobtree.nodes.primitives import (
     octagons,
 )
 from blobtree.nodes.tree import Node
+from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
 
 STRAIGHTEST_ARC = 1e3
@@ -238,6 +240,21 @@ class TaperedBezier(Primitive):
     end_radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the end")]
     color: Color = DEFAULT_COLOR
 
+    joints: ClassVar[int] = 0
+    """Ends at which a stroke goes on, as `formulas.curve_skeletons.closest_on_curve` reads them."""
+
+    @classmethod
+    def packed(
+        cls,
+        primitives: Sequence[ProgramPrimitive],
+        influences: Float64Array,
+        matrices: Float64Array | None,
+    ) -> Float64Array:
+        """Return the parameters (n, 4, 4) on the tape of n pieces, with the ends that are joints."""
+        texels = super().packed(primitives, influences, matrices)
+        texels[:, 3, 3] = [cast(TaperedBezier, primitive).joints for primitive in primitives]
+        return texels
+
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
         """Return the coefficients of powers of t of the curve and of its influence radius."""
@@ -340,13 +357,17 @@ class Stroke(Pieces):
         """Return the union of the parabolas."""
         balls = np.column_stack([self.points, self.radii])
         pieces = _b_spline(balls) if self.spline == "b_spline" else _catmull_rom(balls)
-        return self.united(self._piece(*controls) for controls in pieces.tolist())
+        last = len(pieces) - 1
+        joints = [(place > 0) + 2 * (place < last) for place in range(len(pieces))]
+        return self.united(map(self._piece, joints, pieces.tolist()))
 
-    def _piece(self, start: list[float], control: list[float], end: list[float]) -> TaperedBezier:
-        a, b, c = (tuple(ball[:3]) for ball in (start, control, end))
+    def _piece(self, joints: int, controls: list[list[float]]) -> TaperedBezier:
+        start, control, end = controls
+        a, b, c = (tuple(ball[:3]) for ball in controls)
         radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
         piece = TaperedBezier(a, b, c, **radii, **self.shared)  # type: ignore[arg-type]  # lists of four
         object.__setattr__(piece, "to_width_radius", self.radii[0] - start[3])
+        object.__setattr__(piece, "joints", joints)
         return piece
 
 

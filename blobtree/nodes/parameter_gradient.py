@@ -236,6 +236,8 @@ def _of_leaves(
         if isinstance(instruction, Run) and any(id(p.primitive) in owners for p in instruction.primitives):
             runs.append(instruction)
             starts.append(header)
+    if not runs:  # their weights are negative, and they do nothing where they stand
+        return []
     tapes: list[Tape] = []
     for side in (-1.0, 1.0):
         try:

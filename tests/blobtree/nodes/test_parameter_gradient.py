@@ -164,6 +164,14 @@ def test_similar_and_other_maps() -> None:
         assert wrong_derivatives(tree + Segment((0, 0, 0), (1, 1, 0), radius=0.3), rng, columns=40)[1] == []
 
 
+def test_parameters_of_what_does_nothing_have_derivatives_of_0() -> None:
+    tree = Point((0, 0, 0), radius=0.5) | Point((0.3, 0, 0), radius=0.5, weight=-0.5)
+    seen = tree.parameter_gradient([[0.2, 0.1, 0.0]])
+    absent = [parameter.path == (1,) for parameter in seen.parameters]
+    assert not seen.values[:, absent].any()
+    assert seen.values[:, np.logical_not(absent)].any()
+
+
 def test_outside_every_support_derivatives_are_0_and_bad_points_are_refused() -> None:
     ball = Point((0, 0, 0), radius=1.0)
     np.testing.assert_array_equal(ball.parameter_gradient([[9, 9, 9]]).values, np.zeros((1, 4)))

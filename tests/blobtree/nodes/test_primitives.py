@@ -193,17 +193,25 @@ def test_the_handle_of_a_torus_is_in_its_mesh() -> None:
     assert len(mesh.vertices) == len(mesh.faces) // 2  # V − E + F = 0
 
 
-def test_beside_a_corner_a_triangle_has_the_right_closest_point() -> None:
-    """Feet on two edges that differ little, whose squared distances are equal in float32."""
+def test_gradients_are_exact_where_the_closest_point_leaves_a_corner_or_a_joint() -> None:
+    """Two candidates differ little there, and have the same squared distance in float32."""
     rng = np.random.default_rng(3)
     triangle = Triangle((0.58, -0.76, 0.35), (-0.55, -0.62, -0.7), (-0.36, -0.4, 0.4), radius=0.4)
-    a, b, c = (np.array(corner) for corner in (triangle.a, triangle.b, triangle.c))
-    edges = [edge / np.linalg.norm(edge) for edge in (b - a, c - a)]
-    sides = [np.cross(edge, rng.normal(size=(40, 3))) for edge in edges for _ in range(5)]
-    along = [10.0 ** rng.uniform(-5.0, -2.5, (40, 1)) * edge for edge in edges for _ in range(5)]
-    points = (a + 0.2 * np.concatenate(sides) + np.concatenate(along)).astype(np.float32)
-    expected = oracle.gradient(triangle, points, 1e-7)
-    np.testing.assert_allclose(triangle.gradient(points), expected, atol=2e-5)
+    corners = np.array([triangle.a, triangle.b, triangle.c])
+    curved = replace(WORM, points=((0, 0, 0), (0.5, 0.3, 0), (0.6, 1, 0.4), (1, 1, 1)))
+    pieces: Any = curved.expanded.children
+    ends: list[tuple[Node, Any, Any]] = [
+        (triangle, corners[i], corners[i - k] - corners[i]) for i in range(3) for k in (1, 2)
+    ]
+    ends += [(curved, np.array(p.start), np.subtract(p.control, p.start)) for p in pieces[1:]]
+    for node, end, direction in ends:
+        tangent = direction / np.linalg.norm(direction)
+        away = np.cross(tangent, rng.normal(size=(200, 3)))
+        along = 10.0 ** rng.uniform(-5.0, -2.5, (200, 1)) * tangent
+        points = (end + 0.2 * away / np.linalg.norm(away, axis=1)[:, None] + along).astype(np.float32)
+        points = points[oracle.evaluate(node, points).margin > 1e-3]
+        expected = oracle.gradient(node, points, 1e-7)
+        np.testing.assert_allclose(node.gradient(points), expected, atol=2e-5)
 
 
 def test_bounds_are_tight() -> None:
