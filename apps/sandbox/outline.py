@@ -1,8 +1,10 @@
-"""The outline of a scene: objects, the nodes of their trees, and images, as rows of a list."""
+"""The outline of a scene: objects, the nodes of their trees, layers and images, as rows of a list."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from blobtree.nodes.paths import Path as TreePath
 from decals.editing.document import Document
@@ -23,15 +25,19 @@ class Row:
     label
         Name of the object, or class of the node.
     kind
-        "object", "combination", "modifier", "primitive", "mesh", "image" or "more".
+        "object", "combination", "modifier", "primitive", "mesh", "layer", "image" or "more".
     depth
         Indentation.
+    hidden, locked
+        True if the user hid or locked it.
     """
 
     key: str
     label: str
     kind: str
     depth: int
+    hidden: bool = False
+    locked: bool = False
 
 
 def key_of(number: int, path: TreePath) -> str:
@@ -46,13 +52,17 @@ def parse_key(key: str) -> tuple[int, TreePath]:
 
 
 def outline(document: Document) -> list[dict[str, Any]]:
-    """Return the rows of a document: each object, with the nodes of its tree below it, then the images."""
+    """Return the rows of a document: each object, with the nodes of its tree below it, layers, and images."""
     rows: list[Row] = []
     for number, item in enumerate(document.objects):
         kind = "object" if isinstance(item, TreeObject) else "mesh"
-        rows.append(Row(f"object {number}", item.name, kind, 0))
+        rows.append(Row(f"object {number}", item.name, kind, 0, () in item.hidden, () in item.locked))
         if isinstance(item, TreeObject):
             rows += _nodes(number, item)
+    hidden = document.hidden.decals.layers
+    for layer in np.unique(np.concatenate([document.decals.column("layers"), hidden])).tolist():
+        flags = layer in hidden, layer in document.locked_layers
+        rows.append(Row(f"layer {layer}", f"layer {layer}", "layer", 0, *flags))
     images = (Path(image.source).name for image in document.images)
     rows += [Row(f"image {number}", name, "image", 0) for number, name in enumerate(images)]
     return [asdict(row) for row in rows]
@@ -68,6 +78,7 @@ def _nodes(number: int, item: TreeObject) -> list[Row]:
             break
         count = len(node.children)
         kind = "primitive" if count == 0 else "modifier" if count == 1 else "combination"
-        rows.append(Row(key_of(number, path), type(node).__name__, kind, 1 + len(path)))
+        flags = (bool(path) and path in paths for paths in (item.hidden, item.locked))
+        rows.append(Row(key_of(number, path), type(node).__name__, kind, 1 + len(path), *flags))
         pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
     return rows

@@ -33,7 +33,8 @@ TOOLBAR = {
 
 ROW_ICONS = (
     "({object: 'mdi-cube-outline', mesh: 'mdi-vector-triangle', combination: 'mdi-set-center', "
-    "modifier: 'mdi-tune-variant', primitive: 'mdi-circle-medium', image: 'mdi-image-outline'})[row.kind]"
+    "modifier: 'mdi-tune-variant', primitive: 'mdi-circle-medium', layer: 'mdi-layers-outline', "
+    "image: 'mdi-image-outline'})[row.kind]"
 )
 
 
@@ -44,9 +45,16 @@ ROW_CHANGES = {
 }
 """Icons of what can be done with the selected rows."""
 
+ROW_FLAGS = (
+    ("hide", "hidden", ("mdi-eye-off-outline", "mdi-eye-outline")),
+    ("lock", "locked", ("mdi-lock-outline", "mdi-lock-open-variant-outline")),
+)
+"""Buttons of a row: its change, the row's value, and icons for true and false."""
+
 OPEN_MENU = (
     "menu = {open: true, x: $event.clientX, y: $event.clientY, key: row.key, label: row.label, "
-    "object: ['object', 'mesh'].includes(row.kind), image: ['image', 'more'].includes(row.kind)}"
+    "object: ['object', 'mesh'].includes(row.kind), image: ['image', 'more', 'layer'].includes(row.kind), "
+    "flags: !['image', 'more'].includes(row.kind)}"
 )
 """Open the menu of a row at the pointer."""
 
@@ -206,14 +214,16 @@ class Page:
 
     def _build_outline(self) -> None:
         vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])
-        with vuetify3.VList(density="compact", nav=True):
+        with (
+            vuetify3.VList(density="compact", nav=True),
+            html.Div(v_for="row in outline", key="row.key", classes="d-flex align-center"),
+        ):
             vuetify3.VListItem(
-                v_for="row in outline",
-                key="row.key",
                 title=("row.label",),
                 prepend_icon=(ROW_ICONS,),
                 active=("row.key === selected || marked.includes(row.key)",),
-                style=("`padding-left: ${8 + 14 * row.depth}px`",),
+                style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
+                classes="flex-grow-1",
                 click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey, selected]"),
                 contextmenu=f"$event.preventDefault(); {OPEN_MENU}",
                 draggable=True,
@@ -227,6 +237,13 @@ class Page:
                 __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
                 __properties=["draggable"],
             )
+            for change, flag, icons in ROW_FLAGS:
+                html.Button(
+                    v_if="!['image', 'more'].includes(row.kind)",
+                    classes=(f"'mdi row-flag ' + (row.{flag} ? '{icons[0]}' : '{icons[1]}')",),
+                    click=(self.sandbox.change_row, f"[row.key, '{change}']"),
+                    raw_attrs=[f':aria-pressed="row.{flag}"', *named(f"'{change} ' + row.label")],
+                )
         self._build_row_menu()
         with html.Div(v_if="renamed.key", classes="d-flex ga-2 pa-2"):
             vuetify3.VTextField(v_model="renamed.name", raw_attrs=named("'new name'"), **FIELD)
@@ -260,6 +277,9 @@ class Page:
                 ("Duplicate", "!menu.image", (change, "[menu.key, 'duplicate']")),
                 ("Group", "!menu.object && !menu.image", (change, "[menu.key, 'group']")),
                 ("Remove", "!menu.image", (change, "[menu.key, 'remove']")),
+                ("Hide or show", "menu.flags", (change, "[menu.key, 'hide']")),
+                ("Lock or unlock", "menu.flags", (change, "[menu.key, 'lock']")),
+                ("Isolate, or show all", "menu.flags", (change, "[menu.key, 'isolate']")),
                 ("Frame", "!menu.image", (self._frame, "[menu.key]")),
             ):
                 vuetify3.VListItem(title=title, v_if=shown, click=event)

@@ -111,8 +111,7 @@ class Sandbox:
         self._step: Callable[[], None] | None = None
         self._rows: list[dict[str, Any]] = []
         self._marked: list[str] = []
-        self._objects: Any = None
-        self._images: Any = None
+        self._outlined: tuple[Any, ...] = (None,) * 4
         self._measured: tuple[object, float] = None, 1.0
         self._reported_pick: tuple[object, dict[str, str]] = None, {}
 
@@ -177,13 +176,14 @@ class Sandbox:
         }
 
     def _outline(self) -> list[dict[str, Any]]:
-        """Return the rows of the outline; they change only with the objects and images."""
+        """Return the rows of the outline; they change only with the document."""
         document = self._window.document
-        if self._objects is not document.objects or self._images is not document.images:
+        shown = document.objects, document.images, document.locked_layers, document.decals.version
+        if any(a is not b and a != b for a, b in zip(shown, self._outlined, strict=True)):
             rows = outline(document)
             if rows != self._rows:  # a key may stand for another node now
                 self._rows, self._marked = rows, []
-            self._objects, self._images = document.objects, document.images
+            self._outlined = shown
         return self._rows
 
     def _panel(self) -> dict[str, Any]:
@@ -226,6 +226,10 @@ class Sandbox:
             trees = self._window.actions.trees
             if key == "":
                 self._window.actions.state.primitive = None
+                return
+            if (layer := _layer_of(key)) is not None:
+                decals, state = self._window.document.decals, self._window.actions.state
+                state.selection = state.selectable(decals.numbers[decals.column("layers") == layer])
                 return
             number, path = self._row(key)
             trees.select_node(number, path)
@@ -486,7 +490,7 @@ class Sandbox:
             set_mode(self._window.actions.state, name, raw)
 
     def change_row(self, key: str, change: str, value: Any = None) -> None:
-        """Change what a row of the outline stands for: "rename", "remove", "duplicate", "group" or "move" it.
+        """Change what a row of the outline stands for.
 
         If the row is one of several marked ones, all are removed or grouped.
 
@@ -495,16 +499,29 @@ class Sandbox:
         key
             Key of the row.
         change
-            What to do.
+            What to do: "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate".
+            "hide" shows a hidden row, and "lock" unlocks a locked one.
         value
             New name of an object; or the key of the row to which a node is moved.
         """
         with self._reported():
             actions = self._window.actions
+            flag = {"hide": "hidden", "lock": "locked"}.get(change)
+            if (layer := _layer_of(key)) is not None:
+                if flag is not None:
+                    actions.visibility.flag_layer(flag, layer)
+                elif change == "isolate":
+                    actions.visibility.isolate_layer(layer)
+                return
             is_object = isinstance(key, str) and key.startswith("object ")
             marked = self._marked if key in self._marked else [key]
             number, path = self._row(key)
             match change:
+                case "hide" | "lock":
+                    for row in marked:
+                        actions.visibility.flag_node(str(flag), *self._row(row))
+                case "isolate":
+                    actions.visibility.isolate_node(number, path)
                 case "group" if not is_object:
                     actions.trees.group_nodes(number, [self._row(other)[1] for other in marked])
                 case "remove" if len(marked) > 1:
@@ -548,6 +565,12 @@ class Sandbox:
         except ImplicitDecalsError as error:
             self._window.actions.state.show(str(error))
         self._window.redraw(whole=whole)
+
+
+def _layer_of(key: object) -> int | None:
+    """Return the layer of a row's key; None for other rows."""
+    text = str(key).removeprefix("layer ")
+    return int(text) if text != key and text.lstrip("-").isdigit() else None
 
 
 def _bare_scene(item: SceneObject) -> Scene:

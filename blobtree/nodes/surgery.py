@@ -3,7 +3,7 @@
 A branch is a node that is an operand of a combination, with the maps above it; a `Path` leads to it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from enum import Enum
 from typing import Any
@@ -119,6 +119,57 @@ def remove_branch(tree: Node, path: Path) -> Node:
             if others is not None:
                 return with_node(tree, path, others)
     raise InvalidNode("path: expected a part of a tree, got its last visible part; remove the object instead")
+
+
+def without_branches(tree: Node, paths: Iterable[Path]) -> Node:
+    """Return a tree without the branches at several paths; errors are those of `remove_branch`."""
+    kept: dict[Path, Node | None] = dict.fromkeys(paths)
+    above = {path[:depth] for path in kept for depth in range(len(path))}
+    for path in sorted(above - kept.keys(), key=len, reverse=True):
+        node: Node | None = node_at(tree, path)
+        assert node is not None
+        children = [kept.get((*path, step), child) for step, child in enumerate(node.children)]
+        gone = [step for step, child in enumerate(children) if child is None]
+        if not node.combines or len(gone) == len(children) or (_cuts(node) and 0 in gone):
+            kept[path] = None if gone else with_node(node, (0,), _present(children[0]))
+            continue
+        for step, child in enumerate(children):
+            if child is not None:
+                node = with_node(node, (step,), child)
+        for step in reversed(gone):
+            node = None if node is None else _without_child(node, step)
+        kept[path] = node
+    result = kept.get((), tree)
+    if result is None:
+        raise InvalidNode("paths: expected a part of a tree, got all of it; leave out one of them")
+    return result
+
+
+def _present(node: Node | None) -> Node:
+    assert node is not None
+    return node
+
+
+def paths_after(before: Node, after: Node, paths: Iterable[Path]) -> tuple[Path, ...]:
+    """Return the paths that lead, after an edit of a tree, to the nodes that paths led to before.
+
+    Paths of removed nodes are left out.
+    """
+    return tuple(found for path in paths if (found := _path_after(before, after, path)) is not None)
+
+
+def _path_after(before: Node, after: Node, path: Path) -> Path | None:
+    node = node_at(before, path)
+    try:
+        at_path: Node | None = node_at(after, path)
+    except InvalidNode:
+        at_path = None
+    if at_path is node:
+        return path
+    try:
+        return path_of(after, node)
+    except InvalidNode:
+        return path if type(at_path) is type(node) else None
 
 
 def move_branch(tree: Node, path: Path, target: Path) -> tuple[Node, Path]:

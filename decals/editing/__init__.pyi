@@ -35,6 +35,7 @@ from .tree_commands import (
     ResizePrimitive,
     SetParameter,
 )
+from .visibility import FlagNodes, HideDecals, LockLayers, ShowDecals
 
 __all__ = [
     "KEYS",
@@ -49,8 +50,11 @@ __all__ = [
     "DuplicateDecals",
     "DuplicatePrimitive",
     "EditSession",
+    "FlagNodes",
     "GroupOperands",
+    "HideDecals",
     "JoinPrimitive",
+    "LockLayers",
     "MapValues",
     "MoveBranch",
     "MoveDecals",
@@ -73,6 +77,7 @@ __all__ = [
     "SetCamera",
     "SetParameter",
     "SetValues",
+    "ShowDecals",
     "TurnDecals",
     "UndoEntry",
     "first_hit",

@@ -121,6 +121,13 @@ class ActionState:
             raise InvalidEdit("no decal is selected; click on one")
         return np.array(self.selection, np.int64)
 
+    def selectable(self, numbers: ArrayLike) -> tuple[int, ...]:
+        """Return those of some numbers that belong to a decal whose layer is not locked."""
+        document, given = self.session.document, np.asarray(numbers, np.int64)
+        exist: Int64Array = given[document.decals.has(given)]
+        locked = np.isin(document.decals.take(exist).layers, document.locked_layers)
+        return tuple(exist[~locked].tolist())
+
     @property
     def primitive_is_subject(self) -> bool:
         """True if duplicate and delete apply to the primitive: one is selected, and no decal is."""

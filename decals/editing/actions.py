@@ -15,6 +15,7 @@ from decals.editing.file_actions import FileActions
 from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, action, registered_actions
 from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
+from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
@@ -46,6 +47,8 @@ class Actions:
         Actions on objects and primitives.
     files : FileActions
         Actions on the scene's file.
+    visibility : VisibilityActions
+        Actions that hide and lock.
     help_page
         Page of the help that the window shows, from 1; 0 for none.
     help_pages
@@ -75,10 +78,11 @@ class Actions:
         self.decals = DecalActions(self.state)
         self.trees = TreeActions(self.state)
         self.files = FileActions(self.state, path)
+        self.visibility = VisibilityActions(self.state)
         self.help_page, self.help_pages = 0, 1
         self._actions = {
             name: (binding, method.__get__(owner))
-            for owner in (self, self.files, self.decals, self.trees)
+            for owner in (self, self.files, self.decals, self.trees, self.visibility)
             for name, (binding, method) in registered_actions(type(owner)).items()
         }
 
@@ -112,7 +116,7 @@ class Actions:
     def select(self, cursor: Cursor) -> None:
         """Select the decal under the cursor, or none."""
         pick = self.state.picked = cursor()
-        self.state.selection = () if pick is None or pick.owner < 0 else (pick.owner,)
+        self.state.selection = () if pick is None else self.state.selectable([pick.owner])
         self.state.message = f"decal {pick.owner}" if pick is not None and self.state.selection else ""
 
     @action(
@@ -121,7 +125,7 @@ class Actions:
     def select_also(self, cursor: Cursor) -> None:
         """Add the decal under the cursor to the selection, or remove it."""
         pick = cursor()
-        if pick is None or pick.owner < 0:
+        if pick is None or not self.state.selectable([pick.owner]):
             return
         selection = self.state.selection
         others = tuple(number for number in selection if number != pick.owner)
@@ -131,7 +135,7 @@ class Actions:
     @action("select_all", "Ctrl+a", summary="select all decals", group=Group.SELECTION)
     def select_all(self, _cursor: Cursor) -> None:
         """Select all decals."""
-        self.state.selection = tuple(self.state.session.document.decals.numbers.tolist())
+        self.state.selection = self.state.selectable(self.state.session.document.decals.numbers)
         self.state.message = f"{len(self.state.selection)} decals"
 
     @action(
@@ -266,10 +270,11 @@ def _redo(session: EditSession, entry: UndoEntry) -> str:
 
 KEYS = KeyTable(
     [
-        *(binding for binding, _ in registered_actions(Actions).values()),
-        *(binding for binding, _ in registered_actions(FileActions).values()),
-        *(binding for binding, _ in registered_actions(DecalActions).values()),
-        *(binding for binding, _ in registered_actions(TreeActions).values()),
+        *(
+            binding
+            for owner in (Actions, FileActions, DecalActions, TreeActions, VisibilityActions)
+            for binding, _ in registered_actions(owner).values()
+        ),
         *UNREGISTERED,
     ]
 )

@@ -69,11 +69,15 @@ class BrushSettings:
 
 
 def decals_within(document: Document, point: ArrayLike, radius: float) -> Int64Array:
-    """Return the numbers of the decals whose centres lie within a radius around a point, shape (3,)."""
+    """Return the numbers of the decals whose centres lie within a radius around a point, shape (3,).
+
+    Decals of locked layers are left out.
+    """
     center = finite_vector("point", point, InvalidEdit)
     reach = positive_number("radius", radius)
     distances = np.linalg.norm(document.decals.decals.positions - center, axis=1)
-    numbers: Int64Array = document.decals.numbers[distances < reach]
+    near = (distances < reach) & ~np.isin(document.decals.column("layers"), document.locked_layers)
+    numbers: Int64Array = document.decals.numbers[near]
     return numbers
 
 
@@ -171,7 +175,7 @@ class BrushDecals:
         lengths = reach * np.sqrt(rng.uniform(size=count))
         turns = rng.uniform(0.0, 2.0 * np.pi, count)
         offsets = np.cos(turns)[:, None] * along + np.sin(turns)[:, None] * np.cross(normal, along)
-        points = nearest_points(document.objects, center + lengths[:, None] * offsets)
+        points = nearest_points(document.shown_objects, center + lengths[:, None] * offsets)
         near = document.decals.decals.positions[
             np.linalg.norm(document.decals.decals.positions - center, axis=1) < 2.0 * reach + spacing
         ]
@@ -230,7 +234,7 @@ class PushDecals:
         squares = np.square((before.positions - center) / self.radius).sum(axis=1)
         shares = np.maximum(1.0 - squares, 0.0) ** 3
         targets = before.positions + shares[:, None] * offset
-        points = nearest_points(document.objects, targets)
+        points = nearest_points(document.shown_objects, targets)
         return document.compute_replacement(numbers, move_decals(before, points))
 
 

@@ -1,7 +1,7 @@
 """Commands for decals, images and the camera; each is an immutable value that computes an `Edit`."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.validation import point_array
-from decals.editing.document import Document, Edit
+from decals.editing.document import Document, Edit, hidden_states
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
 from decals.images.load import AnyImage
@@ -384,6 +384,7 @@ class ReplaceScene:
 
     scene: Scene
     label: str = "replace the scene"
+    ignores_locks: ClassVar[bool] = True
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -397,6 +398,8 @@ class ReplaceScene:
             camera=scene.camera,
             drawing=scene.drawing,
             recipes=() if scene.recipe is None else (scene.recipe,),
+            hidden=hidden_states(scene, first + len(scene.decals)),
+            locked_layers=scene.locked_layers,
         )
         return document.compute_deletion(document.decals.numbers).then(addition)
 
@@ -493,10 +496,9 @@ class RemoveImage:
         images = (*document.images[:index], *document.images[index + 1 :])
         decals, numbers = document.decals.decals, document.decals.numbers
         affected = decals.images >= index
-        indices = decals.images[affected]
-        indices = np.where(indices == index, NO_IMAGE, indices - 1)
+        hidden = replace(document.hidden, decals=_without_image(document.hidden.decals, index))
         return document.compute_replacement(
-            numbers[affected], decals[affected].replace(images=indices), images=images
+            numbers[affected], _without_image(decals[affected], index), images=images, hidden=hidden
         )
 
 
@@ -527,6 +529,12 @@ class SetCamera:
         """Return the edit."""
         instance("camera", self.camera, Camera, InvalidEdit, "Camera.framing makes one")
         return document.compute_parts(camera=self.camera)
+
+
+def _without_image(decals: Decals, index: int) -> Decals:
+    """Return decals that show their tint in place of an image, and later images under the next index."""
+    images = decals.images
+    return decals.replace(images=np.where(images == index, NO_IMAGE, images - (images > index)))
 
 
 def _checked_point(position: ArrayLike, normal: ArrayLike) -> tuple[Float32Array, Float32Array]:

@@ -15,7 +15,7 @@ from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
-from decals.scenes.objects import SceneObject
+from decals.scenes.objects import SceneObject, shown_objects
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
 from decals.scenes.scene import DecalImage, Scene
@@ -82,6 +82,13 @@ class DecalStates:
 NO_DECALS = DecalStates.deleted(np.zeros(0, np.int64))
 
 
+def hidden_states(scene: Scene, first: int | None = None) -> DecalStates:
+    """Return the hidden decals of a scene under numbers from a first one on."""
+    first = len(scene.decals) if first is None else first
+    numbers = np.arange(first, first + len(scene.hidden_decals))
+    return DecalStates.existing(numbers, scene.hidden_decals)
+
+
 @dataclass(frozen=True, eq=False)
 class SceneParts:
     """Parts of a scene that an edit replaces; None for parts that stay."""
@@ -91,6 +98,8 @@ class SceneParts:
     camera: Any = None
     drawing: Any = None
     recipes: Any = None
+    hidden: Any = None
+    locked_layers: Any = None
 
     def overlaid_on(self, other: "SceneParts") -> "SceneParts":
         """Return these parts, and the other ones where these are None."""
@@ -163,6 +172,10 @@ class Document:
         How the scene is drawn.
     recipe
         How its decals were made, if that is known.
+    hidden
+        Decals that are hidden.
+    locked_layers
+        Layers whose decals no command changes.
 
     Examples
     --------
@@ -184,10 +197,13 @@ class Document:
         family: ForkFamily | None = None,
         drawing: Drawing | None = None,
         recipe: Recipe | None = None,
+        hidden: DecalStates = NO_DECALS,
+        locked_layers: tuple[int, ...] = (),
     ) -> None:
         self._objects, self._images, self._camera, self._decals = objects, images, camera, decals
         self._first_drawing = self._drawing = Drawing() if drawing is None else drawing
         self._recipes = () if recipe is None else (recipe,)
+        self._hidden, self._locked_layers = hidden, locked_layers
         self._family = ForkFamily() if family is None else family
 
     @classmethod
@@ -201,12 +217,28 @@ class Document:
         """
         instance("scene to edit", scene, Scene, InvalidScene, "decals.cover makes one")
         editor = DecalEditor(scene.decals)
-        return cls(scene.objects, scene.images, scene.camera, editor, None, scene.drawing, scene.recipe)
+        kept = scene.drawing, scene.recipe, hidden_states(scene), scene.locked_layers
+        return cls(scene.objects, scene.images, scene.camera, editor, None, *kept)
 
     @property
     def objects(self) -> tuple[SceneObject, ...]:
         """Meshes and trees."""
         return self._objects
+
+    @property
+    def shown_objects(self) -> list[SceneObject]:
+        """What is to be seen of the objects; see `decals.scenes.objects.shown_objects`."""
+        return shown_objects(self._objects)
+
+    @property
+    def hidden(self) -> DecalStates:
+        """The hidden decals, under the numbers that they had."""
+        return self._hidden
+
+    @property
+    def locked_layers(self) -> tuple[int, ...]:
+        """Layers whose decals no command changes, ascending."""
+        return self._locked_layers
 
     @property
     def images(self) -> tuple[DecalImage, ...]:
@@ -262,6 +294,8 @@ class Document:
             decals=self.decals.decals,
             drawing=self.drawing,
             recipe=self.recipe,
+            hidden_decals=self.hidden.decals,
+            locked_layers=self.locked_layers,
         )
 
     def object(self, number: int) -> SceneObject:
@@ -272,13 +306,14 @@ class Document:
 
     def fork(self) -> "Document":
         """Return an independent copy; objects and images are shared."""
-        kept = self._family, self._drawing, self.recipe
+        kept = self._family, self._drawing, self.recipe, self._hidden, self._locked_layers
         return Document(self._objects, self._images, self._camera, self._decals.copy(), *kept)
 
     def adopt(self, fork: "Document") -> None:
         """Take over the state of a fork, which must not be used afterwards; renderers keep this document."""
         self._objects, self._images, self._camera = fork._objects, fork._images, fork._camera
         self._recipes = fork._recipes
+        self._hidden, self._locked_layers = fork._hidden, fork._locked_layers
         if fork._drawing is not fork._first_drawing:
             self._drawing = fork._drawing
         self._decals.adopt(fork._decals)
@@ -341,3 +376,7 @@ class Document:
             self._drawing = parts.drawing
         if parts.recipes is not None:
             self._recipes = parts.recipes
+        if parts.hidden is not None:
+            self._hidden = parts.hidden
+        if parts.locked_layers is not None:
+            self._locked_layers = parts.locked_layers

@@ -236,9 +236,9 @@ class DecalDrag:
     def move(self, ray: Ray, occluded: Callable[[Float32Array], bool]) -> None:
         """Move the decals to the visible surface point along a ray; without one they stay."""
         document = self._actions.state.session.document
-        hit = first_hit(document.objects, *ray)
+        hit = first_hit(document.shown_objects, *ray)
         if not len(hit.objects) or occluded(hit.positions[0]):
             return
         offset = shortest_rotations(self._normal[None], hit.normals)[0] @ self._offset
-        target = nearest_points(document.objects, hit.positions + offset)
+        target = nearest_points(document.shown_objects, hit.positions + offset)
         self._actions.state.run_latest(MoveDecals(self._numbers, target.positions[0], target.normals[0]))

@@ -245,13 +245,14 @@ def pick(
     array([0., 0., 1.], dtype=float32)
     """
     instance("document", document, Document, InvalidEdit, "session.document is one")
-    hit = first_hit(document.objects, origin, direction)
+    numbers = [number for number, item in enumerate(document.objects) if item.shown is not None]
+    hit = first_hit(document.shown_objects, origin, direction)
     if not len(hit.objects):
         return None
     owner = -1
     if len(document.decals):
         owner = int(evaluate(document.decals, hit.positions, hit.normals, contact=contact).owner[0])
-    return SurfacePick(int(hit.objects[0]), hit.positions[0], hit.normals[0], owner)
+    return SurfacePick(numbers[int(hit.objects[0])], hit.positions[0], hit.normals[0], owner)
 
 
 ANGLES, RINGS = 48, 12

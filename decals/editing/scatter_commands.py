@@ -191,6 +191,7 @@ class RelaxDecals:
         distances = np.linalg.norm(decals.positions - center, axis=1)
         closest = int(distances.argmin())
         near = distances < RELAXED_DISTANCE * SPACING * decals.radii[closest]
+        near &= ~np.isin(decals.layers, document.locked_layers)
         rows = np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
         if len(rows) < 2:
             return Edit()

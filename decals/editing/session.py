@@ -8,6 +8,7 @@ from typing import Protocol
 
 from blobtree.progress import Progress
 from decals.editing.document import DecalStates, Document, Edit, SceneParts
+from decals.editing.visibility import check_locks
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.files import save_scene
@@ -133,6 +134,8 @@ class EditSession:
         if not known or isinstance(command, type):
             raise InvalidEdit(f"expected a command such as ScaleDecals([7], 1.5), got {describe(command)}")
         edit = command.compute(self.document)
+        if not getattr(command, "ignores_locks", False):
+            check_locks(self.document, edit)
         if edit.empty:
             return edit
         self._apply(edit.after, edit.parts_after)

@@ -111,7 +111,11 @@ class TreeActions:
         return self._primitive_under(require_pick(cursor))
 
     def _primitive_under(self, pick: SurfacePick) -> tuple[int, Path]:
-        return pick.object, dominant_primitive(self._tree(pick.object), pick.position)
+        tree, item = self._tree(pick.object), self._state.session.document.objects[pick.object].shown
+        if not isinstance(item, TreeObject) or item.tree is tree:
+            return pick.object, dominant_primitive(tree, pick.position)
+        seen = node_at(item.tree, dominant_primitive(item.tree, pick.position))
+        return pick.object, path_of(tree, seen)
 
     def _tree(self, number: int) -> Node:
         item = self._state.session.document.objects[number]

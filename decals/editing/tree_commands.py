@@ -25,7 +25,7 @@ from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit
-from decals.scenes.objects import SceneObject, TreeObject, check_names
+from decals.scenes.objects import SceneObject, TreeObject, check_names, with_tree
 from decals.validation import describe, finite_number, finite_vector, instance, member
 
 
@@ -87,7 +87,8 @@ class PrimitiveCommand:
     def _exchanged(self, document: Document, tree: Node) -> TreeObject:
         """Return the command's object with another tree."""
         before = document.objects[self.object]
-        return TreeObject(before.name, tree, before.origin)
+        assert isinstance(before, TreeObject)
+        return with_tree(before, tree)
 
     def _with_object(self, document: Document, item: SceneObject) -> tuple[SceneObject, ...]:
         """Return the document's objects with the command's object exchanged."""

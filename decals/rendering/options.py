@@ -250,6 +250,12 @@ def check_scene(scene: object) -> None:
         raise InvalidScene(f"scene: expected a Scene, got {describe(scene)}; decals.cover makes one")
 
 
+def drawn_objects(scene: SceneLike) -> list[object]:
+    """Return what is to be seen of a scene's objects; an object says so with ``shown``."""
+    parts = [getattr(item, "shown", item) for item in scene.objects]
+    return [part for part in parts if part is not None]
+
+
 def viewpoint_of(scene: SceneLike, viewpoint: Viewpoint | None) -> Viewpoint:
     """Return the viewpoint of a picture: the scene's camera by default."""
     chosen: Any = getattr(scene, "camera", None) if viewpoint is None else viewpoint

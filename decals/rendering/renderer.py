@@ -21,7 +21,7 @@ from decals.rendering.gbuffer import depth_program
 from decals.rendering.gl_libraries import is_forked
 from decals.rendering.light_pass import light_file, light_program, resolve_program
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
-from decals.rendering.options import RenderOptions, SceneLike, check_scene, viewpoint_of
+from decals.rendering.options import RenderOptions, SceneLike, check_scene, drawn_objects, viewpoint_of
 from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend
 from decals.rendering.progressive import (
@@ -373,12 +373,12 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
         If the scene holds an object of unknown kind.
     """
     context = uploads.context
-    objects = [warmup_of(context, item) for item in scene.objects]
+    objects = [warmup_of(context, item) for item in drawn_objects(scene)]
     has_decals, light = len(scene.decals) > 0, light_file(options.lights)
     formulas = (options.contact, scene.decals.layered) if has_decals else None
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
-    tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in scene.objects]
+    tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
     if has_decals:
         tasks += _decal_tasks(uploads, scene, options)
     tasks += [

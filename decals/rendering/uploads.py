@@ -20,7 +20,7 @@ from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.options import SceneLike, check_scene
+from decals.rendering.options import SceneLike, check_scene, drawn_objects
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import WarmupPlan
@@ -495,7 +495,7 @@ class Uploads:
     def scene(self, scene: SceneLike) -> UploadedScene:
         """Return a whole scene; errors are those of `decals.rendering.options.check_scene`."""
         check_scene(scene)
-        drawables = [self.drawable(item) for item in scene.objects]
+        drawables = [self.drawable(item) for item in drawn_objects(scene)]
         return UploadedScene(drawables, self.decals(scene), self.images(scene))
 
     def drawable(self, item: object) -> Drawable:

@@ -18,7 +18,8 @@
     }
 
 The last four of a decal are written where they are not contact, 0, white and 1. Image -1 is the plain tint.
-A file without "drawing" was drawn in the contact mode "product"; "recipe" is there if it is known.
+A file without "drawing" was drawn in the contact mode "product"; "recipe" is there if it is known,
+"hidden_decals" and "locked_layers" if there are any; objects name hidden and locked nodes by their paths.
 
 Numbers are the shortest decimals that give the same float32 again. Paths are relative to the scene file.
 """
@@ -99,6 +100,8 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
     decals: list[DecalRecord]
     drawing: DrawingRecord | None = None
     recipe: _RecipeRecord | None = None
+    hidden_decals: list[DecalRecord] = []
+    locked_layers: list[int] = []
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
@@ -211,6 +214,10 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
     }
     if scene.recipe is not None:
         parts["recipe"] = vars(scene.recipe)
+    if len(scene.hidden_decals):
+        parts["hidden_decals"] = _lines(records_of(scene.hidden_decals))
+    if scene.locked_layers:
+        parts["locked_layers"] = scene.locked_layers
     fields = [
         b"  %b: %b" % (msgspec.json.encode(key), msgspec.json.encode(value)) for key, value in parts.items()
     ]
@@ -233,6 +240,8 @@ def from_json(
         images=_images(record.images, folder, trust),
         drawing=drawing_of_record(record.drawing),
         recipe=None if record.recipe is None else Recipe(**msgspec.structs.asdict(record.recipe)),
+        hidden_decals=decals_of(record.hidden_decals),
+        locked_layers=tuple(record.locked_layers),
     )
 
 

@@ -11,7 +11,7 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.progress import Progress
 from blobtree.pyvista_views import to_polydata, write_polydata
 from decals.errors import InvalidMesh, InvalidScene
-from decals.scenes.objects import MeshObject, SceneObject
+from decals.scenes.objects import MeshObject, SceneObject, shown_objects
 from decals.surfaces.normals import split_at_creases, vertex_normals
 
 if TYPE_CHECKING:
@@ -30,7 +30,9 @@ def as_polydata(
     split_normals: bool = False,
     progress: Progress | None = None,
 ) -> "pv.PolyData":
-    """Return all objects as one mesh with normals and "RGB" colours; trees are polygonized.
+    """Return what is to be seen of objects as one mesh with normals and "RGB" colours.
+
+    Trees are polygonized.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def as_polydata(
         A tree has no surface in cells of this size.
     """
     parts = []
-    for item in objects:
+    for item in shown_objects(objects):
         if isinstance(item, MeshObject):
             parts.append(_mesh_polydata(item, split_normals))
             continue

@@ -1,9 +1,11 @@
 """Objects of a scene: meshes and BlobTrees by name, and models of other kinds as such objects."""
 
+import copy
+import operator
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -12,7 +14,9 @@ from numpy.typing import ArrayLike
 from blobtree import Node
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.colors import ColorLike, color_rgb
+from blobtree.errors import InvalidNode
 from blobtree.lazy import Lazy
+from blobtree.nodes.paths import Path, node_at
 from decals.errors import InvalidScene
 from decals.scenes.origin import Origin, as_origin, check_distance, local_tree, local_vertices
 from decals.surfaces.convert import as_shape
@@ -22,6 +26,9 @@ from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance, is_unicode, real_number
 
 Color = tuple[float, float, float]
+Paths = tuple[Path, ...]
+"""Paths of nodes in a tree; ``()`` is the path of its root."""
+
 Box = tuple[Float32Array, Float32Array]
 """Lower and upper corner, ``float32[3]`` each."""
 
@@ -52,6 +59,9 @@ class MeshObject:
         Point that vertices are relative to. By default the zero point; for a model farther from it than
         1,000 times its size, a point near the model, which is subtracted in float64.
 
+    hidden, locked : tuple of paths
+        ``((),)`` for an object that is not drawn, and for one that the editor does not change; ``()`` else.
+
     Raises
     ------
     InvalidMesh
@@ -76,6 +86,8 @@ class MeshObject:
     source: str | None = None
     crease_angle: float = CREASE_ANGLE
     origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
+    hidden: Paths = field(default=(), repr=False)
+    locked: Paths = field(default=(), repr=False)
     surface: MeshSurface = field(init=False, repr=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
@@ -89,6 +101,8 @@ class MeshObject:
             source: str | None = None,
             crease_angle: float = CREASE_ANGLE,
             origin: ArrayLike | None = None,
+            hidden: Paths = (),
+            locked: Paths = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -101,6 +115,7 @@ class MeshObject:
             "source": _source(self.name, self.source),
             "crease_angle": as_crease_angle(self.crease_angle),
             "origin": origin,
+            **_flags(self),
             "surface": surface,
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -111,6 +126,11 @@ class MeshObject:
     def __repr__(self) -> str:
         """Return the name and the numbers of vertices and faces, as arrays would fill the screen."""
         return f"MeshObject({self.name!r}, {len(self.vertices)} vertices, {len(self.faces)} faces)"
+
+    @property
+    def shown(self) -> "MeshObject | None":
+        """The object; None if it is hidden."""
+        return None if self.hidden else self
 
     @property
     def bounds(self) -> Box:
@@ -132,10 +152,14 @@ class TreeObject:
         Point that the tree is relative to. By default the zero point; for a model farther from it than
         1,000 times its size, a point near the model, which is subtracted in float64.
 
+    hidden, locked : tuple of paths
+        Nodes that are not drawn, and nodes that the editor does not change. A path has the index of the child
+        at each step from the root; ``()`` is the whole object.
+
     Raises
     ------
     InvalidScene
-        If the name is empty or the tree is not a BlobTree.
+        If the name is empty, the tree is not a BlobTree, or a path leads to no node of it.
 
     Examples
     --------
@@ -148,10 +172,19 @@ class TreeObject:
     name: str
     tree: Node
     origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
+    hidden: Paths = field(default=(), repr=False)
+    locked: Paths = field(default=(), repr=False)
 
     if TYPE_CHECKING:
 
-        def __init__(self, name: str, tree: Node, origin: ArrayLike | None = None) -> None: ...
+        def __init__(
+            self,
+            name: str,
+            tree: Node,
+            origin: ArrayLike | None = None,
+            hidden: Paths = (),
+            locked: Paths = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", _name(self.name))
@@ -163,10 +196,26 @@ class TreeObject:
         else:
             origin = as_origin(self.origin)
         object.__setattr__(self, "origin", origin)
+        for key, paths in _flags(self).items():
+            object.__setattr__(self, key, paths)
+
+    @property
+    def shown(self) -> "TreeObject | None":
+        """The object without its hidden nodes; None if nothing of it is to be seen."""
+        return None if () in self.hidden else self._shown_part if self.hidden else self
+
+    @Lazy
+    def _shown_part(self) -> "TreeObject | None":
+        from blobtree.nodes.surgery import without_branches  # most scenes hide nothing
+
+        try:
+            return TreeObject(self.name, without_branches(self.tree, self.hidden), self.origin)
+        except InvalidNode:  # all nodes are hidden
+            return None
 
     @Lazy
     def surface(self) -> ImplicitSurface:
-        """Return the tree's surface; the first call polygonizes it to find where it lies."""
+        """Return the surface of the whole tree; the first call polygonizes it to find where it lies."""
         return ImplicitSurface(self.tree)
 
     @property
@@ -176,6 +225,59 @@ class TreeObject:
 
 
 SceneObject = MeshObject | TreeObject
+
+
+def _flags(item: SceneObject) -> dict[str, Paths]:
+    """Return the checked paths of hidden and locked nodes, each once, in order; a mesh has its root alone."""
+    tree = item.tree if isinstance(item, TreeObject) else None
+    checked = {}
+    for name in ("hidden", "locked"):
+        given = getattr(item, name)
+        try:
+            paths = {tuple(map(operator.index, path)) for path in given}
+            known = paths <= {()} if tree is None else all(node_at(tree, path) for path in paths)
+        except (TypeError, InvalidNode):
+            known = False
+        if not known:
+            raise InvalidScene(
+                f"object {item.name!r}, {name}: expected paths of its nodes, such as ((0, 1),), "
+                f"got {describe(given)}"
+            )
+        checked[name] = tuple(sorted(paths))
+    return checked
+
+
+def flagged(item: SceneObject, **flags: Paths) -> SceneObject:
+    """Return an object with other nodes ``hidden`` or ``locked``; its surface is not built again."""
+    twin = copy.copy(item)
+    vars(twin).pop("_shown_part", None)
+    for name, paths in flags.items():
+        object.__setattr__(twin, name, paths)
+    for name, paths in _flags(twin).items():
+        object.__setattr__(twin, name, paths)
+    return twin
+
+
+def _paths_after(item: TreeObject, tree: Node) -> dict[str, Paths]:
+    """Return the flags of an object for another tree, of which most nodes are the same."""
+    from blobtree.nodes.surgery import paths_after
+
+    given = {name: getattr(item, name) for name in ("hidden", "locked")}
+    return {
+        name: (*((),) * (() in paths), *paths_after(item.tree, tree, [path for path in paths if path]))
+        for name, paths in given.items()
+        if paths
+    }
+
+
+def with_tree(item: TreeObject, tree: Node) -> TreeObject:
+    """Return an object with another tree; nodes that stay are hidden and locked as before."""
+    return TreeObject(item.name, tree, item.origin, **_paths_after(item, tree))
+
+
+def shown_objects(objects: Iterable[SceneObject]) -> list[SceneObject]:
+    """Return what is to be seen of objects: without hidden ones, and without hidden nodes."""
+    return [shown for item in objects if (shown := item.shown) is not None]
 
 
 def as_crease_angle(angle: object) -> float:
@@ -211,7 +313,7 @@ def as_object(
         return model
     source = os.fspath(model) if isinstance(model, str | os.PathLike) else None
     shape = as_shape(model, name=name, error=InvalidScene)
-    name = name if source is None else Path(source).stem
+    name = name if source is None else FilePath(source).stem
     return (
         TreeObject(name, shape) if isinstance(shape, Node) else MeshObject(name, *shape, color, source, angle)
     )
@@ -231,7 +333,8 @@ def relative_to(item: SceneObject, origin: Origin) -> SceneObject:
     box = item.tree.support if isinstance(item, TreeObject) else item.bounds
     check_distance(item.name, *(corner.astype(np.float64) + shift for corner in box))
     if isinstance(item, TreeObject):
-        return replace(item, tree=item.tree.translate(tuple(shift)), origin=origin)
+        tree = item.tree.translate(tuple(shift))
+        return replace(with_tree(item, tree), origin=origin)
     vertices = (item.vertices + shift).astype(np.float32)
     return replace(item, vertices=vertices, origin=origin)
 

@@ -15,7 +15,7 @@ from decals.images.builtin import is_builtin
 from decals.images.load import is_embedded
 from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject
 from decals.scenes.origin import WORLD
 from decals.surfaces.mesh_file import MeshArrays, read_mesh
 from decals.surfaces.normals import CREASE_ANGLE
@@ -45,6 +45,8 @@ class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=Tru
     data: _InlineMesh | None = None
     crease_angle: float = CREASE_ANGLE
     origin: Vector | None = None
+    hidden: Paths = ()
+    locked: Paths = ()
 
 
 class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
@@ -53,14 +55,17 @@ class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=Tru
     name: str
     tree: TreeFile
     origin: Vector | None = None
+    hidden: Paths = ()
+    locked: Paths = ()
 
 
 def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     """Describe an object; paths are relative to the folder."""
     origin = None if item.origin == WORLD else item.origin
     if isinstance(item, TreeObject):
-        return TreeRecord(item.name, to_tree_file(item.tree), origin)
-    kept: dict[str, Any] = {"crease_angle": item.crease_angle, "origin": origin}
+        return TreeRecord(item.name, to_tree_file(item.tree), origin, item.hidden, item.locked)
+    kept: dict[str, Any] = {"crease_angle": item.crease_angle, "origin": origin, "hidden": item.hidden}
+    kept["locked"] = item.locked
     if item.source is not None:
         return MeshRecord(item.name, item.color, source=relative(item.source, folder), **kept)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
@@ -76,17 +81,19 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
         If what it names is missing or broken.
     """
     if isinstance(record, TreeRecord):
-        return TreeObject(record.name, from_tree_file(record.tree), record.origin or WORLD)
+        tree = from_tree_file(record.tree)
+        return TreeObject(record.name, tree, record.origin or WORLD, record.hidden, record.locked)
     if (record.source is None) == (record.data is None):
         raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
     origin, angle = record.origin or WORLD, record.crease_angle
+    flags = record.hidden, record.locked
     if record.data is not None:
         vertices, faces = _unpacked(record.name, record.data)
-        return MeshObject(record.name, vertices, faces, record.color, None, angle, origin)
+        return MeshObject(record.name, vertices, faces, record.color, None, angle, origin, *flags)
     vertices, faces = _mesh(str(record.source), folder, samples)
     source = absolute(str(record.source), folder)
     local = vertices - np.array(origin)
-    return MeshObject(record.name, local, faces, record.color, source, angle, origin)
+    return MeshObject(record.name, local, faces, record.color, source, angle, origin, *flags)
 
 
 def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshArrays:

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 import decals
 from blobtree.progress import Progress
 from decals import rendering
-from decals.errors import InvalidScene, NoGraphics
+from decals.errors import ImplicitDecalsError, InvalidScene, NoGraphics
 from decals.images.load import AnyImage, each_image, image_pixels
-from decals.model import Decals
+from decals.model import LAYER_LIMIT, Decals
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names, with_common_origin
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
 from decals.surfaces.convert import Model
-from decals.validation import describe, instance, require_rgba
+from decals.validation import describe, instance, require_rgba, whole_number
 
 NOTEBOOK_SIZE = (640, 480)
 """Size of the picture of a scene in a notebook."""
@@ -99,6 +99,15 @@ def check_camera(camera: Camera, origin: Origin) -> None:
         )
 
 
+def as_layers(name: str, layers: Any, error: type[ImplicitDecalsError]) -> tuple[int, ...]:
+    """Return numbers of layers, each once, in order; raise an error for other values."""
+    try:
+        numbers = {whole_number(name, one, -LAYER_LIMIT, LAYER_LIMIT - 1, error) for one in layers}
+    except TypeError:
+        raise error(f"{name}: expected numbers of layers, got {describe(layers)}") from None
+    return tuple(sorted(numbers))
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
     """Everything that a picture shows.
@@ -119,6 +128,10 @@ class Scene:
         How the scene is drawn where nothing else is said: contact mode, samples, background, lights.
     recipe : Recipe, optional
         How its decals were made.
+    hidden_decals : Decals
+        Decals that are not drawn; the editor shows them again.
+    locked_layers : tuple of int
+        Layers whose decals the editor does not change.
 
     Raises
     ------
@@ -147,6 +160,8 @@ class Scene:
     images: tuple[DecalImage, ...] = ()
     drawing: rendering.Drawing = field(default_factory=lambda: rendering.Drawing())
     recipe: Recipe | None = None
+    hidden_decals: Decals = field(default_factory=Decals.empty)
+    locked_layers: tuple[int, ...] = ()
 
     if TYPE_CHECKING:  # models and images of any kind are converted
 
@@ -159,6 +174,8 @@ class Scene:
             images: AnyImage | Iterable[AnyImage] = ...,
             drawing: rendering.Drawing = ...,
             recipe: Recipe | None = None,
+            hidden_decals: Decals = ...,
+            locked_layers: Iterable[int] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -180,7 +197,12 @@ class Scene:
             instance("recipe", self.recipe, Recipe, InvalidScene, "leave it out")
         check_names(self.objects)
         check_camera(self.camera, self.origin)
-        last = int(self.decals.images.max(initial=-1))
+        instance("hidden_decals", self.hidden_decals, Decals, InvalidScene, "decals.scatter makes some")
+        object.__setattr__(
+            self, "locked_layers", as_layers("locked_layers", self.locked_layers, InvalidScene)
+        )
+        shown_images = self.decals.images, self.hidden_decals.images
+        last = max(int(images.max(initial=-1)) for images in shown_images)
         if last >= len(self.images):
             raise InvalidScene(
                 f"a decal shows image {last}, but the scene has {len(self.images)} images; "
@@ -269,6 +291,8 @@ class Scene:
         images: AnyImage | Sequence[AnyImage] | None = None,
         drawing: rendering.Drawing | None = None,
         recipe: Recipe | None = None,
+        hidden_decals: Decals | None = None,
+        locked_layers: Iterable[int] | None = None,
     ) -> "Scene":
         """Return the same scene with some parts replaced."""
         given: dict[str, Any] = {
@@ -278,5 +302,7 @@ class Scene:
             "images": images,
             "drawing": drawing,
             "recipe": recipe,
+            "hidden_decals": hidden_decals,
+            "locked_layers": locked_layers,
         }
         return replace(self, **{key: value for key, value in given.items() if value is not None})

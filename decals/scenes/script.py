@@ -101,7 +101,7 @@ class _Script:
         """Return the text of the script."""
         objects = [self._object(item) for item in scene.objects]
         images = [self._image(image) for image in scene.images]
-        decals = self._decals(scene.decals)
+        decals = self._decals("decals", scene.decals)
         camera = scene.camera
         view = ", ".join(repr(getattr(camera, name)) for name in ("position", "target", "up", "fov"))
         head = ['"""A scene of Implicit Decals; run this file to see it, or import ``scene``."""', ""]
@@ -122,6 +122,12 @@ class _Script:
             "    camera=camera,",
             f"    decals={decals},",
             *([] if scene.drawing == Drawing() else [f"    drawing={_drawing_text(scene.drawing)},"]),
+            *(
+                [f"    hidden_decals={self._decals('hidden', scene.hidden_decals)},"]
+                if len(scene.hidden_decals)
+                else []
+            ),
+            *([f"    locked_layers={scene.locked_layers!r},"] if scene.locked_layers else []),
             ")",
             "",
             'if __name__ == "__main__":',
@@ -143,9 +149,9 @@ class _Script:
             self._names[id(item)] = item.name
             return (
                 f"decals.MeshObject({item.name!r}, {vertices}, {faces}, {item.color!r}, "
-                f"source={item.source!r}, crease_angle={item.crease_angle!r}{_origin(item)})"
+                f"source={item.source!r}, crease_angle={item.crease_angle!r}{_more(item)})"
             )
-        return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)}{_origin(item)})"
+        return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)}{_more(item)})"
 
     def _tree(self, tree: Node) -> str:
         """Write one line for each node, operands first, and return the name of the last one."""
@@ -191,14 +197,14 @@ class _Script:
         pixels = self._array(f"image_{len(self.arrays)}", image.pixels)
         return f"decals.DecalImage({image.source!r}, {pixels})"
 
-    def _decals(self, decals: Decals) -> str:
+    def _decals(self, part: str, decals: Decals) -> str:
         if not len(decals):
             return "decals.Decals.empty()"
         lines = ["decals.Decals("]
         for name in COLUMNS:
             column = getattr(decals, name)
             if len(decals) > MAX_ROWS:
-                value = self._array(f"decals_{name}", column)
+                value = self._array(f"{part}_{name}", column)
             elif (column == column[:1]).all() and name not in COLUMNS[:4]:
                 value = f"np.full({column.shape!r}, {_number_text(column[0])}, {column.dtype.name!r})"
             else:
@@ -250,6 +256,8 @@ def _value_text(value: Any) -> str:
     return f"decals.rendering.{value!r}" if isinstance(value, Background) else repr(value)
 
 
-def _origin(item: SceneObject) -> str:
-    """Return the argument of an object's origin, if it is far away."""
-    return "" if item.origin == WORLD else f", origin={item.origin!r}"
+def _more(item: SceneObject) -> str:
+    """Return the arguments of an object's origin, hidden and locked nodes that are not the default."""
+    standard = {"origin": WORLD, "hidden": (), "locked": ()}
+    given = {name: getattr(item, name) for name in standard}
+    return "".join(f", {name}={value!r}" for name, value in given.items() if value != standard[name])

@@ -127,7 +127,7 @@ def test_values_of_a_page_are_plain_and_follow_the_session(window: EditWindow) -
     sandbox = Sandbox(window)
     values = sandbox.values()
     assert json.loads(json.dumps(values, default=list)) is not None
-    assert [row["key"] for row in values["outline"]] == ["object 0", "0", "0/0", "0/1", "image 0"]
+    assert [row["key"] for row in values["outline"]] == ["object 0", "0", "0/0", "0/1", "layer 0", "image 0"]
     assert (values["selected"], values["panel"]["controls"], values["done"]) == ("", [], [])
     sandbox.select("0/1")
     values = sandbox.values()
@@ -136,6 +136,38 @@ def test_values_of_a_page_are_plain_and_follow_the_session(window: EditWindow) -
     assert sandbox.values()["panel"]["kind"] == "Sum"
     sandbox.select("")
     assert sandbox.values()["selected"] == ""
+
+
+def test_rows_are_hidden_locked_and_isolated(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+
+    def flags() -> list[str]:
+        rows = sandbox.values()["outline"]
+        return [row["key"] for row in rows if row["hidden"] or row["locked"]]
+
+    sandbox.change_row("0/1", "hide")
+    sandbox.change_row("layer 0", "lock")
+    assert flags() == ["0/1", "layer 0"]
+    sandbox.select("layer 0")
+    assert sandbox.values()["decal"]["count"] == 0  # locked
+    sandbox.change_row("layer 0", "lock")
+    sandbox.select("layer 0")
+    assert sandbox.values()["decal"]["count"] == 20
+    sandbox.change_row("0/1", "hide")
+    sandbox.change_row("0/0", "isolate")
+    assert flags() == ["0/1"]
+    sandbox.change_row("0/0", "isolate")
+    sandbox.change_row("layer 0", "isolate")  # shows everything: there is no other layer
+    sandbox.change_row("layer 0", "hide")
+    assert (flags(), len(window.document.decals)) == (["layer 0"], 0)
+    sandbox.change_row("object 0", "lock")
+    sandbox.change_row("object 0", "remove")
+    finish(window)
+    assert "'model 1' is locked" in sandbox.status
+    sandbox.change_row("layer 7", "hide")
+    assert "layer: expected one with decals" in sandbox.status
+    sandbox.go_to(0)
+    assert (flags(), digest(window.document)) == ([], before)
 
 
 def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWindow) -> None:

@@ -1,0 +1,233 @@
+"""What is hidden or locked: commands that change it, and the check that others change nothing locked."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from blobtree import Node
+from blobtree.errors import InvalidNode
+from blobtree.nodes.paths import Path, node_at
+from blobtree.nodes.surgery import path_of
+from decals.editing.document import DecalStates, Document, Edit
+from decals.editing.queries import move_decals, nearest_points
+from decals.errors import InvalidEdit
+from decals.scenes.objects import Paths, SceneObject, TreeObject, flagged
+from decals.scenes.scene import as_layers
+
+FOLLOW_DISTANCE = 0.02
+"""Decals that were hidden go back to the surface if it is farther away than this, in their radii."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlagNodes:
+    """Hide, show, lock or unlock nodes of objects; the decals on them stay where they are.
+
+    Parameters
+    ----------
+    hidden, locked
+        For the index of each object that changes, the paths of all its nodes that are hidden, or locked, from
+        now on. The path ``()`` is the whole object.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, FlagNodes
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(FlagNodes(hidden={0: ((1,),)}))
+    >>> session.document.shown_objects[0].tree.radius
+    1.0
+    """
+
+    hidden: dict[int, Paths] = field(default_factory=dict)
+    locked: dict[int, Paths] = field(default_factory=dict)
+    label: str = "hide or lock"
+    ignores_locks: ClassVar[bool] = True
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        objects = list(document.objects)
+        for name, flags in (("hidden", self.hidden), ("locked", self.locked)):
+            if not isinstance(flags, dict):
+                raise InvalidEdit(f"{name}: expected paths by the index of their object, got {flags!r:.60}")
+            for number, paths in flags.items():
+                document.object(number)
+                objects[number] = flagged(objects[number], **{name: paths})
+        for item in objects:
+            if item.shown is None and () not in item.hidden:
+                raise InvalidEdit(f"no part of {item.name!r} would be left; hide the object instead")
+        changed = tuple(objects) != document.objects
+        return document.compute_parts(objects=tuple(objects)) if changed else Edit()
+
+
+def toggled(paths: Paths, path: Path) -> Paths:
+    """Return paths with one more, or without it if they have it."""
+    return tuple(other for other in paths if other != path) if path in paths else (*paths, path)
+
+
+def isolating(document: Document, number: int, path: Path) -> FlagNodes:
+    """Return the command that hides everything but a node and what is below it."""
+    hidden: dict[int, Paths] = {other: ((),) for other in range(len(document.objects)) if other != number}
+    item, siblings = document.object(number), []
+    if isinstance(item, TreeObject):
+        for depth, step in enumerate(path):
+            count = len(node_at(item.tree, path[:depth]).children)
+            siblings += [(*path[:depth], other) for other in range(count) if other != step]
+    return FlagNodes({**hidden, number: tuple(siblings)}, label="isolate")
+
+
+@dataclass(frozen=True, eq=False)
+class HideDecals:
+    """Hide decals: they are neither drawn nor edited, and neighbours take their place.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, HideDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(HideDecals([0, 2]))
+    >>> session.document.decals.numbers, session.document.hidden.numbers
+    (array([1]), array([0, 2]))
+    """
+
+    numbers: ArrayLike
+    label: ClassVar[str] = "hide decals"
+    ignores_locks: ClassVar[bool] = True
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        numbers = np.asarray(self.numbers, np.int64)
+        decals = document.decals.take(numbers)  # raises for numbers without a decal
+        hidden = DecalStates.existing(numbers, decals).overlaid_on(document.hidden)
+        return document.compute_deletion(numbers, hidden=hidden) if len(numbers) else Edit()
+
+
+@dataclass(frozen=True, eq=False)
+class ShowDecals:
+    """Show hidden decals again, at their old places; where the surface moved away, on it.
+
+    Parameters
+    ----------
+    layers
+        Layers of the decals; None for all.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, HideDecals, ShowDecals
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(HideDecals([0, 2])), session.do(ShowDecals())
+    >>> session.document.decals.numbers
+    array([0, 1, 2])
+    """
+
+    layers: Sequence[int] | None = None
+    label: ClassVar[str] = "show decals"
+    ignores_locks: ClassVar[bool] = True
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        hidden = document.hidden
+        shown = np.ones(len(hidden.numbers), np.bool_)
+        if self.layers is not None:
+            shown = np.isin(hidden.decals.layers, as_layers("layers", self.layers, InvalidEdit))
+        if not shown.any():
+            return Edit()
+        rest = DecalStates.existing(hidden.numbers[~shown], hidden.decals[~shown])
+        numbers, decals = hidden.numbers[shown], hidden.decals[shown]
+        if document.objects:
+            points = nearest_points(document.objects, decals.positions)
+            gaps = np.linalg.norm(points.positions.astype(np.float64) - decals.positions, axis=1)
+            moved = move_decals(decals, points)
+            far = gaps > FOLLOW_DISTANCE * decals.radii
+            columns = {
+                name: np.where(far[:, None], getattr(moved, name), getattr(decals, name))
+                for name in ("positions", "normals", "tangents")
+            }
+            decals = decals.replace(**columns)
+        if document.decals.has(numbers).any():  # a scene that was loaded numbers its decals anew
+            numbers = document.decals.next_number + np.arange(len(numbers))
+        return document.compute_replacement(numbers, decals, hidden=rest)
+
+
+@dataclass(frozen=True, eq=False)
+class LockLayers:
+    """Set the layers whose decals no command changes.
+
+    Parameters
+    ----------
+    layers
+        All layers that are locked from now on.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, LockLayers
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(LockLayers([0]))
+    >>> session.document.locked_layers
+    (0,)
+    """
+
+    layers: Iterable[int]
+    label: ClassVar[str] = "lock layers"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        return document.compute_parts(locked_layers=as_layers("layers", self.layers, InvalidEdit))
+
+
+def check_locks(document: Document, edit: Edit) -> None:
+    """Raise `InvalidEdit` if an edit of a document changes something that is locked there.
+
+    Decals of a locked layer may still follow a surface that changes.
+    """
+    after = edit.parts_after.objects
+    if after is None:
+        if document.locked_layers and len(edit.before.decals):
+            for layer in np.intersect1d(edit.before.decals.layers, document.locked_layers).tolist():
+                raise InvalidEdit(
+                    f"layer {layer} is locked; unlock it in the outline, or deselect its decals"
+                )
+        return
+    by_name = {item.name: item for item in after}
+    for number, item in enumerate(document.objects):
+        other = after[number] if len(after) == len(document.objects) else by_name.get(item.name)
+        if not item.locked or other is item:
+            continue
+        kept = other is not None and other.name == item.name and _tree(other) is _tree(item)
+        if other is None or (() in item.locked and not kept):
+            raise InvalidEdit(f"{item.name!r} is locked; unlock it in the outline")
+        before, tree = _tree(item), _tree(other)
+        if before is None or tree is None:
+            continue
+        for node in (node_at(before, path) for path in item.locked if path):
+            if not _has(tree, node):
+                raise InvalidEdit(
+                    f"a {type(node).__name__} of {item.name!r} is locked; unlock it in the outline"
+                )
+
+
+def _tree(item: SceneObject) -> Node | None:
+    return item.tree if isinstance(item, TreeObject) else None
+
+
+def _has(tree: Node, node: Node) -> bool:
+    """Return True if a tree has a node."""
+    try:
+        path_of(tree, node)
+    except InvalidNode:
+        return False
+    return True

@@ -1,0 +1,112 @@
+"""Actions that hide, show, isolate and lock nodes, objects, decals and layers."""
+
+import numpy as np
+
+from blobtree.nodes.paths import Path
+from decals.editing.action_state import ActionState, Cursor, require_pick
+from decals.editing.key_bindings import Group, action
+from decals.editing.visibility import (
+    FlagNodes,
+    HideDecals,
+    LockLayers,
+    ShowDecals,
+    isolating,
+    toggled,
+)
+from decals.errors import InvalidEdit
+from decals.validation import describe
+
+
+class VisibilityActions:
+    """Actions on the selected decals or node, else on the object under the cursor.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    """
+
+    def __init__(self, state: ActionState) -> None:
+        self._state = state
+
+    def _subject(self, cursor: Cursor) -> tuple[int, Path]:
+        """Return object and path of the selected node, else those of the object under the cursor."""
+        return self._state.primitive or (require_pick(cursor).object, ())
+
+    @action("hide", "v", summary="hide what is selected, else the object", group=Group.SCENE)
+    def hide(self, cursor: Cursor) -> None:
+        """Hide the selected decals or node, or the object under the cursor."""
+        if self._state.selection:
+            self._state.run(HideDecals(self._state.selection))
+        else:
+            self.flag_node("hidden", *self._subject(cursor))
+
+    @action("show_all", "Shift+v", summary="show everything that is hidden", group=Group.SCENE)
+    def show_all(self, _cursor: Cursor) -> None:
+        """Show all objects, nodes and decals."""
+        session = self._state.session
+        flags: dict[int, tuple[Path, ...]] = dict.fromkeys(range(len(session.document.objects)), ())
+        with session.stroke("show all"):
+            session.do(FlagNodes(flags))
+            session.do(ShowDecals())
+        self._state.message = "everything is shown"
+
+    @action("isolate", "f", summary="hide everything else", group=Group.SCENE)
+    def isolate(self, cursor: Cursor) -> None:
+        """Hide all decals but the selected ones; else all but the node, or the object under the cursor."""
+        if self._state.selection:
+            numbers = self._state.session.document.decals.numbers
+            self._state.run(HideDecals(np.setdiff1d(numbers, self._state.selection)))
+        else:
+            self.isolate_node(*self._subject(cursor))
+
+    @action(
+        "lock", "Shift+l", summary="lock what is selected, else the object; or unlock it", group=Group.SCENE
+    )
+    def lock(self, cursor: Cursor) -> None:
+        """Lock the layers of the selected decals, the selected node, or the object under the cursor."""
+        if self._state.selection:
+            decals = self._state.session.document.decals.take(self._state.selected_numbers)
+            for layer in np.unique(decals.layers).tolist():
+                self.flag_layer("locked", layer)
+        else:
+            self.flag_node("locked", *self._subject(cursor))
+
+    # -- outline ----------------------------------------------------------------------------------------
+
+    def isolate_node(self, number: int, path: Path) -> None:
+        """Hide everything but a node; if that is so already, show all objects and nodes."""
+        document = self._state.session.document
+        command = isolating(document, number, path)
+        shown: dict[int, tuple[Path, ...]] = dict.fromkeys(range(len(document.objects)), ())
+        flags = shown | command.hidden
+        done = all(set(item.hidden) == set(flags[n]) for n, item in enumerate(document.objects))
+        self._state.run(FlagNodes(shown, label="show all") if done else command)
+
+    def flag_node(self, flag: str, number: int, path: Path) -> None:
+        """Hide or lock a node, or show or unlock it: ``flag`` is "hidden" or "locked"."""
+        item = self._state.session.document.object(number)
+        paths = toggled(getattr(item, flag), path)
+        verb = {"hidden": ("show", "hide"), "locked": ("unlock", "lock")}[flag][path in paths]
+        self._state.run(FlagNodes(**{flag: {number: paths}}, label=verb))
+
+    def flag_layer(self, flag: str, layer: int) -> None:
+        """Hide or lock a layer of decals, or show or unlock it."""
+        document = self._state.session.document
+        if flag == "locked":
+            present = document.locked_layers
+            locked = [n for n in present if n != layer] if layer in present else [*present, layer]
+            self._state.run(LockLayers(locked))
+        elif layer in document.hidden.decals.layers:
+            self._state.run(ShowDecals([layer]))
+        else:
+            numbers = document.decals.numbers[document.decals.column("layers") == layer]
+            if not len(numbers):
+                raise InvalidEdit(f"layer: expected one with decals, got {describe(layer)}")
+            self._state.run(HideDecals(numbers))
+
+    def isolate_layer(self, layer: int) -> None:
+        """Hide the decals of all other layers; if none is visible, show them."""
+        document = self._state.session.document
+        others = document.decals.numbers[document.decals.column("layers") != layer]
+        self._state.run(HideDecals(others) if len(others) else ShowDecals())
