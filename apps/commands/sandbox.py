@@ -45,6 +45,7 @@ def sandbox(
     define: Definitions = None,
     port: Whole = 8080,
     host: str = HOST,
+    share: Annotated[bool, Parameter(negative=())] = False,
     browser: bool = True,
     desktop: Annotated[bool, Parameter(negative=())] = False,
     trust: Trust = False,
@@ -81,6 +82,8 @@ def sandbox(
     host
         Address to serve the page at, such as 0.0.0.0 for all networks. Its URL then has a token, without
         which the page does not work. Default: this machine only.
+    share
+        All browsers show one session: one drives, the others watch, and ask for the wheel.
     browser
         Open the page in the default browser.
     desktop
@@ -113,7 +116,8 @@ def sandbox(
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
             in_lesson = lab or lessons is not None
-            page(server, window, in_lesson=in_lesson, start=not model and not in_lesson, done=done)
+            start = not model and not in_lesson
+            page(server, window, in_lesson=in_lesson, start=start, done=done, shared=share)
             if done:
                 server.controller.on_server_ready.add(
                     lambda **_: print(_url(host, server.port, ""), flush=True)

@@ -129,7 +129,9 @@ def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> N
 
 
 def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
-    """Return the brush and its controls."""
+    """Return the brush and its controls; the sizes of brushes need the surface, which selecting does not."""
+    if brush.brush is Brush.SELECT:
+        return {"brush": str(brush.brush), "controls": []}
     has_objects = bool(document.objects)
     radius = brush.radius or (default_radius(document) if has_objects else 1.0)
     size = brush.decal_radius or (default_decal_radius(document) if has_objects else 0.1)

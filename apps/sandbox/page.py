@@ -5,9 +5,10 @@ from contextlib import suppress
 from typing import Any
 
 from trame.ui.vuetify3 import VAppLayout
-from trame.widgets import html, vuetify3
+from trame.widgets import client, html, vuetify3
 
 from decals.apps.sandbox import panels
+from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import thumbnails
 from decals.apps.sandbox.panels import DROP, FIELD, named
 from decals.apps.sandbox.sandbox import Sandbox
@@ -20,6 +21,9 @@ REFRESH_SECONDS = 0.1
 """Time between two looks at the session, whose changes the page then shows."""
 
 PANEL_WIDTH = 290
+STYLE = ".v-slider *, .v-field * { transition: none !important }"
+"""A moved slider would otherwise repaint the panel for 0.3 s, which slows the pictures."""
+
 TOOLBAR = {
     "undo": "mdi-undo",
     "redo": "mdi-redo",
@@ -70,13 +74,18 @@ class Page:
         The edited window; its plotter is drawn off screen.
     done
         Show a button that saves and ends the server.
+    shared
+        One browser drives, the others watch.
     options
         Options of the `Sandbox`.
     """
 
-    def __init__(self, server: Any, window: EditWindow, *, done: bool = False, **options: Any) -> None:
+    def __init__(
+        self, server: Any, window: EditWindow, *, done: bool = False, shared: bool = False, **options: Any
+    ) -> None:
         self._server, self._window, self._ends = server, window, done
         self.sandbox = Sandbox(window, **options)
+        Connections(server, shared=shared, end_input=self.sandbox.end_input)
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
@@ -141,6 +150,7 @@ class Page:
     def _build(self) -> None:
         with VAppLayout(self._server, full_height=True) as layout:
             layout.root.theme = ("theme",)
+            client.Style(STYLE)
             with vuetify3.VLayout(full_height=True):
                 self._build_toolbar()
                 self._build_left_side()
@@ -181,6 +191,7 @@ class Page:
     def _build_toolbar(self) -> None:
         with vuetify3.VAppBar(density="compact", flat=True, border=True):
             vuetify3.VAppBarTitle("{{ title }}")
+            panels.build_wheel()
             panels.build_files(self.sandbox)
             panels.build_view_menu(self.sandbox)
             self._build_menu("Add", "mdi-plus", "primitives", self.sandbox.add)

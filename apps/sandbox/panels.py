@@ -192,6 +192,32 @@ def build_files(sandbox: Sandbox) -> None:
             vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists", **COMPACT)
 
 
+def build_wheel() -> None:
+    """Build who drives a shared page, and the button that asks for the wheel or passes it."""
+    with html.Div(v_if="wheel.shared", classes="d-flex align-center ga-2 mr-2"):
+        html.Span(
+            "{{ wheel.drives ? 'You drive' : 'Browser ' + wheel.driver + ' drives' }}, "
+            "{{ wheel.browsers - 1 }} watch",
+            classes="text-caption",
+            raw_attrs=['role="status"'],
+        )
+        vuetify3.VBtn(
+            "Pass the wheel to browser {{ wheel.next }}",
+            v_if="wheel.drives && wheel.next",
+            size="small",
+            variant="tonal",
+            click="trigger('pass_wheel')",
+        )
+        vuetify3.VBtn(
+            "{{ wheel.asks ? 'Asked for the wheel' : 'Ask for the wheel' }}",
+            v_if="!wheel.drives",
+            disabled=("wheel.asks",),
+            size="small",
+            variant="tonal",
+            click="trigger('ask_for_wheel')",
+        )
+
+
 # -- view -----------------------------------------------------------------------------------------------
 
 

@@ -263,14 +263,19 @@ class Sandbox:
         if step is not None:
             step()
 
+    def end_input(self) -> None:
+        """End the moves of a slider whose browser has left, as one entry of the history."""
+        self.take_step()
+        self._last_step = math.inf
+        with self._reported():
+            self._window.actions.trees.end_drag()
+
     def settle(self) -> None:
         """Keep the view up to date, and end the edit of a slider that has rested; call this regularly."""
         if self.display.update():
             self._window.redraw(whole=True)
         if time.monotonic() - self._last_step > REST_SECONDS:
-            self._last_step = math.inf
-            with self._reported():
-                self._window.actions.trees.end_drag()
+            self.end_input()
 
     def set_component(self, name: str, index: list[int], raw: Any) -> None:
         """Set one number of a parameter of the selected node: ``index`` leads to it through lists."""

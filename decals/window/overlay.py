@@ -79,12 +79,12 @@ class Overlay:
         self._actor.mapper.dataset = self._lines
         self._actor.use_bounds = False
         self._actor.ForceTranslucentOn()  # so that it writes no depth and occludes nothing
-        self._text = ""
+        self._text, self._help_lines = "", KEYS.help_lines()
         self._status: Any = plotter.add_text(
             "", position=(TEXT_MARGIN, 10), font_size=9, color="black", render=False, name="decals-status"
         )
         self._help: Any = plotter.add_text(
-            "\n".join(KEYS.help_lines()),
+            "\n".join(self._help_lines),
             position=(TEXT_MARGIN, 40),
             font_size=8,
             color="black",
@@ -134,7 +134,7 @@ class Overlay:
             Number of pages: several in a low window.
         """
         width, height = self._renderer.GetSize()
-        lines = KEYS.help_lines()
+        lines = self._help_lines
         fitting = (height - HELP_BORDER) / (LINE_HEIGHT * MIN_HELP_SIZE)
         pages: int = min(max(math.ceil(len(lines) / max(fitting - 1.0, 1.0)), 1), MAX_HELP_PAGES)
         self._help.SetVisibility(page > 0)

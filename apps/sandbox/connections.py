@@ -1,0 +1,183 @@
+"""The browsers that show a page: one of them drives, and input that a browser leaves behind is ended."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from wslink.websocket import LinkProtocol
+
+MOUSE = "viewport.mouse.interaction"
+TRIGGER = "trame.trigger"
+STATE = "trame.state.get"
+UPDATE = "trame.state.update"
+LIFECYCLE = "trame.lifecycle.update"
+LOOKS = frozenset(
+    {
+        STATE,
+        LIFECYCLE,
+        "trame.error.client",
+        "viewport.image.push",
+        "viewport.image.push.observer.add",
+        "viewport.image.push.quality.get",
+    }
+)
+"""Messages of browsers that only watch."""
+
+
+OURS = frozenset({TRIGGER, UPDATE, LIFECYCLE})
+"""Messages that call functions of the page, whose errors are shown."""
+
+OF_SERVER = "wheel", "trame__template"
+"""First parts of the names of values that no browser may change."""
+
+
+class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
+    """Checks the messages of all browsers of a server before its functions are called.
+
+    Malformed messages are refused without an exception. If the page is shared, only the messages of the
+    browser that drives change something; the others see what it does. The driver passes the wheel to the
+    browser that asked first. If the driver leaves, the next browser drives.
+
+    Parameters
+    ----------
+    server
+        The trame server, before its start.
+    shared
+        One browser drives. Otherwise, all may change everything.
+    end_input
+        Called after a browser has left that held a button or moved a slider.
+    """
+
+    def __init__(self, server: Any, *, shared: bool, end_input: Callable[[], None]) -> None:
+        super().__init__()
+        self._server, self._shared, self._end_input = server, shared, end_input
+        self._web: Any = None
+        self._numbers: dict[str, int] = {}
+        self._count = 0
+        self._driver = ""
+        self._asking: list[str] = []
+        self._mouse: tuple[str, Callable[[], Any]] | None = None
+        self._last_input = ""
+        server.state.wheel = self.wheel("")
+        server.controller.trigger("ask_for_wheel")(self.ask)
+        server.controller.trigger("pass_wheel")(self.pass_wheel)
+        server.add_protocol_to_configure(lambda protocol: protocol.registerLinkProtocol(self))
+        server.controller.on_server_bind.add(self._bind)
+
+    def _bind(self, web: Any) -> None:
+        """Check all calls of a web server; pictures are compressed already, so its messages are not."""
+        self._web = web
+        web.config["ws_compress"] = False
+        for handler in web._ws_handlers:
+            for name, (part, call) in handler.functionMap.items():
+                handler.functionMap[name] = part, self._checked(name, call)
+
+    def _checked(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        async def checked(part: Any, *arguments: Any, **options: Any) -> Any:
+            client = self._web.last_active_client_id
+            if not self._allows(client, name, arguments):
+                return None
+            if name not in LOOKS:
+                self._last_input = client
+            try:
+                bound = inspect.signature(call).bind(part, *arguments, **options)
+                self._check(name, *bound.args[1:])
+            except (TypeError, KeyError, ValueError, AttributeError) as error:
+                return {"error": f"refused: {error}"}
+            try:
+                result = call(part, *arguments, **options)
+                result = await result if inspect.isawaitable(result) else result
+            except Exception as error:
+                if name in OURS:
+                    raise
+                return {"error": f"refused: {error}"}  # trame's functions raise for arguments of no page
+            if name == MOUSE:
+                self._keep_mouse(client, lambda event: call(part, event), *arguments)
+            if name == STATE:
+                result["state"]["wheel"] = self.wheel(client)
+            return result
+
+        return checked
+
+    def _check(self, name: str, first: Any = None, *others: Any) -> None:
+        """Raise an error if no page would send these arguments."""
+        if name == TRIGGER:
+            call = self._server.controller.trigger_fn(first)
+            arguments, options = others
+            inspect.signature(call).bind(*arguments, **options)
+        elif name == UPDATE:
+            for change in first:
+                if change["key"].startswith(OF_SERVER):
+                    raise KeyError(change["key"])
+        elif name == LIFECYCLE and not first.startswith("client"):
+            raise ValueError(first)
+
+    def _keep_mouse(self, client: str, call: Callable[[Any], Any], event: dict[str, Any]) -> None:
+        """Remember a button that is down, to release it if its browser leaves."""
+        buttons = "buttonLeft", "buttonMiddle", "buttonRight"
+        held = any(event[name] for name in buttons)
+        up = {**event, **dict.fromkeys(buttons, 0), "action": "up"}
+        self._mouse = (client, lambda: call(up)) if held else None
+
+    # -- browsers ---------------------------------------------------------------------------------------
+
+    def onConnect(self, _request: Any, client: str) -> None:  # noqa: N802  (wslink's name)
+        """Give a new browser its number."""
+        self._count += 1
+        self._numbers[client] = self._count
+        if not self._driver:
+            self._driver = client
+        self._tell()
+
+    def onClose(self, client: str) -> None:  # noqa: N802  (wslink's name)
+        """End what the browser was doing, and pass the wheel on."""
+        del self._numbers[client]
+        self._asking = [other for other in self._asking if other != client]
+        if self._mouse is not None and self._mouse[0] == client:
+            release, self._mouse = self._mouse[1], None
+            release()
+        if self._last_input == client:
+            self._last_input = ""
+            self._end_input()
+        if self._driver == client:
+            self._driver = next(iter([*self._asking, *self._numbers]), "")
+            self._asking = [other for other in self._asking if other != self._driver]
+        self._tell()
+
+    # -- the wheel --------------------------------------------------------------------------------------
+
+    def _allows(self, client: str, name: str, arguments: tuple[Any, ...]) -> bool:
+        asks = name == TRIGGER and arguments[:1] == ("ask_for_wheel",)
+        return not self._shared or client == self._driver or name in LOOKS or asks
+
+    def wheel(self, client: str) -> dict[str, Any]:
+        """Return what a browser shows of the wheel."""
+        return {
+            "shared": self._shared,
+            "drives": not self._shared or client == self._driver,
+            "driver": self._numbers.get(self._driver, 0),
+            "number": self._numbers.get(client, 0),
+            "browsers": len(self._numbers),
+            "asks": client in self._asking,
+            "next": self._numbers[self._asking[0]] if self._asking else 0,
+        }
+
+    def ask(self) -> None:
+        """Ask for the wheel."""
+        client = self._web.last_active_client_id
+        if client != self._driver and client not in self._asking:
+            self._asking.append(client)
+        self._tell()
+
+    def pass_wheel(self) -> None:
+        """Pass the wheel to the browser that asked first."""
+        if self._asking:
+            self._end_input()
+            self._driver = self._asking.pop(0)
+        self._tell()
+
+    def _tell(self) -> None:
+        """Send each browser what it shows of the wheel."""
+        if self._shared:
+            for client in self._numbers:
+                self.publish("trame.state.topic", {"wheel": self.wheel(client)}, client_id=client)

@@ -1,0 +1,195 @@
+"""Several browsers at one server: who drives, and what becomes of input that a browser leaves behind."""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+import decals
+from decals.window import EditWindow
+from tests.apps.sandbox.test_sandbox import TREE
+from tests.decals.editing.scenes import digest
+from tests.decals.window.driver import Driver
+
+pytest.importorskip("trame_vtk")
+
+SIZE = 160, 120
+BUTTONS = "buttonLeft", "buttonMiddle", "buttonRight", "shiftKey", "ctrlKey", "altKey", "metaKey"
+
+CALLS = (
+    "trame.trigger",
+    "trame.state.update",
+    "trame.lifecycle.update",
+    "trame.force.push",
+    "viewport.mouse.interaction",
+    "viewport.mouse.zoom.wheel",
+    "viewport.image.push",
+    "viewport.image.push.observer.add",
+    "viewport.image.push.observer.remove",
+    "viewport.image.push.quality",
+    "viewport.image.push.quality.get",
+    "viewport.image.push.original.size",
+    "viewport.image.push.enabled",
+    "viewport.image.animation.start",
+    "viewport.image.animation.stop",
+    "viewport.image.animation.fps.max",
+)
+
+
+class Browser:
+    """A connection to the page, without a picture."""
+
+    def __init__(self, page: Any, server: Any) -> None:
+        self._page, self._server = page, server
+
+    async def open(self) -> "Browser":
+        import aiohttp
+        from trame_server.client import WsLinkSession
+
+        self._http = aiohttp.ClientSession()
+        self.socket = await self._http.ws_connect(f"ws://127.0.0.1:{self._server.port}/ws", autoping=True)
+        self._session = WsLinkSession(self.socket)
+        self._listens = asyncio.create_task(self._session.listen())
+        await (await self._session.auth(secret="wslink-secret"))
+        self.wheel = (await self.call("trame.state.get"))["state"]["wheel"]
+        self._session.register_subscription("trame.state.topic", self._take)
+        return self
+
+    def _take(self, changes: dict[str, Any]) -> None:
+        self.wheel = changes.get("wheel", self.wheel)
+
+    async def call(self, name: str, *arguments: Any) -> Any:
+        return await (await self._session.call(name, list(arguments)))
+
+    async def trigger(self, event: Callable[..., Any] | str, *arguments: Any) -> Any:
+        name = event if isinstance(event, str) else self._server.controller.trigger_name(event)
+        return await self.call("trame.trigger", name, list(arguments), {})
+
+    async def mouse(self, at: tuple[float, float], *, down: bool = True, action: str = "move") -> Any:
+        view = str(self._page.view._delivery.get_global_id(self._page.view._window.plotter.render_window))
+        event = {**dict.fromkeys(BUTTONS, 0), "buttonLeft": int(down), "action": action, "view": view}
+        x, y = (at[0] + 0.5) / SIZE[0], (at[1] + 0.5) / SIZE[1]
+        return await self.call("viewport.mouse.interaction", {**event, "x": x, "y": y})
+
+    async def close(self) -> None:
+        """Vanish without a word to the page."""
+        await self.socket.close()
+        await self._listens
+        await self._http.close()
+
+
+Check = Callable[[EditWindow, Any, Callable[[], Awaitable[Browser]]], Awaitable[None]]
+
+
+def serve(check: Check, *, shared: bool = False) -> None:
+    """Serve a page to a check."""
+    from trame.app import get_server
+
+    from decals.apps.sandbox.page import Page
+
+    async def run() -> None:
+        scene = decals.cover(TREE, count=20, images=["tile"])
+        with EditWindow(scene, off_screen=True, size=SIZE) as window:
+            window.show()
+            server = get_server(f"connections {id(window)}", client_type="vue3")
+            page = Page(server, window, shared=shared)
+            options: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
+            task = server.start(host="127.0.0.1", show_connection_info=False, **options)
+            await server.ready
+            await check(window, page, lambda: Browser(page, server).open())
+            await server.stop()
+            await task
+
+    asyncio.run(run())
+
+
+async def until(true: Callable[[], object]) -> None:
+    async with asyncio.timeout(30):
+        while not true():
+            await asyncio.sleep(0.01)
+
+
+def test_one_browser_drives_and_passes_the_wheel(vtk_display: None) -> None:
+    async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
+        first, second, third = [await connect() for _ in range(3)]
+        assert [browser.wheel["drives"] for browser in (first, second, third)] == [True, False, False]
+        await second.trigger(page.sandbox.select, "0/1")
+        await second.mouse((80, 60), action="down")
+        await second.call("trame.state.update", [{"key": "theme", "value": "dark"}])
+        await second.trigger("pass_wheel")
+        assert (window.actions.state.primitive, page._server.state.theme) == (None, "light")
+        await first.trigger(page.sandbox.select, "0/1")
+        await first.call("trame.state.update", [{"key": "theme", "value": "dark"}])
+        assert (window.actions.state.primitive, page._server.state.theme) == ((0, (1,)), "dark")
+        for browser in (third, second):
+            await browser.trigger("ask_for_wheel")
+        await until(lambda: first.wheel["next"] == third.wheel["number"] and second.wheel["asks"])
+        await first.trigger("pass_wheel")
+        await until(lambda: third.wheel["drives"] and not first.wheel["drives"])
+        assert (first.wheel["driver"], first.wheel["browsers"]) == (third.wheel["number"], 3)
+        await third.close()
+        await until(lambda: second.wheel["drives"])  # it asked
+        await second.trigger(page.sandbox.select, "0/0")
+        assert window.actions.state.primitive == (0, (0,))
+        for browser in (first, second):
+            await browser.close()
+
+    serve(check, shared=True)
+
+
+def test_a_browser_that_leaves_in_a_drag_ends_it_as_one_entry(
+    vtk_display: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
+        before = digest(window.document)
+        for times in (1, 2):  # a button that was never released would swallow the next press
+            browser, other = await connect(), await connect()
+            number, (x, y) = next(Driver(window).visible())
+            window.actions.state.selection = (number,)
+            await browser.mouse((x, y), action="down")
+            for step in (3, 6, 9):
+                await browser.mouse((x + step, y))
+            assert window.tools.dragging
+            await browser.close()
+            await until(lambda: not window.tools.dragging and not window.session.stroke_open)
+            assert window.session.labels == ("move",) * times
+            await other.close()
+        browser = await connect()
+        await browser.trigger(page.sandbox.select, "0/1")
+        await browser.trigger(page.sandbox.set_value, "radius", 0.7, False)
+        await browser.close()
+        await until(lambda: window.session.labels[2:] == ("set radius",) and not window.session.stroke_open)
+        page.sandbox.go_to(0)
+        assert digest(window.document) == before
+
+    serve(check)
+    assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
+
+
+def test_malformed_messages_are_refused_without_an_exception(
+    vtk_display: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    odd: list[Any] = [None, 3, "x", [], {}, [1, 2], {"view": "-1"}, {"key": 3}]
+
+    async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
+        before, browser = digest(window.document), await connect()
+        templates = {
+            key: page._server.state[key] for key in page._server.state.to_dict() if "template" in key
+        }
+        for name in CALLS:
+            for count in range(4):
+                for value in odd:
+                    await browser.call(name, *[value] * count)
+        for value in odd:
+            await browser.trigger(page.sandbox.set_value, value)
+            await browser.trigger(page.sandbox.set_value, value, value, value)
+        changes = [{"key": key, "value": "<b>x</b>"} for key in [*templates, "wheel"]]
+        await browser.call("trame.state.update", changes)
+        assert {key: page._server.state[key] for key in templates} == templates
+        assert digest(window.document) == before
+        await browser.close()
+
+    serve(check)
+    assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
