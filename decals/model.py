@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -13,6 +14,7 @@ from blobtree.formulas.falloff import RIM
 from blobtree.validation import items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.load import decode_srgb
+from decals.receivers import codes_of, receiver_array
 from decals.validation import (
     bool_array,
     check_range,
@@ -43,6 +45,12 @@ LAYER_LIMIT = 2**19
 
 NO_IMAGE = -1
 """Image number of a decal that shows only its tint."""
+
+FADE_ANGLES = 1.0, 180.0
+"""Least and greatest fade angle, in degrees."""
+
+FADE_DEPTHS = 1e-6, 1e6
+"""Least and greatest fade depth, in radii."""
 
 RECORD = 4
 """Rows of the packed record of a decal."""
@@ -110,13 +118,23 @@ class Decals:
         each, or one for all. Default white.
     opacities : float32[n], optional
         From 0 (invisible) to 1, the default. One number stands for all decals.
+    receivers : str[n], optional
+        Objects of the scene that a decal lies on: one of their names or labels, or several with commas, such
+        as ``"hull, lid"``. One text stands for all decals. On other objects it neither shows nor pushes.
+        Default ``""``: all objects, except those with ``named_only``.
+    fade_angles : float32[n], optional
+        Angle between the normals of decal and surface, in degrees up to 180, at which a decal has faded away;
+        it begins to fade at half the angle. It replaces the facing rule and `spill`. Default 0: no fade.
+    fade_depths : float32[n], optional
+        Distance from the tangent plane of a decal, in its radii, at which it has faded away; it begins to
+        fade at half of it. Default 0: no fade.
 
     Raises
     ------
     InvalidDecals
         Wrong shapes, NaN or infinity, coordinates beyond MAX_COORDINATE, radii outside MIN_RADIUS to
         MAX_COORDINATE, zero normals or tangents, a tangent along its normal, or images, interactions, layers,
-        tints or opacities out of range.
+        tints, opacities or fades out of range, or receivers that are no labels or too many different ones.
 
     See Also
     --------
@@ -151,6 +169,9 @@ class Decals:
     layers: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
     tints: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
     opacities: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    receivers: NDArray[Any] = None  # type: ignore[assignment]  # filled in by __post_init__
+    fade_angles: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    fade_depths: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
 
     if TYPE_CHECKING:
 
@@ -167,6 +188,9 @@ class Decals:
             layers: ArrayLike | None = None,
             tints: ArrayLike | None = None,
             opacities: ArrayLike | None = None,
+            receivers: ArrayLike | None = None,
+            fade_angles: ArrayLike | None = None,
+            fade_depths: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -195,7 +219,11 @@ class Decals:
             "opacities": unit_interval("opacities", one_or_each(self.opacities, count), (count,)).astype(
                 np.float32
             ),
+            "receivers": receiver_array("receivers", self.receivers, count),
+            "fade_angles": _fades("fade_angles", self.fade_angles, count, *FADE_ANGLES),
+            "fade_depths": _fades("fade_depths", self.fade_depths, count, *FADE_DEPTHS),
         }
+        codes_of(arrays["receivers"], [""])  # raises for too many different ones
         for name, array in arrays.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -278,6 +306,36 @@ class Decals:
         """True if decals can cover each other: they are not all contact decals of one layer."""
         return bool((self.interactions != Interaction.PUSH).any() or (self.layers != self.layers[:1]).any())
 
+    @cached_property
+    def limited(self) -> bool:
+        """True if decals have receivers or fades."""
+        return bool((self.receivers != "").any() or self.fade_angles.any() or self.fade_depths.any())
+
+    @property
+    def receiver_table(self) -> list[str]:
+        """Different receivers, of which `limits` has the places: the first one is "", any object."""
+        table = [""]
+        codes_of(self.receivers, table)
+        return table
+
+    @property
+    def limits(self) -> Float32Array:
+        """Rows of receivers and fades that devices read: float32[n, 4], zeros where a decal has none.
+
+        A row is (cosine at which the decal begins to fade, cosine at which it ends, depth at which it ends,
+        place of its receivers in `receiver_table`).
+        """
+        return self.limits_of([""])
+
+    def limits_of(self, table: list[str]) -> Float32Array:
+        """Return `limits` with places in another table of receivers; new ones are appended to it."""
+        limits = np.zeros((len(self), 4), np.float32)
+        angles = np.radians(self.fade_angles.astype(np.float64))
+        fading = angles > 0.0
+        limits[fading, 0], limits[fading, 1] = np.cos(0.5 * angles[fading]), np.cos(angles[fading])
+        limits[:, 2], limits[:, 3] = self.fade_depths, codes_of(self.receivers, table)
+        return limits
+
     def packed(self) -> Float32Array:
         """Return the records that devices read: float32[4n, 4], RECORD rows for each decal.
 
@@ -294,6 +352,14 @@ class Decals:
         record[:, 3, :3] = decode_srgb(self.tints.astype(np.float64))
         record[:, 3, 3] = self.opacities
         return record.reshape(-1, 4)
+
+
+def _fades(name: str, values: Any, count: int, low: float, high: float) -> Float32Array:
+    """Return fade angles or depths as a new array; 0 in each row for None."""
+    given = np.zeros(count) if values is None else one_or_each(values, count)
+    array = finite_array(name, given, (count,))
+    check_range(name, np.where(array == 0.0, low, array), low, high, advice="0 is no fade")
+    return array.astype(np.float32)
 
 
 COLUMNS = tuple(field.name for field in fields(Decals))

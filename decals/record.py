@@ -99,27 +99,6 @@ def facing_limit(packed_rank: wp.float32) -> wp.float32:
 
 
 @wp.func
-def faces(n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
-    """Return True if a decal colours surface with this normal (facing rule)."""
-    facing = decals[RECORD * decal + 1]
-    return wp.dot(xyz(facing), n_q) > facing_limit(facing[3])
-
-
-@wp.func
-def complement_of(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
-    """Return the complement e of a decal's field at q; NO_FIELD out of reach, or where it faces away."""
-    ball = decals[RECORD * decal]
-    w = q - xyz(ball)
-    squared = wp.dot(w, w)
-    size = ball[3] * ball[3]
-    if squared >= REACH_SQUARED * size:  # most candidates return here, before any division
-        return NO_FIELD
-    if not faces(n_q, decal, decals):
-        return NO_FIELD
-    return field_complement(squared / size)
-
-
-@wp.func
 def apart(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.vec3:
     """Return the vector from the centre of one decal to that of another."""
     return xyz(decals[RECORD * other]) - xyz(decals[RECORD * decal])

@@ -1,6 +1,7 @@
 // The decal pass, body of pixels.frag and pixels.comp: for every pixel of the G-buffer the decals that cover it, over
 // the object's own colour. DECALS: there are decals; the slot holds decals.glsl. POSED: some objects are posed, and the
 // textures of rest.frag say where their pixels lie in the rest pose. TWO_TARGETS: also write owner, field and uv.
+// LIMITED: decals have receivers or fades.
 //@ include camera.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
@@ -13,6 +14,11 @@ uniform sampler2D r_right;
 uniform sampler2D r_up;
 #endif
 
+#ifdef LIMITED
+uniform isampler2D object_masks;
+#endif
+int surface_receivers = -1;  // mask of the object at this pixel, see decals/receivers.py
+
 //@ slot decals optional
 
 // color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
@@ -24,6 +30,10 @@ Pixel pixel_at(ivec2 texel) {
     if (pixel.color.w > 0.0) {
         vec4 visible = texelFetch(g_position, texel, 0);
         vec3 position = visible.xyz;
+#ifdef LIMITED
+        int object = int(visible.w) - 1;
+        surface_receivers = texelFetch(object_masks, ivec2(object & 4095, object >> 12), 0).x;
+#endif
         vec3 normal = texelFetch(g_normal, texel, 0).xyz;
 #ifdef POSED
         vec4 rest = texelFetch(r_position, texel, 0);

@@ -7,6 +7,7 @@ uniform isampler2D index_table;
 uniform isampler2D index_ids;
 uniform int index_level_count;
 uniform int index_mask;
+uniform sampler2D decal_limits;  // decal i: cosines between which it fades, depth at which it ends, place of receivers
 uniform int decal_mapping;
 uniform float decal_stiffness;
 uniform sampler2DArray decal_images;  // linear, premultiplied
@@ -78,7 +79,8 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
         vec2 dy = scale * tangent_coordinates(unroll_step(up, n_p, n), n_p, u.xyz);
         color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
     }
-    return tint.w * color * vec4(tint.rgb, 1.0);
+    float fade = decal_limited ? fade_at(q, n, hit.owner) : 1.0;
+    return fade * tint.w * color * vec4(tint.rgb, 1.0);
 }
 
 // Premultiplied linear colour of all decals at a point over each other, from the topmost (`hit`) down; no cap.

@@ -1,6 +1,7 @@
 // Decals in a fragment shader of VTK: inserted before its main(), which calls decal_over for every colour that its
 // lights are multiplied with. Positions and normals are those of the decals' space; the caller gives the
 // CameraBlock for that space and the picture being drawn.
+uniform int surface_receivers;  // mask of the actor, see decals/receivers.py
 //@ include color.glsl
 //@ include decals.glsl
 

@@ -15,7 +15,8 @@ from decals.editing.commands import SetValues
 from decals.editing.document import Document
 from decals.errors import InvalidEdit
 from decals.field.mapping import ImageMapping
-from decals.model import NO_IMAGE, Interaction
+from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Interaction
+from decals.receivers import labels_of
 from decals.record import Contact
 from decals.scenes.objects import bounds_of
 from decals.validation import describe, finite_number
@@ -31,8 +32,17 @@ COLUMNS = {
     "interaction": "interactions",
     "layer": "layers",
     "spill": "spill",
+    "receivers": "receivers",
+    "fade_angle": "fade_angles",
+    "fade_depth": "fade_depths",
 }
 """Arrays of `decals.Decals` by the names of their controls."""
+
+ANY_OBJECT = "any object"
+"""Choice of receivers that stands for all objects."""
+
+MAX_DEPTH = 2.0
+"""End of the slider of fade depths, in radii."""
 
 LAYERS = 8
 """Ends of the slider of layers; the field takes any layer."""
@@ -66,6 +76,27 @@ def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[
         ),
         _slider("layer", int(last.layers[0]), -layers, layers, "drawn from the lowest up", step=1.0),
         Control("spill", "switch", bool(last.spill[0]), "also colours surface that faces away"),
+        Control(
+            "receivers",
+            "choice",
+            str(last.receivers[0]) or ANY_OBJECT,
+            "objects that it lies on",
+            choices=tuple(receiver_choices(document, str(last.receivers[0]))),
+        ),
+        _slider(
+            "fade_angle",
+            float(last.fade_angles[0]),
+            0.0,
+            FADE_ANGLES[1],
+            "degrees between the normals at which it has faded away; 0: no fade",
+        ),
+        _slider(
+            "fade_depth",
+            float(last.fade_depths[0]),
+            0.0,
+            max(MAX_DEPTH, float(last.fade_depths[0])),
+            "distance from its plane, in radii, at which it has faded away; 0: no fade",
+        ),
     ]
     return [asdict(control) for control in controls]
 
@@ -81,6 +112,12 @@ def image_names(document: Document) -> list[str]:
         name = Path(image.source).name[:40] or f"image {number}"
         names.append(name if name not in names else f"{name} ({number})")
     return names
+
+
+def receiver_choices(document: Document, present: str) -> list[str]:
+    """Return the receivers to choose from: any object, each label of the objects, and the present ones."""
+    labels = sorted(frozenset[str]().union(*map(labels_of, document.objects)))
+    return [ANY_OBJECT, *labels, *([present] if present and present not in labels else [])]
 
 
 def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
@@ -104,6 +141,12 @@ def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
             return int(Interaction[raw.upper()])
         case "spill":
             return bool(raw)
+        case "receivers":
+            return "" if raw == ANY_OBJECT else raw
+        case "fade_angle" | "fade_depth":
+            least = (FADE_ANGLES if name == "fade_angle" else FADE_DEPTHS)[0]
+            number = finite_number(name, _as_number(raw), InvalidEdit)
+            return 0.0 if 0.0 <= number < least else number
     raise InvalidEdit(f"value of decals: expected one of {', '.join(COLUMNS)}, got {describe(name)}")
 
 

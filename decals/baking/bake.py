@@ -125,7 +125,8 @@ def bake(
         if not objects:
             raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
         meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
-        colors = SurfaceColors(meshes, decals, images, drawing.contact, drawing.mapping, drawing.stiffness)
+        shown = drawing.contact, drawing.mapping, drawing.stiffness
+        colors = SurfaceColors(meshes, objects, decals, images, *shown)
         texture = None
         if vertex_colors:
             nodes = _colored_nodes(meshes, colors, report)
@@ -153,6 +154,8 @@ class SurfaceColors:
     ----------
     meshes : sequence of BakeMesh
         The objects.
+    objects : sequence of objects of a scene
+        The same as the scene has them, which decides which decals lie on them.
     decals : Decals or DecalEditor
         The decals on them.
     images : sequence of uint8[h, w, 4]
@@ -164,13 +167,14 @@ class SurfaceColors:
     def __init__(
         self,
         meshes: Sequence[BakeMesh],
+        objects: Sequence[object],
         decals: Decals | DecalEditor,
         images: Sequence[UInt8Array],
         contact: AnyContact,
         mapping: ImageMapping,
         stiffness: float,
     ) -> None:
-        self._meshes, self._decals, self._images = meshes, decals, images
+        self._meshes, self._objects, self._decals, self._images = meshes, objects, decals, images
         self._contact, self._mapping, self._stiffness = contact, mapping, stiffness
         self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
 
@@ -186,6 +190,7 @@ class SurfaceColors:
             stiffness=self._stiffness,
             index=self._index,
             images=self._images,
+            on=self._objects[number],
         ).color
         assert over is not None  # there are images, if only an empty list of them
         colors: Float64Array = base * (1.0 - over[:, 3:]) + over[:, :3]

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int64Array
-from blobtree.validation import point_array
+from blobtree.validation import point_array, truth
 from decals.editing.document import Document, Edit, hidden_states
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
 from decals.images.load import AnyImage
 from decals.index.rows import as_numbers
-from decals.model import NO_IMAGE, Decals
+from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
@@ -324,6 +324,81 @@ class MoveDecals(DecalCommand):
         targets = nearest_points(document.objects, first.positions + offsets)
         others = move_decals(before[1:], targets)
         return document.compute_replacement(self.numbers, Decals.concatenate([first, others]))
+
+
+@dataclass(frozen=True, eq=False)
+class OrderDecals(DecalCommand):
+    """Draw decals over, or under, all others of their layer and interaction.
+
+    Such decals are drawn in the order of their numbers, so decals exchange their numbers: `numbers_after`
+    returns those of the moved ones. Contact decals push each other and have no order.
+
+    Parameters
+    ----------
+    numbers
+        Numbers of the decals. Contact decals among them stay as they are.
+    front
+        True to bring the decals to the front, False to send them to the back.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, OrderDecals
+    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"])
+    >>> scene = scene.replace(decals=scene.decals.replace(interactions="overlap", layers=[0, 0, 1]))
+    >>> session = EditSession(scene)
+    >>> command = OrderDecals([0], front=True)
+    >>> command.numbers_after(session.document)
+    array([1])
+    >>> edit = session.do(command)
+    >>> bool((session.document.decals[1].positions == scene.decals[[0]].positions).all())
+    True
+    """
+
+    front: bool
+
+    if TYPE_CHECKING:  # any array-like of numbers is converted
+
+        def __init__(self, numbers: ArrayLike, front: bool) -> None: ...
+
+    @property
+    def label(self) -> str:
+        """Name of the undo entry."""
+        return "bring to front" if self.front else "send to back"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        new, old = self._order(document)
+        changed = new != old
+        return document.compute_replacement(new[changed], document.decals.take(old[changed]))
+
+    def numbers_after(self, document: Document) -> Int64Array:
+        """Return the numbers that the decals will have, in the order of `numbers`."""
+        new, old = self._order(document)
+        moved = dict(zip(old.tolist(), new.tolist(), strict=True))
+        return np.array([moved.get(number, number) for number in self.numbers.tolist()], np.int64)
+
+    def _order(self, document: Document) -> tuple[Int64Array, Int64Array]:
+        """Return all numbers of the ranks of the decals, and which decals come to have them."""
+        front, editor = truth("front", self.front, InvalidEdit), document.decals
+        given = editor.take(self.numbers)
+        ordered = given.interactions != Interaction.PUSH
+        if not ordered.any():
+            raise InvalidEdit(
+                "expected overlapping or independent decals, got contact decals, which push each other; "
+                "change their interaction or their layer"
+            )
+        numbers = editor.numbers
+        ranks = (editor.column("layers") + LAYER_LIMIT) * 4 + editor.column("interactions")
+        new, old = [], []
+        for rank in np.unique(given.ranks[ordered]):
+            members = numbers[ranks == rank]
+            moved = np.isin(members, self.numbers)
+            parts = (members[~moved], members[moved]) if front else (members[moved], members[~moved])
+            new.append(members)
+            old.append(np.concatenate(parts))
+        return np.concatenate(new), np.concatenate(old)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.progress import Progress
 from decals.editing.action_state import ActionState, Cursor, require_pick
-from decals.editing.commands import AddDecals, MapValues, ScaleDecals, TurnDecals
+from decals.editing.commands import AddDecals, MapValues, OrderDecals, ScaleDecals, TurnDecals
 from decals.editing.document import Document
 from decals.editing.key_bindings import Group, action
 from decals.editing.queries import mean_normal, nearest_points
@@ -187,6 +187,25 @@ class DecalActions:
             return layers
 
         self._map(f"layer {shifted(self._last_selected)[0]}", "layers", shifted)
+
+    @action("bring_to_front", "Shift+Prior", summary="in front of its layer", group=Group.DECALS)
+    def bring_to_front(self, _cursor: Cursor) -> None:
+        """Draw the selected decals over all others of their layers and interactions."""
+        self._order(front=True)
+
+    @action("send_to_back", "Shift+Next", summary="behind its layer", group=Group.DECALS)
+    def send_to_back(self, _cursor: Cursor) -> None:
+        """Draw the selected decals under all others of their layers and interactions."""
+        self._order(front=False)
+
+    def _order(self, *, front: bool) -> None:
+        command = OrderDecals(self._state.selected_numbers, front)
+        after = command.numbers_after(self._state.session.document)
+
+        def select() -> None:
+            self._state.selection = tuple(after.tolist())
+
+        self._state.run(command, select)
 
     @action("next_interaction", "k", summary="push, overlap or independent", group=Group.DECALS)
     def next_interaction(self, _cursor: Cursor) -> None:

@@ -13,6 +13,7 @@ from blobtree._typing import BoolArray, Int64Array
 from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.model import Decals
+from decals.receivers import check_receivers
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.objects import SceneObject, shown_objects
@@ -333,7 +334,7 @@ class Document:
         Raises
         ------
         InvalidEdit
-            A decal would show an image that does not exist.
+            A decal would show an image that does not exist, or lie on an object that does not exist.
         """
         images = parts.get("images", self.images)
         last = int(decals.images.max(initial=-1))
@@ -341,6 +342,7 @@ class Document:
             raise InvalidEdit(
                 f"expected an image from 0 to {len(images) - 1}, got {last}; add the image first"
             )
+        check_receivers(decals.receivers, parts.get("objects", self.objects), InvalidEdit)
         return self._compute(DecalStates.existing(numbers, decals), parts)
 
     def compute_addition(self, decals: Decals) -> Edit:
@@ -352,11 +354,28 @@ class Document:
     def compute_deletion(self, numbers: Int64Array, **parts: Any) -> Edit:
         """Return the edit that deletes decals and replaces scene parts."""
         self.decals.take(numbers)  # raises for numbers without a decal
+        self._check_receivers(numbers, parts)
         return self._compute(DecalStates.deleted(numbers), parts)
 
     def compute_parts(self, **parts: Any) -> Edit:
-        """Return the edit that replaces objects, images or camera."""
+        """Return the edit that replaces objects, images or camera.
+
+        Raises
+        ------
+        InvalidEdit
+            Decals lie only on objects that would no longer exist.
+        """
+        self._check_receivers(NO_DECALS.numbers, parts)
         return self._compute(NO_DECALS, parts)
+
+    def _check_receivers(self, deleted: Int64Array, parts: dict[str, Any]) -> None:
+        """Raise InvalidEdit if new objects lack a receiver of the decals that stay."""
+        if "objects" not in parts:
+            return
+        check_receivers(parts.get("hidden", self.hidden).decals.receivers, parts["objects"], InvalidEdit)
+        if self.decals.limited:
+            staying = self.decals.numbers[~np.isin(self.decals.numbers, deleted)]
+            check_receivers(self.decals.take(staying).receivers, parts["objects"], InvalidEdit)
 
     def _compute(self, after: DecalStates, parts: dict[str, Any]) -> Edit:
         before = DecalStates.read(self.decals, after.numbers)

@@ -251,7 +251,8 @@ def pick(
         return None
     owner = -1
     if len(document.decals):
-        owner = int(evaluate(document.decals, hit.positions, hit.normals, contact=contact).owner[0])
+        on = document.objects[numbers[int(hit.objects[0])]]
+        owner = int(evaluate(document.decals, hit.positions, hit.normals, contact=contact, on=on).owner[0])
     return SurfacePick(numbers[int(hit.objects[0])], hit.positions[0], hit.normals[0], owner)
 
 
@@ -390,7 +391,7 @@ def _image_distances(
     """
     centers = np.zeros((len(decals), 3))
     centers[:, 0] = SEPARATION * np.arange(len(decals))
-    separate = decals.replace(positions=centers, radii=np.ones(len(decals)))
+    separate = decals.replace(positions=centers, radii=np.ones(len(decals)), receivers=None)
     rows = np.repeat(np.arange(len(decals)), len(offsets) // len(decals))
     samples = evaluate(separate, centers[rows] + offsets, normals, mapping=mapping)
     lengths = 2.0 * np.linalg.norm(samples.uv - 0.5, axis=1)
@@ -414,10 +415,20 @@ def _visible_fractions(
     points = centers[:, :, None] + fractions[..., None] * spokes[:, :, None]
     nearest = nearest_points(document.objects, points.reshape(-1, 3))
     contact, mapping = modes
-    samples = evaluate(document.decals, nearest.positions, nearest.normals, contact=contact, mapping=mapping)
-    inside = np.linalg.norm(samples.uv - 0.5, axis=1) <= 0.5 * INSIDE_TOLERANCE
-    owners = np.where(inside, samples.owner, -1).reshape(fractions.shape)
-    shows = owners == numbers[:, None, None]
+    owners = np.full(len(nearest.objects), -1, np.int32)
+    for number in np.unique(nearest.objects):
+        rows = np.flatnonzero(nearest.objects == number)
+        samples = evaluate(
+            document.decals,
+            nearest.positions[rows],
+            nearest.normals[rows],
+            contact=contact,
+            mapping=mapping,
+            on=document.objects[int(number)],
+        )
+        inside = np.linalg.norm(samples.uv - 0.5, axis=1) <= 0.5 * INSIDE_TOLERANCE
+        owners[rows] = np.where(inside, samples.owner, -1)
+    shows = owners.reshape(fractions.shape) == numbers[:, None, None]
     last = np.logical_and.accumulate(shows, axis=2).sum(axis=2) - 1
     result: Float64Array = np.take_along_axis(fractions, np.maximum(last, 0)[..., None], axis=2)[..., 0]
     return result

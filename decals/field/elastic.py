@@ -34,6 +34,7 @@ from decals.field.radial import (
     power,
     size_above,
 )
+from decals.field.receivers import acts, complement_of
 from decals.index.lookup import IndexedDecals, cell_range, rank_range
 from decals.record import (
     NO_FIELD,
@@ -41,8 +42,6 @@ from decals.record import (
     RECORD,
     RIM_RADIUS,
     apart,
-    complement_of,
-    faces,
     field_complement,
     rank_of,
     visible_radius,
@@ -144,7 +143,7 @@ def sum_of_pushes(
     for level in range(index.level_count):
         span = rank_range(q, rank, level, index)
         for j in range(span[0], span[1]):
-            if index.ids[j] != owner and complement_of(q, n_q, index.ids[j], index.records) < NO_FIELD:
+            if index.ids[j] != owner and complement_of(q, n_q, index.ids[j], index) < NO_FIELD:
                 push = plane_push(
                     ray,
                     distance,
@@ -233,7 +232,7 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
             squared = wp.dot(offset, offset)
             size = ball[3] * ball[3]
             if squared < REACH_SQUARED * size:
-                if faces(n_q, decal, index.records):
+                if acts(offset, n_q, decal, index):
                     b = wp.vec4i(a[3], b[0], b[1], b[2])
                     a = wp.vec4i(decal, a[0], a[1], a[2])
                     count += 1

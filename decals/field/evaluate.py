@@ -21,6 +21,7 @@ from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
+from decals.receivers import label_names, object_mask, surface_mask, takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH, RECORD, RIM_RADIUS
 from decals.validation import describe, member, stiffness_number
 
@@ -93,6 +94,7 @@ def evaluate(
     jacobian: bool = False,
     normal_derivatives: ArrayLike | None = None,
     neighbors: bool = False,
+    on: object | str | Iterable[str] | None = None,
     device: Any = None,
 ) -> Samples:
     """Evaluate decals at surface points: owner, image coordinates, field and colour.
@@ -121,6 +123,9 @@ def evaluate(
         Derivatives of the normals by the point, for the derivative on curved surface. By default it is flat.
     neighbors : bool, optional
         True also returns the fields and pushes of all decals, `Samples.neighbors`.
+    on : object of a scene, str or sequence of str, optional
+        The object that the points lie on, or its labels, so that only decals act that lie on it. By default
+        all decals act.
     device : optional
         Warp device. Default: Warp's default device.
 
@@ -139,7 +144,7 @@ def evaluate(
     InvalidDecals
         No decals, or the index of others.
     InvalidScene
-        An unknown mapping or contact mode, or a stiffness out of range.
+        An unknown mapping or contact mode, a stiffness out of range, or ``on`` is neither object nor labels.
     InvalidDevice
         Warp has no such device.
 
@@ -178,6 +183,7 @@ def evaluate(
             )
     indexed = _indexed(decals, index, device)
     indexed.stiffness = stiffness
+    _limit(indexed, decals, on, device)
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
     field: Any = wp.zeros(count, dtype=wp.float32, device=device)
@@ -247,7 +253,9 @@ def _neighbors(
     else:
         rows, known = decals, np.arange(len(decals))
     wide = index_on(rows, device, reach=1.0 / NEIGHBOR_REACH)
-    wide.stiffness = indexed.stiffness
+    wide.stiffness, wide.surface, wide.limited = indexed.stiffness, indexed.surface, indexed.limited
+    if wide.limited:
+        wide.limits = wp.array(rows.limits_of(decals.receiver_table), dtype=wp.vec4, device=device)
     owners = owner.numpy()
     kept = np.searchsorted(known, owners).astype(np.int32)
     empty: list[Any] = [wp.zeros(0, dtype=kind, device=device) for kind in (wp.int32, wp.float32)]
@@ -311,6 +319,20 @@ def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any
             f"index: expected the index of these {len(decals)} decals, got {got}; DecalIndex.of makes it"
         )
     return index.on(device, records=decals.packed(), layered=decals.layered, copy=False)
+
+
+def _limit(
+    indexed: Any, decals: Decals | DecalEditor, on: object | str | Iterable[str] | None, device: Any
+) -> None:
+    """Give indexed decals their limits, if they have any, and the mask of the surface that they lie on."""
+    indexed.limited = decals.limited or takes_named_only(on)
+    if not indexed.limited:
+        return
+    indexed.limits = wp.array(decals.limits, dtype=wp.vec4, device=device)
+    if hasattr(on, "name"):
+        indexed.surface = object_mask(on, decals.receiver_table)
+    elif on is not None:
+        indexed.surface = surface_mask(label_names("on", on, InvalidScene), decals.receiver_table)
 
 
 def _colors(

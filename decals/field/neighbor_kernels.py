@@ -10,13 +10,12 @@ from decals.field.contact import contact_push
 from decals.field.elastic import plane_push
 from decals.field.ownership import NO_OWNER
 from decals.field.radial import MIN_ADVANCE, are_nested, plane_distance
+from decals.field.receivers import acts, complement_of
 from decals.index.lookup import IndexedDecals, cell_range
 from decals.record import (
     RECORD,
     Contact,
     apart,
-    complement_of,
-    faces,
     field_complement,
     has_cells,
     is_contact_rank,
@@ -33,12 +32,12 @@ MIN_REMAINDER = 1.0e-6
 
 @wp.func
 def field_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.float32:
-    """Return the field f of a decal before contact; 0 out of its influence, or where it faces away."""
+    """Return the field f of a decal before contact; 0 out of its influence, or where it does not act."""
     ball = index.records[RECORD * decal]
     w = q - xyz(ball)
     squared = wp.dot(w, w)
     size = ball[3] * ball[3]
-    if squared >= size or not faces(n_q, decal, index.records):
+    if squared >= size or not acts(w, n_q, decal, index):
         return 0.0
     return 1.0 - field_complement(squared / size)
 
@@ -52,15 +51,16 @@ def push_at(
     if decal == owner or not is_contact_rank(rank) or rank_of(decal, index.records) != rank:
         return 0.0
     if not has_cells(contact):
-        e = complement_of(q, n_q, decal, index.records)
-        return contact_push(e, complement_of(q, n_q, owner, index.records))
+        e = complement_of(q, n_q, decal, index)
+        return contact_push(e, complement_of(q, n_q, owner, index))
     radius = visible_radius(owner, index.records)
     other = visible_radius(decal, index.records)
     between = apart(owner, decal, index.records)
     w = (q - xyz(index.records[RECORD * owner])) / radius
     distance = wp.length(w)
     remaining = wp.max(1.0 - distance, MIN_REMAINDER)
-    if distance == 0.0 or not faces(n_q, decal, index.records):
+    offset = q - xyz(index.records[RECORD * decal])
+    if distance == 0.0 or not acts(offset, n_q, decal, index):
         return 0.0
     ray = w / distance
     if contact == Contact.ELASTIC:

@@ -29,12 +29,12 @@ from decals.field.elastic import MAX_KEPT, elastic_complement, single_layer_elas
 from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates, unroll
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
+from decals.field.receivers import complement_of
 from decals.index.lookup import ABOVE_ALL, IndexedDecals, cell_range, end_of_lower, rank_range
 from decals.record import (
     NO_FIELD,
     RECORD,
     Contact,
-    complement_of,
     has_cells,
     is_contact_rank,
     rank_of,
@@ -86,7 +86,7 @@ def owner_below(
                     other = rank_of(index.ids[j], index.records)
                 if other < top:
                     break
-                e = complement_of(q, n_q, index.ids[j], index.records)
+                e = complement_of(q, n_q, index.ids[j], index)
                 if is_contact_rank(other):
                     closer = e < least or (e == least and (owner < 0 or index.ids[j] < owner))
                     if closer or (other > top and e <= 0.5):
@@ -128,13 +128,13 @@ def pushed_complement(
     rank = wp.int32(1)
     if index.layered:
         rank = rank_of(owner, index.records)
-    least = complement_of(q, n_q, owner, index.records)
+    least = complement_of(q, n_q, owner, index)
     push = wp.float32(0.0)
     for level in range(index.level_count):
         span = rank_range(q, rank, level, index)
         for j in range(span[0], span[1]):
             if index.ids[j] != owner:
-                phi = contact_push(complement_of(q, n_q, index.ids[j], index.records), least)
+                phi = contact_push(complement_of(q, n_q, index.ids[j], index), least)
                 push = add_push(push, phi, contact)
     return contact_complement(least, push)
 
@@ -150,7 +150,7 @@ def complement_at(
     """Return E = 1 − F of a decal that shows at q; neighbours push only contact decals."""
     if index.layered:
         if not is_contact_rank(rank_of(owner, index.records)):
-            return complement_of(q, n_q, owner, index.records)
+            return complement_of(q, n_q, owner, index)
     if contact == Contact.RADIAL:
         return radial_complement(q, n_q, owner, index)
     if contact == Contact.ELASTIC:
@@ -204,7 +204,7 @@ def single_layer_at(
         span = cell_range(q, level, index)
         for j in range(span[0], span[1]):
             decal = index.ids[j]
-            e = complement_of(q, n_q, decal, index.records)
+            e = complement_of(q, n_q, decal, index)
             if e < 1.0:
                 b = wp.vec4(a[3], b[0], b[1], b[2])
                 a = wp.vec4(e, a[0], a[1], a[2])

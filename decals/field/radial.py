@@ -19,13 +19,12 @@ gaps: every point inside a rim lies at least in the cell of the decal of least |
 
 import warp as wp
 
+from decals.field.receivers import acts, complement_of
 from decals.index.lookup import IndexedDecals, rank_range
 from decals.record import (
     RECORD,
     RIM_RADIUS,
     apart,
-    complement_of,
-    faces,
     facing_limit,
     field_complement,
     rank_of,
@@ -176,7 +175,7 @@ def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDeca
             span = rank_range(q, rank, level, index)
             for j in range(span[0], span[1]):
                 decal = index.ids[j]
-                if decal != tried and complement_of(q, n_q, decal, index.records) <= 0.5:
+                if decal != tried and complement_of(q, n_q, decal, index) <= 0.5:
                     ball = index.records[RECORD * decal]
                     if inside and power(q - xyz(ball), RIM_RADIUS * ball[3]) < own:
                         inside = balls_nested(xyz(ball) - xyz(tried_ball), radius, RIM_RADIUS * ball[3])
@@ -203,7 +202,7 @@ def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -
     for level in range(index.level_count):
         span = rank_range(q, rank, level, index)
         for j in range(span[0], span[1]):
-            if complement_of(q, n_q, index.ids[j], index.records) <= 0.5:
+            if complement_of(q, n_q, index.ids[j], index) <= 0.5:
                 holders += 1
                 own = power_of(q, index.ids[j], index.records)
                 if (
@@ -242,11 +241,11 @@ def radial_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedD
     for level in range(index.level_count):
         span = rank_range(edge, rank, level, index)
         for j in range(span[0], span[1]):
-            if index.ids[j] != owner and faces(n_q, index.ids[j], index.records):
-                if not are_nested(owner, index.ids[j], index.records):
-                    other = visible_radius(index.ids[j], index.records)
-                    end = wp.min(
-                        end, plane_distance(ray, apart(owner, index.ids[j], index.records), radius, other)
-                    )
+            decal = index.ids[j]
+            if decal != owner:
+                offset = q - xyz(index.records[RECORD * decal])
+                if acts(offset, n_q, decal, index) and not are_nested(owner, decal, index.records):
+                    other = visible_radius(decal, index.records)
+                    end = wp.min(end, plane_distance(ray, apart(owner, decal, index.records), radius, other))
     x = wp.min(distance / end, 1.0)
     return field_complement(x * x * RIM_SQUARED)

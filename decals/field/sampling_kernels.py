@@ -8,6 +8,7 @@ import warp as wp
 from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.mapping import in_image
 from decals.field.ownership import NO_OWNER, complement_at, owner_at, owner_below, uv_at
+from decals.field.receivers import fade_at
 from decals.index.lookup import IndexedDecals, next_number_below
 from decals.record import RECORD, rank_of
 
@@ -37,21 +38,26 @@ def image_at(uv: wp.vec2, extent: wp.vec3i, texels: wp.array(dtype=wp.vec4)) -> 
 
 @wp.func
 def decal_color(
+    q: wp.vec3,
+    n_q: wp.vec3,
     decal: wp.int32,
     uv: wp.vec2,
-    decals: wp.array(dtype=wp.vec4),
+    index: IndexedDecals,
     extents: wp.array(dtype=wp.vec3i),
     texels: wp.array(dtype=wp.vec4),
 ) -> wp.vec4:
-    """Return the premultiplied linear colour of one decal: its image, or white, times tint and opacity."""
+    """Return the premultiplied linear colour of one decal: image or white, times tint, opacity, fades."""
     if not in_image(uv):
         return wp.vec4(0.0, 0.0, 0.0, 0.0)
-    image = int(decals[RECORD * decal + 2][3])
-    tint = decals[RECORD * decal + 3]
+    image = int(index.records[RECORD * decal + 2][3])
+    tint = index.records[RECORD * decal + 3]
+    opacity = tint[3]
+    if index.limited:
+        opacity = opacity * fade_at(q, n_q, decal, index)
     color = wp.vec4(1.0, 1.0, 1.0, 1.0)
     if image >= 0:
         color = image_at(uv, extents[image], texels)
-    return tint[3] * wp.cw_mul(color, wp.vec4(tint[0], tint[1], tint[2], 1.0))
+    return opacity * wp.cw_mul(color, wp.vec4(tint[0], tint[1], tint[2], 1.0))
 
 
 @wp.func
@@ -112,7 +118,7 @@ def color_points(
     while owner != NO_OWNER and color[3] < OPAQUE_ALPHA:
         image = image_point(q, n_q, owner, mapping, contact, index)
         uv = wp.vec2(image[0], image[1])
-        color += (1.0 - color[3]) * decal_color(owner, uv, index.records, extents, texels)
+        color += (1.0 - color[3]) * decal_color(q, n_q, owner, uv, index, extents, texels)
         if not index.layered:
             break
         rank = rank_of(owner, index.records)

@@ -14,14 +14,15 @@ from decals.index.editable_index import IDS, LEVELS, TABLE, EditableIndex
 from decals.index.index import DecalIndex
 from decals.index.rows import DecalRows, runs_of
 from decals.model import RECORD, Decals
+from decals.receivers import codes_of
 from decals.validation import instance
 
 MAX_SINGLE_EDITS = 64
 """Number of decals that are inserted into the index one by one, however few decals there are."""
 
-RECORDS = "decal_records"
+RECORDS, LIMITS = "decal_records", "decal_limits"
 
-__all__ = ["IDS", "LEVELS", "RECORDS", "TABLE", "DecalEditor"]
+__all__ = ["IDS", "LEVELS", "LIMITS", "RECORDS", "TABLE", "DecalEditor"]
 
 
 class DecalEditor:
@@ -68,6 +69,7 @@ class DecalEditor:
         self._rows, self._index = rows, EditableIndex()
         self._log, self._dirty = ChangeLog(), DirtyBalls()
         self._log.add(RECORDS, (0, len(rows.records)), new=True)
+        self._log.add(LIMITS, (0, len(rows.limits)), new=True)
 
     def copy(self) -> Self:
         """Return an independent editor of the same decals under the same numbers."""
@@ -130,13 +132,13 @@ class DecalEditor:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Arrays for devices: "decal_records", "index_levels", "index_table" and "index_ids".
+        """Arrays for devices: "decal_records", "decal_limits", "index_levels", "index_table" and "index_ids".
 
-        `Decals.packed` and `DecalIndex` describe them; here they have spare rows at the end. An edit may
-        replace a full array by a larger one.
+        `Decals.packed`, `Decals.limits` and `DecalIndex` describe them; here they have spare rows at the end.
+        An edit may replace a full array by a larger one.
         """
         self._update_index()
-        return {RECORDS: self._rows.records, **self._index.arrays}
+        return {RECORDS: self._rows.records, LIMITS: self._rows.limits, **self._index.arrays}
 
     @property
     def level_count(self) -> int:
@@ -148,6 +150,21 @@ class DecalEditor:
     def layered(self) -> bool:
         """Truth of `Decals.layered`: the decals are not all contact decals of one layer."""
         return self._rows.layered
+
+    @property
+    def limited(self) -> bool:
+        """True if decals have had receivers or fades, see `Decals.limited`."""
+        return self._rows.limited
+
+    @property
+    def limits(self) -> Float32Array:
+        """`Decals.limits` of all numbers, with spare rows at the end."""
+        return self._rows.limits
+
+    @property
+    def receiver_table(self) -> list[str]:
+        """Receivers whose places `limits` holds; it only grows."""
+        return self._rows.receiver_table
 
     @property
     def index(self) -> DecalIndex:
@@ -207,6 +224,7 @@ class DecalEditor:
         """
         _require_decals(decals)
         rows = self._rows.require_assignable(numbers, len(decals))
+        codes_of(decals.receivers, self._rows.receiver_table)  # raises for too many different ones
         self._mark_stale_if_many(rows)
         version, existing = self._log.version + 1, rows[self._rows.contains(rows)]
         balls_before = self._rows.balls(existing)
@@ -263,12 +281,18 @@ class DecalEditor:
                 self._index.remove(self._rows.records, number, self._log)
 
     def _write(self, rows: Int64Array, decals: Decals) -> None:
-        before = self._rows.records
+        records, limits = self._rows.records, self._rows.limits
+        limited = limits[rows[rows < len(limits)]].any()
         self._rows.assign(rows, decals)
-        if self._rows.records is not before:
+        if self._rows.records is not records:
             self._log.add(RECORDS, (0, len(self._rows.records)), new=True)
+        if self._rows.limits is not limits:
+            self._log.add(LIMITS, (0, len(self._rows.limits)), new=True)
+        limited = limited or self._rows.limits[rows].any()
         for first, last in runs_of(rows):
             self._log.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
+            if limited:
+                self._log.add(LIMITS, (first, last + 1))
 
     def _update_index(self) -> None:
         """Rebuild a stale index, with spare room."""

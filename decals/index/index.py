@@ -32,6 +32,7 @@ from decals.index.build import build_index
 from decals.index.decal_cells import LEVEL_SHIFT, NO_PARITY
 from decals.index.lookup import IndexedDecals, count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, LAYER_LIMIT, MAX_COORDINATE, Decals
+from decals.receivers import EVERYTHING
 from decals.record import DEFAULT_STIFFNESS
 from decals.validation import check_range, finite_array, instance, whole_array
 
@@ -197,6 +198,8 @@ def indexed_decals(
     index.mask = len(table) - 1
     index.ids = wp.array(ids, dtype=wp.int32, device=device, copy=copy)
     index.stiffness = DEFAULT_STIFFNESS
+    index.limited, index.surface = False, EVERYTHING
+    index.limits = wp.zeros(0, dtype=wp.vec4, device=device)
     return index
 
 

@@ -36,6 +36,9 @@ MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
     mask="index_mask",
     ids="index_ids",
     stiffness="decal_stiffness",
+    limited="decal_limited",
+    limits="decal_limits",
+    surface="surface_receivers",
 )
 class IndexedDecals:
     """Records and index of a set of decals on one device; ``shaders/decals.glsl`` has them as uniforms.
@@ -50,6 +53,10 @@ class IndexedDecals:
         Arrays of the index, as `decals.index.index` describes them; the table has ``mask + 1`` slots.
     stiffness
         Stiffness of elastic contact (`decals.field.elastic`).
+    limited, limits
+        `decals.model.Decals.limited` and `decals.model.Decals.limits`, which are read where it is True.
+    surface
+        Mask of the surface, see `decals.receivers.surface_mask`.
     """
 
     records: wp.array(dtype=wp.vec4)
@@ -60,6 +67,9 @@ class IndexedDecals:
     mask: wp.int32
     ids: wp.array(dtype=wp.int32)
     stiffness: wp.float32
+    limited: wp.bool
+    limits: wp.array(dtype=wp.vec4)
+    surface: wp.int32
 
 
 @wp.func

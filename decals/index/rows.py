@@ -14,6 +14,9 @@ from decals.model import COLUMNS, LAYER_LIMIT, RECORD, Decals, Interaction
 MIN_SPARE_ROWS = 1024
 """Smallest number of spare rows of an array; arrays grow by half."""
 
+KEPT = "radii", "tints", "receivers", "fade_angles", "fade_depths"
+"""Columns with arrays of their own."""
+
 INTERACTION_MASK = 3
 """Mask of a rank's `Interaction`."""
 
@@ -21,13 +24,19 @@ INTERACTION_MASK = 3
 class DecalRows:
     """Decals by number; a deleted number leaves a gap, which may be filled again.
 
-    The packed records are the store, so that nothing is copied for devices. Visible radii and sRGB tints have
-    arrays of their own, because a record holds only the influence radius and the linear tint.
+    The packed records are the store, so that nothing is copied for devices. The columns of KEPT have arrays
+    of their own: a record holds other forms of them, such as the influence radius and the linear tint.
 
     Attributes
     ----------
     records : float32[4 * capacity, 4]
         Records of all numbers, as `Decals.packed` lays them out, with spare rows at the end.
+    limits : float32[capacity, 4]
+        `Decals.limits` of all numbers.
+    receiver_table : list of str
+        Receivers whose places the limits hold; it only grows.
+    limited : bool
+        True if decals have had receivers or fades.
     count : int
         Number of decals.
     end : int
@@ -37,7 +46,10 @@ class DecalRows:
     def __init__(self, decals: Decals) -> None:
         self.count = self.end = len(decals)
         self.records = _records_with_spare(decals.packed(), len(decals))
-        self._radii, self._tints = with_spare(decals.radii), with_spare(decals.tints)
+        self.receiver_table = [""]
+        self.limits = with_spare(decals.limits_of(self.receiver_table))
+        self.limited = decals.limited
+        self._kept = {name: with_spare(getattr(decals, name)) for name in KEPT}
         self._present = with_spare(np.ones(len(decals), np.bool_))
         self._rank_counts: Counter[int] = Counter(decals.ranks.tolist())
 
@@ -45,7 +57,8 @@ class DecalRows:
         """Return the same decals under the same numbers, in arrays of their own."""
         twin = copy.copy(self)
         twin.records, twin._present = self.records.copy(), self._present.copy()
-        twin._radii, twin._tints = self._radii.copy(), self._tints.copy()
+        twin.limits, twin.receiver_table = self.limits.copy(), self.receiver_table.copy()
+        twin._kept = {name: array.copy() for name, array in self._kept.items()}
         twin._rank_counts = self._rank_counts.copy()
         return twin
 
@@ -95,6 +108,8 @@ class DecalRows:
     def column(self, name: str, rows: Int64Array) -> NDArray[Any]:
         """Return one array of `Decals` for these rows."""
         packed = self.records.reshape(-1, RECORD, 4)
+        if name in KEPT:
+            return self._kept[name][rows]
         match name:
             case "positions":
                 return packed[:, 0, :3][rows]
@@ -102,8 +117,6 @@ class DecalRows:
                 return packed[:, 1, :3][rows]
             case "tangents":
                 return packed[:, 2, :3][rows]
-            case "radii":
-                return self._radii[rows]
             case "images":
                 return packed[:, 2, 3][rows].astype(np.int32)
             case "spill":
@@ -112,8 +125,6 @@ class DecalRows:
                 return self._ranks(rows) & INTERACTION_MASK
             case "layers":
                 return (self._ranks(rows) >> 2) - LAYER_LIMIT
-            case "tints":
-                return self._tints[rows]
             case "opacities":
                 return packed[:, 3, 3][rows]
         raise KeyError(name)
@@ -123,17 +134,27 @@ class DecalRows:
         return self.records[RECORD * rows]
 
     def assign(self, rows: Int64Array, decals: Decals) -> None:
-        """Write decals into rows, which may lie past the end."""
+        """Write decals into rows, which may lie past the end.
+
+        Raises
+        ------
+        InvalidDecals
+            The decals have too many different receivers. Nothing changes then.
+        """
+        limits = decals.limits_of(self.receiver_table)
+        self.limited = self.limited or decals.limited
         self.end = max(self.end, int(rows.max(initial=-1)) + 1)
         if self.end > len(self._present):
-            self._radii = with_spare(self._radii, self.end)
-            self._tints = with_spare(self._tints, self.end)
+            self._kept = {name: with_spare(array, self.end) for name, array in self._kept.items()}
+            self.limits = with_spare(self.limits, self.end)
             self._present = with_spare(self._present, self.end)
         if RECORD * self.end > len(self.records):
             self.records = _records_with_spare(self.records, self.end)
         self._uncount(rows)
         self.records.reshape(-1, RECORD, 4)[rows] = decals.packed().reshape(-1, RECORD, 4)
-        self._radii[rows], self._tints[rows] = decals.radii, decals.tints
+        self.limits[rows] = limits
+        for name, array in self._kept.items():
+            array[rows] = getattr(decals, name)
         self._rank_counts.update(decals.ranks.tolist())
         self.count += int((~self._present[rows]).sum())
         self._present[rows] = True

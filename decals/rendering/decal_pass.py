@@ -9,6 +9,7 @@ from blobtree.transpile.glsl import translate_library
 from decals.field.law import AnyContact, ContactLaw
 from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import complement_at, owner_at, owner_below, single_layer_at, uv_at
+from decals.field.receivers import fade_at
 from decals.index.lookup import next_number_below
 from decals.record import Contact
 from decals.rendering.context import Context
@@ -22,7 +23,7 @@ from decals.rendering.pixel_pass import (
     use_textures,
 )
 from decals.rendering.rest_buffer import RestBuffer
-from decals.rendering.uploads import DecalData, ImageArray
+from decals.rendering.uploads import DataTexture, DecalData, ImageArray
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 
 BODY = "decal_pass.glsl"
@@ -47,7 +48,7 @@ class DecalPass:
         self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
         self._framebuffer = context.gl.framebuffer(self._targets)
         self._context = context
-        self._passes: dict[tuple[str, bool], PixelPass] = {}
+        self._passes: dict[tuple[str, bool, bool], PixelPass] = {}
 
     def draw(
         self,
@@ -59,11 +60,16 @@ class DecalPass:
         contact: AnyContact,
         stiffness: float,
         rest: RestBuffer | None = None,
+        masks: DataTexture | None = None,
         part: Part = WHOLE,
     ) -> None:
-        """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours."""
-        library = "" if decals is None else decal_library(contact, layered=decals.layered)
-        painting = self._pass(library, posed=rest is not None)
+        """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours.
+
+        ``masks`` are those of the objects, see `decals.receivers.object_mask`, for decals that are limited.
+        """
+        limited = decals is not None and decals.limited
+        library = "" if decals is None else decal_library(contact, layered=decals.layered, limited=limited)
+        painting = self._pass(library, posed=rest is not None, limited=limited)
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         textures |= rest.textures if rest is not None else {}
@@ -75,17 +81,20 @@ class DecalPass:
             set_uniform(program, "decal_mapping", int(mapping))
             set_uniform(program, "decal_stiffness", stiffness)
             decals.use(program, unit + 1)
+            if masks is not None:
+                masks.use(unit + 1 + decals.texture_count)
+                set_uniform(program, "object_masks", unit + 1 + decals.texture_count)
         painting.run(rectangle.rows(part))
 
     def read_decal(self, tile: Tile) -> Float32Array:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""
         return read_floats(self._framebuffer, 1, tile)
 
-    def _pass(self, library: str, *, posed: bool) -> PixelPass:
+    def _pass(self, library: str, *, posed: bool, limited: bool) -> PixelPass:
         """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
-        key = library, posed
+        key = library, posed, limited
         if key not in self._passes:
-            program = decal_program(self._context, library, len(self._targets), posed=posed)
+            program = decal_program(self._context, library, len(self._targets), posed=posed, limited=limited)
             self._passes[key] = PixelPass(self._context.gl, program, self._targets)
         return self._passes[key]
 
@@ -98,10 +107,12 @@ class DecalPass:
             target.release()
 
 
-def decal_program(context: Context, library: str, targets: int = 1, *, posed: bool = False) -> Program:
+def decal_program(
+    context: Context, library: str, targets: int = 1, *, posed: bool = False, limited: bool = False
+) -> Program:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
     slots = {"decals": "//@ include decals.glsl", "functions": library} if library else {}
-    defines = {"DECALS": bool(library), "POSED": posed and bool(library)}
+    defines = {"DECALS": bool(library), "POSED": posed and bool(library), "LIMITED": limited}
     return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines=defines))
 
 
@@ -115,16 +126,18 @@ LIBRARY_FUNCTIONS = (
     in_image,
     tangent_coordinates,
     unroll_step,
+    fade_at,
 )
 """Functions that ``shaders/decals.glsl`` calls."""
 
 
 @cache
-def decal_library(contact: AnyContact, *, layered: bool) -> str:
+def decal_library(contact: AnyContact, *, layered: bool, limited: bool) -> str:
     """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
     constants = (
         f"const float RIM = {float(RIM)!r};\n"
         f"const int decal_contact = {int(contact)};\n"
+        f"const bool decal_limited = {str(limited).lower()};\n"
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )

@@ -11,6 +11,7 @@ from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.model import Decals
+from decals.receivers import takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
@@ -242,6 +243,12 @@ class SceneLike(Protocol):
 def is_scene_like(scene: object) -> bool:
     """Return True if a value has objects, decals and images to draw."""
     return all(hasattr(scene, name) for name in ("objects", "decals", "images"))
+
+
+def is_limited(scene: SceneLike) -> bool:
+    """Return True if decals of a scene have receivers or fades, or an object takes decals by name only."""
+    limited: bool = scene.decals.limited
+    return len(scene.decals) > 0 and (limited or any(map(takes_named_only, scene.objects)))
 
 
 def check_scene(scene: object) -> None:

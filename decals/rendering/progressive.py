@@ -210,7 +210,8 @@ class TargetState:
 
 def _editor_formulas(decals: Decals | DecalEditor) -> tuple[object, ...]:
     """Return the properties of an editor's decals that decide which shader paints them."""
-    return (decals.layered, len(decals) > 0) if isinstance(decals, DecalEditor) else ()
+    editable = isinstance(decals, DecalEditor)
+    return (decals.layered, decals.limited, len(decals) > 0) if editable else ()
 
 
 def decal_version(scene: SceneLike) -> int:
@@ -381,8 +382,9 @@ def plan_frame(
     dirty = state.dirty(previous, tile)
     steps = _surface_steps(uploaded, tile, targets, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
-    modes = options.mapping, options.contact, options.stiffness, targets.rest_for(uploaded.drawables)
-    decal_arguments = gbuffer, uploaded.decals, uploaded.images, *modes
+    modes = options.mapping, options.contact, options.stiffness
+    rest = targets.rest_for(uploaded.drawables)
+    decal_arguments = gbuffer, uploaded.decals, uploaded.images, *modes, rest, uploaded.masks
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     light_arguments = gbuffer, paint, tile, radius, options.lights

@@ -21,7 +21,14 @@ from decals.rendering.gbuffer import depth_program
 from decals.rendering.gl_libraries import is_forked
 from decals.rendering.light_pass import light_file, light_program, resolve_program
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
-from decals.rendering.options import RenderOptions, SceneLike, check_scene, drawn_objects, viewpoint_of
+from decals.rendering.options import (
+    RenderOptions,
+    SceneLike,
+    check_scene,
+    drawn_objects,
+    is_limited,
+    viewpoint_of,
+)
 from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend
 from decals.rendering.progressive import (
@@ -375,14 +382,17 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     context = uploads.context
     objects = [warmup_of(context, item) for item in drawn_objects(scene)]
     has_decals, light = len(scene.decals) > 0, light_file(options.lights)
-    formulas = (options.contact, scene.decals.layered) if has_decals else None
+    formulas = (options.contact, scene.decals.layered, is_limited(scene)) if has_decals else None
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
     tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
     if has_decals:
         tasks += _decal_tasks(uploads, scene, options)
     tasks += [
-        WarmupTask(SHADERS, lambda: decal_program(context, _library(scene, options))),
+        WarmupTask(
+            SHADERS,
+            lambda: decal_program(context, _library(scene, options), limited=is_limited(scene)),
+        ),
         WarmupTask(SHADERS, lambda: light_program(context, light)),
         WarmupTask(SHADERS, partial(depth_program, context)),
         WarmupTask(SHADERS, partial(resolve_program, context)),
@@ -393,7 +403,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
     decals = scene.decals
     index = [WarmupTask(DECALS, lambda: decals.index)] if isinstance(decals, DecalEditor) else []
-    translate = partial(decal_library, options.contact, layered=decals.layered)
+    translate = partial(decal_library, options.contact, layered=decals.layered, limited=is_limited(scene))
     return [
         *index,
         WarmupTask(DECALS, partial(uploads.decals, scene)),
@@ -404,4 +414,6 @@ def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
 
 def _library(scene: SceneLike, options: RenderOptions) -> str:
     """Return the formulas of the decals; nothing for a scene without decals."""
-    return decal_library(options.contact, layered=scene.decals.layered) if len(scene.decals) else ""
+    if not len(scene.decals):
+        return ""
+    return decal_library(options.contact, layered=scene.decals.layered, limited=is_limited(scene))

@@ -15,12 +15,13 @@ from blobtree._typing import Float32Array, Int64Array, UInt8Array
 from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS
 from decals.errors import InvalidScene, TooMuchData
 from decals.images.load import decode_srgb
-from decals.index.editor import DecalEditor
+from decals.index.editor import LIMITS, RECORDS, DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
+from decals.receivers import object_mask
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.options import SceneLike, check_scene, drawn_objects
+from decals.rendering.options import SceneLike, check_scene, drawn_objects, is_limited
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import WarmupPlan
@@ -248,8 +249,9 @@ def _iterations(lengths: Int64Array, *, layered: bool) -> int:
 class DecalData:
     """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
 
-    def __init__(self, context: Context, decals: Decals | DecalEditor) -> None:
+    def __init__(self, context: Context, decals: Decals | DecalEditor, *, limited: bool = False) -> None:
         self._context = context
+        self.limited = limited
         self._version = 0
         self._loop_limit = LoopLimit(context.max_loop_iterations)
         if isinstance(decals, DecalEditor):
@@ -258,13 +260,16 @@ class DecalData:
         else:
             index = DecalIndex.of(decals)
             arrays = {
-                "decal_records": decals.packed(),
+                RECORDS: decals.packed(),
+                LIMITS: decals.limits,
                 "index_levels": index.levels,
                 "index_table": index.table,
                 "index_ids": index.ids,
             }
         self._loop_limit.check(index, layered=decals.layered, version=self._version)
-        self._textures = {name: DataTexture(context, array) for name, array in arrays.items()}
+        self._textures = {
+            name: DataTexture(context, array) for name, array in arrays.items() if limited or name != LIMITS
+        }
         self._read_uniforms(decals, index)
 
     def _read_uniforms(self, decals: Decals | DecalEditor, index: DecalIndex) -> None:
@@ -285,6 +290,8 @@ class DecalData:
         self._loop_limit.check(index, layered=editor.layered, version=editor.version)
         byte_count, since, self._version = 0, self._version, editor.version
         for name, ranges in editor.changed_rows(since).items():
+            if name not in self._textures:
+                continue
             array = editor.arrays[name]
             if self._textures[name].count != len(array):
                 self._textures[name].release()
@@ -297,6 +304,11 @@ class DecalData:
         self._read_uniforms(editor, index)
         return byte_count
 
+    @property
+    def texture_count(self) -> int:
+        """Number of textures."""
+        return len(self._textures)
+
     def use(self, program: Program, first_unit: int) -> None:
         """Bind all textures to the units from ``first_unit`` on, and set the uniforms of a program."""
         units = range(first_unit, first_unit + len(self._textures))
@@ -304,7 +316,7 @@ class DecalData:
             set_uniform(program, name, value)
 
     def bind(self, units: Sequence[int]) -> dict[str, int]:
-        """Bind the textures to four units; return the uniforms of a program by their names."""
+        """Bind the textures to `texture_count` units; return the uniforms of a program by their names."""
         samplers = dict(zip(self._textures, units, strict=True))
         for name, unit in samplers.items():
             self._textures[name].use(unit)
@@ -470,6 +482,7 @@ class UploadedScene:
     drawables: list[Drawable]
     decals: DecalData | None
     images: ImageArray | None
+    masks: DataTexture | None = None
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -491,12 +504,31 @@ class Uploads:
         self._drawables: GpuCache[Drawable] = GpuCache()
         self._decals: GpuCache[DecalData] = GpuCache()
         self._images: GpuCache[ImageArray] = GpuCache()
+        self._masks: tuple[tuple[int, ...], DataTexture] | None = None
 
     def scene(self, scene: SceneLike) -> UploadedScene:
         """Return a whole scene; errors are those of `decals.rendering.options.check_scene`."""
         check_scene(scene)
-        drawables = [self.drawable(item) for item in drawn_objects(scene)]
-        return UploadedScene(drawables, self.decals(scene), self.images(scene))
+        objects = drawn_objects(scene)
+        drawables = [self.drawable(item) for item in objects]
+        masks = self._masks_of(scene, objects)
+        return UploadedScene(drawables, self.decals(scene), self.images(scene), masks)
+
+    def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
+        """Return the masks of objects of a scene; None if its decals are not limited."""
+        if not is_limited(scene):
+            return None
+        table = scene.decals.receiver_table
+        masks = tuple(object_mask(item, table) for item in objects)
+        if self._masks is None or self._masks[0] != masks:
+            self._release_masks()
+            self._masks = masks, DataTexture(self.context, np.array(masks, np.int32))
+        return self._masks[1]
+
+    def _release_masks(self) -> None:
+        if self._masks is not None:
+            self._masks[1].release()
+        self._masks = None
 
     def drawable(self, item: object) -> Drawable:
         """Return the drawable of an object."""
@@ -507,7 +539,8 @@ class Uploads:
         decals = scene.decals
         if not len(decals):
             return None
-        data = self._decals.get(lambda: DecalData(self.context, decals), decals)
+        limited = is_limited(scene)
+        data = self._decals.get(lambda: DecalData(self.context, decals, limited=limited), decals, limited)
         if isinstance(decals, DecalEditor):
             data.update(decals)
         return data
@@ -528,3 +561,4 @@ class Uploads:
         """Release everything."""
         for cache in (self._drawables, self._decals, self._images):
             cache.release()
+        self._release_masks()

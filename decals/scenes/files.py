@@ -12,14 +12,16 @@
       "recipe": {"function": "decals.cover", "parameters": {"count": 500, ...}, "seed": 0, "versions": {...}},
       "decals": [
         {"position": [x, y, z], "normal": ..., "tangent": ..., "radius": r, "image": 0, "spill": false,
-         "interaction": "overlap", "layer": 1, "tint": [r, g, b], "opacity": 1.0},
+         "interaction": "overlap", "layer": 1, "tint": [r, g, b], "opacity": 1.0,
+         "receivers": "hull, lid", "fade_angle": 80.0, "fade_depth": 0.5},
         ...
       ]
     }
 
-The last four of a decal are written where they are not contact, 0, white and 1. Image -1 is the plain tint.
-A file without "drawing" was drawn in the contact mode "product"; "recipe" is there if it is known,
-"hidden_decals" and "locked_layers" if there are any; objects name hidden and locked nodes by their paths.
+The last seven of a decal are written where they are not contact, 0, white, 1, any object and no fades.
+Image -1 is the plain tint. A file without "drawing" was drawn in the contact mode "product"; "recipe" is
+there if it is known, "hidden_decals" and "locked_layers" if there are any; objects name hidden and locked
+nodes by their paths.
 
 Numbers are the shortest decimals that give the same float32 again. Paths are relative to the scene file.
 """

@@ -205,7 +205,7 @@ def measure(
         for number, item in enumerate(scene.objects):
             rows = np.flatnonzero(points.surface_ids == number)
             for part, normals, turns in _drawn(item, points.positions[rows], points.normals[rows], scene):
-                sums.add(part, normals, turns, modes, rng)
+                sums.add(part, normals, turns, modes | {"on": item}, rng)
                 done += len(part)
                 report("measuring", done / samples)
     return sums.result(domain.area, samples)

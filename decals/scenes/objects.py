@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,9 @@ from blobtree.colors import ColorLike, color_rgb
 from blobtree.errors import InvalidNode
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, node_at
+from blobtree.validation import truth
 from decals.errors import InvalidScene
+from decals.receivers import label_names
 from decals.scenes.origin import Origin, as_origin, check_distance, local_tree, local_vertices
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
@@ -58,6 +60,10 @@ class MeshObject:
     origin : (x, y, z), optional
         Point that vertices are relative to. By default the zero point; for a model farther from it than
         1,000 times its size, a point near the model, which is subtracted in float64.
+    labels : str or sequence of str
+        Labels besides the name, by which decals choose the objects that they lie on (`Decals.receivers`).
+    named_only : bool
+        True if only decals lie on the object that name it, or one of its labels.
 
     hidden, locked : tuple of paths
         ``((),)`` for an object that is not drawn, and for one that the editor does not change; ``()`` else.
@@ -88,6 +94,8 @@ class MeshObject:
     origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
     hidden: Paths = field(default=(), repr=False)
     locked: Paths = field(default=(), repr=False)
+    labels: tuple[str, ...] = ()
+    named_only: bool = False
     surface: MeshSurface = field(init=False, repr=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
@@ -103,6 +111,8 @@ class MeshObject:
             origin: ArrayLike | None = None,
             hidden: Paths = (),
             locked: Paths = (),
+            labels: str | Iterable[str] = (),
+            named_only: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -116,6 +126,7 @@ class MeshObject:
             "crease_angle": as_crease_angle(self.crease_angle),
             "origin": origin,
             **_flags(self),
+            **_labels(self),
             "surface": surface,
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -151,6 +162,8 @@ class TreeObject:
     origin : (x, y, z), optional
         Point that the tree is relative to. By default the zero point; for a model farther from it than
         1,000 times its size, a point near the model, which is subtracted in float64.
+    labels, named_only
+        Which decals lie on the object, as for `MeshObject`.
 
     hidden, locked : tuple of paths
         Nodes that are not drawn, and nodes that the editor does not change. A path has the index of the child
@@ -174,6 +187,8 @@ class TreeObject:
     origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
     hidden: Paths = field(default=(), repr=False)
     locked: Paths = field(default=(), repr=False)
+    labels: tuple[str, ...] = ()
+    named_only: bool = False
 
     if TYPE_CHECKING:
 
@@ -184,6 +199,8 @@ class TreeObject:
             origin: ArrayLike | None = None,
             hidden: Paths = (),
             locked: Paths = (),
+            labels: str | Iterable[str] = (),
+            named_only: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -196,8 +213,8 @@ class TreeObject:
         else:
             origin = as_origin(self.origin)
         object.__setattr__(self, "origin", origin)
-        for key, paths in _flags(self).items():
-            object.__setattr__(self, key, paths)
+        for key, value in (_flags(self) | _labels(self)).items():
+            object.__setattr__(self, key, value)
 
     @property
     def shown(self) -> "TreeObject | None":
@@ -209,7 +226,7 @@ class TreeObject:
         from blobtree.nodes.surgery import without_branches  # most scenes hide nothing
 
         try:
-            return TreeObject(self.name, without_branches(self.tree, self.hidden), self.origin)
+            return replace(self, tree=without_branches(self.tree, self.hidden), hidden=(), locked=())
         except InvalidNode:  # all nodes are hidden
             return None
 
@@ -225,6 +242,14 @@ class TreeObject:
 
 
 SceneObject = MeshObject | TreeObject
+
+
+def _labels(item: SceneObject) -> dict[str, Any]:
+    """Return the checked labels of an object, and whether it takes only decals that name it."""
+    return {
+        "labels": label_names(f"object {item.name!r}, labels", item.labels, InvalidScene),
+        "named_only": truth("named_only", item.named_only, InvalidScene),
+    }
 
 
 def _flags(item: SceneObject) -> dict[str, Paths]:
@@ -272,7 +297,8 @@ def _paths_after(item: TreeObject, tree: Node) -> dict[str, Paths]:
 
 def with_tree(item: TreeObject, tree: Node) -> TreeObject:
     """Return an object with another tree; nodes that stay are hidden and locked as before."""
-    return TreeObject(item.name, tree, item.origin, **_paths_after(item, tree))
+    paths: dict[str, Any] = {**_paths_after(item, tree)}
+    return replace(item, tree=tree, **paths)
 
 
 def shown_objects(objects: Iterable[SceneObject]) -> list[SceneObject]:

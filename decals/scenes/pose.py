@@ -67,6 +67,16 @@ class PosedMesh:
         return self.rest.origin
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels besides the name."""
+        return self.rest.labels
+
+    @property
+    def named_only(self) -> bool:
+        """True if only decals lie on the object that name it."""
+        return self.rest.named_only
+
+    @property
     def bounds(self) -> Box:
         """Lower and upper corner of this pose, float32[3] each."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)

@@ -29,6 +29,10 @@ SampleLoader = Callable[[str], MeshArrays]
 """Gives the vertices and faces of a sample mesh by its name."""
 
 
+_OPTIONS = "hidden", "locked", "labels", "named_only"
+"""Options of an object that its record has under the same names."""
+
+
 class _InlineMesh(Struct, forbid_unknown_fields=True):
     """Little-endian float32 and int32 rows; msgspec writes bytes as base64."""
 
@@ -47,6 +51,8 @@ class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=Tru
     origin: Vector | None = None
     hidden: Paths = ()
     locked: Paths = ()
+    labels: tuple[str, ...] = ()
+    named_only: bool = False
 
 
 class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
@@ -57,15 +63,17 @@ class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=Tru
     origin: Vector | None = None
     hidden: Paths = ()
     locked: Paths = ()
+    labels: tuple[str, ...] = ()
+    named_only: bool = False
 
 
 def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     """Describe an object; paths are relative to the folder."""
     origin = None if item.origin == WORLD else item.origin
+    kept: dict[str, Any] = {name: getattr(item, name) for name in _OPTIONS} | {"origin": origin}
     if isinstance(item, TreeObject):
-        return TreeRecord(item.name, to_tree_file(item.tree), origin, item.hidden, item.locked)
-    kept: dict[str, Any] = {"crease_angle": item.crease_angle, "origin": origin, "hidden": item.hidden}
-    kept["locked"] = item.locked
+        return TreeRecord(item.name, to_tree_file(item.tree), **kept)
+    kept["crease_angle"] = item.crease_angle
     if item.source is not None:
         return MeshRecord(item.name, item.color, source=relative(item.source, folder), **kept)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
@@ -80,20 +88,19 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
     InvalidScene, InvalidMesh, blobtree.ImplicitDecalsError
         If what it names is missing or broken.
     """
+    kept: dict[str, Any] = {name: getattr(record, name) for name in _OPTIONS}
     if isinstance(record, TreeRecord):
-        tree = from_tree_file(record.tree)
-        return TreeObject(record.name, tree, record.origin or WORLD, record.hidden, record.locked)
+        return TreeObject(record.name, from_tree_file(record.tree), record.origin or WORLD, **kept)
     if (record.source is None) == (record.data is None):
         raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
     origin, angle = record.origin or WORLD, record.crease_angle
-    flags = record.hidden, record.locked
     if record.data is not None:
         vertices, faces = _unpacked(record.name, record.data)
-        return MeshObject(record.name, vertices, faces, record.color, None, angle, origin, *flags)
+        return MeshObject(record.name, vertices, faces, record.color, None, angle, origin, **kept)
     vertices, faces = _mesh(str(record.source), folder, samples)
     source = absolute(str(record.source), folder)
     local = vertices - np.array(origin)
-    return MeshObject(record.name, local, faces, record.color, source, angle, origin, *flags)
+    return MeshObject(record.name, local, faces, record.color, source, angle, origin, **kept)
 
 
 def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshArrays:
@@ -174,6 +181,9 @@ class DecalRecord(Struct, forbid_unknown_fields=True):
     layer: Whole | UnsetType = UNSET
     tint: Vector | UnsetType = UNSET
     opacity: float | UnsetType = UNSET
+    receivers: str | UnsetType = UNSET
+    fade_angle: float | UnsetType = UNSET
+    fade_depth: float | UnsetType = UNSET
 
 
 def records_of(decals: Decals) -> Iterator[DecalRecord]:
@@ -189,11 +199,16 @@ def records_of(decals: Decals) -> Iterator[DecalRecord]:
         _unless_default(decals.layers, 0),
         _unless_default(_decimals(decals.tints), 1.0),
         _unless_default(_decimals(decals.opacities), 1.0),
+        _unless_default(decals.receivers, ""),
+        _unless_default(_decimals(decals.fade_angles), 0.0),
+        _unless_default(_decimals(decals.fade_depths), 0.0),
     )
     return (DecalRecord(*values) for values in zip(*columns, strict=True))
 
 
-def _unless_default(array: NDArray[Any], default: float, names: Sequence[str] | None = None) -> Iterator[Any]:
+def _unless_default(
+    array: NDArray[Any], default: float | str, names: Sequence[str] | None = None
+) -> Iterator[Any]:
     """Give each row's value, or its name, as JSON has it; UNSET where it is the default throughout."""
     usual = (array == default).all(axis=tuple(range(1, array.ndim)))
     for value, omit in zip(array.tolist(), usual.tolist(), strict=True):
@@ -247,6 +262,9 @@ def _checked_decals(records: list[DecalRecord]) -> Decals:
             layers=_whole(_given(record.layer, 0) for record in records),
             tints=np.array([_given(record.tint, (1.0, 1.0, 1.0)) for record in records], np.float32),
             opacities=np.array([_given(record.opacity, 1.0) for record in records], np.float32),
+            receivers=[_given(record.receivers, "") for record in records],
+            fade_angles=np.array([_given(record.fade_angle, 0.0) for record in records], np.float32),
+            fade_depths=np.array([_given(record.fade_depth, 0.0) for record in records], np.float32),
         )
     except ImplicitDecalsError as error:
         raise InvalidScene(f"decals: {error}") from error

@@ -15,6 +15,7 @@ from decals import rendering
 from decals.errors import ImplicitDecalsError, InvalidScene, NoGraphics
 from decals.images.load import AnyImage, each_image, image_pixels
 from decals.model import LAYER_LIMIT, Decals
+from decals.receivers import check_receivers
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names, with_common_origin
 from decals.scenes.origin import WORLD, Origin
@@ -136,8 +137,8 @@ class Scene:
     Raises
     ------
     InvalidScene
-        If names repeat, a decal shows an image that the scene lacks, objects are too far apart for float32,
-        or the camera is not relative to the origin of a scene far away.
+        If names repeat, a decal shows an image or names a receiver that the scene lacks, objects are too far
+        apart for float32, or the camera is not relative to the origin of a scene far away.
 
     See Also
     --------
@@ -208,6 +209,8 @@ class Scene:
                 f"a decal shows image {last}, but the scene has {len(self.images)} images; "
                 "add the image or renumber the decals"
             )
+        for shown_or_hidden in (self.decals, self.hidden_decals):
+            check_receivers(shown_or_hidden.receivers, self.objects, InvalidScene)
 
     @property
     def origin(self) -> Origin:

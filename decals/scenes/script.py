@@ -40,7 +40,14 @@ COLUMNS = (
     "layers",
     "tints",
     "opacities",
+    "receivers",
+    "fade_angles",
+    "fade_depths",
 )
+
+
+LIMITS = COLUMNS[-3:]
+"""Columns that are written if some decals have them."""
 
 
 def write_script(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -203,14 +210,18 @@ class _Script:
         lines = ["decals.Decals("]
         for name in COLUMNS:
             column = getattr(decals, name)
+            if name in LIMITS and not column.astype(np.bool_).any():
+                continue
+            if name == "receivers":
+                column = np.array(column.tolist(), np.str_)
             if len(decals) > MAX_ROWS:
                 value = self._array(f"{part}_{name}", column)
             elif (column == column[:1]).all() and name not in COLUMNS[:4]:
-                value = f"np.full({column.shape!r}, {_number_text(column[0])}, {column.dtype.name!r})"
+                value = f"np.full({column.shape!r}, {_number_text(column[0])}, {_type_name(column)!r})"
             else:
                 rows = ",\n".join(f"            {_number_text(row)}" for row in column)
                 listed = f"            [\n{rows},\n            ],"
-                value = f"np.array(\n{listed}\n            {column.dtype.name!r},\n        )"
+                value = f"np.array(\n{listed}\n            {_type_name(column)!r},\n        )"
             lines.append(f"        {name}={value},")
         return "\n".join([*lines, "    )"])
 
@@ -226,12 +237,17 @@ def _module_of(kind: type[Node]) -> str:
     return min(found, key=len)
 
 
+def _type_name(column: NDArray[Any]) -> str:
+    """Return the name of the type of an array, as `numpy.array` takes it."""
+    return "str" if column.dtype.kind == "U" else column.dtype.name
+
+
 def _number_text(values: Any) -> str:
     """Return numbers as text that reads back to the same bits; float32 needs at most nine digits."""
     array = np.asarray(values)
     if array.ndim:
         return f"[{', '.join(map(_number_text, array))}]"
-    return str(array.item()) if array.dtype != np.float32 else repr(float(str(array[()])))
+    return repr(float(str(array[()]))) if array.dtype == np.float32 else repr(array.item())
 
 
 def _drawing_text(drawing: Drawing) -> str:
@@ -257,7 +273,7 @@ def _value_text(value: Any) -> str:
 
 
 def _more(item: SceneObject) -> str:
-    """Return the arguments of an object's origin, hidden and locked nodes that are not the default."""
-    standard = {"origin": WORLD, "hidden": (), "locked": ()}
+    """Return the arguments of an object's origin, hidden and locked nodes, and labels, unless default."""
+    standard = {"origin": WORLD, "hidden": (), "locked": (), "labels": (), "named_only": False}
     given = {name: getattr(item, name) for name in standard}
     return "".join(f", {name}={value!r}" for name, value in given.items() if value != standard[name])

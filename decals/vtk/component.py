@@ -176,7 +176,14 @@ class DecalsComponent:
         self.scene = scene.replace(decals=together, images=(*scene.images, *added))
         return together
 
-    def apply(self, actor: pv.Actor, *, follow: bool = False, crease_angle: float = CREASE_ANGLE) -> pv.Actor:
+    def apply(
+        self,
+        actor: pv.Actor,
+        *,
+        follow: bool = False,
+        crease_angle: float = CREASE_ANGLE,
+        labels: str | Iterable[str] | None = None,
+    ) -> pv.Actor:
         """Show the subplot's decals on an actor of pyvista, whose lights, scalars and edges stay.
 
         Parameters
@@ -189,13 +196,17 @@ class DecalsComponent:
         crease_angle
             Angle between two faces, in degrees, from which their edge is sharp for decals. Two subplots that
             show one actor share the angle of the first.
+        labels
+            Labels of the actor: decals with other `Decals.receivers` do not lie on it. By default all lie on
+            it. A subplot with objects takes only receivers of its objects.
 
         Raises
         ------
         InvalidScene
-            VTK does not draw the actor as polygons, or the crease angle is out of range.
+            VTK does not draw the actor as polygons, the crease angle is out of range, or the labels are no
+            texts.
         """
-        self.subplot.apply(actor, follow=follow, crease_angle=crease_angle)
+        self.subplot.apply(actor, follow=follow, crease_angle=crease_angle, labels=labels)
         return actor
 
     def remove(self, actor: pv.Actor) -> None:

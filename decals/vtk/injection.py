@@ -16,6 +16,7 @@ from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.receivers import EVERYTHING, surface_mask
 from decals.rendering import Renderer, SceneLike
 from decals.rendering.decal_pass import decal_library
 from decals.rendering.pixel_pass import CameraBuffer
@@ -96,6 +97,8 @@ class Injection:
         An actor of polygons.
     follow
         If True, decals are in the actor's coordinates and move with it.
+    labels
+        Labels of the actor, for receivers of decals; None if all decals lie on it.
     crease_angle
         Angle in degrees from which edges are sharp.
     paint
@@ -108,17 +111,18 @@ class Injection:
         actor: Any,
         *,
         follow: bool = False,
+        labels: tuple[str, ...] | None = None,
         crease_angle: float = CREASE_ANGLE,
         paint: str = PAINT,
     ) -> None:
-        self.actor, self._follow, self._paint = actor, follow, paint
+        self.actor, self._follow, self._labels, self._paint = actor, follow, labels, paint
         self._mapper = polygon_mapper(actor)
         self._normals = SmoothNormals(crease_angle)
         self._add_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
         self._additions = ShaderAdditions(actor)
-        self._variant: tuple[AnyContact, bool] | None = None
+        self._variant: tuple[AnyContact, bool, bool] | None = None
         self._code: dict[ShaderTag, str] = {}
         self._written = False
         injection = weakref.ref(self)
@@ -141,11 +145,13 @@ class Injection:
             return
         self._add_normals()  # the mapper's input may have been replaced
         subplot, data, _ = source
-        variant = subplot.contact, data.layered
+        variant = subplot.contact, data.layered, data.limited
         if variant != self._variant:
             self._variant, self._code = (
                 variant,
-                _code(decal_library(subplot.contact, layered=data.layered), self._paint),
+                _code(
+                    decal_library(subplot.contact, layered=data.layered, limited=data.limited), self._paint
+                ),
             )
         self._additions.write(self._code)
         self._written = True
@@ -180,9 +186,10 @@ class Injection:
         model = np.linalg.inv(world) @ matrix_of(self.actor)
         program.SetUniformMatrix(MODEL, _vtk_matrix(model))
         units = subplot.applied.texture_units()
-        uniforms = data.bind(units[1:])
+        uniforms = data.bind(units[1 : 1 + data.texture_count])
         images.use(units[0])
         uniforms |= {"decal_images": units[0], "decal_mapping": int(subplot.mapping)}
+        uniforms["surface_receivers"] = self._mask(subplot)
         for name, value in uniforms.items():
             program.SetUniformi(name, value)
         program.SetUniformf("decal_stiffness", subplot.stiffness)
@@ -195,6 +202,12 @@ class Injection:
             return None
         data, images = subplot.renderer.uploads(subplot.scene)
         return None if data is None or images is None else (subplot, data, images)
+
+    def _mask(self, subplot: InjectionTarget) -> int:
+        """Return the mask of the actor; without labels, all decals lie on it."""
+        if self._labels is None or subplot.scene is None:
+            return EVERYTHING
+        return surface_mask(self._labels, subplot.scene.decals.receiver_table)
 
     def _world_matrix(self, subplot: InjectionTarget) -> Float64Array:
         """Return the matrix from the decals' space to the world."""
@@ -235,8 +248,8 @@ def _vtk_matrix(matrix: Float64Array) -> vtkMatrix4x4:
     return result
 
 
-INJECTED_TEXTURES = 5
-"""Texture units of an injected shader: images, records, and the three arrays of the index."""
+INJECTED_TEXTURES = 6
+"""Texture units of an injected shader: images, records, limits, and the three arrays of the index."""
 
 
 class InjectedDecals:
@@ -259,10 +272,14 @@ class InjectedDecals:
         self._units: list[int] = []
         self.in_frame = False
 
-    def apply(self, actor: Any, *, follow: bool, crease_angle: float) -> None:
+    def apply(
+        self, actor: Any, *, follow: bool, crease_angle: float, labels: tuple[str, ...] | None = None
+    ) -> None:
         """Show the decals on an actor."""
         self._release(self._of(actor))
-        self._injections.append(Injection(self._subplot, actor, follow=follow, crease_angle=crease_angle))
+        self._injections.append(
+            Injection(self._subplot, actor, follow=follow, labels=labels, crease_angle=crease_angle)
+        )
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor.

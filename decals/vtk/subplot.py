@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -21,6 +21,7 @@ from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.receivers import label_names
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Drawing, check_scene, drawing_of
@@ -223,9 +224,18 @@ class SubplotRenderer:
         self._proxy_actor.enclose(box(cast(Sequence[SceneObject], objects)) if objects else None)
         return bool(objects)
 
-    def apply(self, actor: Any, *, follow: bool = False, crease_angle: float = CREASE_ANGLE) -> None:
+    def apply(
+        self,
+        actor: Any,
+        *,
+        follow: bool = False,
+        crease_angle: float = CREASE_ANGLE,
+        labels: str | Iterable[str] | None = None,
+    ) -> None:
         """Show the decals on an actor of VTK; see `DecalsComponent.apply`."""
-        self.applied.apply(actor, follow=follow, crease_angle=as_crease_angle(crease_angle))
+        names = None if labels is None else label_names("labels", labels, InvalidScene)
+        angle = as_crease_angle(crease_angle)
+        self.applied.apply(actor, follow=follow, crease_angle=angle, labels=names)
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor; see `DecalsComponent.remove`."""

@@ -43,12 +43,14 @@ def decals_at(
     corrected: bool = True,
     reach: float = 1.0,
     contact: str = "elastic",
+    on: frozenset[str] | None = None,
 ) -> Any:
     """What the topmost of `decals` (anything with their arrays) shows at points with unit normals.
 
-    reach 1 is the paper; less leaves out whatever is farther than that many influence radii.
+    reach 1 is the paper; less leaves out whatever is farther than that many influence radii. `on`: labels of
+    the object that the points lie on.
     """
-    return _in_chunks(_topmost, decals, points, normals, corrected, reach, contact)
+    return _in_chunks(_topmost, decals, points, normals, corrected, reach, contact, on)
 
 
 def colors_at(
@@ -59,6 +61,7 @@ def colors_at(
     *,
     corrected: bool = True,
     contact: str = "elastic",
+    on: frozenset[str] | None = None,
 ) -> Any:
     """Premultiplied colours of all decals over each other, from the lowest up.
 
@@ -67,7 +70,7 @@ def colors_at(
     """
 
     def composed(decals: Any, points: NDArray[Any], normals: NDArray[Any]) -> Any:
-        scene = _Scene(decals, points, normals, 1.0)
+        scene = _Scene(decals, points, normals, 1.0, on)
         color = np.zeros((len(points), 4))
         for members in reversed(_drawings(decals)):
             owner, complement, _ = scene.shown(members, contact)
@@ -76,7 +79,7 @@ def colors_at(
                 decals, points[rows], normals[rows], owner[rows], complement[rows], corrected
             )
             inside = np.hypot(*(uv - 0.5).T) <= 0.5 + 1e-5
-            front = color_of(owner[rows], uv) * inside[:, None]
+            front = color_of(owner[rows], uv) * (inside * scene.fades[rows, owner[rows]])[:, None]
             color[rows] = front + (1 - front[:, 3:]) * color[rows]
         return (color,)
 
@@ -105,9 +108,15 @@ def _drawings(decals: Any) -> Any:
 
 
 def _topmost(
-    decals: Any, points: NDArray[Any], normals: NDArray[Any], corrected: bool, reach: Any, contact: Any
+    decals: Any,
+    points: NDArray[Any],
+    normals: NDArray[Any],
+    corrected: bool,
+    reach: Any,
+    contact: Any,
+    on: frozenset[str] | None,
 ) -> Any:
-    scene = _Scene(decals, points, normals, reach)
+    scene = _Scene(decals, points, normals, reach, on)
     count = len(points)
     owner, complement, doubt = np.full(count, -1), np.ones(count), np.full(count, 4.0)
     for members in _drawings(decals):
@@ -126,14 +135,33 @@ def _topmost(
 class _Scene:
     """All distances between points and decals."""
 
-    def __init__(self, decals: Any, points: NDArray[Any], normals: NDArray[Any], reach: Any) -> None:
+    def __init__(
+        self,
+        decals: Any,
+        points: NDArray[Any],
+        normals: NDArray[Any],
+        reach: Any,
+        on: frozenset[str] | None = None,
+    ) -> None:
         self.points, self.centres = points, decals.positions.astype(np.float64)
         self.radii, self.spill = decals.radii.astype(np.float64), decals.spill
         self.alone = np.asarray(decals.interactions) != 1
         self.cosine = normals @ decals.normals.astype(np.float64).T
         offsets = [points[:, None, a] - self.centres[None, :, a] for a in range(3)]
         self.squared = sum(w**2 for w in offsets) / (self.radii / RIM) ** 2
-        self.facing = self.spill | (self.cosine > FACING_LIMIT)
+        count = len(self.radii)
+        angles = np.radians(np.asarray(getattr(decals, "fade_angles", np.zeros(count)), np.float64))
+        depths = np.asarray(getattr(decals, "fade_depths", np.zeros(count)), np.float64) * self.radii
+        texts = getattr(decals, "receivers", [""] * count)
+        self.limit = np.where(angles > 0, np.cos(angles), np.where(self.spill, -4, FACING_LIMIT))
+        above = np.abs(sum(w * decals.normals[None, :, a] for a, w in enumerate(offsets)))
+        taken = [on is None or text == "" or not on.isdisjoint(text.split(", ")) for text in texts]
+        self.facing = (self.cosine > self.limit) & ((depths == 0) | (above < depths)) & np.array(taken, bool)
+        with np.errstate(all="ignore"):
+            turned = (self.cosine - np.cos(angles)) / (np.cos(angles / 2) - np.cos(angles))
+            sunk = 2 - 2 * above / depths
+        self.fades = np.where(angles > 0, _eased(turned), 1) * np.where(depths > 0, _eased(sunk), 1)
+        self.sinking = np.where(depths > 0, np.abs(above - depths) / self.radii, 4.0)
         self.acts = (self.squared < reach**2) & self.facing
 
     def shown(self, members: Any, contact: Any) -> Any:
@@ -207,8 +235,15 @@ class _Scene:
 
     def facing_doubt(self) -> Any:
         """Distance to the facing limit of a decal that reaches the point."""
-        near = (self.squared < 1) & ~self.spill
-        return np.where(near, np.abs(self.cosine - FACING_LIMIT), 4.0).min(axis=1, initial=4.0)
+        doubt = np.minimum(np.abs(self.cosine - self.limit), self.sinking)
+        return np.where(self.squared < 1, doubt, 4.0).min(axis=1, initial=4.0)
+
+
+def _eased(t: NDArray[Any]) -> NDArray[Any]:
+    """0 up to t = 0, 1 from 1 on, and the cubic with flat ends between."""
+    t = np.clip(np.nan_to_num(t), 0, 1)
+    eased: NDArray[Any] = t * t * (3 - 2 * t)
+    return eased
 
 
 def _stacked(first: Any, second: Any, own: NDArray[Any], other: NDArray[Any]) -> Any:

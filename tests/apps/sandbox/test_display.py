@@ -166,6 +166,9 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
         "layer": 2,
         "interaction": "overlap",
         "spill": True,
+        "receivers": "crate",
+        "fade_angle": 90.0,
+        "fade_depth": 0.5,
         "tint": "#ff0000",
         "image": "tint alone",
     }
@@ -179,6 +182,7 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
     assert rows.radii.tolist() == [np.float32(0.3)] * 2
     assert rows.images.tolist() == [-1, -1]
     assert rows.spill.all()
+    assert rows.receivers.tolist() == ["crate"] * 2
     controls = {control["name"]: control["value"] for control in sandbox.values()["decal"]["controls"]}
     assert {name: controls[name] for name in ("layer", "interaction", "tint", "image")} == {
         "layer": 2,
@@ -187,7 +191,16 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
         "image": "tint alone",
     }
     assert len(sandbox.values()["done"]) == len(values)
-    wrong: list[Any] = [("radius", -1), ("radius", "x"), ("image", "no"), ("tint", 3), ("no", 1), (None, 1)]
+    wrong: list[Any] = [
+        ("radius", -1),
+        ("radius", "x"),
+        ("image", "no"),
+        ("tint", 3),
+        ("receivers", "no"),
+        ("fade_angle", 200),
+        ("no", 1),
+        (None, 1),
+    ]
     for name, value in wrong:
         sandbox.set_decals(name, value)
         assert "expected" in sandbox.status or "radii" in sandbox.status

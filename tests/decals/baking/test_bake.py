@@ -296,6 +296,7 @@ def textured(size: int, samples: int = 1) -> Array:
     ]
     colors = bake_module.SurfaceColors(
         meshes,
+        scene.objects,
         scene.decals,
         [image.pixels for image in scene.images],
         decals.Contact.PRODUCT,

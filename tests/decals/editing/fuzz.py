@@ -18,6 +18,7 @@ from decals.editing import (
     JoinPrimitive,
     MoveDecals,
     MovePrimitive,
+    OrderDecals,
     PaintPrimitive,
     RelaxDecals,
     RemoveImage,
@@ -54,7 +55,7 @@ class RandomCommands:
         self.document = document
         self.spare_decals = spare_decals
         self.makers = (
-            self.add, self.delete, self.alter, self.scale, self.turn, self.carry, self.duplicate,
+            self.add, self.delete, self.alter, self.scale, self.turn, self.carry, self.duplicate, self.order,
             self.add_image, self.change_image, self.remove_image, self.look, self.primitive,
             self.primitive, self.shape, self.relax, self.scatter, self.add_object, self.remove_object,
         )  # fmt: skip
@@ -96,6 +97,10 @@ class RandomCommands:
             {"interactions": int(self.rng.integers(0, 4))},
             {"images": int(self.rng.integers(-1, len(self.document.images) + 1))},
             {"spill": bool(self.rng.integers(2))},
+            {
+                "fade_angles": float(self.rng.uniform(-20, 180)),
+                "receivers": str(self.rng.choice(["", "none"])),
+            },
             {"colour": 1},
         )
         return SetValues.each(self.numbers(), **values[self.rng.integers(len(values))])
@@ -112,6 +117,9 @@ class RandomCommands:
 
     def duplicate(self) -> Any:
         return DuplicateDecals(self.numbers()[:2])
+
+    def order(self) -> Any:
+        return OrderDecals(self.numbers(), bool(self.rng.integers(2)))
 
     def add_image(self) -> Any:
         return AddImage(PICTURES[self.rng.integers(2)])

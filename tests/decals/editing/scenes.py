@@ -47,6 +47,11 @@ def digest(document: Document) -> str:
     arrays += [
         getattr(decals.decals, name) for name in ("spill", "interactions", "layers", "tints", "opacities")
     ]
+    arrays += [
+        decals.decals.fade_angles,
+        decals.decals.fade_depths,
+        np.array(decals.decals.receivers.tolist(), np.str_),
+    ]
     records = decals.arrays["decal_records"].reshape(-1, 4, 4)[decals.numbers]
     return hashlib.sha256(
         b"".join([repr(parts).encode(), *map(np.ndarray.tobytes, [*arrays, records])])

@@ -13,9 +13,11 @@ from decals.editing import (
     DuplicateDecals,
     EditSession,
     MoveDecals,
+    OrderDecals,
     RelaxDecals,
     RemoveImage,
     RemoveObject,
+    RenameObject,
     ReplaceDecals,
     ReplaceImage,
     ScaleDecals,
@@ -99,6 +101,37 @@ def test_duplicates_lie_beside_on_the_surface(session: EditSession) -> None:
     lying = nearest_points(document.objects, copies.positions)
     np.testing.assert_allclose(lying.positions, copies.positions, atol=1e-5)
     np.testing.assert_allclose(lying.normals, copies.normals, atol=1e-4)
+
+
+def test_decals_come_to_the_front_and_go_to_the_back(session: EditSession) -> None:
+    """Within their layer and interaction, in their own order; undo gives back every number."""
+    document = session.document
+    with pytest.raises(InvalidEdit, match="push each other"):
+        session.do(OrderDecals([3], front=True))
+    session.do(SetValues.each(np.arange(10), interactions=2))
+    session.do(SetValues.each([4], layers=1))
+    first, before = document.decals.decals, digest(document)
+    for front, expected in ((True, [0, 1, 3, 5, 7, 8, 9, 2, 6]), (False, [2, 6, 0, 1, 3, 5, 7, 8, 9])):
+        command = OrderDecals([6, 2, 20], front)
+        after = command.numbers_after(document)
+        session.do(command)
+        same_rank = [0, 1, 2, 3, 5, 6, 7, 8, 9]
+        np.testing.assert_array_equal(document.decals.take(same_rank).positions, first[expected].positions)
+        np.testing.assert_array_equal(document.decals.take(after).positions, first[[6, 2, 20]].positions)
+        session.undo()
+        assert digest(document) == before
+
+
+def test_receivers_stay_objects_of_the_document(session: EditSession) -> None:
+    document = session.document
+    names = [item.name for item in document.objects]
+    session.do(SetValues.each([1, 2], receivers=names[0]))
+    before = digest(document)
+    for command in (SetValues.each([3], receivers="none"), RenameObject(0, "other")):
+        with pytest.raises(InvalidEdit, match="expected names or labels"):
+            session.do(command)
+        assert digest(document) == before
+    assert document.scene.decals.receivers[:3].tolist() == ["", names[0], names[0]]
 
 
 def test_images_come_and_go(session: EditSession) -> None:

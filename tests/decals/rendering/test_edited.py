@@ -90,9 +90,9 @@ def test_a_picture_after_an_edit_sends_about_a_kilobyte(
     made: list[DecalData] = []
     update, make = DecalData.update, DecalData.__init__
 
-    def counted_make(self: DecalData, *args: Any) -> None:
+    def counted_make(self: DecalData, *args: Any, **options: Any) -> None:
         made.append(self)
-        make(self, *args)
+        make(self, *args, **options)
 
     monkeypatch.setattr(DecalData, "update", lambda self, editor: sent.append(update(self, editor)))
     monkeypatch.setattr(DecalData, "__init__", counted_make)

@@ -45,20 +45,26 @@ def _decals(count: int = 50) -> Decals:
         layers=rng.integers(-1, 2, count),
         tints=np.where(rng.random((count, 1)) < 0.5, 1.0, rng.random((count, 3))),
         opacities=np.where(rng.random(count) < 0.5, 1.0, rng.random(count)),
+        receivers=[["", "tetra", "blob, round thing"][i] for i in rng.integers(0, 3, count)],
+        fade_angles=np.where(rng.random(count) < 0.5, 0.0, rng.uniform(1, 180, count)),
+        fade_depths=np.where(rng.random(count) < 0.5, 0.0, rng.random(count)),
     )
 
 
 def _scene() -> Scene:
     return Scene(
-        objects=(MeshObject("tetra", CORNERS, FACES, (0.1, 0.2, 0.3)), TreeObject("blob", _tree())),
+        objects=(
+            MeshObject("tetra", CORNERS, FACES, (0.1, 0.2, 0.3), named_only=True),
+            TreeObject("blob", _tree(), labels="round thing"),
+        ),
         camera=Camera((0.1, 2.0, 3.3), (0.0, 1 / 3, 0.0), (0.0, 1.0, 0.1), 31.4),
         images=(DecalImage.load("scale"), DecalImage.load("tile#b0413e")),
         decals=_decals(),
     )
 
 
-def _bits(array: NDArray[np.generic]) -> bytes:
-    return array.tobytes()
+def _bits(array: NDArray[Any]) -> bytes:
+    return repr(array.tolist()).encode() if array.dtype.kind == "T" else array.tobytes()
 
 
 def test_what_is_saved_is_loaded_bit_for_bit(tmp_path: Path) -> None:
@@ -101,9 +107,12 @@ def test_numbers_are_the_shortest_that_round_to_the_same_float32(tmp_path: Path)
 def test_decals_of_older_files_have_the_defaults(tmp_path: Path) -> None:
     """Before there were interactions, layers, tints and opacities; and without them the file is the same."""
     scene = _scene()
-    plain = scene.decals.replace(interactions=None, layers=None, tints=None, opacities=None)
+    given = "interactions", "layers", "tints", "opacities", "receivers", "fade_angles", "fade_depths"
+    plain = scene.decals.replace(**dict.fromkeys(given))
     text = to_json(scene.replace(decals=plain), folder=tmp_path)
-    assert not any(word in text for word in (b"interaction", b"layer", b"tint", b"opacity"))
+    assert not any(
+        word in text for word in (b"interaction", b"layer", b"tint", b"opacity", b"receivers", b"fade")
+    )
     again = from_json(text, folder=tmp_path).decals
     for field in fields(Decals):
         assert _bits(getattr(again, field.name)) == _bits(getattr(plain, field.name))
@@ -242,7 +251,7 @@ def test_no_scene_at_all(tmp_path: Path, text: bytes) -> None:
     assert not is_scene(text)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.99], ids=["early", "middle", "late"])
+@pytest.mark.parametrize("share", [0.1, 0.51, 0.99], ids=["early", "middle", "late"])
 def test_a_truncated_scene_is_reported_as_a_scene(tmp_path: Path, share: float) -> None:
     text = to_json(_scene(), folder=tmp_path)
     path = tmp_path / "cut.json"
@@ -303,3 +312,15 @@ def test_bounds_are_those_of_the_surfaces() -> None:
     assert np.allclose(high, [2.1, 0.5, 0.5], atol=0.02)
     with pytest.raises(InvalidScene, match="at least one"):
         bounds_of([])
+
+
+def test_receivers_are_objects_of_the_scene() -> None:
+    scene = _scene()
+    with pytest.raises(InvalidScene, match="one of blob, round thing, tetra; got 'lid'"):
+        scene.replace(decals=scene.decals.replace(receivers="blob, lid"))
+    assert scene.objects[0].named_only
+    for labels in (7, ["a,b"], [3]):
+        with pytest.raises(InvalidScene, match="expected labels"):
+            TreeObject("blob", _tree(), labels=labels)  # type: ignore[arg-type]
+    with pytest.raises(InvalidScene, match="named_only"):
+        TreeObject("blob", _tree(), named_only=1)  # type: ignore[arg-type]

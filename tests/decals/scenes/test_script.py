@@ -49,6 +49,8 @@ def decals_at_random(count: int) -> decals.Decals:
         spill=rng.integers(0, 2, count, dtype=bool),
         interactions=rng.integers(0, 3, count),
         opacities=rng.uniform(size=count),
+        fade_angles=rng.uniform(1, 180, count),
+        fade_depths=rng.uniform(1, 2, count),
     )
 
 
@@ -63,19 +65,20 @@ def test_the_script_gives_the_same_scene(count: int, tmp_path: Path) -> None:
         Ring((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, radius=0.3),
     ]
     vertices, faces = box((-1, -4, -1), (1, -2, 1))
+    given = decals_at_random(count)
     scene = Scene(
         objects=[
             *(TreeObject(f"tree '{number}'", tree) for number, tree in enumerate(trees)),
-            MeshObject("crate", vertices, faces, color="red", crease_angle=20.0),
+            MeshObject("crate", vertices, faces, color="red", crease_angle=20.0, labels="metal"),
         ],
         camera=Camera((0, 1 / 3, 8), fov=41.5),
         images=["scale", DecalImage("mine", pixels)],
-        decals=decals_at_random(count),
+        decals=given.replace(receivers=[("", "crate, metal")[i % 2] for i in range(count)]),
         drawing=LOOK if count else Drawing(),
     )
     again = rebuilt(scene, tmp_path / "scene.py")
     for item, other in zip(scene.objects, again.objects, strict=True):
-        assert item.name == other.name
+        assert (item.name, item.labels, item.named_only) == (other.name, other.labels, other.named_only)
         if isinstance(item, TreeObject):
             assert item.tree == other.tree
         else:

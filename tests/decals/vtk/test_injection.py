@@ -244,6 +244,27 @@ def test_decals_that_follow_and_decals_that_stay(plotter: Factory) -> None:
     assert (moved == 255).all()  # they are where the actor was
 
 
+def test_actors_take_decals_by_their_labels(plotter: Factory) -> None:
+    mesh = torus()
+    some = decals_over(mesh)
+    named = some.replace(receivers=np.where(np.arange(len(some)) % 2, "ring", "cup"))
+    pictures = []
+    for decals, labels in ((some[::2], None), (named, "cup"), (named, None), (some, None), (named, ["none"])):
+        pl = plotter(window_size=SIZE)
+        pl.disable_anti_aliasing()
+        actor = pl.add_mesh(mesh, lighting=False, color="white")
+        pl.decals.add(decals, images=["tile"])
+        pl.decals.apply(actor, labels=labels)
+        pictures.append(shot(pl))
+    first, by_label, unlabelled, whole, none = pictures
+    assert (np.abs(by_label - first).max(axis=-1) > 3).mean() < 0.001
+    assert (np.abs(unlabelled - whole).max(axis=-1) > 3).mean() < 0.001
+    assert (by_label != whole).any()
+    assert (none == 255).all()
+    with pytest.raises(InvalidScene, match="expected labels"):
+        pl.decals.apply(actor, labels=7)
+
+
 def test_changes_show_with_the_next_frame(plotter: Factory) -> None:
     mesh = torus()
     pl, actor = subplot_with(plotter, mesh, decals_over(mesh), color="white")

@@ -236,7 +236,7 @@ def test_what_went_wrong_in_the_thread_is_tried_again_once_something_changed(
 def test_a_shader_that_is_refused_is_said_once_and_clearly(
     waiting: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*_: Any) -> None:
+    def refuse(*_: Any, **_options: Any) -> None:
         raise CompileError("decal_pass.glsl:7: nonsense")
 
     monkeypatch.setattr("decals.rendering.renderer.decal_program", refuse)
