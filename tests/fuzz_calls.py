@@ -486,6 +486,8 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "DuplicateDecals": {"numbers": [0]},
         "DuplicatePrimitive": {**node, "offset": (1.0, 0.0, 0.0)},
         "JoinPrimitive": {**node, "join": "union"},
+        "TransformPrimitive": {**node, "matrix": np.eye(4), "quick": False},
+        "MirrorPrimitive": {**node, "axis": 0},
         "FlagNodes": {"hidden": {0: ((1,),)}, "locked": {}, "label": "hide"},
         "HideDecals": {"numbers": [0]},
         "ShowDecals": {"layers": None},

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 import pyvista as pv
 
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.nodes.paths import node_in_world
 from decals.apps.views import PRESETS
 from decals.editing.background import Job, Worker
@@ -21,6 +21,7 @@ from decals.surfaces.surface import unit_rows
 from decals.validation import describe, finite_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
+from decals.window.host_plotter import ray_through
 
 MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
 OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
@@ -41,6 +42,9 @@ FOLD_COLOR = "#d55e00"
 LINE_COLOR = "#111111"
 MAX_STRETCH = 5.0
 """Upper end of the colours of stretch."""
+
+GIZMO_SIZE = 0.12
+"""Length of the axes of the gizmo, in heights of the view."""
 
 MAX_BOOKMARKS = 20
 PREFIX = "sandbox "
@@ -236,6 +240,60 @@ class Display:
         view.position, view.focal_point, view.up = camera.position, camera.target, camera.up
         view.view_angle = camera.fov
         self._window.subplot.vtk_renderer.reset_camera_clipping_range()
+
+    def gizmo(self) -> dict[str, Any]:
+        """Return where the handles of the selected node lie in the view, in parts of its width and height."""
+        trees = self._window.actions.trees
+        if not trees.handles(1.0):
+            return {"handles": []}
+        length, matrix = self._gizmo_frame(trees.handles(1.0)[0].position)
+        handles = trees.handles(length)
+        clip = np.array([(*handle.position, 1.0) for handle in handles]) @ matrix.T
+        ahead = clip[:, 3] > 0.0
+        places = 0.5 + clip[:, :2] / np.where(ahead, clip[:, 3], 1.0)[:, None] * (0.5, -0.5)
+        return {
+            "handles": [
+                {"name": handle.name, "x": round(x, 4), "y": round(y, 4)}
+                for handle, (x, y), seen in zip(handles, places.tolist(), ahead, strict=True)
+                if seen
+            ]
+        }
+
+    def _gizmo_frame(self, middle: Float64Array) -> tuple[float, Float64Array]:
+        """Return the length of a gizmo's axes at a point, in model units, and the matrix to clip space."""
+        size = self._window.plotter.window_size
+        matrix = self._window.subplot.viewpoint().clip_matrix(tuple(size), (middle - 1.0, middle + 1.0))
+        depth = float(matrix[3, :3] @ middle + matrix[3, 3])
+        return 2.0 * GIZMO_SIZE * abs(depth) / float(np.linalg.norm(matrix[1, :3])), matrix
+
+    def drag_handle(self, name: str, phase: str, x: float, y: float, *, snap: bool) -> None:
+        """Drag a handle of the selected node; the pointer is given in parts of the view's width and height.
+
+        Parameters
+        ----------
+        name
+            Name of the handle; see `decals.editing.gizmo.Handle`.
+        phase
+            "begin", "move" or "end".
+        x, y
+            Place of the pointer, from the left and from the top.
+        snap
+            Move, turn and scale in round steps.
+        """
+        if phase not in ("begin", "move", "end"):
+            raise InvalidEdit(f"phase: expected begin, move or end, got {describe(phase)}")
+        trees, (width, height) = self._window.actions.trees, self._window.plotter.window_size
+        right, down = (min(max(finite_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
+        ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
+        assert ray is not None  # the place lies in the view
+        if phase == "begin":
+            handles = trees.handles(1.0)
+            length = self._gizmo_frame(handles[0].position)[0] if handles else 1.0
+            trees.begin_handle_drag(name, ray, length)
+            return
+        trees.drag_handle(ray, snap=snap)
+        if phase == "end":
+            trees.end_drag()
 
     def frame_selection(self) -> None:
         """Show the selected node or decals as large as they fit; without a selection, everything."""

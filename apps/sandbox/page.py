@@ -55,12 +55,41 @@ ROW_FLAGS = (
 )
 """Buttons of a row: its change, the row's value, and icons for true and false."""
 
+HANDLE_FILL = (
+    "h.name.startsWith('move ') ? ({x: '#d55e00', y: '#009e73', z: '#0072b2'})[h.name[5]] : "
+    "h.name.startsWith('turn') ? ({x: '#f0b070', y: '#8fd8c0', z: '#90c4f0'})[h.name[5]] : "
+    "h.name === 'scale' ? '#f0e442' : '#ffffff'"
+)
+"""Colours of the handles: strong for axes, light for turns, yellow for the scale, white for points."""
+
 OPEN_MENU = (
     "menu = {open: true, x: $event.clientX, y: $event.clientY, key: row.key, label: row.label, "
     "object: ['object', 'mesh'].includes(row.kind), image: ['image', 'more', 'layer'].includes(row.kind), "
     "flags: !['image', 'more'].includes(row.kind)}"
 )
 """Open the menu of a row at the pointer."""
+
+
+def _place(phase: str) -> str:
+    """Return the expression that sends a phase of a drag of the handle ``h``, and the pointer's place."""
+    box = "$event.target.ownerSVGElement.getBoundingClientRect()"
+    place = f"($event.clientX - {box}.left) / {box}.width, ($event.clientY - {box}.top) / {box}.height"
+    return f"trigger('handle', [h.name, '{phase}', {place}, $event.ctrlKey || $event.metaKey])"
+
+
+GIZMO = f"""<svg style="position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none">
+<line v-for="h in gizmo.handles.filter(h => h.name.startsWith('move '))" :key="h.name" stroke="#111"
+  :x1="100 * gizmo.handles[0].x + '%'" :y1="100 * gizmo.handles[0].y + '%'"
+  :x2="100 * h.x + '%'" :y2="100 * h.y + '%'" stroke-width="3"/>
+<circle v-for="h in gizmo.handles" :key="h.name" :cx="100 * h.x + '%'" :cy="100 * h.y + '%'" r="8"
+  :fill="{HANDLE_FILL}" :data-handle="h.name" stroke="#111" stroke-width="2"
+  style="pointer-events: all; cursor: grab; touch-action: none"
+  @pointerdown.stop.prevent="$event.target.setPointerCapture($event.pointerId); {_place("begin")}"
+  @pointermove="$event.buttons && {_place("move")}"
+  @pointerup.stop="{_place("end")}"
+  @mousedown.stop><title>{{{{ h.name }}}}</title></circle>
+</svg>"""
+"""Handles of the selected node above the view: they cost no frame."""
 
 
 class Page:
@@ -93,6 +122,7 @@ class Page:
         server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "object": False, "image": False}
         server.state.update({**constants, **self.values(), "renamed": renamed, "dropped": dropped})
         server.state.change("dropped")(self._take_dropped)
+        server.controller.trigger("handle")(self.sandbox.drag_handle)
         server.controller.trigger("rename")(lambda key, name: self.sandbox.change_row(key, "rename", name))
         self._build()
         server.controller.on_server_ready.add(self._start)
@@ -158,7 +188,7 @@ class Page:
                 with (
                     vuetify3.VMain(),
                     html.Div(
-                        style="height: 100%",
+                        style="height: 100%; position: relative",
                         dragover="$event.preventDefault()",
                         drop=f"$event.preventDefault(); {DROP.format('dataTransfer')}",
                         __events=["dragover", "drop"],
@@ -167,6 +197,7 @@ class Page:
                 ):
                     self.view = StreamedView(self._window, self.sandbox.take_step, style="height: 100%")
                     self.sandbox.schedule = self.view.update
+                    html.Div(GIZMO, v_if="gizmo.handles.length")
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status"'])

@@ -133,6 +133,7 @@ class Sandbox:
             "undone": list(session.undone_labels[:MAX_HISTORY]),
             "start": self._start,
             "display": self.display.values(),
+            "gizmo": self.display.gizmo(),
             "decal": {
                 "count": len(state.selection),
                 "controls": decal_controls(self._window.document, state.selection),
@@ -276,6 +277,12 @@ class Sandbox:
             self._window.redraw(whole=True)
         if time.monotonic() - self._last_step > REST_SECONDS:
             self.end_input()
+
+    def drag_handle(self, name: str, phase: str, x: float, y: float, snap: bool = False) -> None:
+        """Drag a handle of the selected node; see `Display.drag_handle`."""
+        self._slide(
+            lambda: self.display.drag_handle(name, phase, x, y, snap=bool(snap)), last=phase != "move"
+        )
 
     def set_component(self, name: str, index: list[int], raw: Any) -> None:
         """Set one number of a parameter of the selected node: ``index`` leads to it through lists."""

@@ -11,13 +11,16 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Quantity, parameters_of
-from blobtree.nodes.primitives import Leaf
+from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Node, Transform
 from blobtree.tape.model import checked_tree
 from blobtree.validation import finite_vector
 
 _RADII = (Quantity.RADIUS, Quantity.SEMI_AXES, Quantity.RADII)
 _LENGTHS = (Quantity.LENGTH, Quantity.EXTENTS)
+
+RIGID_TOLERANCE = 1e-9
+"""Error of a matrix that still counts as one without scale and shear."""
 
 Path = tuple[int, ...]
 """Indices of children, from the root down."""
@@ -134,13 +137,42 @@ def world_matrix(tree: Node, path: Path) -> Float64Array:
     InvalidNode
         The node lies below a warp, where the map differs from point to point.
     """
-    matrix = np.eye(3)
+    return world_transform(tree, path)[:3, :3]
+
+
+def world_transform(tree: Node, path: Path) -> Float64Array:
+    """Return the map, float64[4, 4], from a node's own space to the world; errors as `world_matrix`."""
+    matrix = np.eye(4)
     for node in list(nodes_along(tree, path))[:-1]:
         if isinstance(node, Transform):
-            matrix = matrix @ np.asarray(node.matrix, np.float64)[:3, :3]
+            matrix = matrix @ square_matrix(node.matrix)
         elif node.warp is not None:
             raise InvalidNode(f"the primitive lies below a {type(node).__name__}; move that as a whole")
     return matrix
+
+
+def square_matrix(matrix: ArrayLike) -> Float64Array:
+    """Return an affine map, shape (3, 4) or (4, 4), as float64[4, 4]."""
+    return np.vstack([np.asarray(matrix, np.float64)[:3], (0.0, 0.0, 0.0, 1.0)])
+
+
+def mapped(node: Node, change: ArrayLike) -> Node:
+    """Return a node under an affine map, float64[4, 4], of its own space.
+
+    A point, segment or cone that is only moved, turned or mirrored stays of its kind.
+    """
+    matrix = square_matrix(change)
+    if isinstance(node, Transform):
+        return node.child.transform(matrix @ square_matrix(node.matrix))
+    rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID_TOLERANCE)
+    if not (rigid and isinstance(node, Point | Segment | Cone)):
+        return node.transform(matrix)
+    points: dict[str, Any] = {
+        name: tuple((matrix[:3, :3] @ getattr(node, name) + matrix[:3, 3]).tolist())
+        for name, parameter in parameters_of(type(node)).items()
+        if parameter.quantity is Quantity.POINT
+    }
+    return replace(node, **points)
 
 
 def moved(node: Node, offset: ArrayLike) -> Node:

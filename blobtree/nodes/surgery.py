@@ -17,14 +17,17 @@ from blobtree.formulas.operators import Support
 from blobtree.nodes.contact import SolidContact
 from blobtree.nodes.paths import (
     Path,
+    mapped,
     moved,
     node_at,
     nodes_along,
     primitive_at,
     primitives_around,
     resized,
+    square_matrix,
     with_node,
     world_matrix,
+    world_transform,
 )
 from blobtree.nodes.tree import (
     Difference,
@@ -232,7 +235,7 @@ def _matrix(tree: Node, path: Path, first: int) -> Float64Array:
     matrix = np.eye(4)
     for node in list(nodes_along(tree, path))[first:]:
         if isinstance(node, Transform):
-            matrix = matrix @ np.vstack([np.asarray(node.matrix, np.float64), (0.0, 0.0, 0.0, 1.0)])
+            matrix = matrix @ square_matrix(node.matrix)
         elif node.warp is not None:
             raise InvalidNode(f"the place lies below a {type(node).__name__}; move that as a whole")
     return matrix
@@ -300,8 +303,21 @@ def duplicate_branch(tree: Node, path: Path, offset: ArrayLike) -> tuple[Node, P
         The new tree, and the path of the copy in it.
     """
     local_offset = np.linalg.solve(world_matrix(tree, path), finite_vector("offset", offset))
-    *above, node = nodes_along(tree, path)
-    copy = moved(node, local_offset)
+    return _join_copy(tree, path, moved(node_at(tree, path), local_offset))
+
+
+def mirror_branch(tree: Node, path: Path, axis: int = 0) -> tuple[Node, Path]:
+    """Add a mirror image of the branch at a path, beyond the world's plane through 0 across an axis.
+
+    It joins as the copy of `duplicate_branch` does. Returns the new tree, and the path of the image in it.
+    """
+    mirror, world = np.eye(4), world_transform(tree, path)
+    mirror[axis, axis] = -1.0
+    return _join_copy(tree, path, mapped(node_at(tree, path), np.linalg.solve(world, mirror @ world)))
+
+
+def _join_copy(tree: Node, path: Path, copy: Node) -> tuple[Node, Path]:
+    *above, _ = nodes_along(tree, path)
     if above and isinstance(above[-1], Sum | Ricci | Union):
         return add_operand(tree, path[:-1], copy)
     return _join_at(tree, path, copy, Join.BLEND)

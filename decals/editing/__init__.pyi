@@ -27,6 +27,7 @@ from .tree_commands import (
     DuplicatePrimitive,
     GroupOperands,
     JoinPrimitive,
+    MirrorPrimitive,
     MoveBranch,
     MovePrimitive,
     PaintPrimitive,
@@ -35,6 +36,7 @@ from .tree_commands import (
     ReplaceNode,
     ResizePrimitive,
     SetParameter,
+    TransformPrimitive,
 )
 from .visibility import FlagNodes, HideDecals, LockLayers, ShowDecals
 
@@ -57,6 +59,7 @@ __all__ = [
     "JoinPrimitive",
     "LockLayers",
     "MapValues",
+    "MirrorPrimitive",
     "MoveBranch",
     "MoveDecals",
     "MovePrimitive",
@@ -80,6 +83,7 @@ __all__ = [
     "SetParameter",
     "SetValues",
     "ShowDecals",
+    "TransformPrimitive",
     "TurnDecals",
     "UndoEntry",
     "first_hit",

@@ -42,7 +42,7 @@ def followers(
     item
         The object with its new tree.
     offset
-        Displacement of the node in the world, shape (3,).
+        Displacement of the node in the world, shape (3,), or the affine map of its points, shape (4, 4).
 
     Returns
     -------
@@ -61,9 +61,13 @@ def followers(
     )
     rows = anchor.on_object(near)
     positions = decals.positions[rows].astype(np.float64)
+    if offset.ndim == 2:
+        offset = positions @ (offset[:3, :3] - np.eye(3)).T + offset[:3, 3]
     weights = anchor.weights[rows] if offset.any() else np.zeros(len(rows))
     targets = positions + weights[:, None] * offset
-    moves = (weights * np.linalg.norm(offset) > 0) | (np.abs(item.tree(targets) - ISO) > FIELD_TOLERANCE)
+    moves = (weights * np.linalg.norm(offset, axis=-1) > 0) | (
+        np.abs(item.tree(targets) - ISO) > FIELD_TOLERANCE
+    )
     projected = project_without_mesh(item.tree, targets[moves])
     if projected is None:
         projected = item.surface.project(targets[moves])

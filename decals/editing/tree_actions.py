@@ -14,6 +14,7 @@ from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, w
 from decals.editing.action_state import ActionState, Cursor, require_pick
 from decals.editing.background import Step
 from decals.editing.decal_actions import TINTS
+from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
 from decals.editing.key_bindings import Group, action
 from decals.editing.queries import SurfacePick
 from decals.editing.scatter_commands import AddObject, RemoveObject
@@ -23,6 +24,7 @@ from decals.editing.tree_commands import (
     DuplicatePrimitive,
     GroupOperands,
     JoinPrimitive,
+    MirrorPrimitive,
     MoveBranch,
     MovePrimitive,
     PaintPrimitive,
@@ -31,11 +33,13 @@ from decals.editing.tree_commands import (
     ResizePrimitive,
     SetParameter,
     StructureCommand,
+    TransformPrimitive,
 )
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
+from decals.validation import describe
 
 RESIZE_STEP = 1.05
 """Factor of a primitive's radius by one key press."""
@@ -71,6 +75,7 @@ class TreeActions:
     def __init__(self, state: ActionState) -> None:
         self._state = state
         self._color_index = 0
+        self._handle_drag: HandleDrag | None = None
 
     # -- the selected primitive -------------------------------------------------------------------------
 
@@ -158,7 +163,50 @@ class TreeActions:
         moved = np.round(np.asarray(offset, np.float64) / snap) * snap if snap else offset
         self._drag_to(MovePrimitive(*self._state.primitive, moved, quick=True))
 
-    def _drag_to(self, command: MovePrimitive | SetParameter) -> None:
+    def handles(self, length: float) -> list[Handle]:
+        """Return the handles of the selected node for a gizmo of a length; none without a node."""
+        if self._state.primitive is None or self._state.selection:
+            return []
+        number, path = self._state.primitive
+        return handles_of(self._tree(number), path, length)
+
+    def begin_handle_drag(self, name: str, ray: Ray, length: float) -> None:
+        """Begin to drag a handle of the selected node, with the pointer at a ray."""
+        handles = self.handles(length)
+        if name not in [handle.name for handle in handles]:
+            known = ", ".join(handle.name for handle in handles) or "none"
+            raise InvalidEdit(f"handle: expected one of the selected node, {known}, got {describe(name)}")
+        self._handle_drag = HandleDrag(handles, name, ray, length)
+        self._state.begin_stroke(name)
+
+    def drag_handle(self, ray: Ray, *, snap: bool = False) -> None:
+        """Drag the handle to the pointer's ray.
+
+        Parameters
+        ----------
+        ray
+            Origin and direction, shape (3,) each.
+        snap
+            If True, moves, turns and scales go in round steps.
+        """
+        drag, selected = self._handle_drag, self._state.primitive
+        if drag is None or selected is None or not self._state.session.stroke_open:
+            return
+        step = (self._state.snap or snap_distance(drag.length)) if snap else self._state.snap
+        command: MovePrimitive | TransformPrimitive | SetParameter | None = None
+        if drag.name.startswith("move"):
+            offset = drag.offset(ray, step)
+            command = None if offset is None else MovePrimitive(*selected, offset, quick=True)
+        elif drag.name.startswith(("turn ", "scale")):
+            matrix = drag.matrix(ray, snap=snap)
+            command = None if matrix is None else TransformPrimitive(*selected, matrix, quick=True)
+        elif (point := drag.point(ray, step)) is not None:
+            path, name, value = moved_point(self._tree(selected[0]), selected[1], drag.name, point)
+            command = SetParameter(selected[0], path, name, value, quick=True)
+        if command is not None:
+            self._drag_to(command)
+
+    def _drag_to(self, command: MovePrimitive | TransformPrimitive | SetParameter) -> None:
         """Replace the edit of the open stroke by that of a command."""
 
         def step(session: EditSession) -> str:
@@ -171,7 +219,7 @@ class TreeActions:
 
     def end_drag(self) -> None:
         """End the drag; if the object has no visible surface left, the drag is reverted."""
-        state = self._state
+        state, self._handle_drag = self._state, None
         if state.primitive is not None:
             step = _surface_check(state.primitive[0])
             state.background.when_followed(
@@ -386,6 +434,13 @@ class TreeActions:
         number, path = self._state.primitive
         distance = _thickness(node_in_world(self._tree(number), path))
         self._restructure(DuplicatePrimitive(number, path, distance * unit_rows(aside[None])[0]))
+
+    @action(
+        "mirror", "Shift+d", summary="add the mirror image of the same primitive, across x", group=Group.SHAPE
+    )
+    def mirror(self, cursor: Cursor) -> None:
+        """Add the mirror image of the selected node, or the primitive under the cursor, across x = 0."""
+        self._restructure(MirrorPrimitive(*self._primitive(cursor)), handle_offset=np.zeros(3, np.float32))
 
     def delete_selected(self) -> None:
         """Remove the selected primitive."""

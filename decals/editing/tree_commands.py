@@ -11,22 +11,25 @@ from blobtree.nodes import surgery
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import (
     Path,
+    mapped,
     moved,
     node_at,
     primitive_at,
     primitive_path,
     resized,
+    square_matrix,
     with_node,
     world_matrix,
+    world_transform,
 )
 from blobtree.nodes.surgery import Join
-from blobtree.validation import truth
+from blobtree.validation import affine_matrix, truth
 from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject, check_names, with_tree
-from decals.validation import describe, finite_number, finite_vector, instance, member
+from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +66,7 @@ class PrimitiveCommand:
         node
             The new node.
         offset
-            Displacement of the node in the world, shape (3,).
+            Displacement of the node in the world, shape (3,), or the affine map of its points, shape (4, 4).
         quick
             If True, the tree is not checked for a visible surface.
         """
@@ -133,6 +136,46 @@ class MovePrimitive(PrimitiveCommand):
         local_offset = np.linalg.solve(world_matrix(tree, self.path), offset)
         node = moved(node_at(tree, self.path), local_offset)
         return self.compute_exchange(document, node, offset, quick=self.quick)
+
+
+@dataclass(frozen=True, eq=False)
+class TransformPrimitive(PrimitiveCommand):
+    """Map a primitive, or a branch, by an affine map of the world; decals follow the surface.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    matrix
+        The map, shape (3, 4) or (4, 4); it multiplies points as columns.
+    quick
+        If True, the tree is not checked for a visible surface: for the steps of a drag. Check it at the end.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, TransformPrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> turn = [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]]
+    >>> edit = session.do(TransformPrimitive(0, (1,), turn))
+    >>> session.document.objects[0].tree.children[1].center
+    (0.0, 1.2, 0.0)
+    """
+
+    matrix: ArrayLike
+    quick: bool = False
+    label: ClassVar[str] = "transform a primitive"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        tree = self.tree(document)
+        matrix, world = square_matrix(affine_matrix(self.matrix)), world_transform(tree, self.path)
+        node = mapped(node_at(tree, self.path), np.linalg.solve(world, matrix @ world))
+        return self.compute_exchange(document, node, matrix, quick=self.quick)
 
 
 @dataclass(frozen=True, eq=False)
@@ -448,6 +491,39 @@ class DuplicatePrimitive(StructureCommand):
         """Return the new tree, and the path of the copy."""
         offset = finite_vector("offset", self.offset, InvalidEdit)
         return surgery.duplicate_branch(tree, self.path, offset)
+
+
+@dataclass(frozen=True, eq=False)
+class MirrorPrimitive(StructureCommand):
+    """Add the mirror image of a primitive, or branch, beyond a plane of the world, joined in the same way.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    axis
+        The plane lies across this axis, through 0: 0, 1 or 2 for x, y or z.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, MirrorPrimitive
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(MirrorPrimitive(0, (1,)))
+    >>> session.document.objects[0].tree.children[2].center
+    (-1.2, 0.0, 0.0)
+    """
+
+    axis: int = 0
+    label: ClassVar[str] = "mirror a primitive"
+
+    def restructure(self, tree: Node) -> tuple[Node, Path]:
+        """Return the new tree, and the path of the image."""
+        return surgery.mirror_branch(tree, self.path, whole_number("axis", self.axis, 0, 2, InvalidEdit))
 
 
 @dataclass(frozen=True, eq=False)

@@ -170,6 +170,49 @@ def test_rows_are_hidden_locked_and_isolated(window: EditWindow) -> None:
     assert (flags(), digest(window.document)) == ([], before)
 
 
+def test_handles_move_turn_and_scale_the_selected_node(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+    assert sandbox.values()["gizmo"]["handles"] == []
+    sandbox.select("0/1")
+    places = {one["name"]: (one["x"], one["y"]) for one in sandbox.values()["gizmo"]["handles"]}
+    assert len(places) == 8
+    (x, y), end = places["move"], places["move x"]
+
+    def drag(name: str, *ways: tuple[float, float], snap: bool = False) -> Any:
+        sandbox.drag_handle(name, "begin", *places[name])
+        for way in ways:
+            sandbox.drag_handle(name, "move", *way, snap)
+        sandbox.drag_handle(name, "end", *ways[-1], snap)
+        finish(window)
+        tree: Any = tree_of(window.document)
+        return tree.children[1]
+
+    far = (2 * end[0] - x, 2 * end[1] - y)
+    center = drag("move x", (0.9, 0.1), far).center
+    assert center[0] > 1.3
+    np.testing.assert_array_equal(center[1:], (0.4, 0.0))
+    assert window.session.labels == ("move x",)
+    moved = sandbox.values()["gizmo"]["handles"][0]
+    np.testing.assert_allclose((moved["x"], moved["y"]), end, atol=0.03)  # perspective
+    sandbox.perform("undo")
+    assert digest(window.document) == before
+    snapped = drag("move x", far, snap=True).center[0] - 1.2
+    np.testing.assert_allclose(snapped, round(snapped, 2), atol=1e-9)
+    sandbox.perform("undo")
+    wide = places["scale"]
+    larger = drag("scale", (2 * wide[0] - x, 2 * wide[1] - y))
+    np.testing.assert_allclose(np.asarray(larger.matrix)[:, :3], 2.0 * np.eye(3), atol=0.05)
+    sandbox.perform("undo")
+    assert digest(window.document) == before
+    sandbox.drag_handle("spin", "begin", 0.5, 0.5)
+    assert "handle: expected one of the selected node, move" in sandbox.status
+    sandbox.drag_handle("move", "throw", 0.5, 0.5)
+    sandbox.drag_handle("move", "begin", None, "x")  # type: ignore[arg-type]
+    sandbox.drag_handle("move", "move", 0.2, 0.2)  # no drag began
+    sandbox.take_step()
+    assert digest(window.document) == before
+
+
 def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWindow) -> None:
     sandbox, before = Sandbox(window), digest(window.document)
     sandbox.select("0/1")

@@ -1,0 +1,153 @@
+"""Handles of nodes: where they lie, and what a drag of one does; the oracle is plain NumPy."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import decals
+from blobtree import Point, Polyline, Segment, Twist
+from blobtree.nodes.paths import mapped, node_at, node_in_world
+from decals.editing import Actions, EditSession, MirrorPrimitive, TransformPrimitive
+from decals.editing.gizmo import (
+    HandleDrag,
+    along_line,
+    angle_about,
+    control_points,
+    handles_of,
+    moved_point,
+    on_plane,
+    scale_about,
+    snap_distance,
+    turn_about,
+)
+from decals.scenes.objects import TreeObject
+from tests.decals.editing.scenes import digest, tree_of
+
+LIMB = Segment((1, 0, 0), (2, 1, 0), radius=0.3)
+TREE = Point((0, 0, 0), radius=1.0) + LIMB
+POINTS = np.random.default_rng(3).uniform(-3, 3, (200, 3)).astype(np.float32)
+numbers = st.floats(-5.0, 5.0)
+vectors = st.tuples(numbers, numbers, numbers).map(np.array)
+directions = vectors.filter(lambda v: bool(np.linalg.norm(v) > 0.1))
+
+
+@given(vectors, directions, vectors, directions)
+@settings(max_examples=60, deadline=None)
+def test_a_line_comes_closest_to_a_ray_there(origin: Any, axis: Any, start: Any, toward: Any) -> None:
+    found = along_line(origin, axis, (start, toward))
+    line, ray = axis / np.linalg.norm(axis), toward / np.linalg.norm(toward)
+    if found is None:
+        assert np.linalg.norm(np.cross(line, ray)) < 2e-3
+        return
+    matrix = np.stack([line, -ray], axis=1)
+    (expected, _), *_ = np.linalg.lstsq(matrix, start - origin, rcond=None)
+    np.testing.assert_allclose(found, expected, atol=1e-5 * max(1.0, abs(expected)))
+
+
+@given(vectors, directions, vectors, directions)
+@settings(max_examples=60, deadline=None)
+def test_a_ray_meets_a_plane_there(point: Any, normal: Any, start: Any, toward: Any) -> None:
+    met = on_plane(point, normal, (start, toward))
+    unit = normal / np.linalg.norm(normal)
+    if met is None:
+        assert abs(toward @ unit) < 2e-3 * np.linalg.norm(toward)
+        return
+    scale = 1.0 + float(np.abs(met).max())
+    assert abs((met - point) @ unit) < 1e-6 * scale
+    assert np.linalg.norm(np.cross(met - start, toward)) < 1e-6 * scale * np.linalg.norm(toward)
+
+
+@given(vectors, st.integers(0, 2), st.floats(-170.0, 170.0))
+@settings(max_examples=30, deadline=None)
+def test_turns_and_angles_agree(center: Any, axis: int, degrees: float) -> None:
+    matrix = turn_about(center, axis, degrees)
+    np.testing.assert_allclose(matrix[:3, :3] @ center + matrix[:3, 3], center, atol=1e-9)
+    arm = np.roll((0.0, 1.0, 0.3), axis)
+    turned = matrix[:3, :3] @ arm
+    np.testing.assert_allclose(angle_about(np.eye(3)[axis], arm, turned), degrees, atol=1e-9)
+
+
+def test_snaps_are_round_and_fit_into_the_gizmo() -> None:
+    assert [snap_distance(length) for length in (4.0, 0.9, 24.0, 1e-3)] == pytest.approx(
+        [1.0, 0.2, 5.0, 2e-4]
+    )
+
+
+def test_handles_stand_at_ends_and_control_points_also_below_maps() -> None:
+    placed = TREE.scale(2.0).translate((1, 0, 0))
+    names = [handle.name for handle in handles_of(placed, (0, 0, 1), 1.0)]
+    assert names[-2:] == ["start 0", "end 0"]
+    assert len(names) == 10
+    start, end = control_points(placed, (0, 0, 1))
+    np.testing.assert_allclose([start.position, end.position], [(3, 0, 0), (5, 2, 0)])
+    assert moved_point(placed, (0, 0, 1), "end 0", (5, 4, 0)) == ((0, 0, 1), "end", (2.0, 2.0, 0.0))
+    curve = Polyline(((0, 0, 0), (1, 1, 0), (2, 0, 0)), radius=0.2)
+    assert [handle.name for handle in control_points(curve, ())] == ["points 0", "points 1", "points 2"]
+    _, name, value = moved_point(curve, (), "points 1", (1, 3, 0))
+    assert (name, value) == ("points", ((0, 0, 0), (1, 3, 0), (2, 0, 0)))
+    assert handles_of(Twist(TREE, degrees=20.0), (0,), 1.0) == []
+
+
+@pytest.mark.parametrize("name", ["move", "move z", "turn y", "scale", "end 0"])
+def test_a_drag_follows_the_pointer_is_one_entry_and_is_undone(name: str) -> None:
+    session = EditSession(decals.cover(TREE, count=12, images=["eye"]))
+    actions, state = Actions(session), digest(session.document)
+    actions.trees.select_node(0, (1,))
+    place = next(handle.position for handle in actions.trees.handles(0.5) if handle.name == name)
+    eye = np.array((1.0, 2.0, 9.0))
+    target = place + np.array((0.2, 0.1, 0.3))
+    actions.trees.begin_handle_drag(name, (eye, place - eye), 0.5)
+    for share in (0.5, 1.0):
+        actions.trees.drag_handle((eye, place + share * (target - place) - eye))
+    actions.trees.end_drag()
+    assert len(session.labels) == 1
+    after = next(handle.position for handle in actions.trees.handles(0.5) if handle.name == name)
+    if name in ("move", "end 0"):  # lies on the pointer's ray
+        assert np.linalg.norm(np.cross(after - eye, target - eye)) < 1e-5
+    elif name == "move z":
+        np.testing.assert_allclose(after[:2], place[:2], atol=1e-6)
+    positions = session.document.decals.decals.positions
+    np.testing.assert_allclose(tree_of(session.document)(positions), 0.5, atol=0.02)
+    session.undo()
+    assert digest(session.document) == state
+    actions.trees.drag_handle((eye, target - eye))  # the drag has ended
+    assert digest(session.document) == state
+
+
+@pytest.mark.parametrize("matrix", [turn_about(np.ones(3), 2, 40.0), scale_about(np.zeros(3), 1.5)])
+def test_a_transformed_node_is_the_mapped_field(matrix: Any) -> None:
+    tree = TREE.rotate((0, 1, 0), 30.0)
+    session = EditSession(decals.Scene(objects=[TreeObject("t", tree)], camera=decals.Camera((0, 0, 9))))
+    session.do(TransformPrimitive(0, (0, 1), matrix))
+    inverse = np.linalg.inv(matrix)
+    before = node_in_world(tree, (0, 1))
+    after = node_in_world(tree_of(session.document), (0, 1))
+    np.testing.assert_allclose(after(POINTS), before(POINTS @ inverse[:3, :3].T + inverse[:3, 3]), atol=2e-5)
+
+
+def test_rigid_maps_keep_the_kind_and_mirrors_join_like_copies() -> None:
+    turned: Any = mapped(LIMB, turn_about(np.zeros(3), 2, 90.0))
+    np.testing.assert_allclose((turned.start, turned.end), [(0, 1, 0), (-1, 2, 0)], atol=1e-12)
+    session = EditSession(decals.cover(TREE, count=5, images=["eye"]))
+    session.do(MirrorPrimitive(0, (1,)))
+    image: Any = node_at(tree_of(session.document), (2,))
+    assert (type(image), image.start, image.end) == (Segment, (-1.0, 0.0, 0.0), (-2.0, 1.0, 0.0))
+    mirrored = POINTS * np.array((-1, 1, 1), np.float32)
+    np.testing.assert_allclose(
+        tree_of(session.document)(POINTS), tree_of(session.document)(mirrored), atol=1e-6
+    )
+    actions = Actions(session)
+    actions.trees.select_node(0, (1,))
+    actions.perform("mirror", lambda: None)
+    assert session.labels[-1] == "mirror a primitive"
+
+
+def test_a_drag_of_a_parallel_ray_does_nothing() -> None:
+    handles = handles_of(TREE, (1,), 1.0)
+    ray = (np.array((0.0, 0.0, 9.0)), np.array((0.0, 0.0, -1.0)))
+    assert HandleDrag(handles, "move z", ray, 1.0).offset(ray, 0.0) is None
+    level = (np.array((9.0, 0.0, 0.0)), np.array((-1.0, 0.0, 0.0)))
+    assert HandleDrag(handles, "turn z", level, 1.0).matrix(level, snap=False) is None
