@@ -1,7 +1,7 @@
 """The process in which `vtk_process` reads mesh files: VTK's readers may crash or hang on damaged ones.
 
-It imports VTK once and forks for every file, so that a crash or corrupt memory does not reach the next file.
-Where the system has no fork it reads by itself, and is started again after a crash.
+It imports pyvista once and forks for every file, so that a crash or corrupt memory does not reach the next
+file. Where the system has no fork it reads by itself, and is started again after a crash.
 """
 
 import contextlib
@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+import pyvista  # noqa: F401  # here, because every fork would import it again
 
+import blobtree.vtk_errors  # noqa: F401
 from decals.errors import ImplicitDecalsError
 from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, read_dataset
 

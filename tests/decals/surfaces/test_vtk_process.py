@@ -51,10 +51,11 @@ def test_a_file_that_breaks_the_reader_is_refused(
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
-def test_without_the_file_of_its_size_a_process_still_reads(sphere: Path) -> None:
+def test_a_process_without_the_file_of_its_size_reads_with_one_import_of_pyvista(sphere: Path) -> None:
     program = f"""
-import io, json, os, pathlib
+import io, json, os, pathlib, sys
 from decals.surfaces import vtk_child
+assert "pyvista" in sys.modules, "every fork would import it again"
 vtk_child.STATM = pathlib.Path({str(sphere.with_name("nothing"))!r})
 answers = io.FileIO(os.open({str(sphere.with_name("answer"))!r}, os.O_WRONLY | os.O_CREAT), "w")
 request = {{"path": os.fsencode({str(sphere)!r}).hex(), "seconds": 60.0, "bytes": 1 << 30}}
