@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias, cast
 
 import numpy as np
+from PIL import ImageColor
 
 from blobtree.errors import ImplicitDecalsError, InvalidNode, MissingPackage
 from blobtree.validation import real, shown
@@ -74,6 +75,8 @@ def _channels(value: object) -> tuple[float, ...]:
 
 
 def _named_channels(value: Any) -> tuple[float, ...]:
+    if isinstance(value, str) and value.lower() in ImageColor.colormap:  # pyvista's colours import matplotlib
+        return (*(channel / 255.0 for channel in ImageColor.getrgb(value)), 1.0)
     try:
         import pyvista as pv
     except ImportError as error:

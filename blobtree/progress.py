@@ -4,13 +4,15 @@ Long functions do their work within `reporting`. Their reports go to the first o
 
 1. the function that the caller passed as ``progress``;
 2. the innermost display (`displayed`), such as the title of a window;
-3. once the work takes long: the output of the notebook's cell, the logger ``blobtree.progress`` if logging is
-   configured, or else stderr. A thread repeats the last report with the elapsed seconds.
+3. once this work, or one such work after another, takes long: the output of the notebook's cell, the logger
+   ``blobtree.progress`` if logging is configured, or else stderr. A thread repeats the last report with the
+   elapsed seconds.
 
 Reports of functions that the work calls, and of kernels that it compiles, go the same way.
 """
 
 import logging
+import math
 import os
 import shutil
 import sys
@@ -35,6 +37,9 @@ LINE_SECONDS, UPDATE_SECONDS = 1.5, 0.5
 
 TICK = 0.25
 """Seconds between two looks at the work."""
+
+PAUSE = 1.5
+"""Work that begins so many seconds after other work goes on with its silence."""
 
 IDLE_TICKS = 20
 """Number of looks without work after which their thread ends."""
@@ -131,7 +136,7 @@ class _Work:
     def __init__(self) -> None:
         self._stage, self._fraction = "", 0.0
         self._depth, self._displayed = 0, False
-        self._began = self._shown_at = time.monotonic()
+        self._began = time.monotonic()
         self._line = _new_line()
 
     def __call__(self, stage: str, fraction: float) -> None:
@@ -158,11 +163,12 @@ class _Work:
                 if self._displayed and _displays:
                     _displays[-1][0]("", 1.0)
 
-    def show(self, now: float) -> None:
-        """Show the stage, if it is time to."""
-        if not (_displays and _displays[-1][1]) and now - self._shown_at >= self._line.seconds:
-            self._shown_at = now
-            self._line.show(self._text(now))
+    def show(self, now: float, silence: float) -> bool:
+        """Show the stage, if the silence was long; return True if it was shown."""
+        if (_displays and _displays[-1][1]) or silence < self._line.seconds:
+            return False
+        self._line.show(self._text(now))
+        return True
 
     def _text(self, now: float) -> str:
         """Return the stage, its fraction unless the stage counts itself, and the elapsed seconds."""
@@ -181,10 +187,14 @@ class _Watcher:
         self._lock = threading.Lock()
         self._work: list[_Work] = []
         self._running = False
+        self._silent_since = self._ended = -math.inf
 
     def add(self, work: _Work) -> None:
         """Watch some work."""
         with self._lock:
+            now = time.monotonic()
+            if not self._work and now - self._ended > PAUSE:
+                self._silent_since = now
             self._work.append(work)
             if not self._running:
                 self._running = True
@@ -195,6 +205,7 @@ class _Watcher:
         with self._lock:
             if work in self._work:  # else this process was forked from the one that added it
                 self._work.remove(work)
+                self._ended = time.monotonic()
 
     def _run(self) -> None:
         idle = 0
@@ -205,8 +216,11 @@ class _Watcher:
                 if idle == IDLE_TICKS:
                     self._running = False
                     return
+                now = time.monotonic()
+                silence = now - self._silent_since
                 for work in self._work:
-                    work.show(time.monotonic())
+                    if work.show(now, silence):
+                        self._silent_since = now
 
 
 _watcher = _Watcher()

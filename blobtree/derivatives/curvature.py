@@ -7,6 +7,7 @@ import warp as wp
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.kernels import loaded
+from blobtree.progress import reporting
 from blobtree.tape.tape import Tape
 
 
@@ -49,13 +50,16 @@ class Curvatures:
 
 def hessians_at(tape: Tape, points: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return values and gradients (n, 4), and symmetric Hessians (n, 3, 3), at points float32[n, 3]."""
-    from blobtree.derivatives.hessian_kernels import evaluate_hessians  # made at the first use
+    with reporting() as report:
+        report("deriving the formulas", 0.0)
+        from blobtree.derivatives.hessian_kernels import evaluate_hessians  # made at the first use
 
+        kernel = loaded(tape.instruction_set.kernel_for(evaluate_hessians))
     uploaded = tape.on()
     gradients: wp.array[wp.vec4] = wp.empty(len(points), dtype=wp.vec4)
     hessians: wp.array[wp.vec4] = wp.empty((len(points), 3), dtype=wp.vec4)
     wp.launch(
-        loaded(tape.instruction_set.kernel_for(evaluate_hessians)),
+        kernel,
         dim=(len(points), 3),
         inputs=[wp.array(points, dtype=wp.vec3), uploaded.data, uploaded.span],
         outputs=[gradients, hessians],

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, IndexArray
 from blobtree.kernels import loaded
+from blobtree.progress import reporting
 from blobtree.tape.tape import Tape
 
 
@@ -35,11 +36,14 @@ def sensitivities_at(
     rows, columns
         int[k]: pairs of a point and a parameter.
     """
-    kernel, dtype = _gradient_kernel() if gradients else _value_kernel()
+    with reporting() as report:
+        report("deriving the formulas", 0.0)
+        kernel, dtype = _gradient_kernel() if gradients else _value_kernel()
+        kernel = loaded(tape.instruction_set.kernel_for(kernel))
     uploaded = tape.on()
     out: wp.array[Any] = wp.empty(len(rows), dtype=dtype)
     wp.launch(
-        loaded(tape.instruction_set.kernel_for(kernel)),
+        kernel,
         dim=len(rows),
         inputs=[
             wp.array(points, dtype=wp.vec3),

@@ -42,6 +42,9 @@ SOFTWARE_LOOP_ITERATIONS = 65_535
 """Iterations after which Mesa's software rasteriser ends all loops of a pixel, without an error
 (LP_MAX_TGSI_LOOP_ITERATIONS)."""
 
+SOFTWARE_SAMPLES = 1 << 18
+"""Samples after which a drawing without a graphics card waits, so that progress can be shown."""
+
 
 class _Entered(threading.local):
     """The contexts whose blocks are open on this thread, the innermost last."""
@@ -119,6 +122,7 @@ class Context:
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         self.anisotropy = _anisotropy(gl)
         self.software = _is_software(gl)
+        self.part_samples = SOFTWARE_SAMPLES if self.software else None
         self.max_loop_iterations = SOFTWARE_LOOP_ITERATIONS if self.software else None
 
     @classmethod

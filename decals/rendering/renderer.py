@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from blobtree._typing import UInt8Array
+from blobtree.progress import reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
@@ -141,10 +142,12 @@ class Renderer:
         """
         check_options(options)
         picture = TiledArray(options.size, 4, np.uint8)
-        for tile, targets in self._tiles(scene, viewpoint, options):
-            light = targets.light_pass.light
-            pixels = targets.resolve.pixels(light, tile, options.samples, options.background)
-            picture.insert(pixels, tile, options.samples)
+        with reporting() as report:
+            report("drawing", 0.0)
+            for tile, targets in self._tiles(scene, viewpoint, options):
+                light = targets.light_pass.light
+                pixels = targets.resolve.pixels(light, tile, options.samples, options.background)
+                picture.insert(pixels, tile, options.samples)
         return picture.array
 
     def buffers(
@@ -160,8 +163,10 @@ class Renderer:
         """
         options = one_sample(options)
         buffers = TiledBuffers(options.size)
-        for tile, targets in self._tiles(scene, viewpoint, options, slot=BUFFERS_SLOT):
-            buffers.insert(targets, tile)
+        with reporting() as report:
+            report("drawing", 0.0)
+            for tile, targets in self._tiles(scene, viewpoint, options, slot=BUFFERS_SLOT):
+                buffers.insert(targets, tile)
         return buffers.buffers
 
     def buffers_at(
@@ -230,7 +235,8 @@ class Renderer:
     ) -> None:
         self._camera.use(tile)
         plan = partial(plan_frame, scene, uploaded, tile, options, depth=False)
-        ProgressiveFrame(iter([targets]), plan, self.context.gl.finish).complete()
+        frame = ProgressiveFrame(iter([targets]), plan, self.context.gl.finish)
+        frame.complete(max_samples=self.context.part_samples)
 
     # -- frames that stay on the GPU ----------------------------------------------------------------------
 

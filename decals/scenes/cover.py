@@ -83,11 +83,12 @@ def cover(
     >>> len(scene.decals)
     12
     """
-    objects = as_objects(models, crease_angle=crease_angle)
-    pictures = as_images(images)
-    if not objects:
-        raise InvalidScene("expected at least one model, got none")
     with reporting(progress) as report:
+        report("reading models and images", 0.0)
+        objects = as_objects(models, crease_angle=crease_angle)
+        pictures = as_images(images)
+        if not objects:
+            raise InvalidScene("expected at least one model, got none")
         report("preparing the surfaces", 0.0)
         decals = scatter(
             [item.surface for item in objects],

@@ -28,9 +28,6 @@ VIEWPORT = 0x0BA2
 FRAMEBUFFER = 0x8D40
 """GL_FRAMEBUFFER."""
 
-SOFTWARE_SAMPLES = 1 << 18
-"""Samples after which a drawing without a graphics card waits, so that progress can be shown."""
-
 VTK_VERSION = 320
 """OpenGL version that VTK requests. Some drivers report it although they support more."""
 
@@ -306,7 +303,7 @@ class FrameRenderer:
         """Draw a scene into the renderer's targets; with ``wait``, until the graphics card has finished."""
         frame = self._begin(scene, options, viewpoint, options.slot)
         with self.context.current():
-            frame.complete(max_samples=SOFTWARE_SAMPLES if self.context.software else None)
+            frame.complete(max_samples=self.context.part_samples)
             self.renderer.sweep()
             if wait and frame.work:
                 self.context.gl.finish()

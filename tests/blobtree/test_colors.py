@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import pyvista as pv
+from PIL import ImageColor
 
 from blobtree import InvalidNode, Point, from_json, to_json
 from blobtree.colors import color_rgb, color_rgba
@@ -26,6 +27,11 @@ def test_a_colour(value: Any, expected: tuple[float, ...]) -> None:
     assert color_rgb("color", value) == pytest.approx(expected)
     assert color_rgba("color", value) == pytest.approx((*expected, 1.0))
     assert Point((0, 0, 0), radius=1.0, color=value).color == pytest.approx(expected)
+
+
+def test_names_of_css_are_those_of_pyvista() -> None:
+    for name in ImageColor.colormap:
+        assert color_rgba("color", name) == pv.Color(name).float_rgba
 
 
 def test_alpha() -> None:

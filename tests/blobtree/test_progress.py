@@ -152,6 +152,24 @@ def test_long_work_prints_lines_without_a_terminal(capsys: pytest.CaptureFixture
 
 
 @pytest.mark.usefixtures("quick", "no_handlers")
+def test_one_work_after_another_is_long_but_for_a_pause(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress._Line, "seconds", 0.1)
+    shown, deadline = "", time.monotonic() + 10.0
+    while not shown and time.monotonic() < deadline:
+        with reporting() as report:
+            report("short", 0.0)
+            time.sleep(0.01)
+        shown += capsys.readouterr().err
+    assert shown.startswith("Short (0 s)\n")
+    monkeypatch.setattr(progress, "PAUSE", 0.0)
+    before = time.monotonic()
+    with reporting():
+        assert progress._watcher._silent_since >= before
+
+
+@pytest.mark.usefixtures("quick", "no_handlers")
 def test_a_terminal_shows_one_line_and_clears_it(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
