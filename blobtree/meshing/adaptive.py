@@ -9,10 +9,12 @@ cells down to the size that the chord error needs at the sharpest bend, where th
 """
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blobtree._typing import Float32Array, IndexArray, Int64Array
+from blobtree._typing import BoolArray, Float32Array, IndexArray, Int64Array
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
 from blobtree.meshing.adaptive_cells import AdaptiveCells
@@ -21,6 +23,8 @@ from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
 from blobtree.meshing.block_tree import BlockTree
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.progress import Progress
+
+Hashes: TypeAlias = NDArray[np.uint64]
 
 ADAPTIVE_KERNELS = (place_on_surface, write_polygons, sample_blocks)
 """Kernels of every adaptive mesh, for `load_together`."""
@@ -58,10 +62,10 @@ class AdaptivePasses:
         """Make the mesh and measure it; return True if it is within the chord error."""
         self.mesh = mesh = self._mesher.mesh(report)
         hashes = _hashes(mesh.vertices.identifiers[mesh.faces])
-        new = np.flatnonzero(~np.isin(hashes, self._fine))
+        new = np.flatnonzero(~_among(hashes, self._fine))
         errors = np.zeros(len(mesh.faces), np.float32)
         errors[new] = self._mesher.errors(mesh, new, report)
-        self._fine = hashes[errors <= ALLOWED_SHARE * self.allowed]
+        self._fine = np.sort(hashes[errors <= ALLOWED_SHARE * self.allowed])
         self._errors = self._leaf_errors(errors)
         return len(self._fine) == len(hashes)
 
@@ -107,7 +111,16 @@ class AdaptivePasses:
         self._leaves.divide(leaves.blocks[wrong], leaves.slots[wrong], times[wrong] > 1)
 
 
-def _hashes(identifiers: Int64Array) -> "np.ndarray[tuple[int], np.dtype[np.uint64]]":
+def _among(hashes: Hashes, ascending: Hashes) -> BoolArray:
+    """Return which hashes are among others (n,); `np.isin` takes four times as long."""
+    order = np.argsort(hashes)
+    at = np.searchsorted(ascending, hashes[order])
+    found = np.zeros(len(hashes), bool)
+    found[order] = np.append(ascending, 0)[at] == hashes[order] if len(ascending) else False
+    return found
+
+
+def _hashes(identifiers: Int64Array) -> Hashes:
     """Return a hash of each triangle (n,) from the identifiers of its corners (n, 3)."""
     mixed = np.zeros(len(identifiers), np.uint64)
     for corner in np.sort(identifiers, axis=1).astype(np.uint64).T:

@@ -47,10 +47,23 @@ class LeafArrays:
 
 
 @wp.func
-def base_block(index: wp.vec3i, depth: wp.int32, keys: wp.array(dtype=wp.int64)) -> wp.int32:
-    """Return the block of the base that holds a cell of the finest level, or −1."""
+def base_block(index: wp.vec3i, depth: wp.int32, keys: wp.array(dtype=wp.int64)) -> wp.vec4i:
+    """Return the block of the base that holds a cell of the finest level: coordinates, and number or −1."""
     shift = 2 * depth + 2
-    return find_block(wp.vec3i(index[0] >> shift, index[1] >> shift, index[2] >> shift), keys)
+    block = wp.vec3i(index[0] >> shift, index[1] >> shift, index[2] >> shift)
+    return wp.vec4i(block[0], block[1], block[2], find_block(block, keys))
+
+
+@wp.func
+def base_block_beside(
+    index: wp.vec3i, depth: wp.int32, keys: wp.array(dtype=wp.int64), near: wp.vec4i
+) -> wp.int32:
+    """Return the number of `base_block`, which is found at once if it is the one of a cell nearby."""
+    shift = 2 * depth + 2
+    block = wp.vec3i(index[0] >> shift, index[1] >> shift, index[2] >> shift)
+    if block == wp.vec3i(near[0], near[1], near[2]):
+        return near[3]
+    return find_block(block, keys)
 
 
 @wp.func
@@ -60,12 +73,12 @@ def cell_in_block(index: wp.vec3i, shift: wp.int32) -> wp.int32:
 
 
 @wp.func
-def locate(index: wp.vec3i, leaves: LeafArrays) -> wp.vec3i:
+def locate(index: wp.vec3i, near: wp.vec4i, leaves: LeafArrays) -> wp.vec3i:
     """Return the leaf that holds a cell of the finest level: (its number, its side, its cell of a block).
 
-    Outside all blocks it is (EMPTY, a base block's side, −1).
+    Outside all blocks it is (EMPTY, a base block's side, −1). `near` is the `base_block` of a cell nearby.
     """
-    block = base_block(index, leaves.depth, leaves.keys)
+    block = base_block_beside(index, leaves.depth, leaves.keys, near)
     shift = 2 * leaves.depth
     cell = int(-1)
     if block < 0:
@@ -92,7 +105,7 @@ def choose_leaf_rows(
             index[axis] = index[axis] + leaves.sizes[i]
         else:
             index[axis] = index[axis] - 1
-        other = locate(index, leaves)
+        other = locate(index, base_block(leaves.lowest[i], leaves.depth, leaves.keys), leaves)
         if other[0] >= 0 and other[1] == leaves.sizes[i]:  # noqa: SIM102  (Warp evaluates both sides)
             if int(tables.knotted_face[int(leaves.codes[other[0]])]) == (face ^ 1):
                 row += FLIPPED
@@ -107,6 +120,7 @@ def write_polygons(
     write: wp.bool,
     polygon_starts: wp.array(dtype=wp.int32),
     counts: wp.array(dtype=wp.int32),
+    owned: wp.array(dtype=wp.int16),
     irregular: wp.array(dtype=wp.uint8),
     pierced: wp.array(dtype=wp.uint8),
     polygons: wp.array(dtype=wp.vec4i),
@@ -116,15 +130,19 @@ def write_polygons(
     An edge along which a smaller leaf lies is left to that leaf; of equal leaves the first one around it
     takes it. A polygon joins the three or four leaves around the edge; of three, the last corner is −1.
     Leaves with a smaller one along a crossed edge are flagged as irregular, and as pierced, by their cells of
-    blocks, if they are empty.
+    blocks, if they are empty. Counting, `owned` receives the edges of each leaf's polygons, as bits.
     """
     i = first + wp.tid()
     size = leaves.sizes[i]
     code = int(leaves.codes[i])
+    near = base_block(leaves.lowest[i], leaves.depth, leaves.keys)
     total = int(0)
+    bits = int(0)
     for edge in range(12):
         a = EDGE_FIRST[edge]
-        if ((code >> a) & 1) != ((code >> EDGE_LAST[edge]) & 1):
+        if (write and ((int(owned[i]) >> edge) & 1) == 1) or (
+            not write and ((code >> a) & 1) != ((code >> EDGE_LAST[edge]) & 1)
+        ):
             axis = edge // 4
             u = (axis + 1) % 3
             v = (axis + 2) % 3
@@ -144,7 +162,9 @@ def write_polygons(
                 index = low
                 index[u] = index[u] - du
                 index[v] = index[v] - dv
-                leaf = locate(index, leaves)
+                leaf = wp.vec3i(i, size, 0)
+                if du != ((a >> u) & 1) or dv != ((a >> v) & 1):
+                    leaf = locate(index, near, leaves)
                 number = leaf[0]
                 if leaf[1] < size:
                     minimal = False
@@ -180,5 +200,7 @@ def write_polygons(
                             polygon = wp.vec4i(polygon[2], polygon[1], polygon[0], -1)
                     polygons[polygon_starts[i] + total] = polygon
                 total += 1
+                bits += 1 << edge
     if not write:
         counts[i] = total
+        owned[i] = wp.int16(bits)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array
 from blobtree.cells.grid import CHILDREN
 from blobtree.formulas.falloff import ISO
-from blobtree.meshing.block_tree import BlockTree
+from blobtree.meshing.block_tree import BlockTree, Rows
 from blobtree.meshing.patches import EDGES
 
 OCTANTS = 8
@@ -87,40 +87,50 @@ class AdaptiveCells:
     def __init__(self, tree: BlockTree, tolerance: float) -> None:
         self.tree = tree
         self._tolerance = tolerance
-        self.divided: BoolArray = np.ones((0, OCTANTS), bool)
+        self._rows: dict[str, Rows] = {}
+        self.divided: BoolArray
         """By block, the octants that are not merged (n, 8)."""
-        self.links: Int32Array = np.empty(0, np.int32)
+        self.links: Int32Array
         """By cell, the block that replaces it, or −1 (64 n,)."""
-        self._codes = np.empty((0, CHILDREN), np.uint8)
-        self._octant_codes = np.empty((0, OCTANTS), np.uint8)
-        self._octant_agrees = np.empty((0, OCTANTS), bool)
-        self._block_ok = np.empty(0, bool)
-        self._explored = np.empty((0, OCTANTS), bool)
+        self._codes: NDArray[np.uint8]
+        self._cell_ok: BoolArray
+        self._octant_codes: NDArray[np.uint8]
+        self._octant_agrees: BoolArray
+        self._block_ok: BoolArray
+        self._explored: BoolArray
         self._extend()
         self.divided[:] = True
 
     def _extend(self) -> None:
         """Classify the blocks that are new in the tree."""
-        old, new = len(self.divided), len(self.tree)
-        if old == new:
+        old, new = len(self._rows["divided"].all) if self._rows else 0, len(self.tree)
+        if self._rows and old == new:
             return
-        values, count = self.tree.values[old:], new - old
+        count = new - old
+        values = np.ascontiguousarray(np.moveaxis(self.tree.values[old:], 0, -1))  # each sample's in a row
         inside = values >= ISO
         sides: Float64Array = self.tree.grid(0).cell_size * 0.25 ** self.tree.levels[old:].astype(np.float64)
         octants = [_octant_samples(values, octant) for octant in OCTANT_OFFSETS]
         agrees = [_agrees(samples, self._tolerance / sides) for samples in octants]
         bends = np.stack([_bend(samples) for samples in octants], axis=1)
-        self._codes = np.concatenate([self._codes, _codes(inside).reshape(count, CHILDREN)])
-        self._octant_codes = np.concatenate(
-            [self._octant_codes, _codes(inside[:, ::2, ::2, ::2]).reshape(count, OCTANTS)]
-        )
-        self._octant_agrees = np.concatenate([self._octant_agrees, np.stack(agrees, axis=1)])
-        ok = SIMPLE[_codes(inside[:, ::4, ::4, ::4]).reshape(count)]
-        ok &= _agrees(values[:, ::2, ::2, ::2], 0.5 * self._tolerance / sides)
-        self._block_ok = np.concatenate([self._block_ok, ok])
-        self._explored = np.concatenate([self._explored, bends <= MAX_BEND])
-        self.divided = np.concatenate([self.divided, np.zeros((count, OCTANTS), bool)])
-        self.links = np.concatenate([self.links, np.full(count * CHILDREN, -1, np.int32)])
+        ok = SIMPLE[_codes(inside[::4, ::4, ::4]).reshape(count)]
+        ok &= _agrees(values[::2, ::2, ::2], 0.5 * self._tolerance / sides)
+        codes = _codes(inside)
+        for name, rows in {
+            "divided": np.zeros((count, OCTANTS), bool),
+            "links": np.full(count * CHILDREN, -1, np.int32),
+            "_codes": codes,
+            "_cell_ok": SIMPLE[codes],
+            "_octant_codes": _codes(inside[::2, ::2, ::2]),
+            "_octant_agrees": np.stack(agrees, axis=1),
+            "_block_ok": ok,
+            "_explored": bends <= MAX_BEND,
+        }.items():
+            if name in self._rows:
+                self._rows[name].append(rows)
+            else:
+                self._rows[name] = Rows(rows)
+            setattr(self, name, self._rows[name].all)
 
     def explore(self, smallest: float) -> None:
         """Refine blocks in which the field bends, down to cells between `smallest` and twice as large."""
@@ -145,9 +155,7 @@ class AdaptiveCells:
             blocks = np.flatnonzero(tree.levels == level)
             below = child[blocks]
             small = tree.grid(level).cell_size <= self._tolerance
-            cells_ok = np.where(
-                below >= 0, block_ok[np.maximum(below, 0)], SIMPLE[self._codes[blocks]] | small
-            )
+            cells_ok = np.where(below >= 0, block_ok[np.maximum(below, 0)], self._cell_ok[blocks] | small)
             ok = cells_ok[:, CELLS_OF_OCTANT].all(axis=2)
             ok &= SIMPLE[self._octant_codes[blocks]] & self._octant_agrees[blocks]
             octant_ok[blocks] = ok
@@ -234,53 +242,46 @@ class AdaptiveCells:
 
 
 def _octant_samples(samples: Float32Array, octant: Int32Array) -> Float32Array:
-    """Return the samples (n, 3, 3, 3) of one octant of blocks (n, 5, 5, 5)."""
+    """Return the samples (3, 3, 3, n) of one octant of blocks (5, 5, 5, n)."""
     x, y, z = 2 * octant
-    return samples[:, x : x + 3, y : y + 3, z : z + 3]
+    return samples[x : x + 3, y : y + 3, z : z + 3]
 
 
 def _codes(inside: BoolArray) -> NDArray[np.uint8]:
-    """Return the codes (n, k, k, k) of cells from the signs of their corners (n, k + 1, k + 1, k + 1)."""
-    side = inside.shape[-1] - 1
-    code = np.zeros((len(inside), side, side, side), np.uint8)
+    """Return the codes (n, k³) of cells from the signs of their corners (k + 1, k + 1, k + 1, n)."""
+    side, count = len(inside) - 1, inside.shape[-1]
+    code = np.zeros((side, side, side, count), np.uint8)
     for corner, (x, y, z) in enumerate(CORNERS.tolist()):
-        code |= inside[:, x : x + side, y : y + side, z : z + side].astype(np.uint8) << np.uint8(corner)
-    return code
+        code |= inside[x : x + side, y : y + side, z : z + side].astype(np.uint8) << np.uint8(corner)
+    return np.ascontiguousarray(code.reshape(side**3, count).T)
 
 
 def _agrees(values: Float32Array, tolerance: Float64Array) -> BoolArray:
     """Return True where each middle of an edge, a face or the cell has a sign of its corners (n,).
 
-    Values (n, 3, 3, 3) whose distance to the surface is at most `tolerance` (n,), in steps between them, may
+    Values (3, 3, 3, n) whose distance to the surface is at most `tolerance` (n,), in steps between them, may
     have either sign.
     """
-    steepest = np.zeros(len(values), np.float32)
-    for axis in range(1, 4):
-        steepest = np.maximum(steepest, np.abs(np.diff(values, axis=axis)).max(axis=(1, 2, 3)))
-    near = (tolerance * steepest)[:, None, None, None]
+    steepest = np.zeros(values.shape[-1], np.float32)
+    for axis in range(3):
+        steepest = np.maximum(steepest, np.abs(np.diff(values, axis=axis)).max(axis=(0, 1, 2)))
+    near = tolerance * steepest
     inside, outside = values >= ISO - near, values < ISO + near
     signs = values >= ISO
-    result = np.ones(len(values), bool)
+    result = np.ones(values.shape[-1], bool)
     for middle in np.ndindex(3, 3, 3):
-        inner = [axis for axis in range(3) if middle[axis] == 1]
-        if inner:
-            where = tuple(slice(0, 3, 2) if axis in inner else middle[axis] for axis in range(3))
-            corners = signs[(slice(None), *where)].reshape(len(values), -1)
-            at = (slice(None), *middle)
-            result &= (inside[at] & corners.any(axis=1)) | (outside[at] & ~corners.all(axis=1))
+        if 1 in middle:
+            corners = signs[tuple(slice(0, 3, 2) if place == 1 else place for place in middle)]
+            corners = corners.reshape(2 ** middle.count(1), len(result))
+            result &= (inside[middle] & corners.any(axis=0)) | (outside[middle] & ~corners.all(axis=0))
     return result
 
 
 def _bend(values: Float32Array) -> Float32Array:
-    """Return how far values (n, 3, 3, 3) are from a linear function, over its change along an edge (n,)."""
-    steps = np.array([-1.0, 0.0, 1.0], np.float32)
-    gradient = [
-        (values * steps.reshape(shape)).sum(axis=(1, 2, 3)) / 18
-        for shape in ((3, 1, 1), (1, 3, 1), (1, 1, 3))
-    ]
-    x, y, z = (g[:, None, None, None] for g in gradient)
-    mean = values.mean(axis=(1, 2, 3))[:, None, None, None]
-    linear = mean + x * steps[:, None, None] + y * steps[:, None] + z * steps
-    change = 2.0 * np.sqrt(sum(g**2 for g in gradient))
-    rest = np.abs(values - linear).max(axis=(1, 2, 3))
+    """Return how far values (3, 3, 3, n) are from a linear function, over its change along an edge (n,)."""
+    steps = np.array([-1.0, 0.0, 1.0], np.float32)[:, None]
+    x, y, z = ((values.take(2, axis) - values.take(0, axis)).sum(axis=(0, 1)) / 18 for axis in range(3))
+    linear = values.mean(axis=(0, 1, 2)) + x * steps[:, None, None] + y * steps[:, None] + z * steps
+    change = 2.0 * np.sqrt(x**2 + y**2 + z**2)
+    rest = np.abs(values - linear).max(axis=(0, 1, 2))
     return np.where(change > 0.0, rest / np.maximum(change, 1e-30), np.inf)

@@ -19,16 +19,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array, Int64Array
 from blobtree.cells.block_kernels import CellBlocks
 from blobtree.cells.grid import CHILDREN, KEY_DIGITS
 from blobtree.cells.scan import exclusive_scan
 from blobtree.device import launch
 from blobtree.errors import InvalidResolution
-from blobtree.formulas.falloff import ISO
 from blobtree.meshing.adaptive_cell_kernels import LeafArrays, choose_leaf_rows, write_polygons
-from blobtree.meshing.adaptive_cells import CORNERS, OCTANT_OF_CELL, OCTANTS, SIMPLE, AdaptiveCells, Leaves
-from blobtree.meshing.adaptive_kernels import measure_distances, place_on_surface
+from blobtree.meshing.adaptive_cells import OCTANT_OF_CELL, OCTANTS, SIMPLE, AdaptiveCells, Leaves
+from blobtree.meshing.adaptive_kernels import PatchArrays, measure_distances, place_on_surface
 from blobtree.meshing.block_tree import on_device
 from blobtree.meshing.crease_kernels import find_choices, move_onto_creases, turn_diagonals
 from blobtree.meshing.mesh import Mesh, cell_patches, patch_tables, vertex_arrays
@@ -40,8 +39,6 @@ SLOTS = CHILDREN + OCTANTS
 
 MAX_REPAIRS = 100
 """Most rounds in which leaves are divided until the mesh is a manifold; each makes some leaves smaller."""
-
-_EDGE_ENDS = np.array(EDGES)
 
 
 @dataclass
@@ -174,18 +171,20 @@ class AdaptiveMesher:
         starts = np.cumsum(PATCH_COUNT[rows.numpy()], dtype=np.int64)
         arrays.starts = on_device(np.append(0, starts)[:-1], wp.int32, device)
         counts = wp.zeros(count + 1, dtype=wp.int32, device=device)
+        owned = wp.empty(count, dtype=wp.int16, device=device)
         irregular = wp.zeros(count, dtype=wp.uint8, device=device)
         pierced = wp.zeros(len(numbers), dtype=wp.uint8, device=device)
         none = wp.empty(0, dtype=wp.vec4i, device=device)
         inputs = [tables.patch_of_edge, arrays]
-        launch(write_polygons, count, [*inputs, False, counts], [counts, irregular, pierced, none], device)
+        outputs = [counts, owned, irregular, pierced]
+        launch(write_polygons, count, [*inputs, False, counts], [*outputs, none], device)
         flags, holes = irregular.numpy().astype(bool), np.flatnonzero(pierced.numpy())
         if len(holes) or (flags & ~SIMPLE[leaves.codes]).any():
             return rows.numpy(), None, flags, holes
         polygon_starts, total = exclusive_scan(counts, "polygons")
         polygons = wp.empty(total, dtype=wp.vec4i, device=device)
         inputs += [True, polygon_starts]
-        launch(write_polygons, count, inputs, [counts, irregular, pierced, polygons], device)
+        launch(write_polygons, count, inputs, [*outputs, polygons], device)
         return rows.numpy(), polygons.numpy().reshape(-1, 4), flags, holes
 
     # -- vertices -----------------------------------------------------------------------------------
@@ -220,44 +219,27 @@ class AdaptiveMesher:
         identifiers: Int64Array,
         report: Progress,
     ) -> Vertices:
-        """Return the vertices of patches, projected from the mean of the patch's crossings."""
+        """Return the vertices of patches, placed on the surface."""
         device, count = self._device, len(owners)
-        values = self._cells.corner_values(leaves, owners).astype(np.float64)
-        first, last = values[:, _EDGE_ENDS[:, 0]], values[:, _EDGE_ENDS[:, 1]]
-        used = PATCH_OF_EDGE[rows[owners]] == patches[:, None]
-        share = np.where(used, (ISO - first) / np.where(used, last - first, 1.0), 0.0)[..., None]
-        ends = CORNERS[_EDGE_ENDS].astype(np.float64)
-        crossings = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
-        mean = (crossings * used[..., None]).sum(axis=1) / used.sum(axis=1)[:, None]
-        distances = np.where(used, np.linalg.norm(crossings - mean[:, None], axis=2), np.inf)
-        nearest = distances.argmin(axis=1)
-        at = np.arange(count)
-        swapped = first[at, nearest] < ISO
-        inner = ends[nearest, swapped.astype(int)]
-        outer = ends[nearest, 1 - swapped.astype(int)]
-        starts, inner, outer = (self._world(leaves, owners, local) for local in (mean, inner, outer))
-        sizes = leaves.sizes[owners] * self._tree.grid(self._tree.depth).cell_size
+        arrays: Any = PatchArrays()
+        values = self._cells.corner_values(leaves, owners)
+        edges = (PATCH_OF_EDGE[rows[owners]] == patches[:, None]) @ (1 << np.arange(len(EDGES)))
+        arrays.values = on_device(values, wp.float32, device)
+        arrays.edges = on_device(edges, wp.int16, device)
+        arrays.lowest = on_device(leaves.lowest[owners], wp.vec3i, device)
+        arrays.sizes = on_device(leaves.sizes[owners], wp.int32, device)
+        arrays.blocks = on_device(leaves.blocks[owners], wp.int32, device)
         positions, normals, colors = (wp.empty(count, dtype=wp.vec3, device=device) for _ in range(3))
-        inputs: list[Any] = [on_device(points, wp.vec3, device) for points in (starts, inner, outer)]
-        inputs += [on_device(sizes, wp.float32, device)]
-        inputs += [on_device(leaves.blocks[owners], wp.int32, device), self._tree.arrays()]
         launch(
             self._kernel(place_on_surface),
             count,
-            inputs,
+            [arrays, self._tree.arrays()],
             [vertex_arrays(positions, normals, colors)],
             device,
             step=partial(report, "placing vertices"),
         )
         sheet_counts = np.ones(count, np.uint8)
         return Vertices(identifiers, positions.numpy(), normals.numpy(), colors.numpy(), sheet_counts)
-
-    def _world(self, leaves: Leaves, owners: IndexArray, local: Float64Array) -> Float32Array:
-        """Return points of leaves, in leaves from their lowest corners, in the world (n, 3)."""
-        grid = self._tree.grid(self._tree.depth)
-        cells = leaves.lowest[owners] + local * leaves.sizes[owners][:, None] + np.array(grid.base)
-        points: Float32Array = (np.array(grid.corner) + cells * grid.cell_size).astype(np.float32)
-        return points
 
     # -- errors -------------------------------------------------------------------------------------
 
@@ -393,22 +375,27 @@ def _triangles(polygons: Int32Array, positions: Float32Array) -> tuple[Int32Arra
 
 def _torn_vertices(faces: Int32Array, vertices: int) -> IndexArray:
     """Return the vertices around which the triangles do not form one closed fan."""
-    start = faces.ravel().astype(np.int64)
-    end = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-    keys = start * vertices + end
+    start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    keys = np.minimum(start, end) * vertices + np.maximum(start, end)
     order = np.argsort(keys)
-    ascending = keys[order]
-    at = np.minimum(np.searchsorted(ascending, end * vertices + start), len(keys) - 1)
-    wrong = ascending[at] != end * vertices + start
-    repeated = np.flatnonzero(ascending[1:] == ascending[:-1])
-    wrong[order[repeated]] = True
+    same = np.diff(keys[order]) == 0
+    before, after = np.append(False, same), np.append(same, False)
+    first = np.flatnonzero(~before & after & ~np.append(same[1:], [False, False]))  # edges of two triangles
+    one, other = order[first], order[first + 1]
+    opposite = start[one] == end[other]
+    twin = np.full(len(keys), -1, np.int64)
+    twin[one[opposite]], twin[other[opposite]] = other[opposite], one[opposite]
+    wrong = twin < 0
     if wrong.any():
         return np.unique(np.concatenate([start[wrong], end[wrong]]))
-    edge = np.arange(len(keys))
-    following = order[at[edge - edge % 3 + (edge + 2) % 3]]  # the next edge from the same vertex
-    label = edge
-    for _doubling in range(max(1, int(np.bincount(start).max(initial=1))).bit_length()):
-        label = np.minimum(label, label[following])
-        following = following[following]
-    fans = np.bincount(start[label == edge], minlength=vertices)
-    return np.flatnonzero(fans != 1)
+    degrees = np.bincount(start, minlength=vertices)
+    firsts = np.full(vertices, -1, np.int64)
+    firsts[start] = np.arange(len(start))
+    walking = np.flatnonzero(degrees)
+    at, steps = firsts[walking], np.zeros(vertices, np.int64)
+    while len(walking):  # to the next edge from the same vertex, until the first one comes again
+        at = twin[at - at % 3 + (at + 2) % 3]
+        steps[walking] += 1
+        going = at != firsts[walking]
+        walking, at = walking[going], at[going]
+    return np.flatnonzero((steps != degrees) | (degrees == 0))

@@ -22,8 +22,37 @@ from blobtree.errors import InvalidResolution
 from blobtree.meshing.adaptive_kernels import BlockTreeArrays
 from blobtree.meshing.dual_kernels import SAMPLES, SAMPLES_PER_SIDE, sample_blocks
 
+GROWTH = 1.5
+"""Room of a `Rows` that is full, over its rows: the rows are copied about thrice, however often it grows."""
+
 UNREFINED = -3
 """Mark of a cell without a block of its own, of which nothing else is known."""
+
+
+class Rows:
+    """An array that grows at its end, in NumPy or on a device."""
+
+    def __init__(self, rows: Any) -> None:
+        self._room = self.all = rows
+
+    def extend(self, count: int) -> Any:
+        """Add rows, and return them, which are not set; `all` is another array then."""
+        old, new = len(self.all), len(self.all) + count
+        if new > len(self._room):
+            room = max(new, int(GROWTH * old))
+            if isinstance(self.all, np.ndarray):
+                longer: Any = np.empty((room, *self.all.shape[1:]), self.all.dtype)
+                longer[:old] = self.all
+            else:
+                longer = wp.empty(room, dtype=self.all.dtype, device=self.all.device)
+                wp.copy(longer, self.all, count=old)
+            self._room = longer
+        self.all = self._room[:new]
+        return self.all[old:]
+
+    def append(self, rows: NDArray[Any]) -> None:
+        """Add rows of NumPy."""
+        self.extend(len(rows))[:] = rows
 
 
 class BlockTree:
@@ -33,21 +62,46 @@ class BlockTree:
         self._cells, self._device = cells, cells.device
         self._kernel = cells.tape.instruction_set.kernel_for
         leaves = cells.leaves
-        self._blocks, self._spans, self._tape = leaves.blocks, leaves.spans, leaves.tape
-        self._keys = leaves.keys
-        self.levels: IndexArray = np.zeros(len(leaves), np.int64)
-        """Level of each block (n,)."""
-        self.coordinates: Int32Array = leaves.blocks.numpy().reshape(-1, 3)
-        """Coordinates (n, 3), in blocks of their level from the root's lowest one."""
-        self.children: Int32Array = np.full(len(leaves) * CHILDREN, UNREFINED, np.int32)
-        """For each cell the block that refines it, SURELY_OUTSIDE, SURELY_INSIDE or UNREFINED (64 n,)."""
-        self.parents: IndexArray = np.full(len(leaves), -1, np.int64)
-        """For each block the cell that it refines (n,), −1 at the base."""
-        self.values: Float32Array = self._sample(0, 0, len(leaves))
-        """The field at the corners of each block's cells (n, 5, 5, 5)."""
+        self._level_rows = [Rows(array) for array in (leaves.blocks, leaves.keys, leaves.spans, leaves.tape)]
+        blocks = len(leaves)
+        self._levels = Rows(np.zeros(blocks, np.int64))
+        self._coordinates = Rows(leaves.blocks.numpy().reshape(-1, 3))
+        self._children = Rows(np.full(blocks * CHILDREN, UNREFINED, np.int32))
+        self._parents = Rows(np.full(blocks, -1, np.int64))
+        self._values = Rows(self._sample(0, 0, blocks))
 
     def __len__(self) -> int:
         return len(self.levels)
+
+    @property
+    def levels(self) -> IndexArray:
+        """Level of each block (n,)."""
+        levels: IndexArray = self._levels.all
+        return levels
+
+    @property
+    def coordinates(self) -> Int32Array:
+        """Coordinates (n, 3), in blocks of their level from the root's lowest one."""
+        coordinates: Int32Array = self._coordinates.all
+        return coordinates
+
+    @property
+    def children(self) -> Int32Array:
+        """For each cell the block that refines it, SURELY_OUTSIDE, SURELY_INSIDE or UNREFINED (64 n,)."""
+        children: Int32Array = self._children.all
+        return children
+
+    @property
+    def parents(self) -> IndexArray:
+        """For each block the cell that it refines (n,), −1 at the base."""
+        parents: IndexArray = self._parents.all
+        return parents
+
+    @property
+    def values(self) -> Float32Array:
+        """The field at the corners of each block's cells (n, 5, 5, 5)."""
+        values: Float32Array = self._values.all
+        return values
 
     @property
     def cells(self) -> SparseCells:
@@ -78,7 +132,7 @@ class BlockTree:
         """Return the blocks and their lattice as an argument of kernels, coordinates in the finest cells."""
         arrays: Any = BlockTreeArrays()
         finest = self.grid(self.depth)
-        arrays.keys, arrays.spans, arrays.tape = self._cells.leaves.keys, self._spans, self._tape
+        arrays.keys, arrays.spans, arrays.tape = self._cells.leaves.keys, self.spans, self.tape
         arrays.children = on_device(self.children, wp.int32, self._device)
         arrays.base, arrays.corner = wp.vec3i(*finest.base), wp.vec3(*finest.corner)
         arrays.cell, arrays.depth = finest.cell_size, self.depth
@@ -89,12 +143,12 @@ class BlockTree:
     @property
     def spans(self) -> DeviceArray:
         """First texel of each block's tape, and one past its last (n, 2)."""
-        return self._spans
+        return self._level_rows[2].all
 
     @property
     def tape(self) -> DeviceArray:
         """The tapes of all blocks."""
-        return self._tape
+        return self._level_rows[3].all
 
     def refine(self, cells: IndexArray) -> int:
         """Refine cells that the surface may cross, and return the number of new blocks.
@@ -119,55 +173,51 @@ class BlockTree:
         return len(self) - before
 
     def _refine_level(self, cells: IndexArray, level: int) -> None:
-        """Refine cells of one level."""
-        device, count = self._device, len(self.children)
+        """Refine cells of one level, in ascending order."""
+        device = self._device
         grid = self.grid(level + 1)
         lattice = child_grid(grid, grid.depth)
-        parents = on_device(np.unique(cells // CHILDREN), wp.int32, device)
-        above: Any = self._level_arrays(self._blocks, self._keys, self._spans, self._tape)
-        children = on_device(self.children, wp.int32, device)
+        parents, rows = np.unique(cells // CHILDREN, return_inverse=True)
+        count, local = len(parents) * CHILDREN, rows * CHILDREN + cells % CHILDREN
+        above: Any = LevelBlocks()
+        above.blocks = on_device(self.coordinates[parents], wp.vec3i, device)
+        above.spans = on_device(self.spans.numpy()[parents], wp.vec2i, device)
+        above.tape = self.tape
+        of_parents = self.children.reshape(-1, CHILDREN)
+        children = on_device(of_parents[parents].ravel(), wp.int32, device)
         flags, texels = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
-        threads, inputs = len(parents) * CHILDREN, [parents, above, lattice]
-        outputs = [children, flags, texels, above]
-        launch(self._kernel(refine_children), threads, [*inputs, False], outputs, device)
+        inputs = [on_device(np.arange(len(parents)), wp.int32, device), above, lattice]
+        outputs = [children, flags, texels, self._level_arrays()]
+        launch(self._kernel(refine_children), count, [*inputs, False], outputs, device)
         wanted = np.zeros(count + 1, np.int32)
-        wanted[cells] = 1
+        wanted[local] = 1
         flags, texels = (on_device(array.numpy() * wanted, wp.int32, device) for array in (flags, texels))
-        old, old_texels = len(self), len(self._tape)
+        old, old_texels = len(self), len(self.tape)
         slots, blocks = exclusive_scan(flags, "blocks", start=old)
         starts, total = exclusive_scan(texels, "texels of the blocks' tapes", start=old_texels)
         if blocks > MAX_BLOCKS:
             raise InvalidResolution(
                 f"expected at most {MAX_BLOCKS:,} blocks of cells, got {blocks:,}; allow a larger error"
             )
-        self.children = children.numpy()
-        if blocks == old:
-            return
-        demand_memory(TEXEL_BYTES * total, device, f"the tapes of {blocks:,} blocks")
-        grown = [
-            _grown(array, length)
-            for array, length in zip(
-                (self._blocks, self._keys, self._spans, self._tape), (blocks,) * 3 + (total,), strict=True
-            )
-        ]
-        level_arrays = self._level_arrays(*grown)
-        outputs = [children, slots, starts, level_arrays]
-        launch(self._kernel(refine_children), threads, [*inputs, True], outputs, device)
-        self._blocks, self._keys, self._spans, self._tape = grown
-        self.children = np.concatenate(
-            [children.numpy(), np.full((blocks - old) * CHILDREN, UNREFINED, np.int32)]
-        )
-        refined = np.flatnonzero(flags.numpy()[:-1])
-        self.parents = np.concatenate([self.parents, refined])
-        self.levels = np.concatenate([self.levels, np.full(blocks - old, level + 1)])
-        self.coordinates = self._blocks.numpy().reshape(-1, 3)
-        self.values = np.concatenate([self.values, self._sample(level + 1, old, blocks)])
+        if blocks > old:
+            demand_memory(TEXEL_BYTES * total, device, f"the tapes of {blocks:,} blocks")
+            for array, length in zip(self._level_rows, (blocks,) * 3 + (total,), strict=True):
+                array.extend(length - len(array.all))
+            outputs = [children, slots, starts, self._level_arrays()]
+            launch(self._kernel(refine_children), count, [*inputs, True], outputs, device)
+        of_parents[parents] = children.numpy().reshape(-1, CHILDREN)
+        if blocks > old:
+            refined = np.flatnonzero(flags.numpy()[:-1])
+            self._children.append(np.full((blocks - old) * CHILDREN, UNREFINED, np.int32))
+            self._parents.append(parents[refined // CHILDREN] * CHILDREN + refined % CHILDREN)
+            self._levels.append(np.full(blocks - old, level + 1))
+            self._coordinates.append(self._level_rows[0].all[old:].numpy().reshape(-1, 3))
+            self._values.append(self._sample(level + 1, old, blocks))
 
-    @staticmethod
-    def _level_arrays(blocks: DeviceArray, keys: DeviceArray, spans: DeviceArray, tape: DeviceArray) -> Any:
-        """Return blocks and their tapes as an argument of kernels."""
+    def _level_arrays(self) -> Any:
+        """Return all blocks and their tapes as an argument of kernels."""
         arrays: Any = LevelBlocks()
-        arrays.blocks, arrays.keys, arrays.spans, arrays.tape = blocks, keys, spans, tape
+        arrays.blocks, arrays.keys, arrays.spans, arrays.tape = (array.all for array in self._level_rows)
         return arrays
 
     def _sample(self, level: int, first: int, end: int) -> Float32Array:
@@ -175,7 +225,8 @@ class BlockTree:
         grid, count = self.grid(level), end - first
         listed = on_device(np.arange(first, end), wp.int32, self._device)
         values: DeviceArray = wp.empty(count * SAMPLES, dtype=wp.float32, device=self._device)
-        inputs: list[Any] = [listed, self._blocks, self._spans, self._tape]
+        arrays = self._level_arrays()
+        inputs: list[Any] = [listed, arrays.blocks, arrays.spans, arrays.tape]
         inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
         launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device)
         samples: Float32Array = values.numpy().reshape(count, *(SAMPLES_PER_SIDE,) * 3)
@@ -185,10 +236,3 @@ class BlockTree:
 def on_device(values: NDArray[Any], dtype: Any, device: str) -> DeviceArray:
     """Return a copy of an array on a device."""
     return wp.array(values, dtype=dtype, device=device)
-
-
-def _grown(array: DeviceArray, length: int) -> DeviceArray:
-    """Return a longer array that begins as `array`."""
-    longer: DeviceArray = wp.empty(length, dtype=array.dtype, device=array.device)
-    wp.copy(longer, array, count=len(array))
-    return longer
