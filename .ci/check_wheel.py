@@ -20,8 +20,8 @@ IMPORT_ALL = """
 import importlib, pathlib, pkgutil, sys
 for package in map(importlib.import_module, sys.argv[2:]):
     names = [found.name for found in pkgutil.walk_packages(package.__path__, package.__name__ + ".")]
-    pages = ("lab.page", "sandbox.page", "sandbox.panels", "sandbox.view", "sandbox.connections")
-    needed = [name for name in names if not name.endswith(pages)]  # those need the extra `browser`
+    browser = "lab.page", *(f"sandbox.{n}" for n in ("connections", "page", "panels", "sessions", "view"))
+    needed = [name for name in names if not name.endswith(browser)]  # those need the extra `browser`
     for module in [package, *map(importlib.import_module, needed)]:
         file = pathlib.Path(module.__file__).resolve()
         assert file.is_relative_to(sys.argv[1]), f"{module.__name__} comes from {file}, not from the wheel"

@@ -1,22 +1,25 @@
 """``implicit-decals sandbox``: modelling and decals in the browser."""
 
+import asyncio
 import ipaddress
 import secrets
+import signal
 import socket
+import sys
+import threading
 import webbrowser
+from collections.abc import Collection
+from contextlib import suppress
 from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 from rich.console import Console
 
-from decals.apps.commands.opening import check_options, opened, report_unsaved
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust, Whole, check_count
-from decals.apps.models.loading import import_definitions
 from decals.errors import InvalidInput, MissingPackage
-from decals.window import EditWindow
-from decals.window.host_plotter import new_plotter
 
 HOST = "127.0.0.1"
 """By default, the page is served to this machine only."""
@@ -27,6 +30,7 @@ ANY_ADDRESS = ("0.0.0.0", "::")
 TITLE = "Implicit Decals sandbox"
 
 MAX_PORT = 65535
+MAX_SESSIONS = 64
 FIRST_SIZE = (700, 700)
 """Width and height of the view in pixels until the page tells its own."""
 
@@ -46,17 +50,19 @@ def sandbox(
     port: Whole = 8080,
     host: str = HOST,
     share: Annotated[bool, Parameter(negative=())] = False,
+    sessions: Whole = 8,
     browser: bool = True,
     desktop: Annotated[bool, Parameter(negative=())] = False,
     trust: Trust = False,
     lab: Annotated[bool, Parameter(negative=())] = False,
     lessons: Path | None = None,
     done: Annotated[bool, Parameter(negative=())] = False,
-) -> None:
+    session: Annotated[bool, Parameter(negative=(), show=False)] = False,
+) -> int:
     """Open models or a scene in the sandbox, a page in the browser.
 
-    The page is served to this machine only, unless --host is given. Ctrl + C in the terminal ends it;
-    unsaved changes are kept.
+    The page is served to this machine only, unless --host is given. Each browser has a session of its own,
+    unless --share is given. Ctrl + C in the terminal ends all; unsaved changes are kept.
 
     Parameters
     ----------
@@ -84,6 +90,8 @@ def sandbox(
         which the page does not work. Default: this machine only.
     share
         All browsers show one session: one drives, the others watch, and ask for the wheel.
+    sessions
+        Most sessions at the same time. One without a browser is saved and ended after half an hour.
     browser
         Open the page in the default browser.
     desktop
@@ -96,11 +104,23 @@ def sandbox(
         A folder of other lessons for the lab.
     done
         Show a button that saves and ends, and print the URL alone, as notebooks need it.
+    session
+        Serve one session, print the URL alone, and end with the standard input.
     """
-    check_options(decals, seed, save)
     check_count("--port", port, 0, MAX_PORT)
+    check_count("--sessions", sessions, 1, MAX_SESSIONS)
     if model and (lab or lessons is not None):
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
+    if not (share or done or desktop or session):
+        options: dict[str, Any] = {"decals": decals, "image": image, "up": up, "seed": seed, "define": define}
+        options |= {"trust": trust, "lab": lab, "lessons": lessons}
+        return _serve_sessions(model, options, save, sessions, host, port, browser=browser)
+    from decals.apps.commands.opening import check_options, opened, report_unsaved
+    from decals.apps.models.loading import import_definitions
+    from decals.window import EditWindow
+    from decals.window.host_plotter import new_plotter
+
+    check_options(decals, seed, save)
     serve, page = _toolkit(lessons)
     if desktop:
         _require_webview()
@@ -118,15 +138,15 @@ def sandbox(
             in_lesson = lab or lessons is not None
             start = not model and not in_lesson
             page(server, window, in_lesson=in_lesson, start=start, done=done, shared=share)
-            if done:
-                server.controller.on_server_ready.add(
-                    lambda **_: print(_url(host, server.port, ""), flush=True)
-                )
+            ready = server.controller.on_server_ready
+            if done or session:
+                ready.add(lambda **_: print(_url(host, server.port, ""), flush=True))
             query = _protect(server, host)
             own_browser = browser and not desktop and bool(query)  # trame's knows no token
-            server.controller.on_server_ready.add(
-                lambda **_: _announce(host, server.port, query, open_browser=own_browser)
-            )
+            if session:
+                ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
+            else:
+                ready.add(lambda **_: _announce(host, server.port, query, open_browser=own_browser))
             window_options = {"exec_mode": "desktop", "title": TITLE} if desktop else {}
             server.start(
                 host=host,
@@ -138,6 +158,77 @@ def sandbox(
             )
     finally:
         report_unsaved(window, "sandbox")
+    return 0
+
+
+def _serve_sessions(
+    model: list[str] | None,
+    options: dict[str, Any],
+    save: Path | None,
+    limit: int,
+    host: str,
+    port: int,
+    *,
+    browser: bool,
+) -> int:
+    """Serve a session to each browser, and return the exit code."""
+    try:
+        from decals.apps.sandbox.sessions import Sessions
+    except ImportError as error:
+        raise _missing(error) from None
+    first = save or Path(f"{Path(model[0]).stem}.json" if model else "scene.json")
+    names: dict[int, Path] = {}
+
+    def command(number: int) -> list[str]:
+        opened, given, path = model or [], options, save
+        if number > 1:  # others have their own files
+            known = names.get(number)
+            path = names[number] = known or _unused(first, names.values())
+            if known is not None and _exists(known):
+                opened, given = [str(known)], {**options, "decals": None, "image": None, "seed": None}
+        given = {**given, "save": path, "port": 0, "no_browser": True, "session": True}
+        return [sys.executable, "-m", "decals", "sandbox", *opened, *_as_arguments(given)]
+
+    def ready(found: int) -> None:
+        query = f"?secret={token}" if token else ""
+        _announce(host, found, query, open_browser=browser)
+
+    token = _token(host)
+    allows_host = (lambda _: True) if token else _is_loopback
+    served = Sessions(command, limit=limit, token=token, allows_host=allows_host)
+    with suppress(KeyboardInterrupt):
+        return asyncio.run(served.serve(host, port, ready))
+    return 0
+
+
+def _unused(first: Path, taken: Collection[Path]) -> Path:
+    """Return the first of NAME-2.json, NAME-3.json, ... that no session has or has written."""
+    names = (first.with_name(f"{first.stem}-{number}.json") for number in count(2))
+    return next(name for name in names if name not in taken and not _exists(name))
+
+
+def _exists(scene: Path) -> bool:
+    """Return True if a session has kept something under this name."""
+    return scene.exists() or scene.with_name(f"{scene.stem}.recovery.json").exists()
+
+
+def _as_arguments(options: dict[str, Any]) -> list[str]:
+    """Return options as the command line writes them."""
+    arguments: list[str] = []
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        if value is True:
+            arguments.append(option)
+        elif value is not None and value is not False:
+            for one in value if isinstance(value, list) else [value]:
+                arguments += [option, str(one)]
+    return arguments
+
+
+def _end_with_input() -> None:
+    """End this process as Ctrl + C does, once the server of sessions closes its standard input."""
+    sys.stdin.buffer.read()
+    signal.raise_signal(signal.SIGINT)
 
 
 def _toolkit(folder: Path | None) -> tuple[Any, Any]:
@@ -148,11 +239,15 @@ def _toolkit(folder: Path | None) -> tuple[Any, Any]:
         from decals.apps.lab.lesson import LESSONS, load_lessons
         from decals.apps.lab.page import LabPage
     except ImportError as error:
-        raise MissingPackage(
-            f"the sandbox needs trame ({error}); install it with: pip install 'implicit-decals[browser]'"
-        ) from None
+        raise _missing(error) from None
     found = load_lessons(LESSONS if folder is None else folder)
     return get_server, lambda server, window, **options: LabPage(server, window, found, **options)
+
+
+def _missing(error: ImportError) -> MissingPackage:
+    return MissingPackage(
+        f"the sandbox needs trame ({error}); install it with: pip install 'implicit-decals[browser]'"
+    )
 
 
 def _require_webview() -> None:
@@ -165,11 +260,15 @@ def _require_webview() -> None:
 
 def _protect(server: Any, host: str) -> str:
     """Ask every browser for a new token, unless only this machine is served; return the end of the URL."""
-    if _is_loopback(host):
-        return ""
-    token = f"t{secrets.token_urlsafe(24)}"  # the page reads digits alone as a number
-    server.cli.set_defaults(authKey=token)
-    return f"?secret={token}"
+    token = _token(host)
+    if token:
+        server.cli.set_defaults(authKey=token)
+    return f"?secret={token}" if token else ""
+
+
+def _token(host: str) -> str:
+    """Return a new token, or nothing if only this machine is served."""
+    return "" if _is_loopback(host) else f"t{secrets.token_urlsafe(24)}"  # digits alone are read as a number
 
 
 def _is_loopback(host: str) -> bool:

@@ -1,9 +1,10 @@
 """The browsers that show a page: one of them drives, and input that a browser leaves behind is ended."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
+from aiohttp import web
 from wslink.websocket import LinkProtocol
 
 MOUSE = "viewport.mouse.interaction"
@@ -29,6 +30,17 @@ OURS = frozenset({TRIGGER, UPDATE, LIFECYCLE})
 
 OF_SERVER = "wheel", "trame__template"
 """First parts of the names of values that no browser may change."""
+
+
+@web.middleware
+async def _compressed(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    response = await handler(request)
+    asks_for_part = {"If-None-Match", "If-Modified-Since", "Range"} & set(request.headers)
+    if not response.prepared and not asks_for_part:  # an empty answer cannot be compressed
+        response.enable_compression()
+    return response
 
 
 class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
@@ -64,11 +76,12 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         server.add_protocol_to_configure(lambda protocol: protocol.registerLinkProtocol(self))
         server.controller.on_server_bind.add(self._bind)
 
-    def _bind(self, web: Any) -> None:
-        """Check all calls of a web server; pictures are compressed already, so its messages are not."""
-        self._web = web
-        web.config["ws_compress"] = False
-        for handler in web._ws_handlers:
+    def _bind(self, bound: Any) -> None:
+        """Check all calls of a web server; compress files, but no messages: pictures are small already."""
+        self._web = bound
+        bound.config["ws_compress"] = False
+        bound.app.middlewares.append(_compressed)
+        for handler in bound._ws_handlers:
             for name, (part, call) in handler.functionMap.items():
                 handler.functionMap[name] = part, self._checked(name, call)
 

@@ -56,7 +56,7 @@ def test_the_sandbox_opens_models_and_serves_this_machine_only(
     folder: Path, opened: list[tuple[Server, EditWindow]], capsys: Capture
 ) -> None:
     blobtree.save(Point((0, 0, 0), radius=1.0), folder / "ball.json")
-    assert run(["sandbox", "ball.json", "--decals", "20", "--port", "0", "--no-browser"]) == 0
+    assert run(["sandbox", "ball.json", "--decals", "20", "--port", "0", "--no-browser", "--share"]) == 0
     server, window = opened[0]
     assert len(window.document.decals) == 20
     assert window.actions.files.path == Path("ball-decals.json")
@@ -85,7 +85,7 @@ def test_other_machines_need_a_token(
 ) -> None:
     urls: list[str] = []
     monkeypatch.setattr(webbrowser, "open", urls.append)
-    assert run(["sandbox", "--host", host, "--port", "0"]) == 0
+    assert run(["sandbox", "--host", host, "--port", "0", "--share"]) == 0
     server = opened[0][0]
     assert server.options["host"] == host
     token = server.cli.get_default("authKey")
@@ -98,6 +98,37 @@ def test_other_machines_need_a_token(
     assert urls[0].endswith(f":8123/?secret={token}")
     assert shown in urls[0]
     assert urls[0] in capsys.readouterr().err
+
+
+def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sessions_module = pytest.importorskip("decals.apps.sandbox.sessions")
+    commands: list[list[str]] = []
+
+    class Sessions:
+        """Stands for the server: it asks for the commands of sessions."""
+
+        def __init__(self, command: Any, *, limit: int, token: str, allows_host: Any) -> None:
+            assert (limit, token) == (3, "")
+            assert [allows_host(host) for host in ("localhost", "::1", "a.example")] == [True, True, False]
+            self.command = command
+
+        async def serve(self, host: str, port: int, _ready: Any) -> int:
+            assert (host, port) == ("127.0.0.1", 8080)
+            (folder / "knot-3.recovery.json").touch()
+            for number in (1, 2, 2, 3):
+                commands.append(self.command(number)[4:])
+                if number == 2:
+                    (folder / "knot-2.json").touch()
+            return 0
+
+    monkeypatch.setattr(sessions_module, "Sessions", Sessions)
+    assert run(["sandbox", "knot", "--decals", "20", "--image", "eye", "--trust", "--sessions", "3"]) == 0
+    ending = ["--port", "0", "--no-browser", "--session"]
+    scattered = ["knot", "--decals", "20", "--image", "eye", "--trust"]
+    assert commands[0] == [*scattered, *ending]
+    assert commands[1] == [*scattered, "--save", "knot-2.json", *ending]
+    assert commands[2] == ["knot-2.json", "--trust", "--save", "knot-2.json", *ending]
+    assert commands[3] == [*scattered, "--save", "knot-4.json", *ending]
 
 
 def test_a_server_refuses_clients_without_its_token() -> None:
@@ -151,7 +182,7 @@ def test_unsaved_changes_are_kept(
         opened[-1][1].session.do(AddImage(DecalImage.load("eye")))
 
     monkeypatch.setattr(Server, "start", edit)
-    assert run(["sandbox"]) == 0
+    assert run(["sandbox", "--share"]) == 0
     assert recovery_path(folder / "scene.json").exists()
     assert "implicit-decals sandbox scene.json" in capsys.readouterr().err
 
@@ -160,14 +191,19 @@ def test_without_trame_a_line_says_what_to_install(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     monkeypatch.setitem(sys.modules, "trame.app", None)
-    assert run(["sandbox"]) == 2
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    monkeypatch.delitem(sys.modules, "decals.apps.sandbox.sessions", raising=False)
+    for options in ([], ["--share"]):
+        assert run(["sandbox", *options]) == 2
     assert "pip install 'implicit-decals[browser]'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [["--port", "70000"], ["--decals", "-1"], ["nothing.json"]])
+@pytest.mark.parametrize(
+    "arguments", [["--port", "70000"], ["--sessions", "0"], ["--decals", "-1"], ["nothing.json"]]
+)
 def test_wrong_arguments_are_refused(
     arguments: list[str], folder: Path, opened: list[tuple[Server, EditWindow]], capsys: Capture
 ) -> None:
-    assert run(["sandbox", *arguments]) == 2
+    assert run(["sandbox", "--share", *arguments]) == 2
     assert "error:" in capsys.readouterr().err
     assert opened == []

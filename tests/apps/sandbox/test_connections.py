@@ -1,7 +1,10 @@
 """Several browsers at one server: who drives, and what becomes of input that a browser leaves behind."""
 
 import asyncio
+import gzip
 import logging
+import posixpath
+import re
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -193,3 +196,31 @@ def test_malformed_messages_are_refused_without_an_exception(
 
     serve(check)
     assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
+
+
+def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
+    async def check(_: EditWindow, page: Any, _connect: Callable[[], Awaitable[Browser]]) -> None:
+        import aiohttp
+
+        state, base = page._server.state, f"http://127.0.0.1:{page._server.port}/"
+        names = ["index.html", "vue.global.js", *state.trame__scripts, *state.trame__styles]
+        async with aiohttp.ClientSession(auto_decompress=False) as client:
+            sent = 0
+            while names:
+                name = names.pop()
+                async with client.get(base + name, headers={"Accept-Encoding": "gzip"}) as answer:
+                    body = await answer.read()
+                    assert answer.status == 200
+                known = {"Accept-Encoding": "gzip", "If-None-Match": answer.headers["ETag"]}
+                async with client.get(base + name, headers=known) as answer:
+                    assert (answer.status, await answer.read()) == (304, b"")
+                sent += len(body)
+                if not name.endswith((".css", ".html")):
+                    continue
+                text = gzip.decompress(body).decode()
+                assert not re.search(r"""(src|href)=["']?(https?:)?//|url\(["']?(https?:)?//""", text)
+                fonts = re.findall(r"""url\(["']?([^"')?#]+\.woff2)""", text)
+                names += {posixpath.normpath(posixpath.join(posixpath.dirname(name), font)) for font in fonts}
+        assert sent < 2e6
+
+    serve(check)

@@ -1,0 +1,310 @@
+"""One session for each browser: a process of its own, behind the address of one server.
+
+The server starts a process when a browser comes for the first time, and knows the browser by a cookie. It
+passes requests and messages on, and ends processes without a browser.
+"""
+
+import asyncio
+import hmac
+import secrets
+import time
+from asyncio.subprocess import PIPE, Process
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
+from html import escape
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from aiohttp import ClientError, ClientSession, ClientWebSocketResponse, WSMsgType, web
+
+IDLE_SECONDS = 30 * 60.0
+"""A session without a browser is saved and ended after this time."""
+
+SHORT_SECONDS = 60.0
+"""Likewise if another browser needs its place."""
+
+MAX_MEGABYTES = 4000.0
+"""A session that takes more memory is saved and ended."""
+
+CHECK_SECONDS = 5.0
+"""Time between two looks at idle sessions and their memory."""
+
+STOP_SECONDS = 20.0
+"""Time in which a session must have kept its changes."""
+
+PAGE = (
+    "<!doctype html><html lang='en'><meta charset='utf-8'><title>Sandbox</title>{refresh}"
+    "<body style='font: 16px sans-serif; margin: 4em'><p role='status'>{text}</p></body></html>"
+)
+
+
+class Session:
+    """A process that serves one browser.
+
+    Parameters
+    ----------
+    number
+        Number of the session, from 1.
+    process
+        Prints the URL of its page first, and ends when its standard input is closed.
+
+    Attributes
+    ----------
+    url
+        URL of its page on this machine; empty until it is known.
+    """
+
+    def __init__(self, number: int, process: Process) -> None:
+        self.number, self.url = number, ""
+        self._process = process
+        self._connections = 0
+        self._left_at = time.monotonic()
+        self._output = asyncio.get_running_loop().create_task(self._read())
+
+    async def _read(self) -> None:
+        assert self._process.stdout is not None
+        async for line in self._process.stdout:
+            text = line.decode(errors="replace").strip()
+            if not self.url and text.startswith("http://"):
+                self.url = text
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code of the process, or None while it runs."""
+        return self._process.returncode
+
+    @property
+    def idle_seconds(self) -> float:
+        """Time for which no browser has shown the session."""
+        return 0.0 if self._connections else time.monotonic() - self._left_at
+
+    @property
+    def megabytes(self) -> float:
+        """Memory of the process; 0 if the system does not tell."""
+        try:
+            pages = int(Path(f"/proc/{self._process.pid}/statm").read_text(encoding="ascii").split()[1])
+        except (OSError, IndexError):
+            return 0.0
+        return pages * 4096 / 1e6
+
+    async def relay(self, http: ClientSession, request: web.Request) -> web.WebSocketResponse:
+        """Pass messages between a browser and the process until one of them leaves."""
+        browser = web.WebSocketResponse(max_msg_size=0, compress=False)
+        await browser.prepare(request)
+        self._connections += 1
+        try:
+            async with http.ws_connect(f"{self.url}ws", max_msg_size=0) as page:
+                ways = [asyncio.create_task(_pass(*way)) for way in ((browser, page), (page, browser))]
+                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+                for way in ways:
+                    way.cancel()
+                await asyncio.gather(*ways, return_exceptions=True)
+        except ClientError:  # the process has ended
+            pass
+        finally:
+            self._connections -= 1
+            self._left_at = time.monotonic()
+            await browser.close()
+        return browser
+
+    async def stop(self) -> None:
+        """Let the process keep its changes, and end it."""
+        stdin = self._process.stdin
+        assert stdin is not None
+        stdin.close()
+        try:
+            await asyncio.wait_for(self._process.wait(), STOP_SECONDS)
+        except TimeoutError:
+            with suppress(ProcessLookupError):
+                self._process.kill()
+            await self._process.wait()
+        await self._output
+
+
+async def _pass(
+    source: web.WebSocketResponse | ClientWebSocketResponse,
+    target: web.WebSocketResponse | ClientWebSocketResponse,
+) -> None:
+    async for message in source:
+        if message.type is WSMsgType.BINARY:
+            await target.send_bytes(message.data)
+
+
+class Sessions:
+    """Starts, finds and ends the sessions of all browsers.
+
+    Parameters
+    ----------
+    command
+        Returns the command of a session from its number.
+    limit
+        Most sessions at the same time.
+    token
+        Part of the URL that browsers must have; empty for none.
+    allows_host
+        Returns False for a name of this machine that no browser uses: a page of another server could have
+        sent the request.
+    """
+
+    def __init__(
+        self,
+        command: Callable[[int], Sequence[str]],
+        *,
+        limit: int,
+        token: str = "",
+        allows_host: Callable[[str], bool] = lambda _: True,
+    ) -> None:
+        self._command, self._limit, self._token, self._allows_host = command, limit, token, allows_host
+        self._sessions: dict[str, Session] = {}
+        self._numbers: dict[str, int] = {}
+        self._waiting: Session | None = None
+        self._ending: set[Session] = set()
+        self._port = 0
+        self._opening = asyncio.Lock()
+
+    async def serve(self, host: str, port: int, ready: Callable[[int], None]) -> int:
+        """Serve until the first session fails to start, or the task is cancelled; return the exit code.
+
+        ``ready`` is called with the port once the address can be opened. The first session starts at once.
+        """
+        self._waiting = first = await self._start(1)
+        app = web.Application(middlewares=[self._check])
+        app.router.add_get("/ws", self._socket)
+        app.router.add_get("/{path:.*}", self._get)
+        runner = web.AppRunner(app)
+        await runner.setup()
+        async with ClientSession(auto_decompress=False) as self._http:
+            try:
+                await web.TCPSite(runner, host, port).start()
+                self._port = runner.addresses[0][1]
+                while not first.url and first.exit_code is None:
+                    await asyncio.sleep(0.02)
+                if first.url:
+                    ready(self._port)
+                    await self._watch()
+                return first.exit_code or 0
+            finally:
+                await runner.cleanup()
+                waiting = () if self._waiting is None else (self._waiting,)
+                left = *self._sessions.values(), *self._ending, *waiting
+                await asyncio.gather(*(session.stop() for session in left))
+
+    async def _watch(self) -> None:
+        """End idle sessions and those that are too large."""
+        while True:
+            await asyncio.sleep(CHECK_SECONDS)
+            for key, session in list(self._sessions.items()):
+                ended = session.exit_code is not None
+                if ended or session.idle_seconds > IDLE_SECONDS or session.megabytes > MAX_MEGABYTES:
+                    await self._end(key)
+
+    async def _end(self, key: str) -> None:
+        """End a session; its files are its browser's the next time."""
+        session = self._sessions.pop(key)
+        self._ending.add(session)  # until it has ended, so that the end of the server waits for it
+        await session.stop()
+        self._ending.discard(session)
+
+    async def _start(self, number: int) -> Session:
+        return Session(
+            number,
+            await asyncio.create_subprocess_exec(
+                *self._command(number),
+                stdin=PIPE,
+                stdout=PIPE,
+                limit=2**20,
+                start_new_session=True,  # Ctrl + C reaches this process only
+            ),
+        )
+
+    # -- requests ---------------------------------------------------------------------------------------
+
+    @web.middleware
+    async def _check(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        """Refuse requests that other pages have sent, and browsers without the token."""
+        origin = request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != request.host:
+            raise web.HTTPForbidden(text="expected a request of the page itself")
+        if not self._allows_host(urlsplit(f"//{request.host}").hostname or ""):
+            raise web.HTTPForbidden(text="expected the address of this machine")
+        known = request.cookies.get(self._cookie, "") in self._numbers
+        if self._token and not known and not self._has_token(request):
+            raise web.HTTPForbidden(text="expected the address with the token that the terminal shows")
+        return await handler(request)
+
+    def _has_token(self, request: web.Request) -> bool:
+        return hmac.compare_digest(request.query.get("secret", "").encode(), self._token.encode())
+
+    @property
+    def _cookie(self) -> str:
+        return f"implicit-decals-{self._port}"
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        session = self._sessions.get(request.cookies.get(self._cookie, ""))
+        if session is None or not session.url:
+            raise web.HTTPServiceUnavailable(text="expected an open session; load the page again")
+        return await session.relay(self._http, request)
+
+    async def _get(self, request: web.Request) -> web.StreamResponse:
+        """Return a file of the browser's session; the page itself starts one."""
+        key = request.cookies.get(self._cookie, "")
+        is_page = request.path in ("/", "/index.html")
+        if key not in self._numbers:
+            key = secrets.token_urlsafe(24)
+        async with self._opening:  # a browser may ask twice at once
+            opened = not is_page or await self._open(key)
+        if not opened:
+            return _page(
+                f"{self._limit} sessions are open already. Close one, and load this page again.", 503
+            )
+        session = self._sessions.get(key)
+        if session is None:
+            raise web.HTTPNotFound
+        if session.exit_code is not None:
+            del self._sessions[key]
+            return _page("The session has ended. Load this page again.", 503)
+        if session.url and request.path == "/":
+            response = web.Response(status=302, headers={"Location": "/index.html"})  # without the token
+        elif session.url:
+            response = await self._file(session, request)
+        else:
+            response = _page("The session starts.", refresh=True)
+        response.set_cookie(self._cookie, key, httponly=True, samesite="Strict")
+        return response
+
+    async def _open(self, key: str) -> bool:
+        """Start the session of a browser, or return False if there is no place for it."""
+        if key in self._sessions:
+            return True
+        if self._waiting is not None:
+            self._sessions[key], self._waiting = self._waiting, None
+            self._numbers[key] = self._sessions[key].number
+            return True
+        if len(self._sessions) >= self._limit:
+            longest = max(self._sessions, key=lambda other: self._sessions[other].idle_seconds)
+            if self._sessions[longest].idle_seconds < SHORT_SECONDS:
+                return False
+            await self._end(longest)
+        number = self._numbers.setdefault(key, len(self._numbers) + 1)
+        self._sessions[key] = await self._start(number)
+        return True
+
+    async def _file(self, session: Session, request: web.Request) -> web.Response:
+        """Return a file of a session, in the encoding in which it comes."""
+        encoding = {"Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
+        try:
+            async with self._http.get(f"{session.url.rstrip('/')}{request.path}", headers=encoding) as answer:
+                names = ("Content-Type", "Content-Encoding")
+                kept = {name: answer.headers[name] for name in names if name in answer.headers}
+                return web.Response(body=await answer.read(), status=answer.status, headers=kept)
+        except ClientError:
+            return _page("The session has ended. Load this page again.", 503)
+
+
+def _page(text: str, status: int = 200, *, refresh: bool = False) -> web.Response:
+    again = "<meta http-equiv='refresh' content='1'>" if refresh else ""
+    return web.Response(
+        text=PAGE.format(text=escape(text), refresh=again), status=status, content_type="text/html"
+    )
