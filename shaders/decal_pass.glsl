@@ -2,6 +2,7 @@
 // the object's own colour. DECALS: there are decals; the slot holds decals.glsl. POSED: some objects are posed, and the
 // textures of rest.frag say where their pixels lie in the rest pose. TWO_TARGETS: also write owner, field and uv.
 // LIMITED: decals have receivers or fades.
+// FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl.
 //@ include camera.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
@@ -45,10 +46,23 @@ Pixel pixel_at(ivec2 texel) {
             rest_up = texelFetch(r_up, texel, 0).xyz;
         }
 #endif
+        vec3 ray = ray_direction(vec2(texel) + 0.5);
+#ifdef FILTERED
+        vec3 right = surface_step(visible.xyz, texelFetch(g_normal, texel, 0).xyz, ray, ray_right.xyz);
+        vec3 up = surface_step(visible.xyz, texelFetch(g_normal, texel, 0).xyz, ray, ray_up.xyz);
+#ifdef POSED
+        if (is_posed) {
+            right = rest_right;
+            up = rest_up;
+        }
+#endif
+        vec4 color = filtered_color(position, normal, right, up);
+#else
         DecalHit hit = decal_at(position, normal);
-        vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
-        pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;
+        vec4 color = decal_color(hit, position, normal, ray);
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
+#endif
+        pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;
     }
 #endif
 #ifdef TWO_TARGETS

@@ -43,6 +43,7 @@ def render(
     samples: OptionalWhole = None,
     contact: ContactName = None,
     stiffness: Stiffness = None,
+    filtered: Annotated[bool | None, Parameter(negative=(), show_default=False)] = None,
     mapping: MappingName = None,
     seed: OptionalWhole = None,
     save: Path | None = None,
@@ -83,6 +84,9 @@ def render(
     stiffness
         Stiffness of elastic contact, from 1 to 64: how close to contact lines images are compressed.
         Default: that of a saved scene, or 2.
+    filtered
+        Average images, rims and contact lines over each sample, so that one sample a pixel
+        shows decals smoothly.
     mapping
         Image mapping: corrected for the curvature of the surface, or chord (the paper's projection).
         Default: that of a saved scene, or corrected.
@@ -104,6 +108,7 @@ def render(
     if samples is not None:
         check_count("--samples", samples, 1, MAX_SAMPLES)
     options = {"samples": samples, "contact": contact, "stiffness": stiffness, "mapping": mapping}
+    options["filtered"] = filtered
     Drawing().overridden(**options)  # checked before anything slow
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:

@@ -118,12 +118,18 @@ def square_of_push(distance: wp.float32, push: wp.float32) -> wp.float32:
 
 
 @wp.func
+def pushed_distance(distance: wp.float32, squares: wp.float32) -> wp.float32:
+    """Return r at a distance in visible radii, under the sum of squares of all pushes z."""
+    z = wp.sqrt(squares)
+    if z > 1.0:  # exact towards contact lines
+        return 1.0 - (1.0 - distance) / (1.0 + z)
+    return distance + (1.0 - distance) * (z / (1.0 + z))
+
+
+@wp.func
 def pushed_along_ray(distance: wp.float32, squares: wp.float32) -> wp.float32:
     """Return E = 1 − F at a distance in visible radii, under the sum of squares of all pushes z."""
-    z = wp.sqrt(squares)
-    r = distance + (1.0 - distance) * (z / (1.0 + z))
-    if z > 1.0:  # the same, exact towards contact lines
-        r = 1.0 - (1.0 - distance) / (1.0 + z)
+    r = pushed_distance(distance, squares)
     return field_complement(r * r * RIM_SQUARED)
 
 

@@ -9,9 +9,17 @@ from blobtree.transpile.glsl import translate_library
 from decals.field.law import AnyContact, ContactLaw
 from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import complement_at, owner_at, owner_below, single_layer_at, uv_at
-from decals.field.receivers import fade_at
+from decals.field.pixel_filter import (
+    contact_distance,
+    image_steps,
+    positive_part,
+    push_square_step,
+    pushed_distance_step,
+)
+from decals.field.radial import balls_nested, is_above, lies_on_top, power
+from decals.field.receivers import acts, fade_at
 from decals.index.lookup import next_number_below
-from decals.record import Contact
+from decals.record import Contact, has_cells
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import (
@@ -48,7 +56,7 @@ class DecalPass:
         self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
         self._framebuffer = context.gl.framebuffer(self._targets)
         self._context = context
-        self._passes: dict[tuple[str, bool, bool], PixelPass] = {}
+        self._passes: dict[tuple[object, ...], PixelPass] = {}
 
     def draw(
         self,
@@ -59,6 +67,7 @@ class DecalPass:
         mapping: ImageMapping,
         contact: AnyContact,
         stiffness: float,
+        filtered: bool = False,
         rest: RestBuffer | None = None,
         masks: DataTexture | None = None,
         part: Part = WHOLE,
@@ -67,9 +76,10 @@ class DecalPass:
 
         ``masks`` are those of the objects, see `decals.receivers.object_mask`, for decals that are limited.
         """
-        limited = decals is not None and decals.limited
-        library = "" if decals is None else decal_library(contact, layered=decals.layered, limited=limited)
-        painting = self._pass(library, posed=rest is not None, limited=limited)
+        limited, library = decals is not None and decals.limited, ""
+        if decals is not None:
+            library = decal_library(contact, layered=decals.layered, limited=limited, filtered=filtered)
+        painting = self._pass(library, posed=rest is not None, limited=limited, filtered=filtered)
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         textures |= rest.textures if rest is not None else {}
@@ -90,11 +100,11 @@ class DecalPass:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""
         return read_floats(self._framebuffer, 1, tile)
 
-    def _pass(self, library: str, *, posed: bool, limited: bool) -> PixelPass:
+    def _pass(self, library: str, **variant: bool) -> PixelPass:
         """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
-        key = library, posed, limited
+        key = library, *variant.values()
         if key not in self._passes:
-            program = decal_program(self._context, library, len(self._targets), posed=posed, limited=limited)
+            program = decal_program(self._context, library, len(self._targets), **variant)
             self._passes[key] = PixelPass(self._context.gl, program, self._targets)
         return self._passes[key]
 
@@ -108,11 +118,19 @@ class DecalPass:
 
 
 def decal_program(
-    context: Context, library: str, targets: int = 1, *, posed: bool = False, limited: bool = False
+    context: Context,
+    library: str,
+    targets: int = 1,
+    *,
+    posed: bool = False,
+    limited: bool = False,
+    filtered: bool = False,
 ) -> Program:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
-    slots = {"decals": "//@ include decals.glsl", "functions": library} if library else {}
-    defines = {"DECALS": bool(library), "POSED": posed and bool(library), "LIMITED": limited}
+    file = "filtered_decals.glsl" if filtered else "decals.glsl"
+    slots = {"decals": f"//@ include {file}", "functions": library} if library else {}
+    variants = {"DECALS": True, "POSED": posed, "LIMITED": limited, "FILTERED": filtered}
+    defines = {name: value and bool(library) for name, value in variants.items()}
     return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines=defines))
 
 
@@ -131,8 +149,25 @@ LIBRARY_FUNCTIONS = (
 """Functions that ``shaders/decals.glsl`` calls."""
 
 
+FILTER_FUNCTIONS = (
+    *LIBRARY_FUNCTIONS,
+    acts,
+    contact_distance,
+    power,
+    balls_nested,
+    is_above,
+    lies_on_top,
+    has_cells,
+    positive_part,
+    push_square_step,
+    pushed_distance_step,
+    image_steps,
+)
+"""Functions that ``shaders/filtered_decals.glsl`` calls."""
+
+
 @cache
-def decal_library(contact: AnyContact, *, layered: bool, limited: bool) -> str:
+def decal_library(contact: AnyContact, *, layered: bool, limited: bool, filtered: bool = False) -> str:
     """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
     constants = (
         f"const float RIM = {float(RIM)!r};\n"
@@ -141,10 +176,10 @@ def decal_library(contact: AnyContact, *, layered: bool, limited: bool) -> str:
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )
-    return constants + _translated_functions(contact if isinstance(contact, ContactLaw) else None)
+    return constants + _translated_functions(contact if isinstance(contact, ContactLaw) else None, filtered)
 
 
 @cache
-def _translated_functions(law: ContactLaw | None) -> str:
-    functions: tuple[Any, ...] = LIBRARY_FUNCTIONS
+def _translated_functions(law: ContactLaw | None, filtered: bool) -> str:
+    functions: tuple[Any, ...] = FILTER_FUNCTIONS if filtered else LIBRARY_FUNCTIONS
     return translate_library(functions if law is None else map(law.formulas.function, functions))

@@ -88,6 +88,9 @@ class Drawing:
         Lights in place of the studio light.
     stiffness : float
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
+    filtered : bool
+        Average images, rims and contact lines over each sample, so that they are smooth with one sample a
+        pixel. Silhouettes and light still need several.
 
     Raises
     ------
@@ -108,6 +111,7 @@ class Drawing:
     background: Background = STUDIO
     lights: Lighting | None = None
     stiffness: float = DEFAULT_STIFFNESS
+    filtered: bool = False
 
     if TYPE_CHECKING:  # names of modes are converted
 
@@ -120,6 +124,7 @@ class Drawing:
             background: Background = STUDIO,
             lights: Lighting | None = None,
             stiffness: float = DEFAULT_STIFFNESS,
+            filtered: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -128,6 +133,7 @@ class Drawing:
             "contact": contact_mode(self.contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
             "stiffness": stiffness_number(self.stiffness, InvalidScene),
+            "filtered": instance("filtered", self.filtered, bool, InvalidScene, "such as True"),
         }
         instance("background", self.background, Background, InvalidScene, "such as decals.rendering.STUDIO")
         if self.lights is not None:
@@ -181,6 +187,7 @@ class RenderOptions(Drawing):
             background: Background = STUDIO,
             lights: Lighting | None = None,
             stiffness: float = DEFAULT_STIFFNESS,
+            filtered: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:

@@ -177,7 +177,13 @@ class TargetState:
             bounds,
             (tile.block(), tile.x, tile.y, tile.width, tile.height, tile.inner, depth),
             (decals, *(image.pixels for image in scene.images)),
-            (options.mapping, options.contact, options.stiffness, *_editor_formulas(decals)),
+            (
+                options.mapping,
+                options.contact,
+                options.stiffness,
+                options.filtered,
+                *_editor_formulas(decals),
+            ),
             decal_version(scene),
             options,
         )
@@ -382,7 +388,7 @@ def plan_frame(
     dirty = state.dirty(previous, tile)
     steps = _surface_steps(uploaded, tile, targets, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
-    modes = options.mapping, options.contact, options.stiffness
+    modes = options.mapping, options.contact, options.stiffness, options.filtered
     rest = targets.rest_for(uploaded.drawables)
     decal_arguments = gbuffer, uploaded.decals, uploaded.images, *modes, rest, uploaded.masks
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]

@@ -372,9 +372,10 @@ def check_options(options: RenderOptions) -> RenderOptions:
 
 
 def one_sample(options: RenderOptions) -> RenderOptions:
-    """Return options with one sample a pixel."""
+    """Return options with one sample a pixel, at its centre."""
     check_options(options)
-    return options if options.samples == 1 else replace(options, samples=1)
+    exact = options.samples == 1 and not options.filtered
+    return options if exact else replace(options, samples=1, filtered=False)
 
 
 def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> WarmupPlan:
@@ -388,7 +389,9 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     context = uploads.context
     objects = [warmup_of(context, item) for item in drawn_objects(scene)]
     has_decals, light = len(scene.decals) > 0, light_file(options.lights)
-    formulas = (options.contact, scene.decals.layered, is_limited(scene)) if has_decals else None
+    formulas = None
+    if has_decals:
+        formulas = options.contact, scene.decals.layered, is_limited(scene), options.filtered
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
     tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
@@ -397,7 +400,9 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     tasks += [
         WarmupTask(
             SHADERS,
-            lambda: decal_program(context, _library(scene, options), limited=is_limited(scene)),
+            lambda: decal_program(
+                context, _library(scene, options), limited=is_limited(scene), filtered=options.filtered
+            ),
         ),
         WarmupTask(SHADERS, lambda: light_program(context, light)),
         WarmupTask(SHADERS, partial(depth_program, context)),
@@ -409,7 +414,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
     decals = scene.decals
     index = [WarmupTask(DECALS, lambda: decals.index)] if isinstance(decals, DecalEditor) else []
-    translate = partial(decal_library, options.contact, layered=decals.layered, limited=is_limited(scene))
+    translate = partial(_library, scene, options)
     return [
         *index,
         WarmupTask(DECALS, partial(uploads.decals, scene)),
@@ -422,4 +427,9 @@ def _library(scene: SceneLike, options: RenderOptions) -> str:
     """Return the formulas of the decals; nothing for a scene without decals."""
     if not len(scene.decals):
         return ""
-    return decal_library(options.contact, layered=scene.decals.layered, limited=is_limited(scene))
+    return decal_library(
+        options.contact,
+        layered=scene.decals.layered,
+        limited=is_limited(scene),
+        filtered=options.filtered,
+    )

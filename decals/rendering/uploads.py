@@ -61,7 +61,7 @@ class ImageArray:
         self.texture = context.gl.texture_array((self.width, self.height, layers), 4, dtype="f2")
         empty = np.zeros((1, 1, 4), np.uint8)
         for layer, image in enumerate(images or [empty]):
-            texels = linear_premultiplied(resized(image, (self.height, self.width))[::-1])
+            texels = linear_premultiplied(filled_corners(resized(image, (self.height, self.width)))[::-1])
             region = (0, 0, layer, self.width, self.height, 1)
             self.texture.write(texels.astype(np.float16).tobytes(), viewport=region)
         self.texture.repeat_x = self.texture.repeat_y = False
@@ -108,6 +108,30 @@ def resized(image: UInt8Array, shape: tuple[int, int]) -> UInt8Array:
         return image
     picture = Image.fromarray(np.ascontiguousarray(image))
     return np.asarray(picture.resize(shape[::-1], Image.Resampling.LANCZOS))
+
+
+DISC_MARGIN = 1.5
+"""Texels around the disc of an image that bilinear look-ups inside it may read."""
+
+
+def filled_corners(image: UInt8Array) -> UInt8Array:
+    """Return an image whose texels outside its disc continue its rim outward.
+
+    Decals show the disc alone, but mip levels average texels on both sides of its rim.
+    """
+    height, width = image.shape[:2]
+    y = (np.arange(height, dtype=np.float32) + 0.5)[:, None] - 0.5 * height
+    x = (np.arange(width, dtype=np.float32) + 0.5) - 0.5 * width
+    distance = np.hypot(2.0 * x / width, 2.0 * y / height)
+    outside = np.nonzero(distance > 1.0 + 2.0 * DISC_MARGIN / min(height, width))
+    if not len(outside[0]):
+        return image
+    filled = image.copy()
+    shrink = (1.0 - 1.0 / min(height, width)) / distance[outside]
+    row = (0.5 * height + y[outside[0], 0] * shrink).astype(np.intp)
+    column = (0.5 * width + x[outside[1]] * shrink).astype(np.intp)
+    filled[outside] = image[row, column]
+    return filled
 
 
 ROW_TEXELS = 1 << TEXTURE_WIDTH_BITS

@@ -47,6 +47,7 @@ class DrawingRecord(Struct, forbid_unknown_fields=True):
     background: _BackgroundRecord | None = None
     lights: _LightingRecord | None = None
     law: str | None = None
+    filtered: bool = False
 
 
 def drawing_record(drawing: Drawing) -> DrawingRecord:
@@ -67,6 +68,7 @@ def drawing_record(drawing: Drawing) -> DrawingRecord:
         else _BackgroundRecord(drawing.background.top, drawing.background.bottom),
         lights=described,
         law=drawing.contact.name if isinstance(drawing.contact, ContactLaw) else None,
+        filtered=drawing.filtered,
     )
 
 
@@ -99,6 +101,7 @@ def drawing_of_record(record: DrawingRecord | None) -> Drawing:
             else Background(record.background.top, record.background.bottom),
             lights=lights,
             stiffness=record.stiffness,
+            filtered=record.filtered,
         )
     except ImplicitDecalsError as error:
         raise InvalidScene(f"drawing: {error}") from error

@@ -26,6 +26,7 @@ def render(
     mapping: ImageMapping | str | None = None,
     background: Background | None = None,
     lights: Lighting | None = None,
+    filtered: bool | None = None,
     viewpoint: Viewpoint | None = None,
 ) -> Picture:
     """Draw a scene, or a model without decals.
@@ -53,6 +54,8 @@ def render(
         Colours behind the objects, such as `decals.rendering.TRANSPARENT`.
     lights : Lighting, optional
         Lights in place of the studio light.
+    filtered : bool, optional
+        Average images, rims and contact lines over each sample; they are then smooth with one sample a pixel.
     viewpoint : Camera or Projection, optional
         Viewpoint in place of the scene's camera.
 
@@ -88,6 +91,7 @@ def render(
         "background": background,
         "lights": lights,
         "stiffness": stiffness,
+        "filtered": filtered,
     }
     width, height = Drawing().overridden(**given).at(size).size  # checked before a model is read
     with reporting() as report:

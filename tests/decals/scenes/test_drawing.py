@@ -21,6 +21,7 @@ LOOK = Drawing(
     background=Background("white", (0.2, 0.3, 0.4, 0.5)),
     lights=Lighting((Light((1, 0.9, 0.8), (0, 0, -1), (0, 0, 3), (1, 0.1, 0), 40.0, 2.0),)),
     stiffness=3.5,
+    filtered=True,
 )
 
 
@@ -61,6 +62,7 @@ def test_the_contact_mode_is_written_and_files_without_one_had_equation_5(tmp_pa
         ("drawing", {"stiffness": 0.5}, "drawing: stiffness: expected a number from 1 to 64, got 0.5"),
         ("drawing", {"samples": 0}, "drawing: samples: expected"),
         ("drawing", {"speed": 1}, "speed"),
+        ("drawing", {"filtered": 1}, "filtered"),
         ("drawing", {"lights": {"lights": [], "frame": [1, 2]}}, "expected 16 numbers, got 2"),
         ("drawing", {"background": {"top": [0, 0, 0, 9], "bottom": [0, 0, 0, 1]}}, "drawing: a background's"),
         ("drawing", 5, "drawing"),

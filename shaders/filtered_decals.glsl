@@ -1,0 +1,295 @@
+// Colour of decals averaged over a pixel, from one look-up of its decals: images by their footprints through mapping
+// and contact, rims, contact lines and edges of layers by the shares of the pixel on both sides of them. The formulas
+// are those of decals/field/pixel_filter.py. A pixel is the parallelogram around q with the sides `right` and `up`.
+//@ include decals.glsl
+const float REACH_SQUARED = 0.330625;
+const int ELASTIC = 3;
+const int MANY = 100;
+const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
+const int SAMPLES = 16;        // parts of pixels with more
+const float MAX_TAPS = 8.0;    // look-ups of an image along one side of a pixel
+const float SPACING = 0.67;   // of look-ups, relative to the shorter side
+const float SHARPNESS = 0.6;   // texels of a look-up relative to the distance between look-ups
+
+struct Place {
+    vec2 uv;
+    vec2 uv_right;
+    vec2 uv_up;
+    vec3 arc;  // length along the surface from the centre, and its changes, in visible radii
+};
+
+// Part of the pixel inside the rim of a decal: share, centre.
+vec3 inside_rim(vec3 arc, vec3 right, vec3 up) {
+    float bend = dot(right, right) + dot(up, up) - dot(arc.yz, arc.yz);  // a circle's distance from its tangent
+    return positive_part(1.0 - arc.x - max(bend, 0.0) / (24.0 * max(arc.x, 0.25)), -arc.yz);
+}
+
+// The same for the chord, of a decal by its ball.
+vec3 inside_ball(vec3 q, vec3 right, vec3 up, vec4 ball) {
+    vec3 w = (q - ball.xyz) / (RIM * ball.w);
+    float chord = max(length(w), 1e-6);
+    float scale = 1.0 / (RIM * ball.w);
+    return inside_rim(vec3(chord, vec2(dot(w, right), dot(w, up)) * (scale / chord)), scale * right, scale * up);
+}
+
+// Part of the pixel on a decal's side of its contact line with another one.
+vec3 beside_line(vec3 q, vec3 right, vec3 up, vec4 ball, vec4 other) {
+    vec3 a = q - ball.xyz, b = q - other.xyz;
+    float value;
+    vec3 slope;
+    if (has_cells(decal_contact)) {
+        value = dot(b - a, b + a) + RIM * RIM * (ball.w - other.w) * (ball.w + other.w);
+        slope = 2.0 * (b - a);
+    } else {
+        value = dot(b, b) / (other.w * other.w) - dot(a, a) / (ball.w * ball.w);
+        slope = 2.0 * (b / (other.w * other.w) - a / (ball.w * ball.w));
+    }
+    return positive_part(value, vec2(dot(slope, right), dot(slope, up)));
+}
+
+vec3 lesser(vec3 part, vec3 other) {
+    return other.x < part.x ? other : part;
+}
+
+// Elastic contact: z² of a neighbour, and its changes.
+vec3 push_steps(vec3 w, vec3 right, vec3 up, vec4 ball, vec4 other) {
+    vec3 result;
+    float same;
+    vec3 apart_ = other.xyz - ball.xyz;
+    push_square_along_w(w, right, apart_, RIM * ball.w, RIM * other.w, decal_stiffness, result.x, result.y);
+    push_square_along_w(w, up, apart_, RIM * ball.w, RIM * other.w, decal_stiffness, same, result.z);
+    return result;
+}
+
+// Where a point lies in a decal's image. `squares`: in elastic contact the sum of squares of all pushes, and its
+// changes; in other modes the first is the distance after contact.
+Place place_of(int decal, vec3 q, vec3 n, vec3 right, vec3 up, vec3 squares) {
+    vec4 ball = decal_texel(4 * decal);
+    float per_radius = 1.0 / (RIM * ball.w);
+    vec3 w = per_radius * (q - ball.xyz);
+    vec3 x = per_radius * right, y = per_radius * up;
+    float chord = length(w);
+    vec2 chords = vec2(dot(w, x), dot(w, y)) / max(chord, 1e-6);
+    vec3 rim = vec3(squares.x, chords);
+    if (decal_contact == ELASTIC) {
+        float same;
+        pushed_distance_along_distance_squares(chord, chords.x, squares.x, squares.y, rim.x, rim.y);
+        pushed_distance_along_distance_squares(chord, chords.y, squares.x, squares.z, same, rim.z);
+    }
+    Place place;
+    image_steps(w, x, y, decal_texel(4 * decal + 1).xyz, n, decal_texel(4 * decal + 2).xyz, rim, decal_mapping, place.uv,
+        place.uv_right, place.uv_up, place.arc);
+    return place;
+}
+
+// Premultiplied linear colour of a decal around a place. Where the image has more than one texel a pixel, several
+// look-ups along each side, more along the longer one, form a box.
+vec4 image_average(int decal, Place place, vec3 q, vec3 n) {
+    vec4 u = decal_texel(4 * decal + 2);
+    vec4 tint = decal_texel(4 * decal + 3);
+    vec4 color = vec4(1.0);
+    if (u.w >= 0.0) {
+        vec2 texels = vec2(textureSize(decal_images, 0).xy);
+        vec2 sides = vec2(length(texels * place.uv_right), length(texels * place.uv_up));
+        float cell = SPACING * clamp(min(sides.x, sides.y), 1.0, max(sides.x, sides.y) * 2.0 / MAX_TAPS);
+        vec2 taps = clamp(floor(sides / cell + 0.7), 1.0, MAX_TAPS);
+        vec2 right = place.uv_right / taps.x, up = place.uv_up / taps.y;
+        float texel = SHARPNESS * max(sides.x / taps.x, sides.y / taps.y);
+        float level = max(round(log2(max(texel, 1e-6))), 0.0);  // whole: some drivers then read one level only
+        vec2 uv = place.uv - 0.5 * ((taps.x - 1.0) * right + (taps.y - 1.0) * up);
+        color = vec4(0.0);
+        float column = 0.0;
+        for (float left = taps.x * taps.y; left > 0.0; left -= 1.0) {
+            color += textureLod(decal_images, vec3(uv, u.w), level);
+            column += 1.0;
+            uv += column == taps.x ? up - (taps.x - 1.0) * right : right;
+            column = column == taps.x ? 0.0 : column;
+        }
+        color /= taps.x * taps.y;
+    }
+    float fade = decal_limited ? fade_at(q, n, decal) : 1.0;
+    return fade * tint.w * color * vec4(tint.rgb, 1.0);
+}
+
+// Distance after contact of a decal across a contact line; with one neighbour, for others are farther.
+vec3 contact_with(int decal, int other, vec3 q, vec3 n, vec3 right, vec3 up) {
+    vec4 ball = decal_texel(4 * decal);
+    float per_radius = 1.0 / (RIM * ball.w);
+    vec3 w = per_radius * (q - ball.xyz);
+    if (decal_contact == ELASTIC) {
+        return other < 0 ? vec3(0.0) : push_steps(w, per_radius * right, per_radius * up, ball, decal_texel(4 * other));
+    }
+    return vec3(other < 0 ? min(length(w), 1.0) : 1.0, 0.0, 0.0);
+}
+
+// Premultiplied colour of the decals of one layer that share the pixel, with their owner at q. `boundaries` counts the
+// rims and contact lines through the pixel, and is MANY where nested decals make others than these.
+vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int boundaries) {
+    vec4 ball = decal_texel(4 * owner);
+    float per_radius = 1.0 / (RIM * ball.w);
+    vec3 w = per_radius * (q - ball.xyz);
+    int rank = decal_layered ? rank_of(owner, decal_records) : 0;
+    bool pushes = !decal_layered || is_contact_rank(rank);
+    vec3 squares = vec3(0.0);
+    ivec2 beside = ivec2(-1);
+    vec2 owner_shares = vec2(1.0);  // of the pixel, on the owner's side of the contact lines with `beside`
+    int above = -1, below = -1, nested_count = 0;
+    float above_share = 0.0;
+    boundaries = 0;
+    for (int level = 0; level < index_level_count; level++) {
+        ivec2 span = cell_range(q, level);
+        for (int j = span.x; j < span.y; j++) {
+            int other = texelFetch(index_ids, ivec2(j & 4095, j >> 12), 0).x;
+            vec4 other_ball = decal_texel(4 * other);
+            vec3 offset = q - other_ball.xyz;
+            if (other == owner || dot(offset, offset) >= REACH_SQUARED * other_ball.w * other_ball.w
+                || !acts(offset, n, other)) {
+                continue;
+            }
+            bool outside = power(offset, RIM * other_ball.w) > 0.0;
+            int other_rank = decal_layered ? rank_of(other, decal_records) : 0;
+            bool together = pushes && other_rank == rank;
+            bool nested = together && has_cells(decal_contact)
+                && balls_nested(other_ball.xyz - ball.xyz, RIM * ball.w, RIM * other_ball.w);
+            if (!together || nested) {
+                bool higher = nested ? is_above(other, owner, decal_records) && lies_on_top(n, other, decal_records)
+                                     : other_rank > rank || (other_rank == rank && other > owner);
+                nested_count += nested ? 1 : 0;
+                if (higher && outside) {
+                    float share = inside_ball(q, right, up, other_ball).x;
+                    boundaries += share > 0.0 ? 1 : 0;
+                    above = share > above_share ? other : above;
+                    above_share = max(share, above_share);
+                } else if (nested && !outside) {
+                    boundaries += higher ? 1 : 0;  // other decals cut it
+                    below = higher ? below : other;
+                }
+                continue;
+            }
+            if (decal_contact == ELASTIC) {
+                squares += push_steps(w, per_radius * right, per_radius * up, ball, other_ball);
+            }
+            float share = beside_line(q, right, up, ball, other_ball).x;
+            boundaries += share < 1.0 ? 1 : 0;
+            if (share < owner_shares.x) {
+                owner_shares = vec2(share, owner_shares.x);
+                beside = ivec2(other, beside.x);
+            } else if (share < owner_shares.y) {
+                owner_shares.y = share;
+                beside.y = other;
+            }
+        }
+    }
+    if (decal_contact != ELASTIC) {
+        squares.x = contact_distance(complement_at(q, n, owner, decal_contact));
+    }
+    // The owner, those beside it or the one below, and the one above in turn; in one loop, because some drivers run
+    // code once even where no pixel needs it.
+    vec3 owner_part = vec3(1.0, 0.0, 0.0);
+    float bare = 0.0, sum = 0.0;
+    vec4 color = vec4(0.0);
+    ivec2 others = beside;
+    for (int decal = owner; decal >= 0;) {
+        bool first = decal == owner, across = decal == beside.x || decal == beside.y;
+        vec4 own_ball = decal_texel(4 * decal);
+        vec3 part = inside_ball(q, right, up, own_ball);
+        if (across) {
+            part = lesser(part, beside_line(q, right, up, own_ball, ball));
+            int third = decal == beside.x ? beside.y : beside.x;
+            if (third >= 0) {
+                part = lesser(part, beside_line(q, right, up, own_ball, decal_texel(4 * third)));
+            }
+        }
+        vec3 at = first ? q : q + part.y * right + part.z * up;
+        vec3 contact = first ? squares : contact_with(decal, across ? owner : -1, at, n, right, up);
+        Place place = place_of(decal, at, n, right, up, contact);
+        if (first) {
+            part = inside_rim(place.arc, per_radius * right, per_radius * up);
+            bare = 1.0 - part.x;
+            boundaries += bare > 0.0 ? 1 : 0;
+            if (beside.x >= 0) {
+                part = lesser(part, beside_line(q, right, up, ball, decal_texel(4 * beside.x)));
+            }
+            place.uv += part.y * place.uv_right + part.z * place.uv_up;
+            owner_part = part;
+            if (below >= 0) {  // the owner lies on it
+                others = ivec2(part.x < 1.0 ? below : -1, -1);
+            }
+        } else if (decal != above) {
+            bare = min(bare, 1.0 - part.x);
+            part.x = across ? part.x : min(part.x, 1.0 - owner_part.x);
+        }
+        vec4 own_color = part.x * image_average(decal, place, at, n);
+        if (decal == above) {
+            color = own_color + (1.0 - own_color.a) * color;
+            break;
+        }
+        color += own_color;
+        sum += part.x;
+        decal = others.x;
+        others = ivec2(others.y, -1);
+        if (decal < 0) {
+            color /= max(sum + bare, 1e-6);
+            decal = above;
+        }
+    }
+    boundaries += boundaries > 0 && nested_count > 0 && nested_count + boundaries > 2 ? MANY : 0;
+    return color;
+}
+
+// The decal with the largest part of a pixel whose centre no decal covers, or -1.
+int nearest_rim(vec3 q, vec3 n, vec3 right, vec3 up) {
+    int nearest = -1;
+    float largest = 0.0;
+    for (int level = 0; level < index_level_count; level++) {
+        ivec2 span = cell_range(q, level);
+        for (int j = span.x; j < span.y; j++) {
+            int decal = texelFetch(index_ids, ivec2(j & 4095, j >> 12), 0).x;
+            vec4 ball = decal_texel(4 * decal);
+            float share = inside_ball(q, right, up, ball).x;
+            if (share > largest && acts(q - ball.xyz, n, decal)) {
+                nearest = decal;
+                largest = share;
+            }
+        }
+    }
+    return nearest;
+}
+
+// Premultiplied linear colour of all decals over each other, averaged over a pixel. In pixels with many boundaries it is
+// the mean of SAMPLES parts, each in another row and column.
+vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+    vec4 sum = vec4(0.0);
+    int count = 1;
+    vec3 point = q;
+    for (int i = 0; i < count; i++) {
+        int owner = decal_single_layer ? int(single_layer_at(point, n, decal_contact).x)
+                                       : owner_at(point, n, decal_contact);
+        if (owner < 0 && count == 1) {
+            owner = nearest_rim(point, n, right, up);
+        }
+        vec4 color = vec4(0.0);
+        int most = 0;
+        while (owner >= 0 && color.a < OPAQUE) {
+            int boundaries;
+            color += (1.0 - color.a) * layer_average(owner, point, n, right, up, boundaries);
+            most = max(most, boundaries);
+            if (!decal_layered) {
+                break;
+            }
+            owner = owner_below(point, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
+                decal_contact);
+        }
+        if (i == 0 && most > MAX_BOUNDARIES) {
+            count = 1 + SAMPLES;
+            right /= sqrt(float(SAMPLES));
+            up /= sqrt(float(SAMPLES));
+        } else {
+            sum += color;
+        }
+        int mirrored = ((i & 1) << 3) | ((i & 2) << 1) | ((i & 4) >> 1) | (i >> 3);
+        vec2 at = (vec2(float(i), float(mirrored)) + 0.5) / float(SAMPLES) - 0.5;
+        point = q + sqrt(float(SAMPLES)) * (at.x * right + at.y * up);
+    }
+    return count > 1 ? sum / float(SAMPLES) : sum;
+}
