@@ -5,14 +5,16 @@ import ipaddress
 import secrets
 import signal
 import socket
+import subprocess
 import sys
 import threading
 import webbrowser
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
-from importlib.util import find_spec
+from importlib import import_module
 from itertools import count
 from pathlib import Path
+from subprocess import PIPE
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -31,6 +33,9 @@ TITLE = "Implicit Decals sandbox"
 
 MAX_PORT = 65535
 MAX_SESSIONS = 64
+WINDOW_SIZE = 1280, 800
+"""Width and height of a window of its own, in pixels."""
+
 FIRST_SIZE = (700, 700)
 """Width and height of the view in pixels until the page tells its own."""
 
@@ -111,10 +116,13 @@ def sandbox(
     check_count("--sessions", sessions, 1, MAX_SESSIONS)
     if model and (lab or lessons is not None):
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
-    if not (share or done or desktop or session):
+    if desktop or not (share or done or session):
         options: dict[str, Any] = {"decals": decals, "image": image, "up": up, "seed": seed, "define": define}
         options |= {"trust": trust, "lab": lab, "lessons": lessons}
-        return _serve_sessions(model, options, save, sessions, host, port, browser=browser)
+        command = _commands(model, options, save)
+        if desktop:
+            return _show_window(command(1))
+        return _serve_sessions(command, sessions, host, port, browser=browser)
     from decals.apps.commands.opening import check_options, opened, report_unsaved
     from decals.apps.models.loading import import_definitions
     from decals.window import EditWindow
@@ -122,8 +130,6 @@ def sandbox(
 
     check_options(decals, seed, save)
     serve, page = _toolkit(lessons)
-    if desktop:
-        _require_webview()
     import_definitions(define)
     opening = opened(
         model, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save, trust=trust
@@ -142,40 +148,27 @@ def sandbox(
             if done or session:
                 ready.add(lambda **_: print(_url(host, server.port, ""), flush=True))
             query = _protect(server, host)
-            own_browser = browser and not desktop and bool(query)  # trame's knows no token
+            own_browser = browser and bool(query)  # trame's knows no token
             if session:
                 ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
             else:
                 ready.add(lambda **_: _announce(host, server.port, query, open_browser=own_browser))
-            window_options = {"exec_mode": "desktop", "title": TITLE} if desktop else {}
             server.start(
                 host=host,
                 port=port,
                 open_browser=browser and not query,
                 show_connection_info=False,
                 timeout=0,
-                **window_options,
             )
     finally:
         report_unsaved(window, "sandbox")
     return 0
 
 
-def _serve_sessions(
-    model: list[str] | None,
-    options: dict[str, Any],
-    save: Path | None,
-    limit: int,
-    host: str,
-    port: int,
-    *,
-    browser: bool,
-) -> int:
-    """Serve a session to each browser, and return the exit code."""
-    try:
-        from decals.apps.sandbox.sessions import Sessions
-    except ImportError as error:
-        raise _missing(error) from None
+def _commands(
+    model: list[str] | None, options: dict[str, Any], save: Path | None
+) -> Callable[[int], list[str]]:
+    """Return the function that gives the command of each session from its number."""
     first = save or Path(f"{Path(model[0]).stem}.json" if model else "scene.json")
     names: dict[int, Path] = {}
 
@@ -189,6 +182,18 @@ def _serve_sessions(
         given = {**given, "save": path, "port": 0, "no_browser": True, "session": True}
         return [sys.executable, "-m", "decals", "sandbox", *opened, *_as_arguments(given)]
 
+    return command
+
+
+def _serve_sessions(
+    command: Callable[[int], list[str]], limit: int, host: str, port: int, *, browser: bool
+) -> int:
+    """Serve a session to each browser, and return the exit code."""
+    try:
+        from decals.apps.sandbox.sessions import Sessions
+    except ImportError as error:
+        raise _missing(error) from None
+
     def ready(found: int) -> None:
         query = f"?secret={token}" if token else ""
         _announce(host, found, query, open_browser=browser)
@@ -199,6 +204,23 @@ def _serve_sessions(
     with suppress(KeyboardInterrupt):
         return asyncio.run(served.serve(host, port, ready))
     return 0
+
+
+def _show_window(command: list[str]) -> int:
+    """Show a session in a window of its own, and return its exit code."""
+    try:
+        webview: Any = import_module("webview")
+    except ImportError:
+        raise MissingPackage(
+            "--desktop needs pywebview; install it with: pip install 'pywebview[qt]', or leave out --desktop"
+        ) from None
+    with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, text=True) as process:
+        assert process.stdout is not None
+        url = next((line.strip() for line in process.stdout if line.startswith("http://")), "")
+        if url:
+            webview.create_window(TITLE, url, width=WINDOW_SIZE[0], height=WINDOW_SIZE[1])
+            webview.start()
+    return process.returncode  # the end of its standard input has ended it
 
 
 def _unused(first: Path, taken: Collection[Path]) -> Path:
@@ -248,14 +270,6 @@ def _missing(error: ImportError) -> MissingPackage:
     return MissingPackage(
         f"the sandbox needs trame ({error}); install it with: pip install 'implicit-decals[browser]'"
     )
-
-
-def _require_webview() -> None:
-    """Raise `MissingPackage` without pywebview, whose window shows the page."""
-    if find_spec("webview") is None:
-        raise MissingPackage(
-            "--desktop needs pywebview; install it with: pip install 'pywebview[qt]', or leave out --desktop"
-        )
 
 
 def _protect(server: Any, host: str) -> str:

@@ -395,7 +395,8 @@ class Sandbox:
                     f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}"
                 )
             path = self._window.actions.files.inside(name)
-            if not path.exists() and not recovery_path(path).is_file():
+            unsaved = self._window.actions.files.inside(recovery_path(path))  # a link could lead elsewhere
+            if not path.exists() and not unsaved.is_file():
                 raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
 
             def load(_progress: Progress, _cancel: Cancel) -> Scene:

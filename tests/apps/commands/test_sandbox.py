@@ -6,6 +6,7 @@ import sys
 import unittest.mock
 import webbrowser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -164,15 +165,21 @@ def test_a_server_refuses_clients_without_its_token() -> None:
         assert asyncio.run(serve()) == [False, False, True]
 
 
-def test_a_window_of_its_own_needs_pywebview(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, opened: list[tuple[Server, EditWindow]], capsys: Capture
+def test_a_window_of_its_own_shows_a_session(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
-    monkeypatch.setattr(sandbox_module, "find_spec", lambda _: None)
+    monkeypatch.setitem(sys.modules, "webview", None)
     assert run(["sandbox", "--desktop"]) == 2
     assert "pip install 'pywebview[qt]'" in capsys.readouterr().err
-    monkeypatch.setattr(sandbox_module, "find_spec", lambda _: object())
-    assert run(["sandbox", "--desktop"]) == 0
-    assert opened[0][0].options["exec_mode"] == "desktop"
+    shown: list[Any] = []
+    window = SimpleNamespace(
+        create_window=lambda *a, **_: shown.append(a), start=lambda: shown.append("start")
+    )
+    monkeypatch.setitem(sys.modules, "webview", window)
+    program = "import sys; print('log\\nhttp://127.0.0.1:1/', flush=True); sys.stdin.read(); sys.exit(3)"
+    monkeypatch.setattr(sandbox_module, "_commands", lambda *_: lambda _: [sys.executable, "-c", program])
+    assert run(["sandbox", "--desktop"]) == 3
+    assert shown == [(sandbox_module.TITLE, "http://127.0.0.1:1/"), "start"]
 
 
 def test_unsaved_changes_are_kept(

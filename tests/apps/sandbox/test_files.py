@@ -161,7 +161,36 @@ def test_files_outside_the_folder_are_neither_read_nor_written(
     for name in ("../a.py", "/tmp/a.png", "no/such/a.png", None, "a.exe"):
         sandbox.write_file(name)  # type: ignore[arg-type]
         assert "expected a" in sandbox.status
+    outside = tmp_path / "outside"
+    folder = outside / "folder"
+    folder.mkdir(parents=True)
+    sandbox = Sandbox(window, folder=folder)
+    blobtree.save(BALL, outside / "ball.json")
+    save_scene(decals.cover(BALL, count=3, images=["eye"]), outside / "lost.recovery.json")
+    (folder / "link").symlink_to(outside)
+    (folder / "ball.json").symlink_to(outside / "ball.json")
+    (folder / "lost.recovery.json").symlink_to(outside / "lost.recovery.json")
+    before = (outside / "ball.json").read_bytes()
+    for name in ("ball.json", "link/ball.json", "link/../ball.json", "lost.json", str(outside / "ball.json")):
+        sandbox.open_file(name)
+        finish(window)
+        assert "inside" in sandbox.status, name
+    for name in (
+        "ball.json",
+        "link/ball.ply",
+        "link/a.png",
+        f"{outside}/a.py",
+        "a.json/../../a.json",
+        "a\0.png",
+    ):
+        sandbox.write_file(name, True)
+        finish(window)
+        assert "inside" in sandbox.status, name
+    assert (outside / "ball.json").read_bytes() == before
+    assert {path.name for path in outside.iterdir()} == {"ball.json", "folder", "lost.recovery.json"}
+    assert {path.name for path in folder.iterdir()} == {"ball.json", "link", "lost.recovery.json"}
+    assert listed(folder) == {"recent": [], "recovered": []}
     sandbox.open_sample("../knot")
     assert "expected one of" in sandbox.status
     assert len(window.document.decals) == 20
-    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith(".")] == []
+    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith(".")] == ["outside"]
