@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, UnusedCliTokensError
 from rich.console import Console
 from rich.markup import escape
 
@@ -162,6 +162,12 @@ def run(tokens: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except OSError as error:
         return _print_error(f"{error.strerror or error}: {error.filename or 'a file'}")
+    except UnusedCliTokensError as error:
+        words = " ".join(error.unused_tokens or ())
+        return _print_error(
+            f"expected one value for each option, such as --size 800x600, got also {words!r}; "
+            "leave it out, or put a value with spaces in quotes"
+        )
     except (CycloptsError, ImplicitDecalsError) as error:  # any other is a bug: it shows its traceback
         return _print_error(str(error))
     return result if isinstance(result, int) else 0

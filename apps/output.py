@@ -3,6 +3,8 @@
 import tempfile
 from pathlib import Path
 
+from rich.console import Console
+
 from decals.errors import InvalidInput
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
@@ -29,6 +31,11 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     except OSError as error:
         reason = f"the output folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
         raise InvalidInput(reason) from error
+
+
+def print_path(path: Path) -> None:
+    """Say on stdout which file was written."""
+    Console().print(str(path), soft_wrap=True, highlight=False, markup=False)
 
 
 def make_folder(folder: Path) -> None:

@@ -21,7 +21,7 @@ from decals.apps.commands.options import (
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_model
-from decals.apps.output import check_output
+from decals.apps.output import check_output, print_path
 
 
 def bake(
@@ -91,3 +91,4 @@ def bake(
             progress=progress,
             **given(contact=contact, stiffness=stiffness, mapping=mapping),
         )
+    print_path(output)

@@ -19,7 +19,7 @@ from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, 
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.gallery import spanning
 from decals.apps.models.shapes import creature, egg
-from decals.apps.output import check_output, make_folder
+from decals.apps.output import check_output, make_folder, print_path
 from decals.errors import NoGraphics
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
@@ -89,7 +89,7 @@ def demo(
             progress(f"drawing {name}", 0.0)
             Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
     for name in PICTURES:
-        Console().print(str(output / name), soft_wrap=True, highlight=False)
+        print_path(output / name)
     lines = "\n".join(f"  {line}" for line in command_lines(next_commands()))
     Console(stderr=True).print(
         f"\nNext, type in this shell:\n\n{lines}", soft_wrap=True, highlight=False, markup=False

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from decals.apps import gallery as examples
 from decals.apps.commands.options import Whole, check_count
-from decals.apps.output import PICTURE_SUFFIXES, check_output, make_folder
+from decals.apps.output import PICTURE_SUFFIXES, check_output, make_folder, print_path
 from decals.errors import InvalidInput
 
 FOLDER = Path("gallery")
@@ -86,6 +86,6 @@ def _draw(pictures: dict[str, Path], side: int) -> None:
             Picture(draw(renderer, panels, side=side)).save(path)
     for name, path in pictures.items():
         if name not in failures:
-            Console().print(str(path), soft_wrap=True, highlight=False)
+            print_path(path)
     if failures:
         raise InvalidInput(f"could not draw {', '.join(failures)}: {next(iter(failures.values()))}")

@@ -11,7 +11,7 @@ from decals import MeshObject, Scene
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_model
-from decals.apps.output import check_output
+from decals.apps.output import check_output, print_path
 from decals.errors import InvalidInput, InvalidMesh, InvalidScene
 from decals.scenes.meshes import as_polydata
 
@@ -87,3 +87,4 @@ def polygonize(
         except (InvalidMesh, InvalidScene) as error:
             raise InvalidInput(f"{model!r}: {error}") from error
         write_polydata(output, surface)
+    print_path(output)

@@ -24,7 +24,7 @@ from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
-from decals.apps.output import PICTURE_SUFFIXES, check_output
+from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
 from decals.apps.views import UPRIGHT, frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing, Picture, Renderer
@@ -131,3 +131,4 @@ def render(
             save_scene(scene, save)
         progress("drawing", 0.0)
         Picture(renderer.render(scene, scene.drawing.at(pixels))).save(output)
+    print_path(output)

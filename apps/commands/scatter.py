@@ -23,7 +23,7 @@ from decals.apps.commands.options import (
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
-from decals.apps.output import check_output
+from decals.apps.output import check_output, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
@@ -140,16 +140,17 @@ def scatter(
         decals = scatter_decals(surfaces, density=density, seed=seed, progress=progress, **options)
         if output.suffix.lower() == ".csv":
             write_table(decals, output, objects[0].origin)
-            return
-        if isinstance(loaded, Scene):
-            camera, drawing = loaded.camera, loaded.drawing
         else:
-            camera, drawing = frame(objects, parse_view(None, axes_of(model[0])), ASPECT), Drawing()
-        if painted is not None:
-            options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
-        recipe = Recipe.of("decals.scatter", seed=seed, models=[item.name for item in objects], **options)
-        kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
-        save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
+            if isinstance(loaded, Scene):
+                camera, drawing = loaded.camera, loaded.drawing
+            else:
+                camera, drawing = frame(objects, parse_view(None, axes_of(model[0])), ASPECT), Drawing()
+            if painted is not None:
+                options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
+            recipe = Recipe.of("decals.scatter", seed=seed, models=[item.name for item in objects], **options)
+            kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
+            save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
+    print_path(output)
 
 
 def write_table(decals: Decals, path: Path, origin: Origin = WORLD) -> None:

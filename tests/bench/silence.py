@@ -26,8 +26,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
-LEFT_OUT = ("edit", "--install-completion", "dragon", "--all", "--define", "--trust", "bench")
-"""Words of commands that need a window, change the home folder, download models, or repeat others."""
+LEFT_OUT = ("edit", "sandbox", "--install-completion", "dragon", "--all", "--define", "--trust", "bench")
+"""Words of commands that need a window or a browser, change the home folder, download models, or repeat
+others."""
 
 SILENCING = re.compile(r"setLevel\(logging.WARNING\)|displayed\(")
 """Code that turns the output off on purpose, or shows it itself; pages explain how."""

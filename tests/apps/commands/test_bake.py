@@ -38,8 +38,9 @@ def test_a_scene_becomes_a_textured_file(saved: Path) -> None:
     assert sorted(path.name for path in saved.iterdir()) == ["model.glb", "scene.json"]
 
 
-def test_vertex_colours_replace_the_texture(saved: Path) -> None:
+def test_vertex_colours_replace_the_texture(saved: Path, capsys: Capture) -> None:
     assert run(["bake", "scene.json", "--vertex-colors", "-o", "model.glb"]) == 0
+    assert capsys.readouterr().out == "model.glb\n"
     tree = read_json(saved / "model.glb")
     assert "textures" not in tree
     assert all("COLOR_0" in mesh["primitives"][0]["attributes"] for mesh in tree["meshes"])

@@ -31,6 +31,7 @@ from decals.errors import NoGraphics
         (["render", "ball.ply", "-o", "a.png", "--samples", "0"], "--samples"),
         (["render", "ball.ply", "-o", "a.png", "--size", "0x10"], "--size"),
         (["render", "ball.ply", "-o", "a.png", "--size", "10"], "WIDTHxHEIGHT"),
+        (["render", "ball.ply", "-o", "a.png", "--size", "10x10", "20"], "got also '20'"),
         (["render", "ball.ply", "-o", "a.png", "--size", "99999x99999"], "16384"),
         (["render", "ball.ply", "-o", "a.png", "--camera", "up"], "three-quarter"),
         (["render", "ball.ply", "-o", "a.png", "--camera", "0,0,0"], "0,0,0"),

@@ -27,7 +27,7 @@ def test_render_a_mesh_and_a_blob_together(folder: Path, capsys: Capture) -> Non
     assert drawn.shape == (48, 64, 4)
     middle, corner = drawn[20:28, 24:40, :3].reshape(-1, 3), drawn[0, 0, :3]
     assert np.abs(middle.astype(int) - corner).max(axis=1).mean() > 40
-    assert capsys.readouterr().out == ""
+    assert capsys.readouterr().out == "both.png\n"
 
 
 def test_pictures_depend_on_the_seed_only(folder: Path) -> None:
