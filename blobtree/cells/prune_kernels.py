@@ -10,7 +10,13 @@ import warp as wp
 
 from blobtree.formulas.falloff import falloff_range
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
-from blobtree.formulas.skeletons import HALF_DIAGONAL, SKELETONS
+from blobtree.formulas.skeletons import (
+    HALF_DIAGONAL,
+    POINT,
+    SKELETONS,
+    box_to_point,
+    squared_distances_to_ball,
+)
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import (
     FIELD,
@@ -47,6 +53,8 @@ _Ranges = wp.types.matrix(shape=(REGISTERS, 2), dtype=wp.float32)
 _Starts = wp.types.vector(length=REGISTERS, dtype=wp.int32)
 _Points = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
 _Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
+POINT_CODE = SKELETONS.index(POINT)
+
 _OuterStarts = wp.types.vector(length=WARP_REGISTERS, dtype=wp.int32)
 
 
@@ -58,16 +66,25 @@ def widened(r: wp.vec2) -> wp.vec2:
     return wp.vec2(wp.max(r[0] - RANGE_MARGIN, 0.0), r[1] + RANGE_MARGIN)
 
 
-@unrolled
+@wp.func
+def ball_range(
+    kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
+) -> wp.vec2:
+    """Return the range of a primitive over the ball around the cube center ± half."""
+    c = closest(kind, center, tape, at)
+    distances = squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence(kind, tape, at))
+    return falloff_range(distances[0], distances[1])
+
+
+@wp.func
 def primitive_range(
     kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
 ) -> wp.vec2:
     """Return the range of a primitive over the cube center ± half."""
-    distances = wp.vec2()
-    for code in range(wp.static(len(SKELETONS))):
-        if kind == code:
-            distances = wp.static(SKELETONS[code].box_distances)(center, half, tape, at)
-    return widened(falloff_range(distances[0], distances[1]))
+    if kind == POINT_CODE:
+        distances = box_to_point(center, half, tape, at)
+        return widened(falloff_range(distances[0], distances[1]))
+    return widened(ball_range(kind, center, half, tape, at))
 
 
 @wp.func

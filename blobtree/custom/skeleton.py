@@ -28,12 +28,7 @@ from blobtree.custom.checks import check_skeleton
 from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
 from blobtree.errors import InvalidNode
-from blobtree.formulas.skeletons import (
-    HALF_DIAGONAL,
-    Skeleton,
-    min_influence_of_one,
-    squared_distances_to_ball,
-)
+from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 from blobtree.nodes.parameters import Color, Parameter, Radius
 from blobtree.nodes.primitives import DEFAULT_COLOR, INFLUENCE_SLOT, Primitive
 from blobtree.tape.program import ProgramPrimitive
@@ -173,19 +168,8 @@ def _row(kind: str, digest: str, source: CustomSource, parameters: tuple[Paramet
         ),
         {source.function.key: source.function},
     )
-    box_name = f"custom_{kind}_box_{digest}"
-    box = generated(
-        box_name,
-        _BOX.format(name=box_name, closest=closest_name),
-        {
-            closest_name: closest,
-            "HALF_DIAGONAL": HALF_DIAGONAL,
-            "min_influence_of_one": min_influence_of_one,
-            "squared_distances_to_ball": squared_distances_to_ball,
-        },
-    )
     return Skeleton(
-        kind, closest, cast(wp.Function, min_influence_of_one), box, texels, folds_maps=False, digest=digest
+        kind, closest, cast(wp.Function, min_influence_of_one), texels, folds_maps=False, digest=digest
     )
 
 
@@ -194,13 +178,6 @@ def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """The user's closest point, and the influence."""
 {texels}    c = {call}
     return wp.vec4(c[0], c[1], c[2], t0[{influence}])
-'''
-
-_BOX = '''\
-def {name}(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − skeleton| / influence)² over the ball around the cube center ± half."""
-    c = {closest}(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
 '''
 
 

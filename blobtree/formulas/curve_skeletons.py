@@ -8,12 +8,7 @@ bracket the minima. No start value can lead to the wrong one of two minima.
 
 import warp as wp
 
-from blobtree.formulas.skeletons import (
-    HALF_DIAGONAL,
-    Skeleton,
-    min_influence_of_one,
-    squared_distances_to_ball,
-)
+from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 
 wp.set_module_options({"enable_backward": False})
 
@@ -268,21 +263,7 @@ def min_influence_of_curve(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.fl
     return wp.min(start, wp.min(start + 0.5 * first, start + first + tape[at + 2][3]))
 
 
-@wp.func
-def box_to_arc(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − arc| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_arc(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-@wp.func
-def box_to_curve(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − curve| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_curve(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_curve(tape, at))
-
-
-ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, box_to_arc, parameters=3)
-CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, box_to_curve, parameters=4)
+ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, parameters=3)
+CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, parameters=4)
 
 CURVE_SKELETONS = (ARC, CURVE)

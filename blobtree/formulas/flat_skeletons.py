@@ -2,12 +2,7 @@
 
 import warp as wp
 
-from blobtree.formulas.skeletons import (
-    HALF_DIAGONAL,
-    Skeleton,
-    min_influence_of_one,
-    squared_distances_to_ball,
-)
+from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 
 wp.set_module_options({"enable_backward": False})
 
@@ -85,29 +80,7 @@ def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32)
     return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], corner[3])
 
 
-@wp.func
-def box_to_rectangle(
-    center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
-    """Bounds on (|x − rectangle| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_rectangle(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-@wp.func
-def box_to_triangle(
-    center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
-    """Bounds on (|x − triangle| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_triangle(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-RECTANGLE = Skeleton(
-    "rectangle", closest_on_rectangle, min_influence_of_one, box_to_rectangle, parameters=3, convex=True
-)
-TRIANGLE = Skeleton(
-    "triangle", closest_on_triangle, min_influence_of_one, box_to_triangle, parameters=4, convex=True
-)
+RECTANGLE = Skeleton("rectangle", closest_on_rectangle, min_influence_of_one, parameters=3, convex=True)
+TRIANGLE = Skeleton("triangle", closest_on_triangle, min_influence_of_one, parameters=4, convex=True)
 
 FLAT_SKELETONS = (RECTANGLE, TRIANGLE)

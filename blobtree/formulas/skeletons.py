@@ -148,41 +148,6 @@ def box_to_point(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4
     return wp.vec2(nearest, farthest) / (point[3] * point[3])
 
 
-@wp.func
-def box_to_segment(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − segment| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_segment(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-@wp.func
-def box_to_cone(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − axis| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_cone(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_cone(tape, at))
-
-
-@wp.func
-def box_to_circle(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − circle| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_circle(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-@wp.func
-def box_to_disc(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − disc| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_disc(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-@wp.func
-def box_to_box(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """Bounds on (|x − box| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_box(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """One row of the table: a kind's name, functions and size on the tape."""
@@ -190,7 +155,6 @@ class Skeleton:
     name: str
     closest: wp.Function
     min_influence: wp.Function
-    box_distances: wp.Function
     parameters: int
     """Number of texels (vec4) of its parameters on the tape."""
     folds_maps: bool = True
@@ -201,16 +165,12 @@ class Skeleton:
     """Digest of the sources of a custom kind."""
 
 
-POINT = Skeleton("point", closest_on_point, min_influence_of_one, box_to_point, parameters=1, convex=True)
-SEGMENT = Skeleton(
-    "segment", closest_on_segment, min_influence_of_one, box_to_segment, parameters=2, convex=True
-)
-CONE = Skeleton("cone", closest_on_cone, min_influence_of_cone, box_to_cone, parameters=2)
-CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, box_to_circle, parameters=2)
-DISC = Skeleton("disc", closest_on_disc, min_influence_of_one, box_to_disc, parameters=2, convex=True)
-BOX = Skeleton(
-    "box", closest_on_box, min_influence_of_one, box_to_box, parameters=2, folds_maps=False, convex=True
-)
+POINT = Skeleton("point", closest_on_point, min_influence_of_one, parameters=1, convex=True)
+SEGMENT = Skeleton("segment", closest_on_segment, min_influence_of_one, parameters=2, convex=True)
+CONE = Skeleton("cone", closest_on_cone, min_influence_of_cone, parameters=2)
+CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, parameters=2)
+DISC = Skeleton("disc", closest_on_disc, min_influence_of_one, parameters=2, convex=True)
+BOX = Skeleton("box", closest_on_box, min_influence_of_one, parameters=2, folds_maps=False, convex=True)
 
 SKELETONS = (POINT, SEGMENT, CONE, CIRCLE, DISC, BOX)
 """Every kind; its index here is its code on the tape."""

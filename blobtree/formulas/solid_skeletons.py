@@ -2,12 +2,7 @@
 
 import warp as wp
 
-from blobtree.formulas.skeletons import (
-    HALF_DIAGONAL,
-    Skeleton,
-    min_influence_of_one,
-    squared_distances_to_ball,
-)
+from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 
 wp.set_module_options({"enable_backward": False})
 
@@ -28,17 +23,6 @@ def closest_on_cylinder(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32)
     return wp.vec4(start[0] + c[0], start[1] + c[1], start[2] + c[2], start[3])
 
 
-@wp.func
-def box_to_cylinder(
-    center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
-    """Bounds on (|x − cylinder| / influence)² over the ball around the cube center ± half."""
-    c = closest_on_cylinder(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence_of_one(tape, at))
-
-
-CYLINDER = Skeleton(
-    "cylinder", closest_on_cylinder, min_influence_of_one, box_to_cylinder, parameters=2, convex=True
-)
+CYLINDER = Skeleton("cylinder", closest_on_cylinder, min_influence_of_one, parameters=2, convex=True)
 
 SOLID_SKELETONS = (CYLINDER,)

@@ -183,8 +183,9 @@ def kink(name: str, a: Floats, b: Floats, reach: float = 2e-3, **parameters: Any
 
 
 def cliques(names: tuple[str, ...], pairs: tuple[tuple[str, str], ...]) -> list[tuple[int, ...]]:
-    """All groups of operands of which every two blend, by trying every group."""
+    """The maximal groups of operands of which every two blend, by trying every group."""
     edges = {frozenset((names.index(one), names.index(other))) for one, other in pairs}
     numbers = range(len(names))
     groups = [group for size in range(1, len(names) + 1) for group in combinations(numbers, size)]
-    return [group for group in groups if all(frozenset(two) in edges for two in combinations(group, 2))]
+    found = [group for group in groups if all(frozenset(two) in edges for two in combinations(group, 2))]
+    return [group for group in found if not any(set(group) < set(other) for other in found)]

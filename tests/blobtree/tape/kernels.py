@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from blobtree.formulas.skeletons import HALF_DIAGONAL, Skeleton, squared_distances_to_ball
+from blobtree.formulas.skeletons import Skeleton
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,11 +26,4 @@ def min_influence_of_pair(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.flo
     return tape[at][3]
 
 
-@wp.func
-def box_to_pair(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
-    """By the ball around the cube."""
-    c = closest_of_pair(center, tape, at)
-    return squared_distances_to_ball(center, half * HALF_DIAGONAL, c, tape[at][3])
-
-
-PAIR = Skeleton("pair", closest_of_pair, min_influence_of_pair, box_to_pair, 1, folds_maps=False, digest="1")
+PAIR = Skeleton("pair", closest_of_pair, min_influence_of_pair, 1, folds_maps=False, digest="1")
