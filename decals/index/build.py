@@ -12,12 +12,19 @@ from numpy.typing import NDArray
 
 from blobtree.kernels import loaded
 from decals.index import build_kernels as kernels
-from decals.index.decal_cells import EMPTY, EXPONENT_OF_ONE, EXPONENTS, NO_PARITY
+from decals.index.decal_cells import EMPTY, EXPONENT_OF_ONE, EXPONENTS, NO_FLOOR, NO_PARITY
 
 INT32 = np.iinfo(np.int32)
 
 MAX_AVERAGE_CELLS = 24
 """Average number of cells of a decal up to which sizes share levels: twice the usual number."""
+
+
+MIN_LARGER = 16
+"""Number of decals on a level for each smaller decal that uses its cells."""
+
+MAX_SMALLER = 4
+"""Largest number of such smaller decals with their centres in one cell."""
 
 
 class IndexArrays(NamedTuple):
@@ -27,6 +34,7 @@ class IndexArrays(NamedTuple):
     table: Any
     ids: Any
     parity: int
+    floor: int
 
 
 def build_index(positions: Any, influence: Any, ranks: Any) -> IndexArrays:
@@ -38,6 +46,7 @@ class _Sizes(NamedTuple):
     """Cells of each decal (exponent, number, running sum), and the range of ranks of each exponent."""
 
     parity: int
+    floor: int
     exponents: Any
     counts: Any
     ends: Any
@@ -64,7 +73,7 @@ class _Builder:
     def build(self) -> IndexArrays:
         if not self.count:
             nothing = wp.zeros(0, dtype=wp.vec4, device=self.device)
-            return IndexArrays(nothing, self.empty_table(1), self.empty_ints(0), NO_PARITY)
+            return IndexArrays(nothing, self.empty_table(1), self.empty_ints(0), NO_PARITY, NO_FLOOR)
         order = self.drawing_order()
         sizes = self.choose_sizes(order)
         levels, level_of = _levels(sizes)
@@ -80,32 +89,59 @@ class _Builder:
             [keys, owners],
         )
         table, ids = self.build_lists(keys, owners)
-        return IndexArrays(wp.array(levels, dtype=wp.vec4, device=self.device), table, ids, sizes.parity)
+        numbers = wp.array(levels, dtype=wp.vec4, device=self.device)
+        return IndexArrays(numbers, table, ids, sizes.parity, sizes.floor)
 
     def choose_sizes(self, order: Any) -> "_Sizes":
-        """Return the sizes with the fewest levels, shared in pairs if that does not need too many cells."""
-        best = self.sizes(order, NO_PARITY)
+        """Return the sizes with the fewest levels, shared in pairs if that does not need too many cells.
+
+        A few small decals use the cells of larger ones first.
+        """
+        best = self.sizes(order, NO_PARITY, NO_FLOOR)
+        floor = self.floor_of(best, order)
+        if floor != NO_FLOOR:
+            best = self.sizes(order, NO_PARITY, floor)
         used = best.used - EXPONENT_OF_ONE
         for parity in (0, 1):
             if len(np.unique(used - ((used & 1) != parity))) < len(best.used):
-                other = self.sizes(order, parity)
+                other = self.sizes(order, parity, floor)
                 if other.cells <= MAX_AVERAGE_CELLS * self.count and other.cost < best.cost:
                     best = other
         return best
 
-    def sizes(self, order: Any, parity: int) -> "_Sizes":
+    def floor_of(self, sizes: "_Sizes", order: Any) -> int:
+        """Return the largest exponent that a few smaller decals can share; NO_FLOOR for none.
+
+        Each level costs a look-up at every point. A decal in larger cells than its own costs one more
+        candidate at the few points in these.
+        """
+        used = sizes.used - EXPONENT_OF_ONE
+        if len(used) < 2:
+            return NO_FLOOR
+        exponents = sizes.exponents.numpy()
+        for exponent in used[:0:-1].tolist():
+            smaller = np.flatnonzero(exponents < exponent)
+            if MIN_LARGER * len(smaller) > np.count_nonzero(exponents == exponent):
+                continue
+            rows = order.numpy()[smaller]
+            cells = np.floor(self.positions.numpy()[rows] / 2.0**exponent)
+            if np.unique(cells, axis=0, return_counts=True)[1].max() <= MAX_SMALLER:
+                return int(exponent)
+        return NO_FLOOR
+
+    def sizes(self, order: Any, parity: int, floor: int) -> "_Sizes":
         exponents, counts, ends = (self.empty_ints(self.count) for _ in range(3))
         lowest = self.filled(EXPONENTS, INT32.max)
         highest = self.filled(EXPONENTS, INT32.min)
         self.launch(
             kernels.measure_decals,
             self.count,
-            [self.positions, self.influence, self.ranks, order, parity],
+            [self.positions, self.influence, self.ranks, order, parity, floor],
             [exponents, counts, lowest, highest],
         )
         wp.utils.array_scan(counts, ends, inclusive=True)
         cells = int(ends[self.count - 1 :].numpy()[0])
-        return _Sizes(parity, exponents, counts, ends, cells, lowest.numpy(), highest.numpy())
+        return _Sizes(parity, floor, exponents, counts, ends, cells, lowest.numpy(), highest.numpy())
 
     def drawing_order(self) -> Any:
         """Return the numbers of the decals in draw order."""

@@ -41,6 +41,7 @@ def measure_decals(
     ranks: wp.array(dtype=wp.int32),
     order: wp.array(dtype=wp.int32),
     parity: wp.int32,
+    floor: wp.int32,
     exponents: wp.array(dtype=wp.int32),
     counts: wp.array(dtype=wp.int32),
     lowest: wp.array(dtype=wp.int32),
@@ -49,7 +50,7 @@ def measure_decals(
     """Write exponent and number of the cells of each decal in draw order, and the ranks of each exponent."""
     i = wp.tid()
     decal = order[i]
-    exponent = cell_exponent(positions[decal], influence[decal], parity)
+    exponent = cell_exponent(positions[decal], influence[decal], parity, floor)
     width = power_of_two(exponent)
     corner = lowest_cell(positions[decal], influence[decal], width)
     across = cells_across(positions[decal], influence[decal], width)

@@ -27,6 +27,9 @@ EXPONENT_OF_ONE = 128
 NO_PARITY = -1
 """Parity value for which each size of decals has its own level; see `shared_exponent`."""
 
+NO_FLOOR = -EXPONENT_OF_ONE
+"""Exponent of the smallest cells where each size of decals may have cells of its own."""
+
 MAX_CELLS_OF_DECAL = 125
 """Largest number of cells of a decal: 3 along each axis in its own size, 5 in half its size."""
 
@@ -91,8 +94,8 @@ def shared_exponent(exponent: wp.int32, parity: wp.int32) -> wp.int32:
 
 
 @wp.func
-def cell_exponent(position: wp.vec3, influence: wp.float32, parity: wp.int32) -> wp.int32:
-    """Return the exponent e of the cell size 2^e of a decal.
+def cell_exponent(position: wp.vec3, influence: wp.float32, parity: wp.int32, floor: wp.int32) -> wp.int32:
+    """Return the exponent e of the cell size 2^e of a decal, at least the floor.
 
     The size lies in (ρ, 2ρ], or is half of that if the decal shares the level of smaller ones. It is larger
     where the spacing of float32 positions is larger.
@@ -100,9 +103,8 @@ def cell_exponent(position: wp.vec3, influence: wp.float32, parity: wp.int32) ->
     centre = to_float64(position)
     reach = grown_reach(influence)
     farthest = wp.max(wp.max(wp.abs(centre[0]), wp.abs(centre[1])), wp.abs(centre[2])) + reach
-    return wp.max(
-        shared_exponent(exponent_above(reach), parity), exponent_above(wp.min(farthest, MAX_LENGTH)) - FINEST
-    )
+    finest = wp.max(floor, exponent_above(wp.min(farthest, MAX_LENGTH)) - FINEST)
+    return wp.max(shared_exponent(exponent_above(reach), parity), finest)
 
 
 @wp.func

@@ -11,12 +11,15 @@ from blobtree._typing import Float32Array, Int64Array
 from blobtree.kernels import loaded
 from decals.index import edit_kernels as kernels
 from decals.index.change_log import ChangeLog
-from decals.index.decal_cells import FINEST, MAX_CELLS_OF_DECAL, NO_PARITY, REACH_WITH_SLACK
+from decals.index.decal_cells import FINEST, MAX_CELLS_OF_DECAL, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex, indexed_decals
 from decals.index.rows import with_spare
 from decals.model import RECORD
 
 MAX_LEVELS = 128
+
+MAX_SMALL_EDITS = 64
+"""Number of decals smaller than the cells they share, from which the index is rebuilt."""
 
 LEVELS, TABLE, IDS = "index_levels", "index_table", "index_ids"
 _TYPES = {LEVELS: wp.vec4, TABLE: wp.vec4i, IDS: wp.int32}
@@ -31,14 +34,15 @@ class EditableIndex:
         "index_levels", "index_table" and "index_ids". A change may replace an array.
     stale : bool
         True if `build` must run before the arrays may be read.
-    parity : int
-        Sizes that share levels, as `DecalIndex.parity`.
+    parity, floor : int
+        Sizes that share levels, as in `DecalIndex`.
     """
 
     def __init__(self) -> None:
         self.arrays: dict[str, NDArray[Any]] = {}
         self.stale = True
-        self.parity = NO_PARITY
+        self.parity, self.floor = NO_PARITY, NO_FLOOR
+        self._small_edits = 0
         self._level_of: dict[int, int] = {}
         self._list_rooms: Any = None
         self._records: Float32Array | None = None
@@ -65,8 +69,10 @@ class EditableIndex:
         levels = np.zeros((MAX_LEVELS, 4), np.float32)
         levels[: index.level_count] = index.levels
         level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
-        reordered = index.parity != self.parity or not _same_order(self._level_of, level_of)
-        self.parity, self._level_of = index.parity, level_of
+        shared = self.parity, self.floor
+        self.parity, self.floor, self._small_edits = index.parity, index.floor, 0
+        reordered = shared != (self.parity, self.floor) or not _same_order(self._level_of, level_of)
+        self._level_of = level_of
         table, ids = index.table.copy(), index.ids.copy()
         full = np.flatnonzero(table[:, 0] >= 0)
         heads = table[full, 3]
@@ -86,6 +92,9 @@ class EditableIndex:
     def insert(self, records: Float32Array, number: int, rank: int, log: ChangeLog) -> bool:
         """Insert a decal into the lists of its cells; return False if they have no room for it."""
         exponent = self._exponent(records, number)
+        self._small_edits += _exponent_above(records[RECORD * number, 3]) < self.floor
+        if self._small_edits > MAX_SMALL_EDITS:
+            return False
         self._widen_level(exponent, float(rank), log)
         inputs = [number, exponent, self._level_of[exponent], self._indexed(records), self._list_rooms]
         inputs += [self._state_on_cpu, self._ranges_on_cpu, self._slots_on_cpu]
@@ -119,9 +128,9 @@ class EditableIndex:
         x, y, z, influence = records[RECORD * number].tolist()
         reach = influence * REACH_WITH_SLACK
         farthest = max(abs(x), abs(y), abs(z)) + reach
-        exponent = math.frexp(reach)[1]
+        exponent = _exponent_above(influence)
         joins = self.parity != NO_PARITY and exponent % 2 != self.parity
-        return max(exponent - joins, math.frexp(farthest)[1] - FINEST)
+        return max(exponent - joins, self.floor, math.frexp(farthest)[1] - FINEST)
 
     def _widen_level(self, exponent: int, rank: float, log: ChangeLog) -> None:
         """Add the level of a cell size if it is missing, and include a rank in its range."""
@@ -138,6 +147,11 @@ class EditableIndex:
     def _log_lists(self, log: ChangeLog) -> None:
         for first, end in self._ranges[: self._state[2]].tolist():
             log.add(IDS, (first, end))
+
+
+def _exponent_above(influence: float) -> int:
+    """Return the exponent of the smallest power of two above a neighbour reach."""
+    return math.frexp(float(influence) * REACH_WITH_SLACK)[1]
 
 
 def _shared(array: NDArray[Any], dtype: Any) -> tuple[NDArray[Any], Any]:

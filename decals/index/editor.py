@@ -171,7 +171,7 @@ class DecalEditor:
         """Current index in the editor's own memory; the next edit changes it."""
         arrays, count = self.arrays, self.next_number
         levels = arrays[LEVELS][: self.level_count]
-        return DecalIndex(levels, arrays[TABLE], arrays[IDS], count, self._index.parity)
+        return DecalIndex(levels, arrays[TABLE], arrays[IDS], count, self._index.parity, self._index.floor)
 
     @property
     def max_influence(self) -> float:

@@ -6,7 +6,8 @@ the one level whose cells are larger than ρ and at most 2ρ wide: in at most 27
 
 A look-up reads one cell of each level. Sizes therefore share levels in pairs where that leaves fewer levels:
 the larger size then uses the cells of the smaller, half as wide. A decal then has at most 125 cells, and all
-have at most 24 on average. Three arrays go to the device:
+have at most 24 on average. A few small decals among many larger ones use the cells of these. Three arrays go
+to the device:
 
     levels  float32[l, 4]   each level: (cells per unit length, cell size, lowest rank, highest rank)
     table   int32[2^k, 4]   slots of an open-addressing hash table: (x + level·2²⁴, y, z, head), or x < 0
@@ -29,7 +30,7 @@ from blobtree.device import known_device
 from blobtree.kernels import loaded
 from decals.errors import InvalidDecals
 from decals.index.build import build_index
-from decals.index.decal_cells import LEVEL_SHIFT, NO_PARITY
+from decals.index.decal_cells import LEVEL_SHIFT, NO_FLOOR, NO_PARITY
 from decals.index.lookup import IndexedDecals, count_candidates, list_candidates
 from decals.model import DEFAULT_RANK, LAYER_LIMIT, MAX_COORDINATE, Decals
 from decals.receivers import EVERYTHING
@@ -58,6 +59,8 @@ class DecalIndex:
     parity : int, optional
         Parity of the size exponents that keep their own level; the others share it. Default -1: no level is
         shared.
+    floor : int, optional
+        Exponent of the smallest cells, which smaller decals share.
 
     See Also
     --------
@@ -80,6 +83,7 @@ class DecalIndex:
     ids: Int32Array
     count: int
     parity: int = NO_PARITY
+    floor: int = NO_FLOOR
 
     @classmethod
     def build(cls, positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike = DEFAULT_RANK) -> Self:
@@ -106,7 +110,7 @@ class DecalIndex:
         order = whole_array("ranks", order, len(centres), low=0, high=MAX_RANK, default=DEFAULT_RANK)
         arrays = build_index(*_device_arrays(centres, reach, order, known_device("cpu")))
         lists = arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy()
-        return cls(*lists, count=len(centres), parity=arrays.parity)
+        return cls(*lists, count=len(centres), parity=arrays.parity, floor=arrays.floor)
 
     @classmethod
     def of(cls, decals: Decals) -> Self:
@@ -181,7 +185,7 @@ def index_on(decals: Decals, device: Any = None, *, reach: float = 1.0) -> Any:
     `reach` multiplies the distance to which decals are listed, their neighbour reach.
     """
     placed = _device_arrays(decals.positions, reach * decals.influence, decals.ranks, device)
-    levels, table, ids, _ = build_index(*placed)
+    levels, table, ids, *_ = build_index(*placed)
     return indexed_decals(decals.packed(), levels, table, ids, layered=decals.layered, device=device)
 
 

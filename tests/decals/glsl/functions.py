@@ -64,6 +64,8 @@ def rows(array: NDArray[Any]) -> NDArray[Any]:
     """`array` as a data texture takes it: int32[n], or float32[n, 4] padded with zeros."""
     if array.dtype.kind in "iu" and array.shape[1:] in ((), (4,)):
         return array.astype(np.int32)
+    if not len(array):
+        return np.zeros((1, 4), np.float32)
     columns = array.reshape(len(array), -1).astype(np.float32)
     return np.pad(columns, ((0, 0), (0, 4 - columns.shape[1])))
 

@@ -236,13 +236,19 @@ def test_hundreds_of_thousands_in_one_point() -> None:
         ((30, 0, 30), 2),
         ((30, 30, 30), 2),
         ((30, 30, 30, 30), 2),
-        ((1, 1000), 2),
-        ((1, 0, 300, 300), 2),
+        ((1, 1000), 1),
+        ((100, 1000), 2),
+        ((1, 0, 300, 300), 1),
+        ((2, 1, 0, 0, 2000), 1),
+        ((1000, 0, 0, 1), 2),
         ((300,), 1),
     ],
 )
-def test_sizes_join_in_pairs_while_cells_are_few(counts: Any, joined: Any) -> None:
-    """Neighbouring sizes share a level, unless most decals would take too many cells for it."""
+def test_sizes_join_while_cells_and_candidates_are_few(counts: Any, joined: Any) -> None:
+    """Neighbouring sizes share a level, unless most decals would take too many cells for it.
+
+    So do a few small decals, unless they lie close together.
+    """
     rng = np.random.default_rng(2)
     exponents = np.repeat(np.arange(len(counts)) - 5, counts)
     positions = rng.random((len(exponents), 3)).astype(np.float32)
