@@ -179,6 +179,8 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
     radius = brush.radius or (default_radius(document) if has_objects else 1.0)
     size = brush.decal_radius or (default_decal_radius(document) if has_objects else 0.1)
     usual = default_radius(document) if has_objects else 1.0
+    if brush.brush in (Brush.SELECT, Brush.BOX, Brush.LASSO):
+        return {"brush": str(brush.brush), "controls": []}
     reach = max(4.0 * usual, radius)
     controls = [_slider("radius", radius, reach / STEPS, reach, "radius of the brush, in model units")]
     if brush.brush is Brush.SCATTER:

@@ -6,8 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 import pyvista as pv
+from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Float64Array
+from blobtree._typing import Float32Array
 from blobtree.nodes.paths import node_in_world
 from decals.apps.views import PRESETS
 from decals.editing.background import Job, Worker
@@ -21,7 +22,7 @@ from decals.surfaces.surface import unit_rows
 from decals.validation import describe, finite_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
-from decals.window.host_plotter import ray_through
+from decals.window.host_plotter import pixels_of, ray_through
 
 MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
 OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
@@ -246,25 +247,36 @@ class Display:
         trees = self._window.actions.trees
         if not trees.handles(1.0):
             return {"handles": []}
-        length, matrix = self._gizmo_frame(trees.handles(1.0)[0].position)
-        handles = trees.handles(length)
-        clip = np.array([(*handle.position, 1.0) for handle in handles]) @ matrix.T
-        ahead = clip[:, 3] > 0.0
-        places = 0.5 + clip[:, :2] / np.where(ahead, clip[:, 3], 1.0)[:, None] * (0.5, -0.5)
+        handles = trees.handles(self._gizmo_length())
+        places = self._in_view(pixels_of(self._window.subplot, [handle.position for handle in handles]))
         return {
             "handles": [
-                {"name": handle.name, "x": round(x, 4), "y": round(y, 4)}
-                for handle, (x, y), seen in zip(handles, places.tolist(), ahead, strict=True)
-                if seen
+                {"name": handle.name, "x": x, "y": y}
+                for handle, (x, y) in zip(handles, places, strict=True)
+                if np.isfinite(x)
             ]
         }
 
-    def _gizmo_frame(self, middle: Float64Array) -> tuple[float, Float64Array]:
-        """Return the length of a gizmo's axes at a point, in model units, and the matrix to clip space."""
-        size = self._window.plotter.window_size
-        matrix = self._window.subplot.viewpoint().clip_matrix(tuple(size), (middle - 1.0, middle + 1.0))
-        depth = float(matrix[3, :3] @ middle + matrix[3, 3])
-        return 2.0 * GIZMO_SIZE * abs(depth) / float(np.linalg.norm(matrix[1, :3])), matrix
+    def _in_view(self, pixels: ArrayLike) -> list[list[float]]:
+        """Return pixels as parts of the view's width, and of its height from the top."""
+        places = (np.asarray(pixels, np.float64).reshape(-1, 2) + 0.5) / self._window.plotter.window_size
+        places[:, 1] = 1.0 - places[:, 1]
+        listed: list[list[float]] = places.round(4).tolist()
+        return listed
+
+    def selection_line(self) -> str:
+        """Return the box or lasso that is being drawn, as points of an SVG of the size 1."""
+        return " ".join(f"{x},{y}" for x, y in self._in_view(self._window.tools.selection_line))
+
+    def _gizmo_length(self) -> float:
+        """Return the length of the gizmo's axes, in model units: the same in all pictures of a size."""
+        (middle, *_), subplot = self._window.actions.trees.handles(1.0), self._window.subplot
+        camera = subplot.vtk_renderer.camera
+        back = np.subtract(camera.position, camera.focal_point)
+        side = unit_rows(np.cross(camera.up, back)[None])[0].astype(np.float64)
+        ends = pixels_of(subplot, [middle.position, middle.position + side])
+        height: int = self._window.plotter.window_size[1]
+        return GIZMO_SIZE * height / float(np.linalg.norm(ends[1] - ends[0]))
 
     def drag_handle(self, name: str, phase: str, x: float, y: float, *, snap: bool) -> None:
         """Drag a handle of the selected node; the pointer is given in parts of the view's width and height.
@@ -287,9 +299,7 @@ class Display:
         ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
         assert ray is not None  # the place lies in the view
         if phase == "begin":
-            handles = trees.handles(1.0)
-            length = self._gizmo_frame(handles[0].position)[0] if handles else 1.0
-            trees.begin_handle_drag(name, ray, length)
+            trees.begin_handle_drag(name, ray, self._gizmo_length() if trees.handles(1.0) else 1.0)
             return
         trees.drag_handle(ray, snap=snap)
         if phase == "end":

@@ -92,6 +92,14 @@ GIZMO = f"""<svg style="position: absolute; inset: 0; width: 100%; height: 100%;
 """Handles of the selected node above the view: they cost no frame."""
 
 
+LASSO = """<svg viewBox="0 0 1 1" preserveAspectRatio="none"
+  style="position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none">
+<polygon :points="gizmo.line" fill="#0072b233" stroke="#0072b2" stroke-width="2"
+  vector-effect="non-scaling-stroke"/>
+</svg>"""
+"""The box or lasso that is being drawn."""
+
+
 class Page:
     """The page of one sandbox.
 
@@ -197,6 +205,7 @@ class Page:
                 ):
                     self.view = StreamedView(self._window, self.sandbox.take_step, style="height: 100%")
                     self.sandbox.schedule = self.view.update
+                    html.Div(LASSO, v_if="gizmo.line")
                     html.Div(GIZMO, v_if="gizmo.handles.length")
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):

@@ -17,6 +17,8 @@ COMPACT = {"density": "compact", "hide_details": True}
 
 BRUSH_ICONS = {
     Brush.SELECT: "mdi-cursor-default-outline",
+    Brush.BOX: "mdi-selection-drag",
+    Brush.LASSO: "mdi-lasso",
     Brush.SCATTER: "mdi-spray",
     Brush.PUSH: "mdi-gesture-swipe",
     Brush.ERASE: "mdi-eraser",
@@ -24,6 +26,8 @@ BRUSH_ICONS = {
 }
 BRUSH_TEXTS = {
     Brush.SELECT: "select and move decals",
+    Brush.BOX: "box: drag to select decals",
+    Brush.LASSO: "lasso: drag around decals to select them",
     Brush.SCATTER: "scatter brush: drag to place decals",
     Brush.PUSH: "push brush: drag to push decals, neighbours yield",
     Brush.ERASE: "erase brush: drag to delete decals",
@@ -307,7 +311,7 @@ def build_brushes(sandbox: Sandbox) -> None:
 
 def build_decal_panel(sandbox: Sandbox) -> None:
     """Build the panels of the brush, the selected decals, and the contact modes."""
-    with html.Div(v_if="brush.brush !== 'select'", classes="pa-3"):
+    with html.Div(v_if="brush.controls.length", classes="pa-3"):
         html.H2("{{ brush.brush }} brush", classes="text-subtitle-1")
         with html.Div(v_for="c in brush.controls", key="c.name"):
             build_label()

@@ -133,7 +133,7 @@ class Sandbox:
             "undone": list(session.undone_labels[:MAX_HISTORY]),
             "start": self._start,
             "display": self.display.values(),
-            "gizmo": self.display.gizmo(),
+            "gizmo": {**self.display.gizmo(), "line": self.display.selection_line()},
             "decal": {
                 "count": len(state.selection),
                 "controls": decal_controls(self._window.document, state.selection),

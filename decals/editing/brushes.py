@@ -31,9 +31,14 @@ MAX_NEW_DECALS = 400
 
 
 class Brush(StrEnum):
-    """What a drag with the left button does to decals; SELECT selects and moves them."""
+    """What a drag with the left button does to decals.
+
+    SELECT selects and moves single ones, BOX and LASSO select those in a box, or in a line around them.
+    """
 
     SELECT = "select"
+    BOX = "box"
+    LASSO = "lasso"
     SCATTER = "scatter"
     PUSH = "push"
     ERASE = "erase"

@@ -6,11 +6,19 @@ from enum import Enum, auto
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Float64Array
 from decals.editing.actions import KEYS, Actions
 from decals.editing.brushes import Brush, BrushStroke
 from decals.editing.commands import MoveDecals
-from decals.editing.queries import SurfacePick, first_hit, nearest_points, pick, shortest_rotations
+from decals.editing.queries import (
+    SurfacePick,
+    facing_decals,
+    first_hit,
+    inside_polygon,
+    nearest_points,
+    pick,
+    shortest_rotations,
+)
 from decals.errors import InvalidEdit
 from decals.validation import describe, finite_number, instance
 
@@ -47,6 +55,13 @@ class PointerTools:
         Returns the ray through a pixel, or None outside the picture.
     occluded
         Hidden points can neither be picked nor be the target of a drag.
+    pixels
+        Returns the pixels at which points appear, shape (n, 2), for boxes and lassos.
+
+    Attributes
+    ----------
+    selection_line
+        Corners of the box or lasso that is being drawn, in pixels.
 
     Examples
     --------
@@ -68,9 +83,11 @@ class PointerTools:
         actions: Actions,
         ray: Callable[[float, float], Ray | None],
         occluded: Occluded = lambda _x, _y, _point: False,
+        pixels: Callable[[Float32Array], Float64Array] = lambda points: np.full((len(points), 2), np.nan),
     ) -> None:
         self.actions = instance("actions", actions, Actions, InvalidEdit, "Actions(session) makes some")
-        self._ray, self._occluded = ray, occluded
+        self._ray, self._occluded, self._pixels = ray, occluded, pixels
+        self.selection_line: list[tuple[float, float]] = []
         self._press, self._press_position = Press.UP, (0.0, 0.0)
         self._drag: DecalDrag | None = None
         self._brush: BrushStroke | None = None
@@ -118,6 +135,10 @@ class PointerTools:
         self._press_position, self._press, self._drag = _checked_pixel(x, y), Press.DOWN, None
         if ctrl:
             return True
+        self.selection_line = []
+        if self.actions.state.brush.brush in (Brush.BOX, Brush.LASSO) and not shift:
+            self.selection_line = [(x, y)]
+            return True
         if self.actions.state.brush.brush is not Brush.SELECT and not shift:
             return self._begin_brush(x, y)
         selection = self.actions.state.selection
@@ -142,6 +163,11 @@ class PointerTools:
         x, y = _checked_pixel(x, y)
         if self._press is Press.UP:
             return False
+        if self.selection_line:
+            (left, low), box = self.selection_line[0], self.actions.state.brush.brush is Brush.BOX
+            line = [(left, low), (x, low), (x, y), (left, y)]
+            self.selection_line = line if box else [*self.selection_line, (x, y)]
+            return True
         if self._brush is not None:
             surface_pick = self.at(x, y)
             if surface_pick is not None:
@@ -167,6 +193,10 @@ class PointerTools:
         brush, self._brush = self._brush, None
         if press is Press.UP:
             return False
+        line, self.selection_line = self.selection_line, []
+        if len(line) > 2:
+            self._select_inside(line)
+            return True
         if brush is not None:
             self.actions.state.end_stroke()
             return True
@@ -176,6 +206,20 @@ class PointerTools:
             self.actions.state.end_stroke()
         return drag is not None or ctrl
 
+    def _select_inside(self, line: list[tuple[float, float]]) -> None:
+        """Select the visible decals whose centres appear in a polygon."""
+        state = self.actions.state
+        document = state.session.document
+        numbers = document.decals.numbers
+        places = self._pixels(document.decals.column("positions"))
+        inside = inside_polygon(places, line)
+        rays = [self._ray(*place) for place in places[inside].tolist()]
+        known = np.array([ray is not None for ray in rays], np.bool_)
+        near = numbers[inside][known]
+        seen = facing_decals(document, near, [ray for ray in rays if ray is not None])
+        state.primitive, state.selection = None, state.selectable(near[seen])
+        state.message = f"{len(state.selection)} decals"
+
     def _perform(self, name: str, x: float, y: float, *, ctrl: bool, shift: bool) -> bool:
         if not isinstance(name, str):
             raise InvalidEdit(f"key: expected its name, such as 'z', got {describe(name)}")
@@ -184,6 +228,7 @@ class PointerTools:
         if action is None:
             return False
         if action == "deselect":
+            self.selection_line = []
             self._drag = self._brush = None
         if self.dragging:
             self.actions.state.end_stroke()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
@@ -254,6 +254,57 @@ def pick(
         on = document.objects[numbers[int(hit.objects[0])]]
         owner = int(evaluate(document.decals, hit.positions, hit.normals, contact=contact, on=on).owner[0])
     return SurfacePick(numbers[int(hit.objects[0])], hit.positions[0], hit.normals[0], owner)
+
+
+def inside_polygon(points: ArrayLike, corners: ArrayLike) -> BoolArray:
+    """Return True for each point in a polygon, by the even-odd rule.
+
+    Parameters
+    ----------
+    points
+        Points of a plane, shape (n, 2); NaN is outside.
+    corners
+        Corners of the polygon, shape (m, 2); the last is joined to the first.
+
+    Examples
+    --------
+    >>> from decals.editing.queries import inside_polygon
+    >>> inside_polygon([(1, 1), (3, 1)], [(0, 0), (2, 0), (2, 2), (0, 2)]).tolist()
+    [True, False]
+    """
+    x, y = np.asarray(points, np.float64).reshape(-1, 2).T[..., None]
+    first = np.asarray(corners, np.float64).reshape(-1, 2)
+    (x0, y0), (x1, y1) = first.T, np.roll(first, -1, axis=0).T
+    spans = (y0 > y) != (y1 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossed = spans & (x < (x1 - x0) * (y - y0) / (y1 - y0) + x0)
+    inside: BoolArray = crossed.sum(axis=1) % 2 == 1
+    return inside
+
+
+FACING = 0.3
+"""Cosine between view and normal up to which a decal at an edge still counts as facing the viewer."""
+
+HIDDEN_DEPTH = 0.5
+"""A decal counts as hidden if another surface lies so far in front of its centre, in its radii."""
+
+
+def facing_decals(
+    document: Document, numbers: ArrayLike, rays: Sequence[tuple[ArrayLike, ArrayLike]]
+) -> BoolArray:
+    """Return True for each decal that a viewer sees, given the ray from the viewer to its centre."""
+    decals = document.decals.take(numbers)
+    if not len(decals):
+        return np.zeros(0, np.bool_)
+    origins, directions = (point_array(np.array([ray[part] for ray in rays])) for part in (0, 1))
+    directions = unit_rows(directions)
+    depths = np.einsum("ni,ni->n", decals.positions - origins, directions)
+    first = np.full(len(decals), np.inf)
+    for item in document.shown_objects:
+        first = np.minimum(first, item.surface.raycast(origins, directions))
+    toward = np.einsum("ni,ni->n", decals.normals, directions) < FACING
+    seen: BoolArray = toward & (first > depths - HIDDEN_DEPTH * decals.radii)
+    return seen
 
 
 ANGLES, RINGS = 48, 12

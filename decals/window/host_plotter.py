@@ -9,10 +9,12 @@ from contextlib import contextmanager
 from functools import wraps
 from typing import Any
 
+import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
+from blobtree._typing import Float64Array
 from decals.editing.document import Document
 from decals.editing.pointer_tools import Ray
 from decals.errors import InvalidScene, NoGraphics
@@ -127,6 +129,19 @@ def ray_through(subplot: SubplotRenderer, x: float, y: float) -> Ray | None:
         return None
     rays = subplot.viewpoint().rays(width, height)
     return rays.origins(x, y), rays.directions(x, y)
+
+
+def pixels_of(subplot: SubplotRenderer, points: ArrayLike) -> Float64Array:
+    """Return the pixels of the window at which points appear, float64[n, 2]; NaN behind the camera."""
+    renderer: Any = subplot.vtk_renderer
+    (left, low), (width, height) = renderer.GetOrigin(), renderer.GetSize()
+    places = np.asarray(points, np.float64).reshape(-1, 3)
+    box = places.min(axis=0, initial=-1.0), places.max(axis=0, initial=1.0)  # decides depths alone
+    matrix = subplot.viewpoint().clip_matrix((width, height), box)
+    clip = matrix @ np.column_stack([places, np.ones(len(places))]).T
+    depth = np.where(clip[3] > 0.0, clip[3], np.nan)
+    pixels: Float64Array = (0.5 + 0.5 * (clip[:2] / depth).T) * (width, height) + (left - 0.5, low - 0.5)
+    return pixels
 
 
 def camera_of(subplot: SubplotRenderer) -> Camera | None:

@@ -42,6 +42,7 @@ from decals.window.host_plotter import (
     collected_interrupts,
     edits_at,
     eye_and_target,
+    pixels_of,
     ray_through,
     require_screen,
 )
@@ -167,7 +168,10 @@ class EditWindow:
             setattr(self.subplot, name, present if mode is None else mode)
         self.actions.state.view = lambda: eye_and_target(self.subplot)
         self.tools = PointerTools(
-            self.actions, lambda x, y: ray_through(self.subplot, x, y), self._is_occluded
+            self.actions,
+            lambda x, y: ray_through(self.subplot, x, y),
+            self._is_occluded,
+            lambda points: pixels_of(self.subplot, points),
         )
         self.overlay = Overlay(self.plotter)
         self.handle = PrimitiveHandle(

@@ -5,13 +5,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from blobtree import Node, Point
 from blobtree.nodes.paths import primitive_at
 from decals.editing import EditSession
 from decals.editing.actions import Actions
+from decals.editing.brushes import Brush
 from decals.editing.decal_actions import SCALE_STEP
 from decals.editing.pointer_tools import PointerTools
+from decals.editing.queries import inside_polygon
 from decals.editing.scatter_commands import decals_on
 from decals.model import Interaction
 from tests.decals.editing.scenes import digest, scene, tree_of
@@ -27,7 +31,11 @@ class UserInput:
         self.document = self.session.document
         self.actions = Actions(self.session)
         self.rays = self.document.camera.rays(*SIZE)
-        self.tools = PointerTools(self.actions, self.ray)
+        self.tools = PointerTools(
+            self.actions,
+            self.ray,
+            pixels=lambda points: np.array([self.pixel(point) for point in points]).reshape(-1, 2),
+        )
         self.first = digest(self.document)
 
     def ray(self, x: Any, y: Any) -> Any:
@@ -377,3 +385,48 @@ def test_what_means_nothing_here_is_left_to_others(user: UserInput) -> None:
     assert not user.tools.release(5, 5)
     assert user.key("h")
     assert user.actions.help_visible
+
+
+@pytest.mark.parametrize("brush", [Brush.BOX, Brush.LASSO])
+def test_boxes_and_lassos_select_what_is_seen_in_them(brush: Brush) -> None:
+    user = UserInput()
+    user.actions.state.brush.brush = brush
+    width, height = SIZE
+    corners = [(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)]
+    assert user.tools.press(*corners[0])
+    for corner in corners[2:3] if brush is Brush.BOX else corners[1:]:
+        assert user.tools.move(*corner)
+    assert len(user.tools.selection_line) == 4
+    assert user.tools.release(*corners[-1])
+    selected = user.actions.state.selection
+    for number, at in user.visible():
+        met, center = user.tools.at(*at), user.document.decals[number].positions[0]
+        if met is not None and np.linalg.norm(met.position - center) < 0.01:  # its very centre is seen
+            assert number in selected
+    assert 0 < len(selected) < len(user.document.decals)
+    for number in selected:  # its centre is the first point along its ray
+        met = user.tools.at(*user.pixel(user.document.decals[number].positions[0]))
+        assert met is not None
+        gap = np.linalg.norm(met.position - user.document.decals[number].positions[0])
+        assert gap < user.document.decals[number].radii[0]
+    number, (x, y) = user.visible()[0]
+    user.tools.press(x - 3, y - 3)
+    user.tools.move(x + 3, y + 3)
+    user.tools.move(x - 3, y + 3)
+    user.tools.release(x - 3, y + 3)
+    assert user.actions.state.selection in ((number,), ())
+    assert digest(user.document) == user.first
+    user.actions.state.brush.brush = Brush.SELECT
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=3, max_size=8))
+@settings(max_examples=40, deadline=None)
+def test_points_in_polygons_by_crossings(corners: list[tuple[int, int]]) -> None:
+    points = np.random.default_rng(len(corners)).uniform(-1, 10, (20, 2))
+    inside = inside_polygon(points, corners)
+    for (x, y), found in zip(points, inside, strict=True):
+        crossings = 0
+        for (x0, y0), (x1, y1) in zip(corners, corners[1:] + corners[:1], strict=True):
+            if (y0 > y) != (y1 > y):
+                crossings += x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+        assert found == (crossings % 2 == 1)
