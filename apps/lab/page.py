@@ -7,7 +7,7 @@ from trame.widgets import client, html, vuetify3
 
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
-from decals.apps.sandbox.page import PANEL_WIDTH, Page
+from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
 from decals.apps.sandbox.panels import COMPACT, FIELD, icon_button, named
 from decals.window import EditWindow
 
@@ -78,9 +78,7 @@ class LabPage(Page):
         return values
 
     def _build_left_side(self) -> None:
-        with vuetify3.VNavigationDrawer(
-            permanent=True, width=(f"in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH}",), location="left"
-        ):
+        with drawer("left", (f"in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH}",)):
             client.Style(STYLE)
             with html.Div(v_if="!in_lesson"):
                 self._build_outline()
@@ -151,9 +149,7 @@ class LabPage(Page):
             )
 
     def _build_right_side(self) -> None:
-        with vuetify3.VNavigationDrawer(
-            permanent=True, width=(f"in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH}",), location="right"
-        ):
+        with drawer("right", (f"in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH}",)):
             with vuetify3.VBtnToggle(
                 v_if="in_lesson",
                 v_model="lab_side",

@@ -21,7 +21,12 @@ REFRESH_SECONDS = 0.1
 """Time between two looks at the session, whose changes the page then shows."""
 
 PANEL_WIDTH = 290
-STYLE = ".v-slider *, .v-field * { transition: none !important }"
+NARROW = 900
+"""Width of a window, in pixels, below which the panels lie above the view."""
+
+STYLE = """.v-slider *, .v-field * { transition: none !important }
+.toolbar .v-toolbar__content { overflow-x: auto }
+.row-flag { font-size: 18px; padding: 4px }"""
 """A moved slider would otherwise repaint the panel for 0.3 s, which slows the pictures."""
 
 TOOLBAR = {
@@ -68,6 +73,21 @@ OPEN_MENU = (
     "flags: !['image', 'more'].includes(row.kind)}"
 )
 """Open the menu of a row at the pointer."""
+
+
+ALT = "new MutationObserver(() => document.querySelectorAll('img:not([alt])').forEach(i => i.alt = ''))"
+"""The view shows an image without the text that screen readers ask for."""
+
+
+def drawer(side: str, width: Any) -> Any:
+    """Return the panel at a side of the page; in a narrow window it is closed at first, above the view."""
+    return vuetify3.VNavigationDrawer(
+        v_model=(f"{side}_open", None),
+        mobile_breakpoint=(str(NARROW),),
+        width=width,
+        location=side,
+        raw_attrs=named(f"'{side} panel'"),
+    )
 
 
 def _place(phase: str) -> str:
@@ -189,6 +209,7 @@ class Page:
         with VAppLayout(self._server, full_height=True) as layout:
             layout.root.theme = ("theme",)
             client.Style(STYLE)
+            client.Script(f"{ALT}.observe(document, {{childList: true, subtree: true}})")
             with vuetify3.VLayout(full_height=True):
                 self._build_toolbar()
                 self._build_left_side()
@@ -200,10 +221,15 @@ class Page:
                         dragover="$event.preventDefault()",
                         drop=f"$event.preventDefault(); {DROP.format('dataTransfer')}",
                         __events=["dragover", "drop"],
+                        raw_attrs=['role="application"', *named("'view of the scene'")],
                         **browser_keys(self._window),
                     ),
                 ):
-                    self.view = StreamedView(self._window, self.sandbox.take_step, style="height: 100%")
+                    self.view = StreamedView(
+                        self._window,
+                        self.sandbox.take_step,
+                        style="height: 100%",
+                    )
                     self.sandbox.schedule = self.view.update
                     html.Div(LASSO, v_if="gizmo.line")
                     html.Div(GIZMO, v_if="gizmo.handles.length")
@@ -213,12 +239,12 @@ class Page:
 
     def _build_left_side(self) -> None:
         """Build what stands left of the view."""
-        with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="left"):
+        with drawer("left", PANEL_WIDTH):
             self._build_outline()
 
     def _build_right_side(self) -> None:
         """Build what stands right of the view."""
-        with vuetify3.VNavigationDrawer(permanent=True, width=PANEL_WIDTH, location="right"):
+        with drawer("right", PANEL_WIDTH):
             self._build_panels()
 
     def _build_panels(self) -> None:
@@ -229,8 +255,10 @@ class Page:
         self._build_history()
 
     def _build_toolbar(self) -> None:
-        with vuetify3.VAppBar(density="compact", flat=True, border=True):
-            vuetify3.VAppBarTitle("{{ title }}")
+        with vuetify3.VAppBar(density="compact", flat=True, border=True, classes="toolbar"):
+            html.H1("{{ title }}", classes="text-h6 mx-3")
+            for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
+                panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open")
             panels.build_wheel()
             panels.build_files(self.sandbox)
             panels.build_view_menu(self.sandbox)
@@ -267,10 +295,16 @@ class Page:
         vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])
         with (
             vuetify3.VList(density="compact", nav=True),
-            html.Div(v_for="row in outline", key="row.key", classes="d-flex align-center"),
+            html.Div(
+                v_for="row in outline",
+                key="row.key",
+                classes="d-flex align-center",
+                raw_attrs=['role="listitem"'],
+            ),
         ):
             vuetify3.VListItem(
                 title=("row.label",),
+                raw_attrs=['role="button"'],
                 prepend_icon=(ROW_ICONS,),
                 active=("row.key === selected || marked.includes(row.key)",),
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),

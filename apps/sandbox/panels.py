@@ -114,7 +114,10 @@ def build_start(sandbox: Sandbox) -> None:
     """Build the start page: new model, samples, recent files, recovered sessions and lessons."""
     with (
         vuetify3.VDialog(
-            model_value=("start.open",), update_modelValue=(sandbox.show_start, "[$event]"), max_width=860
+            model_value=("start.open",),
+            update_modelValue=(sandbox.show_start, "[$event]"),
+            max_width=860,
+            raw_attrs=['aria-label="start"'],
         ),
         vuetify3.VCard(title="Sandbox", subtitle="Model, and cover models with decals."),
         vuetify3.VCardText(),

@@ -9,6 +9,7 @@ import io
 import sys
 import tempfile
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -32,7 +33,7 @@ from decals.apps.views import UPRIGHT
 from decals.editing.scatter_commands import decals_on
 from decals.window import EditWindow
 from tests.apps.lab.answers import ANSWERS
-from tests.decals.editing.scenes import digest, scene
+from tests.decals.editing.scenes import digest, scene, tree_of
 from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
 from tests.frontends import page as docs
@@ -185,6 +186,156 @@ async def sandbox(picture: str | None = None) -> None:
     window.close()
 
 
+async def creature(picture: str | None = None) -> None:
+    """From an empty start a user builds a creature, covers, brushes, undoes, saves and loads it."""
+    folder = Path(tempfile.mkdtemp())
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("creature", client_type="vue3")
+    window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
+    window.show()
+    sandbox_page = SandboxPage(server, window, folder=folder, start=True)
+    async with served(server, size=(1280, 800)) as browser:
+        user = Builder(browser, window)
+        await accessible(browser)
+        await browser.get_by_label("New model").click()
+        await until(lambda: not sandbox_page.sandbox.values()["start"]["open"])
+        empty = digest(window.document)
+        await user.add("Point", "#4f8f6f", center=(0, 0, 0), radius=1.0)
+        await user.add("Point", "#4f8f6f", center=(0, 0.5, 1.2), radius=0.7)
+        await user.add("Segment", "#3f6f9f", start=(0.5, -0.5, 0.6), end=(0.9, -1.5, 0.8), radius=0.3)
+        await user.mirror()
+        await user.add("Segment", "#3f6f9f", start=(0.5, -0.5, -0.6), end=(0.9, -1.5, -0.7), radius=0.3)
+        await user.mirror()
+        await user.add("Segment", "#9f6f3f", start=(0.3, 1.0, 1.1), end=(0.6, 1.6, 1.0), radius=0.2)
+        await user.mirror()
+        await user.add("Point", "#202020", center=(0.3, 0.7, 1.8), radius=0.2)
+        await user.mirror()
+        await user.add("Segment", "#4f8f6f", start=(0, 0, -0.8), end=(0, 0.4, -2.0), radius=0.3)
+        await user.add("Point", "#9f3f3f", center=(0, 0.2, 1.9), radius=0.25)
+        tree: Any = tree_of(window.document)
+        assert len(tree.children) == 12
+        assert tree.children[3].end == (-0.9, -1.5, 0.8)
+        await browser.keyboard.press("Escape")
+        await browser.get_by_text("Sum", exact=True).click()  # another click deselects
+        await browser.get_by_text("Sum", exact=True).click()
+        await until(lambda: window.actions.state.primitive is None)
+        window.subplot.vtk_renderer.ResetCamera()
+        window.redraw(whole=True)
+        await shows(browser, plotter)
+        middle = plotter.window_size[0] // 2, plotter.window_size[1] // 2
+        await point(browser, plotter, middle)
+        await browser.keyboard.press("g")
+        await until(lambda: window.session.labels[-1] == "scatter" and not window.busy)
+        driver = Driver(window)
+        before = await shows(browser, plotter)
+        number, at = next(driver.visible())
+        await drag(browser, plotter, at)
+        await until(lambda: window.actions.state.selection == (number,))
+        owners = {place: driver.owner(place) for place in around(at, 60)}
+        await drag(browser, plotter, at, (at[0] + 6, at[1]), (at[0] + 14, at[1] + 4))
+        await until(lambda: window.session.labels[-1] == "move" and not window.tools.dragging)
+        await browser.keyboard.press("Escape")
+        await until(lambda: window.actions.state.selection == ())
+        after = await shows(browser, plotter)
+        kept = [p for p, owner in owners.items() if owner not in (-1, number) and driver.owner(p) == owner]
+        changes = [np.abs(after[-1 - y, x] - before[-1 - y, x]).max() for x, y in kept]
+        assert max(changes) > 8  # a neighbour that stays shows another part of its image
+        await browser.get_by_label("push brush").click()
+        await drag(browser, plotter, middle, (middle[0] + 8, middle[1]), (middle[0] + 24, middle[1]))
+        await until(lambda: window.session.labels[-1] == "push brush" and not window.tools.dragging)
+        await browser.get_by_label("select and move decals").click()
+        last = await shows(browser, plotter)
+        await accessible(browser)
+        if picture is not None:
+            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+        entries = len(window.session.labels)
+        await browser.get_by_text("Start", exact=True).click()
+        await until(lambda: window.session.labels == () and not window.busy)
+        assert digest(window.document) == empty
+        sandbox_page.sandbox.go_to(entries)
+        await shows(browser, plotter)
+        await browser.keyboard.press("Control+s")
+        sandbox_page.sandbox.perform("save")
+        await until(lambda: not window.background.busy and not window.session.modified)
+    window.close()
+    file = Path(str(window.actions.files.path))
+    fresh = pv.Plotter(off_screen=True, window_size=plotter.window_size)
+    with EditWindow(decals.load_scene(file), plotter=fresh) as loaded:
+        loaded.show()
+        SandboxPage(get_server("again", client_type="vue3"), loaded, folder=folder)
+        async with served(get_server("again"), size=(1280, 800)) as browser:
+            again = await shows(browser, fresh)
+            assert again.shape == last.shape
+            assert np.abs(again - last).mean() < 0.5
+    fresh.close()
+
+
+class Builder:
+    """A user that adds primitives with the menu, and sets their values in the panel."""
+
+    def __init__(self, browser: Page, window: EditWindow) -> None:
+        self._browser, self._window = browser, window
+
+    async def _done(self, entries: int) -> None:
+        await until(lambda: len(self._window.session.labels) >= entries and not self._window.background.busy)
+
+    async def add(self, kind: str, color: str, **values: Any) -> None:
+        """Add a primitive and set its values, one undo entry each."""
+        entries = len(self._window.session.labels)
+        await self._browser.get_by_role("button", name="Add", exact=True).click()
+        await self._browser.locator(".v-overlay--active .v-list-item").get_by_text(kind, exact=True).click()
+        await self._done(entries + 1)
+        for name, value in values.items():
+            parts = value if isinstance(value, tuple) else (value,)
+            for i, part in enumerate(parts):
+                label = f"{name} {i + 1}" if isinstance(value, tuple) else name
+                await self._set(label, str(part))
+        await self._set("color", color)
+
+    async def _set(self, label: str, text: str) -> None:
+        role = "textbox" if label != "color" else None
+        field = self._browser.get_by_role("textbox", name=label, exact=True)
+        if role is None:
+            field = self._browser.locator("input[type=color]").first
+        await field.wait_for()
+        if await field.input_value() == text:
+            return
+        entries = self._window.session.labels
+        await field.fill(text)
+        await field.dispatch_event("change")
+        await until(lambda: self._window.session.labels != entries and not self._window.background.busy)
+
+    async def mirror(self) -> None:
+        """Add the mirror image of the selected primitive, and keep it selected."""
+        entries = len(self._window.session.labels)
+        await point(self._browser, self._window.plotter, (20, 200))
+        await self._browser.keyboard.press("Shift+D")
+        await self._done(entries + 1)
+
+
+def around(at: tuple[int, int], reach: int) -> list[tuple[int, int]]:
+    """Return pixels around a pixel."""
+    steps = range(-reach, reach + 1, 6)
+    return [(at[0] + x, at[1] + y) for x in steps for y in steps]
+
+
+async def accessible(browser: Page) -> None:
+    """Make sure that axe-core finds nothing serious in the page."""
+    found = find_spec("axe_playwright_python")
+    if found is None or found.origin is None:
+        return
+    script = (Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8")
+    await browser.evaluate(script)
+    violations = await browser.evaluate("axe.run().then(result => result.violations)")
+    serious = [
+        (one["id"], one["impact"], [node["html"][:160] for node in one["nodes"]][:4])
+        for one in violations
+        if one["impact"] in ("serious", "critical")
+    ]
+    assert not serious, serious
+
+
 async def sandbox_start(picture: str | None = None) -> None:
     """From the start page a user opens a sample, brushes and clicks decals, drops an image and saves."""
     folder = Path(tempfile.mkdtemp())
@@ -286,6 +437,7 @@ def main() -> None:
         "streamed": streamed,
         "sandbox": sandbox,
         "start": sandbox_start,
+        "creature": creature,
         "lab": lab,
     }
     asyncio.run(checks[name](*arguments))

@@ -30,7 +30,7 @@ def require(*modules: str) -> None:
         pytest.skip(f"no OpenGL here: {install_advice(libraries)}")
 
 
-@pytest.mark.parametrize("check", ["page", "user", "streamed", "sandbox", "start", "lab"])
+@pytest.mark.parametrize("check", ["page", "user", "streamed", "sandbox", "start", "creature", "lab"])
 def test_in_a_browser(check: str) -> None:
     require(*NEEDED)
     assert "done" in run_module("tests.frontends.in_browser", check)

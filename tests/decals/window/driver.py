@@ -68,6 +68,11 @@ class Driver:
             if found is not None and found.owner == number:
                 yield number, at
 
+    def owner(self, at: Any) -> int:
+        """The decal that shows at a pixel; -1 for none."""
+        found = self.window.tools.at(*at)
+        return -1 if found is None else found.owner
+
     def finish(self) -> None:
         """Let the window see what goes on in the background come to its end."""
         while self.window.background.busy:
