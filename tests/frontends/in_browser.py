@@ -309,6 +309,7 @@ class Builder:
     async def mirror(self) -> None:
         """Add the mirror image of the selected primitive, and keep it selected."""
         entries = len(self._window.session.labels)
+        await self._browser.mouse.move(1100, 500)  # the view takes keys once the pointer enters it
         await point(self._browser, self._window.plotter, (20, 200))
         await self._browser.keyboard.press("Shift+D")
         await self._done(entries + 1)
@@ -321,7 +322,7 @@ def around(at: tuple[int, int], reach: int) -> list[tuple[int, int]]:
 
 
 async def accessible(browser: Page) -> None:
-    """Make sure that axe-core finds nothing serious in the page."""
+    """Make sure that axe-core finds nothing serious in the page; axe-playwright-python brings its script."""
     found = find_spec("axe_playwright_python")
     if found is None or found.origin is None:
         return

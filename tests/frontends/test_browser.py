@@ -21,7 +21,9 @@ def require(*modules: str) -> None:
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         names = ", ".join(missing)
-        pytest.skip(f"missing: {names}; pip install 'implicit-decals[browser]' playwright nbclient ipykernel")
+        pytest.skip(
+            f"missing: {names}; pip install 'implicit-decals[browser]' playwright axe-playwright-python nbclient ipykernel"
+        )
     from tests.frontends.browsing import browser_path
 
     if browser_path() is None:
