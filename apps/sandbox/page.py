@@ -24,8 +24,11 @@ PANEL_WIDTH = 290
 NARROW = 900
 """Width of a window, in pixels, below which the panels lie above the view."""
 
+NARROW_WINDOW = f"$vuetify.display.width < {NARROW}"
+
 STYLE = """.v-slider *, .v-field * { transition: none !important }
 .toolbar .v-toolbar__content { overflow-x: auto }
+.toolbar .v-btn-group { flex-shrink: 0 }
 .row-flag { font-size: 18px; padding: 4px }"""
 """A moved slider would otherwise repaint the panel for 0.3 s, which slows the pictures."""
 
@@ -258,7 +261,7 @@ class Page:
         with vuetify3.VAppBar(density="compact", flat=True, border=True, classes="toolbar"):
             html.H1("{{ title }}", classes="text-h6 mx-3")
             for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
-                panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open")
+                panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW)
             panels.build_wheel()
             panels.build_files(self.sandbox)
             panels.build_view_menu(self.sandbox)

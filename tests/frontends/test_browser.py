@@ -21,9 +21,8 @@ def require(*modules: str) -> None:
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         names = ", ".join(missing)
-        pytest.skip(
-            f"missing: {names}; pip install 'implicit-decals[browser]' playwright axe-playwright-python nbclient ipykernel"
-        )
+        packages = "'implicit-decals[browser]' playwright axe-playwright-python nbclient ipykernel"
+        pytest.skip(f"missing: {names}; pip install {packages}")
     from tests.frontends.browsing import browser_path
 
     if browser_path() is None:
