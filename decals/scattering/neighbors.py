@@ -28,6 +28,9 @@ MIN_PARALLEL_QUERIES = 4000
 NEIGHBOR_COUNTS = (4, 16, 64, 256)
 """Number of nearest points that a search examines, in turn, until enough of them face the same way."""
 
+ROWS_AT_ONCE = 16_384
+"""Points that are searched for at once: NumPy keeps the interpreter's lock meanwhile, and a window waits."""
+
 NEIGHBOR_REACH = 2.0
 """Largest distance of neighbours, in spacings."""
 
@@ -165,13 +168,14 @@ class FacingTree:
         for width in self._widths(count + skip_self):
             if len(open_rows) == 0:
                 break
-            sorted_arrays = self._nearest_among(
-                points[open_rows], normals[open_rows], width, open_rows if skip_self else None
-            )
             columns = slice(0, min(count, width))
-            distances[open_rows, columns], indices[open_rows, columns] = (
-                array[:, columns] for array in sorted_arrays
-            )
+            for first in range(0, len(open_rows), ROWS_AT_ONCE):
+                rows = open_rows[first : first + ROWS_AT_ONCE]
+                own = rows if skip_self else None
+                sorted_arrays = self._nearest_among(points[rows], normals[rows], width, own)
+                distances[rows, columns], indices[rows, columns] = (
+                    array[:, columns] for array in sorted_arrays
+                )
             open_rows = open_rows[~np.isfinite(distances[open_rows, -1])]
         return distances, indices
 
