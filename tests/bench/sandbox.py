@@ -1,5 +1,7 @@
 """The sandbox in headless Chromium: milliseconds from a slider or a drag to the next frame in the browser.
 
+``server_ms`` is the time of a drag on the server alone: from its message until the picture is sent.
+
     python -m tests.bench.sandbox
     python -m tests.bench.sandbox --decals 1000 --events 20 --json sandbox.json
 
@@ -10,7 +12,7 @@ import argparse
 import asyncio
 import json
 import time
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,7 @@ async def measure(count: int, events: int) -> dict[str, float]:
     window = EditWindow(scene, plotter=plotter)
     window.show()
     page = SandboxPage(server, window)
+    on_server = _clock(page, window)
     async with served(server, size=SIZE) as browser:
         await until(lambda: not window.subplot.warming_up)
         figures = {"first_picture_warm_s": time.perf_counter() - began}
@@ -61,7 +64,8 @@ async def measure(count: int, events: int) -> dict[str, float]:
         for number in range(events):
             await asyncio.sleep(REST_SECONDS)
             times.append(await _timed(browser, browser.keyboard.press(("PageUp", "PageDown")[number % 2])))
-        figures |= _summary("slider", times)
+        figures |= _summary("slider", times) | _summary("server_slider", on_server)
+        on_server.clear()
         page.sandbox.select("")
         driver = Driver(window)
         number, (x, y) = next(driver.visible())
@@ -79,9 +83,34 @@ async def measure(count: int, events: int) -> dict[str, float]:
             first, event = browser.mouse.move(x - 1, top), browser.mouse.move(x, top)
             times.append(await _timed(browser, event, first))  # the page sends no first move after a rest
         await browser.mouse.up()
-        figures |= _summary("drag", times)
+        figures |= _summary("drag", times) | _summary("server", on_server)
     window.close()
     return figures
+
+
+def _clock(page: SandboxPage, window: EditWindow) -> list[float]:
+    """Return the list to which every input adds its milliseconds on the server, until its picture is sent."""
+    began: list[float] = []
+    times: list[float] = []
+
+    def starting(call: Callable[..., Any]) -> Callable[..., Any]:
+        def started(*arguments: Any) -> Any:
+            began.append(time.perf_counter())
+            return call(*arguments)
+
+        return started
+
+    def publish(image: bytes, pixels: Any) -> None:
+        sent(image, pixels)
+        if began:
+            times.append(1000.0 * (time.perf_counter() - began[0]))
+            began.clear()
+
+    sent = page.view._publish
+    page.view._publish = publish  # type: ignore[method-assign]
+    page.sandbox.schedule = starting(page.sandbox.schedule)
+    window.tools.move = starting(window.tools.move)  # type: ignore[method-assign]
+    return times
 
 
 async def _timed(
