@@ -2,7 +2,7 @@
 // and contact, rims, contact lines and edges of layers by the shares of the pixel on both sides of them. The formulas
 // are those of decals/field/pixel_filter.py. A pixel is the parallelogram around q with the sides `right` and `up`.
 //@ include decals.glsl
-const float REACH_SQUARED = 0.330625;
+const float REACH = 0.575;  // see decals/record.py
 const int ELASTIC = 3;
 const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
@@ -135,6 +135,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     vec2 owner_shares = vec2(1.0);  // of the pixel, on the owner's side of the contact lines with `beside`
     int above = -1, below = -1, nested_count = 0;
     float above_share = 0.0;
+    float half_pixel = 0.5 * (length(right) + length(up));
     boundaries = 0;
     for (int level = 0; level < index_level_count; level++) {
         ivec2 span = cell_range(q, level);
@@ -142,8 +143,8 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             int other = texelFetch(index_ids, ivec2(j & 4095, j >> 12), 0).x;
             vec4 other_ball = decal_texel(4 * other);
             vec3 offset = q - other_ball.xyz;
-            if (other == owner || dot(offset, offset) >= REACH_SQUARED * other_ball.w * other_ball.w
-                || !acts(offset, n, other)) {
+            float reach = max(REACH * other_ball.w, RIM * other_ball.w + half_pixel);
+            if (other == owner || dot(offset, offset) >= reach * reach || !acts(offset, n, other)) {
                 continue;
             }
             bool outside = power(offset, RIM * other_ball.w) > 0.0;

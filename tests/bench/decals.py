@@ -9,6 +9,7 @@ oracles of the tests. Other parts:
     --only million                   rendering 1,000,000 decals
     --only faults                    stretched, folded, oversized and missing decals on six models
     --only contact                   folds, stretch, continuity and time of all contact modes
+    --only filter                    one filtered sample a pixel against many
     --only octree                    the paper's octree beside the index
     --only methods                   ray tracer, coordinates at vertices, and fragment shader
     --peers                          mesh-clipped decals, log maps, and texture coordinates at vertices
@@ -110,6 +111,17 @@ def measure_contact(*, quick: bool) -> Figures:
     return figures
 
 
+def measure_filter(*, quick: bool) -> Figures:
+    """Compare one filtered sample a pixel with many, and print the figures."""
+    from tests.bench import filtering
+
+    figures = filtering.measure(quick=quick)
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
+    for name, value in figures.items():
+        print(f"{name:28} {value:12.4g}  {filtering.TARGETS.get(name, '')}".rstrip())
+    return figures
+
+
 def measure_paper(part: str, *, quick: bool) -> Figures:
     """Measure the paper's octree, or its three methods of drawing, and print the figures."""
     from tests.bench import paper_methods, paper_octree
@@ -144,7 +156,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
     parser.add_argument(
         "--only",
-        choices=["index", "million", "faults", "contact", "octree", "methods"],
+        choices=["index", "million", "faults", "contact", "filter", "octree", "methods"],
         help="measure one part",
     )
     parser.add_argument("--peers", action="store_true", help="measure other methods")
@@ -156,6 +168,8 @@ def main() -> None:
         figures = measure_faults(quick=options.quick)
     elif options.only == "contact":
         figures = measure_contact(quick=options.quick)
+    elif options.only == "filter":
+        figures = measure_filter(quick=options.quick)
     elif options.only in ("octree", "methods"):
         figures = measure_paper(options.only, quick=options.quick)
     elif options.only:
