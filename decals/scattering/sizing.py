@@ -43,6 +43,11 @@ MAX_BEHIND, BEHIND = 0.25, 0.02
 """Largest cosine between the normals of a decal and of surface behind a wall, and least product of the
 heights of the centre above that surface and of that surface above the decal's, in squared distances."""
 
+EVEN_AROUND, MAX_ASIDE, MIN_ASIDE = 0.995, 0.05, 0.3
+"""Least cosine between the normals of a decal and of its surface where the surface around it is flat; largest
+cosine between the normals of such a decal and of surface that it sees edge-on; and least height of that
+surface's points over the centre, along their normals, in distances."""
+
 TURN_MARGIN = 0.03
 """Amount by which a decal turns beyond the facing limit, as a cosine."""
 
@@ -55,7 +60,7 @@ CORNER_TOLERANCE = 1.02
 CANDIDATES = 4
 """Nearest decals that face a point and may own it, whatever their radii."""
 
-ARC_REACH = 1.2
+ARC_REACH = 2.0
 """Ratio of the distances of two decals from a point up to which the length to the farther one is measured."""
 
 SPARE = 0.015
@@ -73,6 +78,9 @@ TRIALS_PER_RISK = 16
 
 EVEN_RADIUS_RATIO = 1.495
 """Ratio of a radius to the median at even density, beyond which other decals grow first."""
+
+CLEARANCE = 0.005
+"""Share of its radius by which an image should end beyond every point that the searches find."""
 
 SPECK = 0.01
 """Share of its radius by which an image may end before a point that only such a decal could cover."""
@@ -120,7 +128,8 @@ def turned_normals(
     that is next to such points gets the mean of their normals and its own; its image bends over the edge.
 
     The floor of a thin cup, seen through the wall from a decal outside, may face that decal, as their normals
-    are nearly perpendicular. The decal turns away, by at most `MAX_TURN` degrees.
+    are nearly perpendicular. The decal turns away, by at most `MAX_TURN` degrees. So does a decal on flat
+    surface from faces that it sees edge-on, where its image would be stretched.
 
     Parameters
     ----------
@@ -156,7 +165,9 @@ def turned_normals(
     heights = np.einsum("ni,ni->n", offsets, samples.normals.astype(np.float64))
     cosines = np.einsum("ni,ni->n", normals[owners], samples.normals.astype(np.float64))
     squared = np.einsum("ni,ni->n", offsets, offsets)
-    behind = owned & (cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)
+    flat = (np.einsum("ni,ni->n", normals, own.astype(np.float64)) > EVEN_AROUND)[owners]
+    edge_on = flat & (cosines < MAX_ASIDE) & (heights > MIN_ASIDE * np.sqrt(squared))
+    behind = owned & (((cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)) | edge_on)
     rows = owners[behind]
     away = unit_rows(_sums(samples.normals[behind], rows, len(decals))).astype(np.float64)
     worst = np.full(len(decals), -1.0)
@@ -243,10 +254,13 @@ def covering_radii(
             owned = owned.joined(find(trials))
             _grow(radii, owned, limits)
         report("measuring radii", (len(TRIAL_SPREADS) + 2) / (len(TRIAL_SPREADS) + 3))
-    stages = [(limits, 0.0)]
+    stages = [(limits, -CLEARANCE)]
     if even:
         largest = EVEN_RADIUS_RATIO * float(np.median(radii))
-        radii, stages = np.minimum(radii, largest), [(np.minimum(limits, largest), 0.0), (limits, SPECK)]
+        radii, stages = (
+            np.minimum(radii, largest),
+            [(np.minimum(limits, largest), -CLEARANCE), (limits, SPECK)],
+        )
     radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
     owned = owned.joined(first)
     for limits, speck in stages:
