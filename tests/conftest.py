@@ -10,6 +10,8 @@ from blobtree.custom import definition
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from decals.rendering.gl_libraries import missing_gl_libraries
 
+gc.disable()  # until all tests are collected: a fifth of the time would be spent on looking for garbage
+
 LONG_FILES = (
     "docs/test_pages.py",
     "docs/test_examples.py",
@@ -86,6 +88,7 @@ def pytest_collection_finish() -> None:
     if kernels._state.loaded:
         names = ", ".join(sorted(name for name, _ in kernels._state.loaded))
         raise pytest.UsageError(f"the import of a module of tests has launched kernels of {names}")
+    gc.enable()
     gc.freeze()  # Python then looks for garbage among what tests make, not among all tests
 
 
