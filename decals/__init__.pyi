@@ -14,6 +14,7 @@ from .scattering.sizing import Sizing
 from .scenes.camera import Camera
 from .scenes.cover import cover
 from .scenes.files import load_model, load_scene, save_scene
+from .scenes.material import DecalMaterial
 from .scenes.measure import measure
 from .scenes.objects import MeshObject, TreeObject
 from .scenes.pose import pose, skin
@@ -28,6 +29,7 @@ __all__ = [
     "Contact",
     "ContactLaw",
     "DecalImage",
+    "DecalMaterial",
     "Decals",
     "ImageMapping",
     "ImplicitDecalsError",

@@ -1,7 +1,7 @@
 // The decal pass, body of pixels.frag and pixels.comp: for every pixel of the G-buffer the decals that cover it, over
 // the object's own colour. DECALS: there are decals; the slot holds decals.glsl. POSED: some objects are posed, and the
 // textures of rest.frag say where their pixels lie in the rest pose. TWO_TARGETS: also write owner, field and uv.
-// LIMITED: decals have receivers or fades.
+// LIMITED: decals have receivers or fades. MATERIALS: some images have maps; color.w is then the metalness.
 // FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl.
 //@ include camera.glsl
 //@ include pixel.glsl
@@ -25,6 +25,9 @@ int surface_receivers = -1;  // mask of the object at this pixel, see decals/rec
 // color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
 Pixel pixel_at(ivec2 texel) {
     Pixel pixel;
+#ifdef MATERIALS
+    pixel.material = pixel.glow = vec4(0.0);
+#endif
     pixel.color = texelFetch(g_color, texel, 0);  // half the bytes of a position, which the background need not read
     vec4 buffers = vec4(-1.0, 0.0, 0.0, 0.0);
 #ifdef DECALS
@@ -61,6 +64,14 @@ Pixel pixel_at(ivec2 texel) {
         DecalHit hit = decal_at(position, normal);
         vec4 color = decal_color(hit, position, normal, ray);
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
+#ifdef MATERIALS
+        float part = material_normals.w;
+        if (part > 0.0) {
+            pixel.material = vec4(part * normalize(material_normals.xyz), material_values.x / part);
+            pixel.glow = vec4(material_glow.rgb, material_glow.a / part);
+            pixel.color.w = material_values.y / part;
+        }
+#endif
 #endif
         pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;
     }

@@ -19,6 +19,17 @@ vec3 rest_right;
 vec3 rest_up;
 #endif
 
+#ifdef MATERIALS
+// Sums over the decals of a pixel with materials, each by the part of it that is seen: of normals and 1, of roughness,
+// metalness and 1, and of emission and occlusion.
+uniform sampler2DArray decal_normals;    // alpha times x, y, roughness, metalness
+uniform sampler2DArray decal_emissions;  // alpha times emission, occlusion
+float material_left;                     // part of the pixel that upper decals leave
+vec4 material_normals;
+vec2 material_values;
+vec4 material_glow;
+#endif
+
 const float OPAQUE = 0.9999;  // alpha under which no further decal is searched
 
 //@ slot functions
@@ -54,6 +65,24 @@ DecalHit decal_at(vec3 q, vec3 n) {
     return decal_hit(owner_at(q, n, decal_contact), q, n);
 }
 
+#ifdef MATERIALS
+// Add the maps of a decal's image at a place with derivatives: part of the pixel, normal there, frame of the decal.
+void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3 n, vec3 n_p, vec3 u) {
+    vec4 maps = textureGrad(decal_normals, place, dx, dy);
+    if (maps.z <= 0.0 || alpha <= 0.0) {
+        return;  // no material
+    }
+    vec2 tilt = maps.xy / alpha;
+    // The axis u, turned as the normal is on the way to the point; the inverse of `unroll_step`.
+    vec3 axis = normalize(u - dot(u, n) / max(1.0 + dot(n_p, n), 1e-4) * (n_p + n));
+    vec3 normal = tilt.x * axis + tilt.y * cross(n, axis) + sqrt(max(1.0 - dot(tilt, tilt), 1e-4)) * n;
+    float part = material_left * opacity;
+    material_normals += part * alpha * vec4(normalize(normal), 1.0);
+    material_values += part * maps.zw;
+    material_glow += part * textureGrad(decal_emissions, place, dx, dy);
+}
+#endif
+
 // Premultiplied linear colour of one decal. The derivatives are those of its undeformed image, rolled out, so no
 // edge between decals, or of an object, shows in them.
 vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
@@ -78,6 +107,10 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
         vec2 dx = scale * tangent_coordinates(unroll_step(right, n_p, n), n_p, u.xyz);
         vec2 dy = scale * tangent_coordinates(unroll_step(up, n_p, n), n_p, u.xyz);
         color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
+#ifdef MATERIALS
+        float shown = tint.w * (decal_limited ? fade_at(q, n, hit.owner) : 1.0);
+        add_material(vec3(hit.uv, u.w), dx, dy, color.a, shown, n, n_p, u.xyz);
+#endif
     }
     float fade = decal_limited ? fade_at(q, n, hit.owner) : 1.0;
     return fade * tint.w * color * vec4(tint.rgb, 1.0);
@@ -85,11 +118,20 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
 
 // Premultiplied linear colour of all decals at a point over each other, from the topmost (`hit`) down; no cap.
 vec4 decal_color(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
+#ifdef MATERIALS
+    material_left = 1.0;
+    material_normals = vec4(0.0);
+    material_values = vec2(0.0);
+    material_glow = vec4(0.0);
+#endif
     vec4 color = vec4(0.0);
     if (!decal_layered) {
         return hit.owner < 0 ? color : decal_paint(hit, q, n, ray);
     }
     while (hit.owner >= 0 && color.a < OPAQUE) {
+#ifdef MATERIALS
+        material_left = 1.0 - color.a;
+#endif
         color += (1.0 - color.a) * decal_paint(hit, q, n, ray);
         int below = owner_below(q, n, rank_of(hit.owner, decal_records), next_number_below(hit.owner, decal_records),
             decal_contact);

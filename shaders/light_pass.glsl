@@ -1,9 +1,21 @@
 // The light pass, body of pixels.frag and pixels.comp: painted surface under light. The slot holds studio_light.glsl
-// or lights.glsl; both define `vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo)`.
+// or lights.glsl; both define `vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo)`, and, of a Material
+// in place of the albedo, `material_color`. MATERIAL_LIGHT: some decals have materials; the slot material is material.glsl.
 //@ include pixel.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
 uniform sampler2D g_paint;  // rgb: linear albedo, decals included
+#ifdef MATERIAL_LIGHT
+uniform sampler2D g_material;  // as `material` and `glow` of the decal pass
+uniform sampler2D g_glow;
+#endif
+
+// A smooth normal may point away from the eye at a silhouette: turn it until it is just visible.
+vec3 visible_normal(vec3 normal, vec3 toward_eye) {
+    return normalize(normal - min(dot(normal, toward_eye) - 1e-3, 0.0) * toward_eye);
+}
+
+//@ slot material optional
 
 //@ slot lighting
 
@@ -15,5 +27,17 @@ Pixel pixel_at(ivec2 texel) {
     }
     vec4 normal = texelFetch(g_normal, texel, 0);
     vec3 albedo = texelFetch(g_paint, texel, 0).rgb;
-    return Pixel(vec4(lit_color(texel, position.xyz, normal.w * normal.xyz, albedo), 1.0));
+    vec3 light = lit_color(texel, position.xyz, normal.w * normal.xyz, albedo);
+#ifdef MATERIAL_LIGHT
+    vec4 maps = texelFetch(g_material, texel, 0);
+    float part = min(length(maps.xyz), 1.0);
+    if (part > 0.0) {
+        vec4 glow = texelFetch(g_glow, texel, 0);
+        float metallic = texelFetch(g_paint, texel, 0).w;
+        vec3 bent = normal.w * normalize(maps.xyz);
+        Material material = Material(albedo, bent, max(maps.w, MIN_ROUGHNESS), metallic, glow.w, glow.rgb / part);
+        light = mix(light, material_color(texel, position.xyz, normal.w * normal.xyz, material), part);
+    }
+#endif
+    return Pixel(vec4(light, 1.0));
 }

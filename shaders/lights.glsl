@@ -8,9 +8,10 @@ uniform vec4 lights[4 * MAX_LIGHTS];
 uniform int light_count;
 uniform mat4 light_frame;  // the scene's coordinates to those of the lights
 
-vec3 light_at(int i, vec3 position, vec3 n) {
+// Strength of a light at a position, and the direction in which it travels there.
+float light_strength(int i, vec3 position, out vec3 direction) {
     vec4 origin = lights[4 * i], axis = lights[4 * i + 1], color = lights[4 * i + 2];
-    vec3 direction = axis.xyz;
+    direction = axis.xyz;
     float strength = 1.0;
     if (origin.w > 0.0) {
         direction = position - origin.xyz;
@@ -22,7 +23,13 @@ vec3 light_at(int i, vec3 position, vec3 n) {
             strength *= along >= axis.w ? pow(along, color.w) : 0.0;
         }
     }
-    return max(strength * dot(n, -direction), 0.0) * color.rgb;
+    return strength;
+}
+
+vec3 light_at(int i, vec3 position, vec3 n) {
+    vec3 direction;
+    float strength = light_strength(i, position, direction);
+    return max(strength * dot(n, -direction), 0.0) * lights[4 * i + 2].rgb;
 }
 
 // All in the scene's coordinates; `albedo` and the result are linear.
@@ -35,3 +42,28 @@ vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo) {
     }
     return to_linear(to_srgb(albedo) * light);
 }
+
+#ifdef MATERIAL_LIGHT
+// The same lights on a material, in linear light, with what it mirrors of the studio's environment.
+vec3 material_color(ivec2 texel, vec3 position, vec3 normal, Material m) {
+    if (light_count == 0) {
+        return m.albedo + m.emission;
+    }
+    vec3 eye_direction = -normalize(ray_direction(vec2(texel) + 0.5));
+    vec3 right = normalize(ray_right.xyz);
+    vec3 up = normalize(ray_up.xyz);
+    m.normal = visible_normal(m.normal, eye_direction);
+    mat3 to_camera = transpose(mat3(right, up, cross(right, up)));
+    vec3 light = m.emission + environment_light(m, eye_direction, vec3(0.0), 1.0, to_camera);
+    mat3 frame = mat3(light_frame);
+    vec3 point = (light_frame * vec4(position, 1.0)).xyz;
+    vec3 toward_eye = normalize(frame * eye_direction);
+    m.normal = normalize(transpose(inverse(frame)) * m.normal);
+    for (int i = 0; i < light_count; i++) {
+        vec3 direction;
+        float strength = light_strength(i, point, direction);
+        light += direct_light(m, toward_eye, -direction, to_linear(strength * lights[4 * i + 2].rgb));
+    }
+    return tone_mapped(light);
+}
+#endif

@@ -4,4 +4,8 @@ struct Pixel {
 #ifdef TWO_TARGETS
     vec4 buffers;
 #endif
+#ifdef MATERIALS
+    vec4 material;  // xyz: normal, as long as the part with materials is large; w: roughness
+    vec4 glow;      // rgb: emission, linear; w: occlusion
+#endif
 };

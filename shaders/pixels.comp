@@ -9,6 +9,15 @@ layout(binding = 0) writeonly uniform image2D out_color;
 #ifdef TWO_TARGETS
 layout(binding = 1) writeonly uniform image2D out_buffers;
 #endif
+#ifdef MATERIALS
+#ifdef TWO_TARGETS
+layout(binding = 2) writeonly uniform image2D out_material;
+layout(binding = 3) writeonly uniform image2D out_glow;
+#else
+layout(binding = 1) writeonly uniform image2D out_material;
+layout(binding = 2) writeonly uniform image2D out_glow;
+#endif
+#endif
 
 void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + first_texel;
@@ -19,5 +28,9 @@ void main() {
     imageStore(out_color, texel, pixel.color);
 #ifdef TWO_TARGETS
     imageStore(out_buffers, texel, pixel.buffers);
+#endif
+#ifdef MATERIALS
+    imageStore(out_material, texel, pixel.material);
+    imageStore(out_glow, texel, pixel.glow);
 #endif
 }

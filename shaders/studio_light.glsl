@@ -2,6 +2,8 @@
 // sky over a darker ground. All in linear light.
 //@ include camera.glsl
 //@ include ambient.glsl
+const vec3 KEY_DIRECTION = vec3(-0.55, 0.75, 0.70);  // right, up, back
+const vec3 FILL_DIRECTION = vec3(0.85, 0.10, 0.45);
 const vec3 KEY_COLOR = vec3(1.00, 0.97, 0.92);
 const vec3 FILL_COLOR = vec3(0.13, 0.14, 0.17);
 const vec3 SKY_COLOR = vec3(0.33, 0.35, 0.39);
@@ -12,18 +14,19 @@ const float KEY_SOFTNESS = 0.6;  // how far the key's light, too, is kept out of
 const float GLOSS = 60.0;      // Blinn-Phong exponent
 const float SHEEN = 0.22;      // strength of the highlight
 
-// A smooth normal may point away from the eye at a silhouette: turn it until it is just visible.
-vec3 visible_normal(vec3 normal, vec3 toward_eye) {
-    return normalize(normal - min(dot(normal, toward_eye) - 1e-3, 0.0) * toward_eye);
+// Axes of the camera: right, up, back.
+mat3 camera_frame() {
+    vec3 right = normalize(ray_right.xyz);
+    vec3 up = normalize(ray_up.xyz);
+    return mat3(right, up, cross(right, up));
 }
 
 // `n` points toward the eye; `open_` is the part of the sky that the surroundings leave open, from 0 to 1.
 vec3 shade(vec3 albedo, vec3 n, vec3 toward_eye, float open_) {
-    vec3 right = normalize(ray_right.xyz);
-    vec3 up = normalize(ray_up.xyz);
-    vec3 back = cross(right, up);
-    vec3 key = normalize(-0.55 * right + 0.75 * up + 0.70 * back);
-    vec3 fill = normalize(0.85 * right + 0.10 * up + 0.45 * back);
+    mat3 frame = camera_frame();
+    vec3 up = frame[1];
+    vec3 key = normalize(frame * KEY_DIRECTION);
+    vec3 fill = normalize(frame * FILL_DIRECTION);
 
     float lit = max((dot(n, key) + WRAP) / (1.0 + WRAP), 0.0);
     float key_open = mix(1.0, open_, KEY_SOFTNESS);
@@ -46,3 +49,21 @@ vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo) {
     float open_ = openness(g_position, texel, position, visible, ray);
     return clamp(shade(albedo, visible, toward_eye, open_), 0.0, 1.0);
 }
+
+#ifdef MATERIAL_LIGHT
+// The same light on a material: `normal` is that of the surface, toward the eye or not.
+vec3 material_color(ivec2 texel, vec3 position, vec3 normal, Material m) {
+    vec3 ray = ray_direction(vec2(texel) + 0.5);
+    vec3 toward_eye = -normalize(ray);
+    float open_ = openness(g_position, texel, position, visible_normal(normal, toward_eye), ray);
+    m.normal = visible_normal(m.normal, toward_eye);
+    mat3 frame = camera_frame();
+    vec3 key = normalize(frame * KEY_DIRECTION);
+    vec3 fill = normalize(frame * FILL_DIRECTION);
+    vec3 ambient = mix(GROUND_COLOR, SKY_COLOR, 0.5 + 0.5 * dot(m.normal, frame[1]));
+    vec3 light = mix(1.0, open_, KEY_SOFTNESS) * direct_light(m, toward_eye, key, KEY_STRENGTH * KEY_COLOR);
+    light += open_ * direct_light(m, toward_eye, fill, FILL_COLOR);
+    light += environment_light(m, toward_eye, ambient, open_, transpose(frame));
+    return tone_mapped(light + m.emission);
+}
+#endif

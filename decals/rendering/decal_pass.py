@@ -3,6 +3,8 @@
 from functools import cache
 from typing import Any
 
+import moderngl
+
 from blobtree._typing import Float32Array
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
@@ -22,6 +24,7 @@ from decals.index.lookup import next_number_below
 from decals.record import Contact, has_cells
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
+from decals.rendering.materials import MaterialArrays
 from decals.rendering.pixel_pass import (
     PixelPass,
     Program,
@@ -48,6 +51,12 @@ class DecalPass:
         Size of the largest tile, in samples.
     buffers
         True to write owner, field and uv too.
+
+    Attributes
+    ----------
+    material_targets : dict
+        Normals and roughness, and emission and occlusion, by their names in the light pass; empty before the
+        first scene with materials.
     """
 
     def __init__(self, context: Context, size: tuple[int, int], *, buffers: bool = False) -> None:
@@ -56,6 +65,8 @@ class DecalPass:
         self._targets = [texture for texture in (self.paint, self.decal) if texture is not None]
         self._framebuffer = context.gl.framebuffer(self._targets)
         self._context = context
+        self._size = size
+        self.material_targets: dict[str, moderngl.Texture] = {}
         self._passes: dict[tuple[object, ...], PixelPass] = {}
 
     def draw(
@@ -70,16 +81,21 @@ class DecalPass:
         filtered: bool = False,
         rest: RestBuffer | None = None,
         masks: DataTexture | None = None,
+        materials: MaterialArrays | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours.
 
         ``masks`` are those of the objects, see `decals.receivers.object_mask`, for decals that are limited.
+        ``materials`` fill `material_targets` too.
         """
         limited, library = decals is not None and decals.limited, ""
+        filtered = filtered and materials is None  # maps of materials are not averaged over pixels
         if decals is not None:
             library = decal_library(contact, layered=decals.layered, limited=limited, filtered=filtered)
-        painting = self._pass(library, posed=rest is not None, limited=limited, filtered=filtered)
+        shining = materials is not None and decals is not None
+        variant = {"limited": limited, "filtered": filtered, "materials": shining}
+        painting = self._pass(library, posed=rest is not None, **variant)
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         textures |= rest.textures if rest is not None else {}
@@ -91,9 +107,12 @@ class DecalPass:
             set_uniform(program, "decal_mapping", int(mapping))
             set_uniform(program, "decal_stiffness", stiffness)
             decals.use(program, unit + 1)
+            others: dict[str, Any] = {} if materials is None else dict(materials.textures)
             if masks is not None:
-                masks.use(unit + 1 + decals.texture_count)
-                set_uniform(program, "object_masks", unit + 1 + decals.texture_count)
+                others["object_masks"] = masks.texture
+            for number, (name, other) in enumerate(others.items(), unit + 1 + decals.texture_count):
+                other.use(number)
+                set_uniform(program, name, number)
         painting.run(rectangle.rows(part))
 
     def read_decal(self, tile: Tile) -> Float32Array:
@@ -104,8 +123,12 @@ class DecalPass:
         """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
         key = library, *variant.values()
         if key not in self._passes:
+            if variant["materials"] and not self.material_targets:
+                self.material_targets["g_material"] = self._context.texture(self._size, "f4")
+                self.material_targets["g_glow"] = self._context.texture(self._size, "f2")
+            targets = [*self._targets, *(self.material_targets.values() if variant["materials"] else ())]
             program = decal_program(self._context, library, len(self._targets), **variant)
-            self._passes[key] = PixelPass(self._context.gl, program, self._targets)
+            self._passes[key] = PixelPass(self._context.gl, program, targets)
         return self._passes[key]
 
     def release(self) -> None:
@@ -113,7 +136,7 @@ class DecalPass:
         for painting in self._passes.values():
             painting.release()
         self._framebuffer.release()
-        for target in self._targets:
+        for target in (*self._targets, *self.material_targets.values()):
             target.release()
 
 
@@ -125,11 +148,13 @@ def decal_program(
     posed: bool = False,
     limited: bool = False,
     filtered: bool = False,
+    materials: bool = False,
 ) -> Program:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
     file = "filtered_decals.glsl" if filtered else "decals.glsl"
     slots = {"decals": f"//@ include {file}", "functions": library} if library else {}
     variants = {"DECALS": True, "POSED": posed, "LIMITED": limited, "FILTERED": filtered}
+    variants["MATERIALS"] = materials
     defines = {name: value and bool(library) for name, value in variants.items()}
     return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines=defines))
 

@@ -1,10 +1,13 @@
 """The light pass, which lights the painted surface, and the resolve of its samples to pixels."""
 
+from collections.abc import Mapping
+
 import moderngl
 import numpy as np
 
 from blobtree._typing import UInt8Array
 from decals.rendering.context import Context
+from decals.rendering.environment import environment_glsl
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background
@@ -32,7 +35,7 @@ class LightPass:
         self.light = context.texture(size, "f2")
         self.light.repeat_x = self.light.repeat_y = False  # it may be magnified
         self._context = context
-        self._passes: dict[str, PixelPass] = {}
+        self._passes: dict[tuple[str, bool], PixelPass] = {}
         self._pass(STUDIO_LIGHT)
 
     def draw(
@@ -43,16 +46,18 @@ class LightPass:
         tile: Tile,
         ambient_radius: float,
         lights: Lighting | None = None,
+        materials: Mapping[str, moderngl.Texture] | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Light some rows of a rectangle of a tile; all of the tile must be in the G-buffer.
 
         ``ambient_radius`` is the greatest distance, in the scene's units, at which surface keeps out the
-        studio light. Without ``lights`` the studio light is used.
+        studio light. Without ``lights`` the studio light is used. ``materials`` are the decal pass's targets.
         """
-        light_pass = self._pass(light_file(lights))
+        light_pass = self._pass(light_file(lights), materials=bool(materials))
         program = light_pass.program
-        use_textures(program, {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_paint": paint})
+        textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_paint": paint}
+        use_textures(program, textures | dict(materials or {}))
         if lights is None:
             set_uniform(program, "tile_corner", (tile.x, tile.y))
             set_uniform(program, "tile_size", (tile.width, tile.height))
@@ -62,11 +67,12 @@ class LightPass:
             _use_lights(program, lights)
         light_pass.run(rectangle.rows(part))
 
-    def _pass(self, file: str) -> PixelPass:
-        if file not in self._passes:
-            program = light_program(self._context, file)
-            self._passes[file] = PixelPass(self._context.gl, program, [self.light])
-        return self._passes[file]
+    def _pass(self, file: str, *, materials: bool = False) -> PixelPass:
+        key = file, materials
+        if key not in self._passes:
+            program = light_program(self._context, file, materials=materials)
+            self._passes[key] = PixelPass(self._context.gl, program, [self.light])
+        return self._passes[key]
 
     def release(self) -> None:
         """Release the memory."""
@@ -80,9 +86,13 @@ def light_file(lights: Lighting | None) -> str:
     return STUDIO_LIGHT if lights is None else SCENE_LIGHTS
 
 
-def light_program(context: Context, file: str) -> Program:
+def light_program(context: Context, file: str, *, materials: bool = False) -> Program:
     """Return the program of a kind of light, by its shader file."""
-    return attach_camera(context.pixel_program(BODY, 1, slots={"lighting": f"//@ include {file}"}))
+    slots = {"lighting": f"//@ include {file}"}
+    if materials:
+        slots |= {"material": "//@ include material.glsl", "environment": environment_glsl()}
+    defines = {"MATERIAL_LIGHT": materials}
+    return attach_camera(context.pixel_program(BODY, 1, slots=slots, defines=defines))
 
 
 def _use_lights(program: Program, lights: Lighting) -> None:

@@ -176,7 +176,10 @@ class TargetState:
             tuple(scene.objects),
             bounds,
             (tile.block(), tile.x, tile.y, tile.width, tile.height, tile.inner, depth),
-            (decals, *(image.pixels for image in scene.images)),
+            (
+                decals,
+                *(image if hasattr(image, "surface_texels") else image.pixels for image in scene.images),
+            ),
             (
                 options.mapping,
                 options.contact,
@@ -390,10 +393,19 @@ def plan_frame(
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
     modes = options.mapping, options.contact, options.stiffness, options.filtered
     rest = targets.rest_for(uploaded.drawables)
-    decal_arguments = gbuffer, uploaded.decals, uploaded.images, *modes, rest, uploaded.masks
+    decal_arguments = (
+        gbuffer,
+        uploaded.decals,
+        uploaded.images,
+        *modes,
+        rest,
+        uploaded.masks,
+        uploaded.materials,
+    )
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
-    light_arguments = gbuffer, paint, tile, radius, options.lights
+    materials = None if uploaded.materials is None else targets.decal_pass.material_targets
+    light_arguments = gbuffer, paint, tile, radius, options.lights, materials
     steps += [partial(targets.light_pass.draw, rectangle, *light_arguments) for rectangle in dirty.light]
     return FramePlan(state, steps, dirty.work(tile))
 

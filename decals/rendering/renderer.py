@@ -21,6 +21,7 @@ from decals.rendering.decal_pass import decal_library, decal_program
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.gl_libraries import is_forked
 from decals.rendering.light_pass import light_file, light_program, resolve_program
+from decals.rendering.materials import has_materials
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
 from decals.rendering.options import (
     RenderOptions,
@@ -389,9 +390,9 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     context = uploads.context
     objects = [warmup_of(context, item) for item in drawn_objects(scene)]
     has_decals, light = len(scene.decals) > 0, light_file(options.lights)
-    formulas = None
+    formulas, materials = None, has_materials(scene)
     if has_decals:
-        formulas = options.contact, scene.decals.layered, is_limited(scene), options.filtered
+        formulas = options.contact, scene.decals.layered, is_limited(scene), _is_filtered(scene, options)
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
     tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
@@ -401,14 +402,18 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
         WarmupTask(
             SHADERS,
             lambda: decal_program(
-                context, _library(scene, options), limited=is_limited(scene), filtered=options.filtered
+                context,
+                _library(scene, options),
+                limited=is_limited(scene),
+                filtered=_is_filtered(scene, options),
+                materials=materials,
             ),
         ),
-        WarmupTask(SHADERS, lambda: light_program(context, light)),
+        WarmupTask(SHADERS, lambda: light_program(context, light, materials=materials)),
         WarmupTask(SHADERS, partial(depth_program, context)),
         WarmupTask(SHADERS, partial(resolve_program, context)),
     ]
-    return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light), tasks)
+    return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light, materials), tasks)
 
 
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
@@ -423,6 +428,11 @@ def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     ]
 
 
+def _is_filtered(scene: SceneLike, options: RenderOptions) -> bool:
+    """Return True if decals are averaged over pixels; maps of materials are not."""
+    return options.filtered and not has_materials(scene)
+
+
 def _library(scene: SceneLike, options: RenderOptions) -> str:
     """Return the formulas of the decals; nothing for a scene without decals."""
     if not len(scene.decals):
@@ -431,5 +441,5 @@ def _library(scene: SceneLike, options: RenderOptions) -> str:
         options.contact,
         layered=scene.decals.layered,
         limited=is_limited(scene),
-        filtered=options.filtered,
+        filtered=_is_filtered(scene, options),
     )

@@ -21,6 +21,7 @@ from decals.model import Decals
 from decals.receivers import object_mask
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
+from decals.rendering.materials import MaterialArrays, has_materials
 from decals.rendering.options import SceneLike, check_scene, drawn_objects, is_limited
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
@@ -507,6 +508,7 @@ class UploadedScene:
     decals: DecalData | None
     images: ImageArray | None
     masks: DataTexture | None = None
+    materials: MaterialArrays | None = None
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -528,6 +530,7 @@ class Uploads:
         self._drawables: GpuCache[Drawable] = GpuCache()
         self._decals: GpuCache[DecalData] = GpuCache()
         self._images: GpuCache[ImageArray] = GpuCache()
+        self._materials: GpuCache[MaterialArrays] = GpuCache()
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
 
     def scene(self, scene: SceneLike) -> UploadedScene:
@@ -536,7 +539,17 @@ class Uploads:
         objects = drawn_objects(scene)
         drawables = [self.drawable(item) for item in objects]
         masks = self._masks_of(scene, objects)
-        return UploadedScene(drawables, self.decals(scene), self.images(scene), masks)
+        images = self.images(scene)
+        return UploadedScene(drawables, self.decals(scene), images, masks, self._materials_of(scene, images))
+
+    def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArrays | None:
+        """Return the maps of a scene's images; None without any."""
+        if images is None or not has_materials(scene):
+            return None
+        shape = images.height, images.width
+        return self._materials.get(
+            lambda: MaterialArrays(self.context, scene.images, shape), images, *scene.images
+        )
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
         """Return the masks of objects of a scene; None if its decals are not limited."""
@@ -578,11 +591,11 @@ class Uploads:
 
     def sweep(self) -> None:
         """Release everything that was not used since the last sweep."""
-        for cache in (self._drawables, self._decals, self._images):
+        for cache in (self._drawables, self._decals, self._images, self._materials):
             cache.sweep()
 
     def release(self) -> None:
         """Release everything."""
-        for cache in (self._drawables, self._decals, self._images):
+        for cache in (self._drawables, self._decals, self._images, self._materials):
             cache.release()
         self._release_masks()

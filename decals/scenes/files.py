@@ -6,7 +6,7 @@
       "format": "implicit-decals-scene",
       "version": 1,
       "objects": [{"type": "mesh", ...}, {"type": "tree", ...}],
-      "images": ["scale", "pictures/moss.png"],
+      "images": ["scale", "pictures/moss.png", {"name": "steel", "pixels": "steel.png", "roughness": ...}],
       "camera": {"position": [x, y, z], ...},
       "drawing": {"contact": "elastic", "stiffness": 2.0, "mapping": "corrected", "samples": 2, ...},
       "recipe": {"function": "decals.cover", "parameters": {"count": 500, ...}, "seed": 0, "versions": {...}},
@@ -42,6 +42,8 @@ from decals.images.load import embedded_image, is_embedded, load_image
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
 from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawing_record
+from decals.scenes.material import DecalMaterial
+from decals.scenes.material_record import MaterialRecord, material_of, material_record, sources_of
 from decals.scenes.objects import SceneObject, as_object
 from decals.scenes.recipe import Recipe
 from decals.scenes.records import (
@@ -97,7 +99,7 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
     format: Literal["implicit-decals-scene"]
     version: Literal[1]
     objects: list[MeshRecord | TreeRecord]
-    images: list[str]
+    images: list[str | MaterialRecord]
     camera: _CameraRecord
     decals: list[DecalRecord]
     drawing: DrawingRecord | None = None
@@ -209,7 +211,7 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "format": FORMAT,
         "version": VERSION,
         "objects": _lines(record_of(item, folder) for item in scene.objects),
-        "images": [_image_source(image, folder) for image in scene.images],
+        "images": [_image_record(image, folder) for image in scene.images],
         "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
         "drawing": drawing_record(scene.drawing),
         "decals": decals,
@@ -233,7 +235,8 @@ def from_json(
     record = _decode(text)
     if not trust:
         meshes = [item.source for item in record.objects if isinstance(item, MeshRecord)]
-        check_inside([*(source for source in meshes if source is not None), *record.images], folder)
+        images = [source for image in record.images for source in sources_of(image)]
+        check_inside([*(source for source in meshes if source is not None), *images], folder)
     objects = [object_of(item, folder, samples) for item in record.objects]
     return Scene(
         objects=tuple(objects),
@@ -247,6 +250,11 @@ def from_json(
     )
 
 
+def _image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
+    """Return an image as a file has it."""
+    return material_record(image) if isinstance(image, DecalMaterial) else _image_source(image, folder)
+
+
 def _image_source(image: DecalImage, folder: Path) -> str:
     """Return the name or the path of an image; the picture itself if it has neither."""
     if is_builtin(image.source) or is_file(Path(image.source)):
@@ -254,7 +262,7 @@ def _image_source(image: DecalImage, folder: Path) -> str:
     return embedded_image(image.pixels)
 
 
-def _images(sources: list[str], folder: Path, trust: bool) -> tuple[DecalImage, ...]:
+def _images(sources: list[str | MaterialRecord], folder: Path, trust: bool) -> tuple[DecalImage, ...]:
     """Load the images of a scene; InvalidScene if an unknown scene has too many, or too large ones."""
     images: list[DecalImage] = []
     pixels = 0
@@ -262,7 +270,10 @@ def _images(sources: list[str], folder: Path, trust: bool) -> tuple[DecalImage, 
         raise InvalidScene(f"images: expected at most {MAX_IMAGES}, got {len(sources)}; {TRUST_ADVICE}")
     for number, source in enumerate(sources):
         name = f"image {number}"
-        if is_embedded(source):
+        if isinstance(source, MaterialRecord):
+            images.append(material_of(source, folder))
+            source = source.name
+        elif is_embedded(source):
             images.append(DecalImage(name, load_image(source)))
             source = name
         else:

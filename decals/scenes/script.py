@@ -21,6 +21,7 @@ from decals.images.builtin import is_builtin
 from decals.model import Decals
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background, Drawing
+from decals.scenes.material import MAP_NAMES, DecalMaterial
 from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.origin import WORLD
 from decals.scenes.scene import DecalImage, Scene
@@ -201,6 +202,15 @@ class _Script:
     def _image(self, image: DecalImage) -> str:
         if is_builtin(image.source):
             return repr(image.source)
+        if isinstance(image, DecalMaterial):
+            number = len(self.arrays)
+            maps = {name: getattr(image, name) for name in MAP_NAMES}
+            given = [
+                f"{name}={self._array(f'material_{number}_{name}', map_)}"
+                for name, map_ in maps.items()
+                if map_ is not None
+            ]
+            return f"decals.DecalMaterial({image.source!r}, {', '.join(given)})"
         pixels = self._array(f"image_{len(self.arrays)}", image.pixels)
         return f"decals.DecalImage({image.source!r}, {pixels})"
 
