@@ -25,6 +25,7 @@ Example = Literal[
     "dragon",
     "interactions",
     "layers",
+    "materials",
     "contact_modes",
     "size_ratio",
     "mapping_modes",
