@@ -21,10 +21,11 @@ EVERYTHING = -1
 
 def label_names(name: str, text: object, error: type[ImplicitDecalsError]) -> tuple[str, ...]:
     """Return labels that are given as one text with commas, or as several texts; none twice."""
-    parts = text.split(",") if isinstance(text, str) else text
-    if not isinstance(parts, Iterable) or isinstance(parts, bytes):
-        raise error(f"{name}: expected labels such as 'hull, lid', got {describe(text)}")
-    listed = list(parts)
+    parts: Any = text.split(",") if isinstance(text, str) else text
+    try:
+        listed: list[Any] = [parts] if isinstance(parts, bytes) else list(parts)
+    except TypeError:
+        raise error(f"{name}: expected labels such as 'hull, lid', got {describe(text)}") from None
     for part in listed:
         if not isinstance(part, str) or not is_unicode(part) or "\0" in part or "," in part:
             raise error(f"{name}: expected labels of letters, without commas, got {describe(part)}")

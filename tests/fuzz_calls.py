@@ -139,6 +139,19 @@ def call_table() -> Calls:
         ),
         "TreeObject": (decals.TreeObject, {"name": "a", "tree": tree}),
         "DecalImage": (decals.DecalImage, {"source": "a", "pixels": pixels}),
+        "DecalMaterial": (
+            decals.DecalMaterial,
+            {
+                "source": "a",
+                "pixels": pixels,
+                "normal": pixels,
+                "roughness": 0.5,
+                "metallic": pixels,
+                "occlusion": 1.0,
+                "emission": pixels,
+                "height": pixels,
+            },
+        ),
         "Scene": (
             decals.Scene,
             {"objects": (item,), "camera": camera, "decals": spots[:0], "images": ()},

@@ -362,6 +362,10 @@ class OrderDecals(DecalCommand):
 
         def __init__(self, numbers: ArrayLike, front: bool) -> None: ...
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        truth("front", self.front, InvalidEdit)
+
     @property
     def label(self) -> str:
         """Name of the undo entry."""
@@ -381,7 +385,7 @@ class OrderDecals(DecalCommand):
 
     def _order(self, document: Document) -> tuple[Int64Array, Int64Array]:
         """Return all numbers of the ranks of the decals, and which decals come to have them."""
-        front, editor = truth("front", self.front, InvalidEdit), document.decals
+        editor = document.decals
         given = editor.take(self.numbers)
         ordered = given.interactions != Interaction.PUSH
         if not ordered.any():
@@ -395,7 +399,7 @@ class OrderDecals(DecalCommand):
         for rank in np.unique(given.ranks[ordered]):
             members = numbers[ranks == rank]
             moved = np.isin(members, self.numbers)
-            parts = (members[~moved], members[moved]) if front else (members[moved], members[~moved])
+            parts = (members[~moved], members[moved]) if self.front else (members[moved], members[~moved])
             new.append(members)
             old.append(np.concatenate(parts))
         return np.concatenate(new), np.concatenate(old)

@@ -218,7 +218,7 @@ def _heights(name: str, given: Any) -> Float32Array | None:
     """Return heights as float32[h, w]; floats of any size are kept."""
     if given is None:
         return None
-    array = np.asarray(given) if isinstance(given, np.ndarray | list) else None
+    array = given if isinstance(given, np.ndarray) else None
     if array is None or array.dtype.kind != "f" or array.ndim != 2:
         return (image_pixels(given, name=name)[..., 0] / 255.0).astype(np.float32)
     heights = array.astype(np.float32)

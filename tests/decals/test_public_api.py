@@ -13,7 +13,8 @@ PACKAGES = [
     "window",
 ]  # fmt: skip
 NAMES = [
-    "Camera", "Contact", "ContactLaw", "DecalImage", "Decals", "ImageMapping", "ImplicitDecalsError",
+    "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
+    "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
     "bake", "cover", "define_contact", "edit", "evaluate", "load_image", "load_model", "load_scene",
     "measure", "pose", "render", "save_scene", "scatter", "show", "skin",
