@@ -23,6 +23,8 @@ KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Not
 NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
 OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "parallel", "axes"]
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
+CHANGES = ["rename", "remove", "duplicate", "move", "group", "hide", "lock", "isolate"]
+HANDLES = ["move", "move x", "turn y", "scale", "start 0"]
 ALL: dict[str, list[list[Any]]] = {
     "select": [KEYS_OF_ROWS],
     "mark": [KEYS_OF_ROWS],
@@ -38,9 +40,10 @@ ALL: dict[str, list[list[Any]]] = {
     "set_display": [OPTIONS, [*SHOWN, 0.3, True, False]],
     "move_camera": [["frame", "look", "keep", "go"], ["front", "top", 0, 3]],
     "set_decals": [NAMES, [0.1, 0.5, 2, "overlap", "tint alone", "#0000ff", True], [True, False]],
-    "set_brush": [["brush", "radius", "density"], ["select", "scatter", "push", 0.3]],
+    "set_brush": [["brush", "radius", "density"], ["select", "scatter", "push", "lasso", 0.3]],
     "set_mode": [["contact", "mapping", "stiffness"], ["product", "elastic", "chord", 2.0]],
-    "change_row": [KEYS_OF_ROWS, ["rename", "remove", "duplicate", "move", "group"], ["name", "0/1", "0"]],
+    "change_row": [KEYS_OF_ROWS, CHANGES, ["name", "0/1", "0"]],
+    "drag_handle": [HANDLES, ["begin", "move", "end"], [0.1, 0.5, 0.8], [0.3, 0.6], [True, False]],
     "open_file": [["../x.json", "none.json", "a\0.json"]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3]],
