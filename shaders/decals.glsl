@@ -48,19 +48,19 @@ DecalHit decal_hit(int owner, vec3 q, vec3 n) {
     if (owner < 0) {
         return DecalHit(-1, 0.0, vec2(0.0));
     }
-    float complement = complement_at(q, n, owner, decal_contact);
-    return DecalHit(owner, 1.0 - complement, uv_at(q, n, owner, complement, decal_mapping));
+    vec3 pushed = contact_at(q, n, owner, decal_contact);
+    return DecalHit(owner, 1.0 - pushed.x, uv_at(q, n, owner, pushed, decal_mapping));
 }
 
 // The topmost decal.
 DecalHit decal_at(vec3 q, vec3 n) {
     if (decal_single_layer) {
-        vec2 owner_complement = single_layer_at(q, n, decal_contact);
-        int owner = int(owner_complement.x);
+        vec4 found = single_layer_at(q, n, decal_contact);
+        int owner = int(found.x);
         if (owner < 0) {
             return DecalHit(-1, 0.0, vec2(0.0));
         }
-        return DecalHit(owner, 1.0 - owner_complement.y, uv_at(q, n, owner, owner_complement.y, decal_mapping));
+        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.yzw, decal_mapping));
     }
     return decal_hit(owner_at(q, n, decal_contact), q, n);
 }

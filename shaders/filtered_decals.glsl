@@ -82,6 +82,32 @@ Place place_of(int decal, vec3 q, vec3 n, vec3 right, vec3 up, vec3 squares) {
     return place;
 }
 
+// Bumps of nested decals at a point, and at its neighbours to the right and above.
+struct Bumps {
+    vec4 here;
+    vec4 right;
+    vec4 up;
+};
+
+void add_bump(inout Bumps bumps, vec3 q, vec3 n, vec3 right, vec3 up, vec4 ball, vec4 other_ball, int other) {
+    bumps.here = join_bumps(bumps.here, bump_at(q, n, ball, other_ball, other));
+    bumps.right = join_bumps(bumps.right, bump_at(q + right, n, ball, other_ball, other));
+    bumps.up = join_bumps(bumps.up, bump_at(q + up, n, ball, other_ball, other));
+}
+
+vec2 parted_uv(vec2 uv, vec4 bump, vec3 n, int decal) {
+    vec2 from_centre = uv - 0.5;
+    return uv + max(0.5 - 2.0 * dot(from_centre, from_centre), 0.0) * image_shift(bump, n, decal);
+}
+
+// The place in an image that nested decals part.
+void part_image(inout Place place, Bumps bumps, vec3 n, int decal) {
+    vec2 uv = parted_uv(place.uv, bumps.here, n, decal);
+    place.uv_right = parted_uv(place.uv + place.uv_right, bumps.right, n, decal) - uv;
+    place.uv_up = parted_uv(place.uv + place.uv_up, bumps.up, n, decal) - uv;
+    place.uv = uv;
+}
+
 // Premultiplied linear colour of a decal around a place. Where the image has more than one texel a pixel, several
 // look-ups along each side, more along the longer one, form a box.
 vec4 image_average(int decal, Place place, vec3 q, vec3 n) {
@@ -131,6 +157,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     int rank = decal_layered ? rank_of(owner, decal_records) : 0;
     bool pushes = !decal_layered || is_contact_rank(rank);
     vec3 squares = vec3(0.0);
+    Bumps bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
     ivec2 beside = ivec2(-1);
     vec2 owner_shares = vec2(1.0);  // of the pixel, on the owner's side of the contact lines with `beside`
     int above = -1, below = -1, nested_count = 0;
@@ -156,6 +183,9 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                 bool higher = nested ? is_above(other, owner, decal_records) && lies_on_top(n, other, decal_records)
                                      : other_rank > rank || (other_rank == rank && other > owner);
                 nested_count += nested ? 1 : 0;
+                if (nested && decal_contact == ELASTIC) {
+                    add_bump(bumps, q, n, right, up, ball, other_ball, other);
+                }
                 if (higher && outside) {
                     float share = inside_ball(q, right, up, other_ball).x;
                     boundaries += share > 0.0 ? 1 : 0;
@@ -182,7 +212,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         }
     }
     if (decal_contact != ELASTIC) {
-        squares.x = contact_distance(complement_at(q, n, owner, decal_contact));
+        squares.x = contact_distance(contact_at(q, n, owner, decal_contact).x);
     }
     // The owner, those beside it or the one below, and the one above in turn; in one loop, because some drivers run
     // code once even where no pixel needs it.
@@ -204,6 +234,17 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         vec3 at = first ? q : q + part.y * right + part.z * up;
         vec3 contact = first ? squares : contact_with(decal, across ? owner : -1, at, n, right, up);
         Place place = place_of(decal, at, n, right, up, contact);
+        if (decal_contact == ELASTIC) {
+            if (!first) {
+                bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
+                if (decal == below) {
+                    add_bump(bumps, at, n, right, up, own_ball, ball, owner);
+                }
+            }
+            if (bumps.here.w > 0.0) {
+                part_image(place, bumps, n, decal);
+            }
+        }
         if (first) {
             part = inside_rim(place.arc, per_radius * right, per_radius * up);
             bare = 1.0 - part.x;

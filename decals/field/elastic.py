@@ -15,6 +15,16 @@ its reach: the candidates of the point itself suffice. Several neighbours act to
 For one neighbour that is t + δ_j. r is 1 on the rim and on every plane, and nowhere else. Inside the cell it
 is smooth, also between rays to both sides of a corner, where planes meet each other or the rim. With m planes
 on a ray the slope is at least 1/√m, so no image folds, whatever the sizes.
+
+A smaller decal i that is nested with the owner parts its image, as a stone parts grass. At q = p_i + w, with
+d = |w|/ρ_i and b = ρ_i in radii of the owner, the point of the image moves towards p_i by the gradient of
+
+    s_i = A b² u³/10,   u = (1 − d²/1.6)/(1 − 1/1.6),   A = PARTING (1 − b²),
+
+a bump that ends where i stops to reach; inside its rim, a paraboloid continues it. On that rim the image
+moves by A ρ_i, so only what lies within (1 − A) ρ_i of the centre stays hidden. Several bumps join to
+S = (Σ s_i⁸)^⅛. As S curves by at most PARTING·k^⅛ < 1 for k < 256 of them, the map is the gradient of a
+convex function and does not fold. The displacement is multiplied by 1 − r²: rims and contact lines stay.
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -23,6 +33,7 @@ on a ray the slope is at least 1/√m, so no image folds, whatever the sizes.
 
 import warp as wp
 
+from decals.field.mapping import tangent_coordinates, unroll_step
 from decals.field.radial import (
     NO_OWNER,
     RIM_SQUARED,
@@ -64,6 +75,12 @@ MIN_REMAINDER = 1.0e-12
 
 MIN_DISTANCE = 1.0e-30
 """Smallest divisor of the direction of a ray."""
+
+PARTING = 0.5
+"""Share of its way by which the image moves on the rim of a much smaller nested decal, towards its centre."""
+
+RIM_BUMP = 0.375
+"""Height 1 − d²/(1 + REACH_MARGIN) of a bump's base on the rim, d = 1."""
 
 MAX_KEPT = 8
 """Number of decals or complements that are kept. Where more act, the index is traversed a second time."""
@@ -133,19 +150,81 @@ def pushed_along_ray(distance: wp.float32, squares: wp.float32) -> wp.float32:
     return field_complement(r * r * RIM_SQUARED)
 
 
+@wp.func
+def bump_of(w: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.vec4:
+    """Return gradient and height of the bump of a smaller nested decal, at w from its centre; 0 out of reach.
+
+    Lengths are in radii of the owner, so the gradient is the displacement of the image.
+    """
+    share = other / radius
+    squared = wp.dot(w, w) / (other * other)
+    amount = PARTING * (1.0 - share * share)
+    if squared < 1.0:
+        gradient = -(amount / radius) * w
+        return wp.vec4(gradient[0], gradient[1], gradient[2], amount * share * share * (0.6 - 0.5 * squared))
+    u = wp.max(1.0 - squared / (1.0 + REACH_MARGIN), 0.0) / RIM_BUMP
+    outer = -(amount * u * u / radius) * w
+    return wp.vec4(outer[0], outer[1], outer[2], 0.1 * amount * share * share * u * u * u)
+
+
+@wp.func
+def join_bumps(first: wp.vec4, second: wp.vec4) -> wp.vec4:
+    """Return gradient and height of (s⁸ + t⁸)^⅛ for two bumps; the second may be 0."""
+    if second[3] <= 0.0:
+        return first
+    largest = wp.max(first[3], second[3])
+    a = first[3] / largest
+    b = second[3] / largest
+    a2 = a * a
+    b2 = b * b
+    a6 = a2 * a2 * a2
+    b6 = b2 * b2 * b2
+    joined = wp.pow(a6 * a2 + b6 * b2, 0.125)
+    per = 1.0 / joined
+    per7 = wp.pow(per, 7.0)
+    result = (a6 * a * per7) * first + (b6 * b * per7) * second
+    return wp.vec4(result[0], result[1], result[2], largest * joined)
+
+
 # -- the same of decals ---------------------------------------------------------------------------------
+
+
+@wp.func
+def bump_at(
+    q: wp.vec3, n_q: wp.vec3, own_ball: wp.vec4, ball: wp.vec4, decal: wp.int32, index: IndexedDecals
+) -> wp.vec4:
+    """Return gradient and height at q of the bump of a decal under its owner's image; 0 for none."""
+    if ball[3] < own_ball[3]:
+        radius = RIM_RADIUS * own_ball[3]
+        other = RIM_RADIUS * ball[3]
+        if balls_nested(xyz(ball) - xyz(own_ball), radius, other):
+            if lies_on_top(n_q, decal, index.records):
+                return bump_of(q - xyz(ball), radius, other)
+    return wp.vec4(0.0, 0.0, 0.0, 0.0)
+
+
+@wp.func
+def image_shift(bump: wp.vec4, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.vec2:
+    """Return the displacement that a bump causes in the owner's image, in its radii."""
+    if bump[3] <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    normal = xyz(index.records[RECORD * owner + 1])
+    step = wp.vec3(bump[0], bump[1], bump[2])
+    along = unroll_step(step - wp.dot(step, n_q) * n_q, normal, n_q)
+    return tangent_coordinates(along, normal, xyz(index.records[RECORD * owner + 2]))
 
 
 @wp.func
 def sum_of_pushes(
     q: wp.vec3, n_q: wp.vec3, owner: wp.int32, ray: wp.vec3, distance: wp.float32, index: IndexedDecals
-) -> wp.float32:
-    """Return Σ z² of all neighbours of a contact decal, in a traversal of the index."""
+) -> wp.vec3:
+    """Return (Σ z², shift) of all neighbours of a contact decal, in a traversal of the index."""
     rank = wp.int32(0)
     if index.layered:
         rank = rank_of(owner, index.records)
     radius = visible_radius(owner, index.records)
     squares = wp.float32(0.0)
+    bump = wp.vec4(0.0, 0.0, 0.0, 0.0)
     for level in range(index.level_count):
         span = rank_range(q, rank, level, index)
         for j in range(span[0], span[1]):
@@ -160,16 +239,21 @@ def sum_of_pushes(
                 )
                 if push > 0.0:
                     squares += square_of_push(distance, push)
-    return squares
+                own_ball = index.records[RECORD * owner]
+                ball = index.records[RECORD * index.ids[j]]
+                bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, index.ids[j], index))
+    shift = image_shift(bump, n_q, owner, index)
+    return wp.vec3(squares, shift[0], shift[1])
 
 
 @wp.func
-def elastic_complement(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.float32:
-    """Return E = 1 − F of a contact decal at q, compressed along its ray by all neighbours."""
+def elastic_contact(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDecals) -> wp.vec3:
+    """Return (E, shift) of a contact decal at q, compressed along its ray and parted by all neighbours."""
     w = (q - xyz(index.records[RECORD * owner])) / visible_radius(owner, index.records)
     distance = wp.length(w)
     ray = w / wp.max(distance, MIN_DISTANCE)
-    return pushed_along_ray(wp.min(distance, 1.0), sum_of_pushes(q, n_q, owner, ray, distance, index))
+    sums = sum_of_pushes(q, n_q, owner, ray, distance, index)
+    return wp.vec3(pushed_along_ray(wp.min(distance, 1.0), sums[0]), sums[1], sums[2])
 
 
 @wp.func
@@ -214,10 +298,10 @@ def kept_owner(
 
 
 @wp.func
-def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
-    """Return (owner, E) at q; (NO_OWNER, 0) outside all rims. The decals must not be layered.
+def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec4:
+    """Return (owner, E, shift) at q; (NO_OWNER, 0) outside all rims. The decals must not be layered.
 
-    They are those of `cell_owner` and `elastic_complement`. One traversal of the index finds the candidates,
+    They are those of `cell_owner` and `elastic_contact`. One traversal of the index finds the candidates,
     and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
     one is the owner, unless it is nested with another holder above it that faces the surface well.
     """
@@ -256,7 +340,7 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
                             least = own
                             closest = decal
     if closest < 0:
-        return wp.vec2(float(NO_OWNER), 0.0)
+        return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
     owner = wp.int32(closest)
     own_ball = index.records[RECORD * closest]
     if topmost != closest:
@@ -275,6 +359,7 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
     distance = wp.length(w)
     ray = w / wp.max(distance, MIN_DISTANCE)
     squares = wp.float32(0.0)
+    bump = wp.vec4(0.0, 0.0, 0.0, 0.0)
     for _kept in range(wp.min(count, MAX_KEPT)):
         other = a[0]
         a = wp.vec4i(a[1], a[2], a[3], b[0])
@@ -285,6 +370,10 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
             push = plane_push(ray, distance, between, radius, RIM_RADIUS * ball[3], index.stiffness)
             if push > 0.0:
                 squares += square_of_push(distance, push)
+            bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, other, index))
+    shift = image_shift(bump, n_q, owner, index)
     if count > MAX_KEPT:
-        squares = sum_of_pushes(q, n_q, owner, ray, distance, index)
-    return wp.vec2(float(owner), pushed_along_ray(wp.min(distance, 1.0), squares))
+        sums = sum_of_pushes(q, n_q, owner, ray, distance, index)
+        squares = sums[0]
+        shift = wp.vec2(sums[1], sums[2])
+    return wp.vec4(float(owner), pushed_along_ray(wp.min(distance, 1.0), squares), shift[0], shift[1])

@@ -1,6 +1,6 @@
 """Owner of a surface point, its field after contact, and its image coordinates: the decal pass in four calls.
 
-`owner_at` returns the topmost decal, `complement_at` and `uv_at` its field and image coordinates, and
+`owner_at` returns the topmost decal, `contact_at` and `uv_at` its field and image coordinates, and
 `owner_below` the next decal below, until NO_OWNER. Shaders have the contact mode and `IndexedDecals.layered`
 as constants, so that compilers remove the branches that are not used.
 
@@ -25,7 +25,7 @@ from decals.field.contact import (
     contact_uv,
     rim_distance,
 )
-from decals.field.elastic import MAX_KEPT, elastic_complement, single_layer_elastic
+from decals.field.elastic import MAX_KEPT, elastic_contact, single_layer_elastic
 from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates, unroll
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
@@ -140,22 +140,25 @@ def pushed_complement(
 
 
 @wp.func
-def complement_at(
+def contact_at(
     q: wp.vec3,
     n_q: wp.vec3,
     owner: wp.int32,
     contact: wp.int32,
     index: IndexedDecals,
-) -> wp.float32:
-    """Return E = 1 − F of a decal that shows at q; neighbours push only contact decals."""
+) -> wp.vec3:
+    """Return (E, shift) of a decal that shows at q: E = 1 − F, and the displacement of its image.
+
+    Neighbours push only contact decals. Only elastic contact displaces images, where decals are nested.
+    """
     if index.layered:
         if not is_contact_rank(rank_of(owner, index.records)):
-            return complement_of(q, n_q, owner, index)
+            return wp.vec3(complement_of(q, n_q, owner, index), 0.0, 0.0)
     if contact == Contact.RADIAL:
-        return radial_complement(q, n_q, owner, index)
+        return wp.vec3(radial_complement(q, n_q, owner, index), 0.0, 0.0)
     if contact == Contact.ELASTIC:
-        return elastic_complement(q, n_q, owner, index)
-    return pushed_complement(q, n_q, owner, contact, index)
+        return elastic_contact(q, n_q, owner, index)
+    return wp.vec3(pushed_complement(q, n_q, owner, contact, index), 0.0, 0.0)
 
 
 @wp.func
@@ -163,22 +166,26 @@ def uv_at(
     q: wp.vec3,
     n_q: wp.vec3,
     owner: wp.int32,
-    complement: wp.float32,
+    pushed: wp.vec3,
     mapping: wp.int32,
     index: IndexedDecals,
 ) -> wp.vec2:
-    """Return image coordinates in the owner's image, a disc of radius ½ around (½, ½) (`in_image`)."""
+    """Return image coordinates in the owner's image, a disc of radius ½ around (½, ½) (`in_image`).
+
+    `pushed` is that of `contact_at`. The displacement fades toward the rim, where no image moves.
+    """
     centre = xyz(index.records[RECORD * owner])
     normal = xyz(index.records[RECORD * owner + 1])
     tangent = xyz(index.records[RECORD * owner + 2])
     w = q - centre
-    rim = rim_distance(complement)
-    if mapping == ImageMapping.CHORD:
-        return contact_uv(tangent_coordinates(w, normal, tangent), rim)
-    small = w / visible_radius(owner, index.records)
-    arc = unroll(small, normal, n_q)
-    drawn = image_distance(rim, wp.length(small), arc[3])
-    return contact_uv(tangent_coordinates(xyz(arc), normal, tangent), drawn)
+    drawn = rim_distance(pushed[0])
+    if mapping != ImageMapping.CHORD:
+        small = w / visible_radius(owner, index.records)
+        arc = unroll(small, normal, n_q)
+        drawn = image_distance(drawn, wp.length(small), arc[3])
+        w = xyz(arc)
+    fade = 0.5 * wp.max(1.0 - drawn * drawn, 0.0)
+    return contact_uv(tangent_coordinates(w, normal, tangent), drawn) + fade * wp.vec2(pushed[1], pushed[2])
 
 
 @wp.func
@@ -187,10 +194,10 @@ def single_layer_at(
     n_q: wp.vec3,
     contact: wp.int32,
     index: IndexedDecals,
-) -> wp.vec2:
-    """Return (owner, E) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
+) -> wp.vec4:
+    """Return (owner, E, shift) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
 
-    They are those of `owner_at` and `complement_at`. The decals must not be layered.
+    They are those of `owner_at` and `contact_at`. The decals must not be layered.
     """
     if contact == Contact.ELASTIC:
         return single_layer_elastic(q, n_q, index)
@@ -217,10 +224,10 @@ def single_layer_at(
                         owner = decal
                     least = e
     if owner < 0:
-        return wp.vec2(float(NO_OWNER), 0.0)
+        return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
     if count > MAX_KEPT:
         deformed = pushed_complement(q, n_q, owner, contact, index)
-        return wp.vec2(float(owner), deformed)
+        return wp.vec4(float(owner), deformed, 0.0, 0.0)
     per_span = 1.0 / wp.max(1.0 - 2.0 * least, MIN_SPAN)
     per_least = 1.0 / wp.max(least, MIN_COMPLEMENT)
     push = wp.float32(0.0)
@@ -229,4 +236,4 @@ def single_layer_at(
         push = add_pushes(push, b, least, per_span, per_least, contact)
     if ties > 1:  # on a contact line
         push = 1.0
-    return wp.vec2(float(owner), contact_complement(least, push))
+    return wp.vec4(float(owner), contact_complement(least, push), 0.0, 0.0)

@@ -7,7 +7,7 @@ import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.mapping import in_image
-from decals.field.ownership import NO_OWNER, complement_at, owner_at, owner_below, uv_at
+from decals.field.ownership import NO_OWNER, contact_at, owner_at, owner_below, uv_at
 from decals.field.receivers import fade_at
 from decals.index.lookup import IndexedDecals, next_number_below
 from decals.record import RECORD, rank_of
@@ -70,9 +70,9 @@ def image_point(
     index: IndexedDecals,
 ) -> wp.vec3:
     """Return (u, v, E): image coordinates of q in its owner, and the complement of the owner's field."""
-    complement = complement_at(q, n_q, owner, contact, index)
-    uv = uv_at(q, n_q, owner, complement, mapping, index)
-    return wp.vec3(uv[0], uv[1], complement)
+    pushed = contact_at(q, n_q, owner, contact, index)
+    uv = uv_at(q, n_q, owner, pushed, mapping, index)
+    return wp.vec3(uv[0], uv[1], pushed[0])
 
 
 @wp.kernel

@@ -8,9 +8,10 @@ import moderngl
 from blobtree._typing import Float32Array
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
+from decals.field.elastic import bump_at, image_shift, join_bumps
 from decals.field.law import AnyContact, ContactLaw
 from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
-from decals.field.ownership import complement_at, owner_at, owner_below, single_layer_at, uv_at
+from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
 from decals.field.pixel_filter import (
     contact_distance,
     image_steps,
@@ -164,7 +165,7 @@ LIBRARY_FUNCTIONS = (
     owner_at,
     owner_below,
     next_number_below,
-    complement_at,
+    contact_at,
     uv_at,
     in_image,
     tangent_coordinates,
@@ -187,6 +188,9 @@ FILTER_FUNCTIONS = (
     push_square_step,
     pushed_distance_step,
     image_steps,
+    bump_at,
+    join_bumps,
+    image_shift,
 )
 """Functions that ``shaders/filtered_decals.glsl`` calls."""
 

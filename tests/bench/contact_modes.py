@@ -22,7 +22,7 @@ from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.rendering.decal_pass import DecalPass
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
-from tests.bench.contact_mode_kernels import rims_in_sets
+from tests.bench.contact_mode_kernels import places_in_sets
 from tests.bench.scenes import bench_scene
 
 Array = NDArray[np.float64]
@@ -31,10 +31,12 @@ Figures = dict[str, float]
 MEMBERS = 8
 RATIOS = 1.0, 2.0, 20.0, 100.0
 FOLD_STEPS = 16
-FOLD_TOLERANCE = 1e-5
-"""Decrease of r between two points of a ray that float32 can cause."""
+FOLD_TOLERANCE = 1e-2
+"""Sine of the angle between two steps of the image that float32 can cause."""
 STEP = 1e-3
 """Step of the derivatives along and across rays, in radii."""
+TURN_STEP = 2e-3
+"""Angle across the rays on which folds are counted."""
 TURN = np.radians(0.01)
 """Angle between the rays whose images are compared."""
 RUNS = 5
@@ -68,28 +70,37 @@ class Sets:
             wp.array(self.radii, dtype=wp.float32, ndim=2, device="cpu"),
         ]
 
-    def rims(
+    def places(
         self, contact: Contact, distances: Array, angles: Array, stiffness: float = DEFAULT_STIFFNESS
     ) -> Array:
-        """Return r/r_h in the planes z = 0 at distances in radii; NaN where the first decal does not show."""
+        """Return places in the image, ``[n, 2]``, at distances in radii in the planes z = 0.
+
+        They are NaN where the first decal does not show.
+        """
         rays = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
         points: Any = wp.array(rays * (distances * self.radii[:, 0])[:, None], dtype=wp.vec3, device="cpu")
-        rims = wp.zeros(len(angles), dtype=wp.float32, device="cpu")
+        places = wp.zeros(len(angles), dtype=wp.vec3, device="cpu")
         modes = int(contact), float(stiffness)
-        wp.launch(rims_in_sets, len(angles), [points, *modes, *self._arrays], [rims], device="cpu")
-        found: Array = rims.numpy().astype(np.float64)
-        return np.where(found < 0, np.nan, found)
+        wp.launch(places_in_sets, len(angles), [points, *modes, *self._arrays], [places], device="cpu")
+        found: Array = places.numpy().astype(np.float64)
+        return np.where(found[:, 2:] < 0, np.nan, found[:, :2])
 
 
 def folds(contact: Contact, rays: int, seed: int = 0) -> int:
-    """Return the number of rays on which r decreases between two of sixteen points in a row."""
+    """Return the number of rays with a fold: a place where the image of a small triangle is turned over.
+
+    Each ray has sixteen triangles, with one side along it and one across.
+    """
     sets = Sets(rays, seed)
-    folded, last = np.zeros(rays, bool), np.full(rays, np.nan)
+    folded = np.zeros(rays, bool)
     begin = np.random.default_rng(seed + 1).uniform(0, 1, rays)
     for step in range(FOLD_STEPS):
-        r = sets.rims(contact, (step + begin) / FOLD_STEPS, sets.angles)
-        folded |= r < last - FOLD_TOLERANCE
-        last = r
+        t = (step + begin) / FOLD_STEPS
+        place, farther = (sets.places(contact, t + shift, sets.angles) for shift in (0.0, STEP))
+        along, across = farther - place, sets.places(contact, t, sets.angles + TURN_STEP) - place
+        area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+        sides = np.linalg.norm(along, axis=1) * np.linalg.norm(across, axis=1)
+        folded |= area < -FOLD_TOLERANCE * np.maximum(sides, STEP**2)
     return int(folded.sum())
 
 
@@ -97,21 +108,21 @@ def stretch(contact: Contact, points: int, seed: int = 0) -> Array:
     """Return the ratio of the singular values of the map at random points of the first decals."""
     sets = Sets(points, seed)
     t, angles = sets.distances, sets.angles
-    r, inner, outer = (sets.rims(contact, t + shift, angles) for shift in (0.0, -STEP, STEP))
-    left, right = (sets.rims(contact, t, angles + shift / t) for shift in (-STEP, STEP))
-    along, across, around = (outer - inner) / (2 * STEP), (right - left) / (2 * STEP), r / t
-    squares = along**2 + across**2 + around**2
-    determinant = np.abs(along * around)
+    inner, outer = (sets.places(contact, t + shift, angles) for shift in (-STEP, STEP))
+    left, right = (sets.places(contact, t, angles + shift / t) for shift in (-STEP, STEP))
+    along, across = (outer - inner) / (2 * STEP), (right - left) / (2 * STEP)
+    squares = (along**2 + across**2).sum(axis=1)
+    determinant = np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0])
     larger = np.sqrt((squares + np.sqrt(np.maximum(squares**2 - 4 * determinant**2, 0))) / 2)
     ratio: Array = larger**2 / np.maximum(determinant, 1e-9)
     return ratio[np.isfinite(ratio)]
 
 
 def jump(contact: Contact, points: int, seed: int = 0) -> float:
-    """Return the largest change of r between rays 0.01° apart."""
+    """Return the largest distance between images on rays 0.01° apart."""
     sets = Sets(points, seed)
-    pair = (sets.rims(contact, sets.distances, sets.angles + shift) for shift in (0.0, TURN))
-    return float(np.nanmax(np.abs(np.subtract(*pair))))
+    pair = (sets.places(contact, sets.distances, sets.angles + shift) for shift in (0.0, TURN))
+    return float(np.nanmax(np.linalg.norm(np.subtract(*pair), axis=1)))
 
 
 @contextmanager

@@ -119,7 +119,35 @@ def compressed(t: Array, planes: Array, radius: Array, radii: Array, distance: A
     return result
 
 
-def image_coordinates(world: World, owner: Ints, e: Array, mapping: ImageMapping) -> Array:
+def displacements(world: World, owner: Ints) -> Array:
+    """Section 6, parting: the step of the image at points that have an owner, in its tangent plane."""
+    ranks = list(zip(world.decals.layers.tolist(), world.decals.interactions.tolist(), strict=True))
+    result = np.zeros((len(owner), 3))
+    for row, k in enumerate(owner.tolist()):
+        if ranks[k][1] != Interaction.PUSH:
+            continue
+        heights, steps = [], []
+        for i in range(len(ranks)):
+            b = world.radii[i] / world.radii[k]
+            gap = float(np.linalg.norm(world.centres[i] - world.centres[k])) / world.radii[k]
+            part = min(gap**2 + 1 - b * b, (gap**2 + b * b - 1) / b) if b < 1 else 1.0
+            if ranks[i] == ranks[k] and b < 1 and part <= LEAST_PART * 2 * gap and world.tops[row, i]:
+                d2 = (world.distances[row, i] / world.radii[i]) ** 2
+                a, u = 0.5 * (1 - b * b), max((1.6 - d2) / 0.6, 0.0)
+                heights.append(a * b * b * (0.1 * u**3 if d2 >= 1 else 0.6 - d2 / 2))
+                away = (world.points[row] - world.centres[i]) / world.radii[k]
+                steps.append(-a * (u * u if d2 >= 1 else 1.0) * away)
+        if max(heights, default=0.0) > 0:
+            s = np.array(heights) / max(heights)
+            result[row] = (s**7 / (s**8).sum() ** (7 / 8)) @ np.array(steps)
+    n, n_q = world.decals.normals[owner].astype(np.float64), world.normals
+    flat = result - (result * n_q).sum(axis=1)[:, None] * n_q
+    share = (flat * n).sum(axis=1) / np.maximum(1 + (n * n_q).sum(axis=1), 1e-8)
+    turned: Array = flat - share[:, None] * n_q
+    return turned
+
+
+def image_coordinates(world: World, owner: Ints, e: Array, mapping: ImageMapping, contact: Contact) -> Array:
     """Section 7, for points that have an owner."""
     c = np.cbrt(1 - e)
     rim = np.minimum(np.sqrt(e / (1 + c + c * c)) / RIM, 1)
@@ -146,6 +174,9 @@ def image_coordinates(world: World, owner: Ints, e: Array, mapping: ImageMapping
         drawn = np.maximum(rim + (1 - rim) * t, length)
     xy = np.column_stack([(m * u).sum(axis=1), (m * np.cross(n, u)).sum(axis=1)])
     uv: Array = 0.5 + 0.5 * (drawn / np.maximum(np.linalg.norm(xy, axis=1), 1e-300))[:, None] * xy
+    if contact == Contact.ELASTIC:
+        moved = 0.5 * np.maximum(1 - drawn**2, 0)[:, None] * displacements(world, owner)
+        uv += np.column_stack([(moved * u).sum(axis=1), (moved * np.cross(n, u)).sum(axis=1)])
     return uv
 
 
@@ -168,7 +199,7 @@ def reference(
     uv = np.zeros((len(points), 2))
     owned = owner >= 0
     inside = World(decals, points[owned], normals[owned])
-    uv[owned] = image_coordinates(inside, owner[owned], e[owned], mapping)
+    uv[owned] = image_coordinates(inside, owner[owned], e[owned], mapping, contact)
     return owner, np.where(owned, 1 - e, 0.0), uv
 
 

@@ -76,7 +76,7 @@ def colors_at(
             owner, complement, _ = scene.shown(members, contact)
             rows = np.flatnonzero(owner >= 0)
             uv, _ = _image_place(
-                decals, points[rows], normals[rows], owner[rows], complement[rows], corrected
+                decals, points[rows], normals[rows], owner[rows], complement[rows], corrected, contact
             )
             inside = np.hypot(*(uv - 0.5).T) <= 0.5 + 1e-5
             front = color_of(owner[rows], uv) * (inside * scene.fades[rows, owner[rows]])[:, None]
@@ -127,7 +127,7 @@ def _topmost(
     owned = owner >= 0
     uv, stretch = np.zeros((count, 2)), np.ones(count)
     uv[owned], stretch[owned] = _image_place(
-        decals, points[owned], normals[owned], owner[owned], complement[owned], corrected
+        decals, points[owned], normals[owned], owner[owned], complement[owned], corrected, contact
     )
     return owner, np.where(owned, 1 - complement, 0.0), uv, np.minimum(doubt, scene.facing_doubt()), stretch
 
@@ -231,6 +231,9 @@ class _Scene:
         doubt = np.minimum((np.abs(power) / radii**2).min(axis=1), gap.min(axis=(1, 2)))
         over = (inside_few[:, None, :] & stacked_few & less).any(axis=2)
         doubt = np.minimum(doubt, np.where(inside_few & over, np.abs(away_few), 4.0).min(axis=1))
+        if elastic:
+            aside = facing & stacked & (squared < 1.6 * RIM**2) & (radii < radii[owner][:, None])
+            doubt = np.minimum(doubt, np.where(aside, np.abs(away), 4.0).min(axis=1))
         return np.where(owned, members[owner], -1), complements(z), doubt
 
     def facing_doubt(self) -> Any:
@@ -291,6 +294,7 @@ def _image_place(
     owner: NDArray[Any],
     complement: Any,
     corrected: bool,
+    contact: str,
 ) -> Any:
     """uv, and |q − p| over the length in the tangent plane of what gives uv its direction."""
     p, n, u = (a[owner].astype(np.float64) for a in (decals.positions, decals.normals, decals.tangents))
@@ -304,7 +308,43 @@ def _image_place(
         # What neighbours leave of the way to the rim, times what the arc leaves of it; or already beyond it.
         left = (1 - drawn) * (1 - length) / np.where(length < 1, 1 - chord, 1)
         drawn = np.where(length < 1, 1 - left, length)
-    return 0.5 + 0.5 * (drawn / shadow)[:, None] * xy, chord / shadow
+    xy = (drawn / shadow)[:, None] * xy
+    if contact == "elastic":
+        left_aside = np.maximum(1 - drawn**2, 0)[:, None]
+        moved = _parted(decals, points, normals, owner) * left_aside
+        xy = xy + np.column_stack([(moved * u).sum(axis=1), (moved * np.cross(n, u)).sum(axis=1)])
+    return 0.5 + 0.5 * xy, chord / shadow
+
+
+def _parted(decals: Any, points: NDArray[Any], normals: NDArray[Any], owner: NDArray[Any]) -> Any:
+    """How far stacked decals above the owner draw its image towards them, in the owner's radii.
+
+    Each has a potential: ½ A (1.2 − d²) b² inside its rim, that joins to one of (1.6 − d²)³ there and ends at
+    √1.6 of its radius. The eighth powers of several add up. The step is turned with the normal at q to that
+    at p, around the axis perpendicular to both.
+    """
+    centres, radii = decals.positions.astype(np.float64), decals.radii.astype(np.float64)
+    together = (decals.interactions == 1) & (decals.interactions[owner] == 1)[:, None]
+    together &= decals.layers == decals.layers[owner][:, None]
+    upper = together & (radii < radii[owner][:, None])
+    upper &= _stacked(centres[owner][:, None], centres[None], radii[owner], radii)
+    upper &= decals.spill | (normals @ decals.normals.astype(np.float64).T > ON_TOP)
+    size = radii / radii[owner][:, None]
+    away = (points[:, None] - centres) / radii[owner][:, None, None]
+    squared = (away**2).sum(axis=2) / size**2
+    strength = 0.5 * (1 - size**2) * upper
+    rest = np.clip((1.6 - squared) / 0.6, 0, None)
+    height = size**2 * strength * np.where(squared < 1, 0.6 - squared / 2, rest**3 / 10)
+    slope = strength * np.where(squared < 1, 1, rest**2)
+    most = np.maximum(height.max(axis=1, initial=0), 1e-300)[:, None]
+    total = ((height / most) ** 8).sum(axis=1)[:, None]
+    weight = (height / most) ** 7 / np.maximum(total, 1e-300) ** (7 / 8)
+    step = -((weight * slope)[..., None] * away).sum(axis=1)
+    n_p = decals.normals[owner].astype(np.float64)
+    axis, cosine = np.cross(normals, n_p), (normals * n_p).sum(axis=1)[:, None]
+    step -= (step * normals).sum(axis=1)[:, None] * normals
+    turned = cosine * step + np.cross(axis, step)
+    return turned + axis * (axis * step).sum(axis=1)[:, None] / np.maximum(1 + cosine, 1e-8)
 
 
 def _unrolled(w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any]) -> Any:

@@ -275,7 +275,16 @@ def convex(
     if contact == ELASTIC and share < RIM:
         total = wp.sqrt(squares)
         share = (t + (ONE - t) * total / (ONE + total)) * RIM
-    return Answer(owner, complement(share * share), doubt, FOUR)
+    edge = wp.float64(4.0)
+    for j in range(first, first + these.size):
+        if contact == ELASTIC and these.ranks[j] == rank and these.radii[j] < these.radii[owner]:
+            if relative(q, j, these) < wp.float64(1.7) * RIM * RIM:
+                push = wp.min(kept_share(owner, j, these), kept_share(j, owner, these)) - KEPT_LEAST
+                edge = wp.min(edge, wp.float64(0.01) * wp.abs(push))
+                if these.spill[j] == 0 and push <= ZERO:
+                    away = wp.dot(n, wide(these.normals[j])) - ON_TOP
+                    edge = wp.min(edge, wp.float64(0.1) * wp.abs(away))
+    return Answer(owner, complement(share * share), doubt, edge)
 
 
 @wp.func
@@ -298,8 +307,62 @@ def unrolled(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec4d:
 
 
 @wp.func
+def eighth(x: wp.float64) -> wp.float64:
+    squared = x * x
+    return squared * squared * squared * squared
+
+
+@wp.func
+def parted(q: wp.vec3d, n: wp.vec3d, i: wp.int32, these: Members) -> wp.vec3d:
+    """Step towards smaller decals that lie over i: the slope of the 8-norm of their potentials."""
+    first = i - i % these.size
+    own = wp.float64(these.radii[i])
+    highest = wp.float64(0.0)
+    for turn in range(2):
+        total = wp.float64(0.0)
+        step = wp.vec3d(ZERO, ZERO, ZERO)
+        for j in range(first, first + these.size):
+            over = bool(these.spill[j] != 0 or wp.dot(n, wide(these.normals[j])) > ON_TOP)
+            if over and these.ranks[j] == these.ranks[i] and these.radii[j] < these.radii[i]:
+                if lie_over(i, j, these):
+                    size = wp.float64(these.radii[j]) / own
+                    away = (q - wide(these.positions[j])) / own
+                    d = wp.dot(away, away) / (size * size)
+                    left = wp.max((REACH_SQUARED - d) / wp.float64(0.6), ZERO)
+                    height = wp.float64(0.1) * left * left * left
+                    slope = left * left
+                    if d < ONE:
+                        height = wp.float64(0.1) + HALF * (ONE - d)
+                        slope = wp.float64(1.0)
+                    amount = HALF * (ONE - size * size)
+                    height = height * amount * size * size
+                    if turn == 0:
+                        highest = wp.max(highest, height)
+                    elif height > ZERO:
+                        total += eighth(height / highest)
+                        step -= eighth(height / highest) * highest / height * slope * amount * away
+        if turn == 1 and total > ZERO:
+            return step / wp.pow(total, wp.float64(0.875))
+    return wp.vec3d(ZERO, ZERO, ZERO)
+
+
+@wp.func
+def turned(step: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec3d:
+    """The tangential part of a step at n_q, turned with n_q to n_p on the shortest way."""
+    flat = step - wp.dot(step, n_q) * n_q
+    middle = n_p + n_q
+    return flat - TWO * wp.dot(flat, middle) / wp.max(wp.dot(middle, middle), TINY) * middle
+
+
+@wp.func
 def place(
-    q: wp.vec3d, n: wp.vec3d, i: wp.int32, e: wp.float64, corrected: wp.bool, these: Members
+    q: wp.vec3d,
+    n: wp.vec3d,
+    i: wp.int32,
+    e: wp.float64,
+    corrected: wp.bool,
+    contact: wp.int32,
+    these: Members,
 ) -> wp.vec3d:
     """Image coordinates of q in decal i, and |q − p| over the offset's length in the tangent plane."""
     normal = wide(these.normals[i])
@@ -317,7 +380,12 @@ def place(
     y = wp.dot(m, wp.cross(normal, tangent))
     shadow = wp.max(wp.sqrt(x * x + y * y), TINY)
     r = HALF * drawn / shadow
-    return wp.vec3d(HALF + r * x, HALF + r * y, chord / shadow)
+    aside = wp.vec3d(ZERO, ZERO, ZERO)
+    if contact == ELASTIC and (these.ranks[i] & 3) == PUSH:
+        aside = HALF * wp.max(ONE - drawn * drawn, ZERO) * turned(parted(q, n, i, these), normal, n)
+    u = HALF + r * x + wp.dot(aside, tangent)
+    v = HALF + r * y + wp.dot(aside, wp.cross(normal, tangent))
+    return wp.vec3d(u, v, chord / shadow)
 
 
 @wp.func
@@ -374,4 +442,4 @@ def answer_points(
     edges[i] = found.edge
     places[i] = wp.vec3d(ZERO, ZERO, ONE)
     if found.owner >= 0:
-        places[i] = place(q, n, found.owner, found.complement, corrected, these)
+        places[i] = place(q, n, found.owner, found.complement, corrected, contact, these)

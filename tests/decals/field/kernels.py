@@ -5,7 +5,7 @@ import warp as wp
 from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import add_push, contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import image_distance, in_image, tangent_coordinates, unroll, unroll_step
-from decals.field.ownership import NO_OWNER, complement_at, owner_at, single_layer_at
+from decals.field.ownership import NO_OWNER, contact_at, owner_at, single_layer_at
 from decals.index.lookup import IndexedDecals
 from decals.record import NO_FIELD, RECORD, RIM_RADIUS, field_complement, xyz
 
@@ -28,7 +28,7 @@ def rims_of_points(
     owner = owner_at(points[i], up, contact, index)
     owners[i] = owner
     if owner != NO_OWNER:
-        e = complement_at(points[i], up, owner, contact, index)
+        e = contact_at(points[i], up, owner, contact, index)[0]
         rims[i] = rim_distance(e)
 
 
@@ -51,7 +51,7 @@ def slopes_of_rays(
     for step in range(1, STEPS + 1):
         x = float(step) / float(STEPS)
         q = xyz(ball) + (x * RIM_RADIUS * ball[3]) * rays[i]
-        e = complement_at(q, up, owners[i], contact, index)
+        e = contact_at(q, up, owners[i], contact, index)[0]
         r = rim_distance(e)
         slope = (r - last) * float(STEPS)
         if r < 1.0:
@@ -168,15 +168,15 @@ def both_ways(
     points: wp.array(dtype=wp.vec3),
     contact: wp.int32,
     index: IndexedDecals,
-    once: wp.array(dtype=wp.vec2),
-    twice: wp.array(dtype=wp.vec2),
+    once: wp.array(dtype=wp.vec4),
+    twice: wp.array(dtype=wp.vec4),
 ) -> None:
     i = wp.tid()
     q = points[i]
     up = wp.vec3(0.0, 0.0, 1.0)
     once[i] = single_layer_at(q, up, contact, index)
     owner = owner_at(q, up, contact, index)
-    e = wp.float32(0.0)
+    pushed = wp.vec3(0.0, 0.0, 0.0)
     if owner >= 0:
-        e = complement_at(q, up, owner, contact, index)
-    twice[i] = wp.vec2(float(owner), e)
+        pushed = contact_at(q, up, owner, contact, index)
+    twice[i] = wp.vec4(float(owner), pushed[0], pushed[1], pushed[2])

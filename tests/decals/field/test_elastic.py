@@ -101,6 +101,46 @@ def test_no_kink_where_planes_meet() -> None:
         assert abs(bent[0] - 2 * bent[1] + bent[2]) / step > 0.3
 
 
+def nested_pile(rng: np.random.Generator) -> Decals:
+    """A decal of radius 1 at the origin, and six smaller ones, most of them deep inside it."""
+    radii = np.concatenate([[1.0], 10.0 ** rng.uniform(-1.5, -0.2, 6)])
+    away, angles = rng.uniform(0.1, 1.1, 7) * (np.arange(7) > 0), rng.uniform(0, 2 * np.pi, 7)
+    places = away[:, None] * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    return Decals(places, np.tile(UP, (7, 1)), np.tile([1.0, 0, 0], (7, 1)), radii)
+
+
+def test_a_nested_decal_parts_the_image_below() -> None:
+    """Half of what it hides comes out at its rim; beyond its reach, and on the outer rim, nothing moves."""
+    decals = pair(0.4, 1.0, 0.2)
+    amount = 0.5 * (1 - 0.2**2)
+    for turn in (0.0, 1.0, 2.5):
+        way = np.array([np.cos(turn), np.sin(turn), 0.0])
+        points = [0.4, 0, 0] + np.array([1.0001, np.sqrt(1.6)])[:, None] * 0.2 * way
+        found = 2 * evaluate(decals, points, [UP] * 2).uv - 1
+        moved = found - points[:, :2]
+        expected = -amount * 0.2 * (1 - (points[0] ** 2).sum()) * way[:2]
+        np.testing.assert_allclose(moved, [expected, [0, 0]], atol=2e-4)
+    rim = spokes(np.linspace(0, 6, 50), np.array([0.99999]), 1.0)
+    shown = evaluate(pair(0.85, 1.0, 0.1), rim, [UP] * 50)
+    np.testing.assert_allclose((2 * shown.uv - 1)[shown.owner == 0], rim[shown.owner == 0, :2], atol=1e-4)
+
+
+def test_no_image_folds_among_nested_decals() -> None:
+    rng, step, owned = np.random.default_rng(8), 1e-3, 0
+    for _ in range(40):
+        decals = nested_pile(rng)
+        beside = decals.positions[rng.integers(0, 7, 700)]
+        points = beside + rng.normal(0, 0.3, (700, 3)) * [1, 1, 0]
+        corners = points[:, None] + step * np.array([[0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]])
+        shown = evaluate(decals, corners.reshape(-1, 3), np.tile(UP, (2100, 1)))
+        uv = shown.uv.reshape(-1, 3, 2)[(shown.owner.reshape(-1, 3) == 0).all(axis=1)].astype(np.float64)
+        x, y = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+        area = x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]
+        assert (area > 0).all()
+        owned += len(uv)
+    assert owned > 5000
+
+
 def test_a_decal_without_overlap_is_not_deformed() -> None:
     points = np.linspace(0, 0.99, 50)[:, None] * [1, 0, 0]
     _, r = rims(pair(2.001, 1.0, 1.0), points)

@@ -47,7 +47,7 @@ def test_once_is_twice(
         int(contact),
         index_on(decals, "cpu"),
     ]
-    once, twice = (wp.zeros(len(points), dtype=wp.vec2, device="cpu") for _ in range(2))
+    once, twice = (wp.zeros(len(points), dtype=wp.vec4, device="cpu") for _ in range(2))
     wp.launch(both_ways, len(points), inputs, [once, twice], device="cpu")
     assert (twice.numpy()[:, 0] >= 0).any()
     np.testing.assert_array_equal(once.numpy()[:, 0], twice.numpy()[:, 0])
