@@ -23,8 +23,9 @@ d = |w|/ρ_i and b = ρ_i in radii of the owner, the point of the image moves to
 
 a bump that ends where i stops to reach; inside its rim, a paraboloid continues it. On that rim the image
 moves by A ρ_i, so only what lies within (1 − A) ρ_i of the centre stays hidden. Several bumps join to
-S = (Σ s_i⁸)^⅛. As S curves by at most PARTING·k^⅛ < 1 for k < 256 of them, the map is the gradient of a
+S = (Σ s_i⁸)^⅛. As S curves by at most PARTING·k^⅛ < 1 for k < 4,000 of them, the map is the gradient of a
 convex function and does not fold. The displacement is multiplied by 1 − r²: rims and contact lines stay.
+With pushes of planes, its smallness prevents folds: tests and benchmark find none.
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -76,7 +77,7 @@ MIN_REMAINDER = 1.0e-12
 MIN_DISTANCE = 1.0e-30
 """Smallest divisor of the direction of a ray."""
 
-PARTING = 0.5
+PARTING = 0.35
 """Share of its way by which the image moves on the rim of a much smaller nested decal, towards its centre."""
 
 RIM_BUMP = 0.375

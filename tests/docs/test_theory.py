@@ -133,7 +133,7 @@ def displacements(world: World, owner: Ints) -> Array:
             part = min(gap**2 + 1 - b * b, (gap**2 + b * b - 1) / b) if b < 1 else 1.0
             if ranks[i] == ranks[k] and b < 1 and part <= LEAST_PART * 2 * gap and world.tops[row, i]:
                 d2 = (world.distances[row, i] / world.radii[i]) ** 2
-                a, u = 0.5 * (1 - b * b), max((1.6 - d2) / 0.6, 0.0)
+                a, u = 0.35 * (1 - b * b), max((1.6 - d2) / 0.6, 0.0)
                 heights.append(a * b * b * (0.1 * u**3 if d2 >= 1 else 0.6 - d2 / 2))
                 away = (world.points[row] - world.centres[i]) / world.radii[k]
                 steps.append(-a * (u * u if d2 >= 1 else 1.0) * away)

@@ -332,7 +332,7 @@ def _parted(decals: Any, points: NDArray[Any], normals: NDArray[Any], owner: NDA
     size = radii / radii[owner][:, None]
     away = (points[:, None] - centres) / radii[owner][:, None, None]
     squared = (away**2).sum(axis=2) / size**2
-    strength = 0.5 * (1 - size**2) * upper
+    strength = 0.35 * (1 - size**2) * upper
     rest = np.clip((1.6 - squared) / 0.6, 0, None)
     height = size**2 * strength * np.where(squared < 1, 0.6 - squared / 2, rest**3 / 10)
     slope = strength * np.where(squared < 1, 1, rest**2)

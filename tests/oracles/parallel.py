@@ -334,7 +334,7 @@ def parted(q: wp.vec3d, n: wp.vec3d, i: wp.int32, these: Members) -> wp.vec3d:
                     if d < ONE:
                         height = wp.float64(0.1) + HALF * (ONE - d)
                         slope = wp.float64(1.0)
-                    amount = HALF * (ONE - size * size)
+                    amount = wp.float64(0.35) * (ONE - size * size)
                     height = height * amount * size * size
                     if turn == 0:
                         highest = wp.max(highest, height)

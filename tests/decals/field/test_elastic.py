@@ -110,9 +110,9 @@ def nested_pile(rng: np.random.Generator) -> Decals:
 
 
 def test_a_nested_decal_parts_the_image_below() -> None:
-    """Half of what it hides comes out at its rim; beyond its reach, and on the outer rim, nothing moves."""
+    """A third of its radius comes out at its rim; beyond its reach, and on the outer rim, nothing moves."""
     decals = pair(0.4, 1.0, 0.2)
-    amount = 0.5 * (1 - 0.2**2)
+    amount = 0.35 * (1 - 0.2**2)
     for turn in (0.0, 1.0, 2.5):
         way = np.array([np.cos(turn), np.sin(turn), 0.0])
         points = [0.4, 0, 0] + np.array([1.0001, np.sqrt(1.6)])[:, None] * 0.2 * way
