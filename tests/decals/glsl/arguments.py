@@ -134,6 +134,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "join_bumps": {"first": uniform(0.0, 1.0, 4), "second": uniform(0.0, 1.0, 4)},
     "bump_at": {"own_ball": uniform(0.5, 1.0, 4), "ball": uniform(0.1, 0.6, 4)},
     "image_shift": {"bump": uniform(0.0, 0.5, 4)},
+    "pushed_distance": {"distance": share, "squares": powers(-6, 6)},
     "uv_at": {"pushed": uniform(0.0, 0.5, 3)},
     "plane_push": {"radius": uniform(0.1, 2.0), "other": uniform(0.1, 2.0), "distance": share},
     "square_of_push": {"distance": share},
