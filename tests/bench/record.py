@@ -38,7 +38,14 @@ TARGETS = ("g_position", "g_normal", "g_color", "g_paint")
 """Textures that the passes themselves write."""
 
 
-def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact = Contact.PRODUCT) -> None:
+def record(
+    scene: Scene,
+    size: tuple[int, int],
+    path: Path,
+    *,
+    contact: Contact = Contact.PRODUCT,
+    filtered: bool = False,
+) -> None:
     """Record a picture of a scene of meshes: one sample per pixel, one tile."""
     arrays: Arrays = {}
     passes: dict[str, dict[str, Any]] = {}
@@ -52,7 +59,8 @@ def record(scene: Scene, size: tuple[int, int], path: Path, *, contact: Contact 
             Renderer(context) as renderer,
             _recording_calls(arrays, passes.setdefault(backend, {})),
         ):
-            renderer.render(scene, RenderOptions(size=size, samples=1, contact=contact))
+            context.part_samples = None  # the whole picture in one call, as with a graphics card
+            renderer.render(scene, RenderOptions(size=size, samples=1, contact=contact, filtered=filtered))
     texts = {name: compose(name).text for name in ("mesh.vert", "mesh.frag", "screen.vert")}
     settings = {"size": size, "texts": texts, "passes": passes, "layered": scene.decals.layered}
     np.savez_compressed(path, settings=np.array(json.dumps(settings)), **arrays)  # type: ignore[arg-type]
@@ -157,6 +165,7 @@ def main() -> None:
         "--scattered", action="store_true", help="distribute decals by `scatter` instead of `even_decals`"
     )
     parser.add_argument("--contact", choices=[mode.name.lower() for mode in Contact], default="product")
+    parser.add_argument("--filtered", action="store_true", help="average the decals over each pixel")
     parser.add_argument("--layered", action="store_true", help="random interactions in three layers")
     parser.add_argument("--size", default="1600x1200")
     parser.add_argument("path", type=Path)
@@ -166,7 +175,7 @@ def main() -> None:
     scene = bench_scene(options.model, options.decals, size, scattered=options.scattered)
     if options.layered:
         scene = scene.replace(decals=in_layers(scene.decals))
-    record(scene, size, options.path, contact=Contact[options.contact.upper()])
+    record(scene, size, options.path, contact=Contact[options.contact.upper()], filtered=options.filtered)
 
 
 if __name__ == "__main__":
