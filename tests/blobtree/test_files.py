@@ -121,6 +121,7 @@ def test_temporary_files_of_ended_processes_are_removed(tmp_path: Path) -> None:
 
 
 FULL_DISK = """
+    import logging
     import resource
     import sys
     from pathlib import Path
@@ -134,6 +135,7 @@ FULL_DISK = """
     from decals.apps.commands.scatter import write_table
     from decals.rendering import Picture
 
+    logging.getLogger("blobtree.progress").setLevel(logging.WARNING)  # a busy machine would show it
     folder = sys.argv[1]
     tree = blobtree.Point((0, 0, 0), radius=1.0) + blobtree.Point((1, 0, 0), radius=1.0)
     surface = tree.to_pyvista(resolution=24)
