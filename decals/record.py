@@ -50,6 +50,9 @@ NEIGHBOR_REACH = 0.575
 NO_FIELD = 2.0
 """Complement of a decal that does not act on a point: above every e."""
 
+MIN_KEPT_RADIUS = 0.21
+"""Smallest share of its radius that a decal keeps towards a neighbour that pushes it."""
+
 RECORD = MODEL_RECORD
 FACING_LIMIT = MODEL_FACING_LIMIT
 NO_FACING_LIMIT = -2.0
@@ -108,3 +111,24 @@ def apart(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> 
 def visible_radius(decal: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.float32:
     """Return the visible radius of a decal."""
     return RIM_RADIUS * decals[RECORD * decal][3]
+
+
+@wp.func
+def balls_nested(apart: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.bool:
+    """Return True if two decals with these radii, and centres this far apart, are nested.
+
+    With the distance D of the centres, and radii a ≤ b, that is D² − (b² − a²) ≤ 2 MIN_KEPT_RADIUS·a·D, or
+    D² + (b² − a²) ≤ 2 MIN_KEPT_RADIUS·b·D. The squares of both sides need no root.
+    """
+    smaller = wp.min(radius, other)
+    larger = wp.max(radius, other)
+    squared = wp.dot(apart, apart)
+    difference = (larger - smaller) * (larger + smaller)
+    from_plane = squared - difference
+    to_plane = squared + difference
+    least = 4.0 * MIN_KEPT_RADIUS * MIN_KEPT_RADIUS * squared
+    return (
+        from_plane <= 0.0
+        or from_plane * from_plane <= least * (smaller * smaller)
+        or to_plane * to_plane <= least * (larger * larger)
+    )

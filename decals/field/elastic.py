@@ -38,7 +38,6 @@ from decals.field.mapping import tangent_coordinates, unroll_step
 from decals.field.radial import (
     NO_OWNER,
     RIM_SQUARED,
-    balls_nested,
     comes_next,
     is_above,
     lies_on_top,
@@ -54,6 +53,7 @@ from decals.record import (
     RECORD,
     RIM_RADIUS,
     apart,
+    balls_nested,
     field_complement,
     rank_of,
     visible_radius,
@@ -240,10 +240,13 @@ def sum_of_pushes(
                 )
                 if push > 0.0:
                     squares += square_of_push(distance, push)
-                own_ball = index.records[RECORD * owner]
-                ball = index.records[RECORD * index.ids[j]]
-                bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, index.ids[j], index))
-    shift = image_shift(bump, n_q, owner, index)
+                if index.parting:
+                    own_ball = index.records[RECORD * owner]
+                    ball = index.records[RECORD * index.ids[j]]
+                    bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, index.ids[j], index))
+    shift = wp.vec2(0.0, 0.0)
+    if index.parting:
+        shift = image_shift(bump, n_q, owner, index)
     return wp.vec3(squares, shift[0], shift[1])
 
 
@@ -371,8 +374,11 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
             push = plane_push(ray, distance, between, radius, RIM_RADIUS * ball[3], index.stiffness)
             if push > 0.0:
                 squares += square_of_push(distance, push)
-            bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, other, index))
-    shift = image_shift(bump, n_q, owner, index)
+            if index.parting:
+                bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, other, index))
+    shift = wp.vec2(0.0, 0.0)
+    if index.parting:
+        shift = image_shift(bump, n_q, owner, index)
     if count > MAX_KEPT:
         sums = sum_of_pushes(q, n_q, owner, ray, distance, index)
         squares = sums[0]

@@ -184,8 +184,10 @@ def uv_at(
         arc = unroll(small, normal, n_q)
         drawn = image_distance(drawn, wp.length(small), arc[3])
         w = xyz(arc)
-    fade = 0.5 * wp.max(1.0 - drawn * drawn, 0.0)
-    return contact_uv(tangent_coordinates(w, normal, tangent), drawn) + fade * wp.vec2(pushed[1], pushed[2])
+    uv = contact_uv(tangent_coordinates(w, normal, tangent), drawn)
+    if index.parting:
+        uv += 0.5 * wp.max(1.0 - drawn * drawn, 0.0) * wp.vec2(pushed[1], pushed[2])
+    return uv
 
 
 @wp.func

@@ -6,7 +6,8 @@ ball on its own side of all these planes. A cell is convex and contains the cent
 centre leaves it once, at a distance R that changes continuously with the ray. The image is scaled along each
 ray so that its rim lies at R.
 
-Two decals are nested if one of them would keep less than MIN_KEPT_RADIUS of its radius before their plane.
+Two decals are nested if one of them would keep less than MIN_KEPT_RADIUS of its radius before their plane
+(`decals.record.balls_nested`).
 Nested decals do not push each other. The smaller one lies above the other, and of equal ones that of the
 lower number, on surface that it faces well (`lies_on_top`). So a small decal deep inside a large one is seen
 whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is compressed more than 1/MIN_KEPT_RADIUS times. There are no
@@ -25,6 +26,7 @@ from decals.record import (
     RECORD,
     RIM_RADIUS,
     apart,
+    balls_nested,
     facing_limit,
     field_complement,
     rank_of,
@@ -36,9 +38,6 @@ wp.set_module_options({"enable_backward": False})
 
 NO_OWNER = -1
 """Owner of a point outside all rims."""
-
-MIN_KEPT_RADIUS = 0.21
-"""Smallest share of its radius that a decal keeps towards a neighbour that pushes it."""
 
 TOP_MARGIN = 0.75
 """Amount above the facing limit of the least cosine between the normals of surface and of an upper decal."""
@@ -55,27 +54,6 @@ MIN_ADVANCE = 1.0e-37
 def power(w: wp.vec3, radius: wp.float32) -> wp.float32:
     """Return the power |w|² − ρ² of a point at w from the centre: negative inside the rim."""
     return wp.dot(w, w) - radius * radius
-
-
-@wp.func
-def balls_nested(apart: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.bool:
-    """Return True if two decals with these radii, and centres this far apart, are nested.
-
-    With the distance D of the centres, and radii a ≤ b, that is D² − (b² − a²) ≤ 2 MIN_KEPT_RADIUS·a·D, or
-    D² + (b² − a²) ≤ 2 MIN_KEPT_RADIUS·b·D. The squares of both sides need no root.
-    """
-    smaller = wp.min(radius, other)
-    larger = wp.max(radius, other)
-    squared = wp.dot(apart, apart)
-    difference = (larger - smaller) * (larger + smaller)
-    from_plane = squared - difference
-    to_plane = squared + difference
-    least = 4.0 * MIN_KEPT_RADIUS * MIN_KEPT_RADIUS * squared
-    return (
-        from_plane <= 0.0
-        or from_plane * from_plane <= least * (smaller * smaller)
-        or to_plane * to_plane <= least * (larger * larger)
-    )
 
 
 @wp.func

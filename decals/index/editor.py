@@ -152,6 +152,11 @@ class DecalEditor:
         return self._rows.layered
 
     @property
+    def parting(self) -> bool:
+        """True if contact decals have been nested with larger ones, since the index was read first."""
+        return self._index.parting
+
+    @property
     def limited(self) -> bool:
         """True if decals have had receivers or fades, see `Decals.limited`."""
         return self._rows.limited
@@ -237,6 +242,8 @@ class DecalEditor:
                 self._index.insert(records, number, rank, self._log)
                 for number, rank in zip(rows.tolist(), decals.ranks.tolist(), strict=True)
             )
+        if not self._index.stale:
+            self._index.check_nesting(self._rows.records, self.next_number, rows)
 
     # -- changes ----------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.glsl import uniform_struct
-from decals.record import is_contact_rank, rank_of
+from decals.record import RECORD, RIM_RADIUS, apart, balls_nested, is_contact_rank, rank_of, xyz
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -20,6 +20,9 @@ HALF_RANGE = 8388608.0
 
 ABOVE_ALL = 1 << 23
 """Above every rank."""
+
+NESTING_SLACK = 1.0e-5
+"""Relative enlargement of the larger of two decals that may be nested, above the rounding of all devices."""
 
 MIX_X = wp.constant(wp.uint32(0x1B873593))
 MIX_Y = wp.constant(wp.uint32(0x27D4EB2F))
@@ -36,6 +39,7 @@ MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
     mask="index_mask",
     ids="index_ids",
     stiffness="decal_stiffness",
+    parting="decal_parting",
     limited="decal_limited",
     limits="decal_limits",
     surface="surface_receivers",
@@ -53,6 +57,8 @@ class IndexedDecals:
         Arrays of the index, as `decals.index.index` describes them; the table has ``mask + 1`` slots.
     stiffness
         Stiffness of elastic contact (`decals.field.elastic`).
+    parting
+        True if decals may be nested, so that elastic contact parts images; always True in Warp.
     limited, limits
         `decals.model.Decals.limited` and `decals.model.Decals.limits`, which are read where it is True.
     surface
@@ -67,6 +73,7 @@ class IndexedDecals:
     mask: wp.int32
     ids: wp.array(dtype=wp.int32)
     stiffness: wp.float32
+    parting: wp.bool
     limited: wp.bool
     limits: wp.array(dtype=wp.vec4)
     surface: wp.int32
@@ -194,3 +201,41 @@ def list_candidates(
         for j in range(span[0], span[1]):
             candidates[slot] = index.ids[j]
             slot += 1
+
+
+@wp.func
+def parts_image(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True if two decals of different sizes are nested contact decals of one rank, or nearly so."""
+    size = decals[RECORD * decal][3]
+    other_size = decals[RECORD * other][3]
+    rank = rank_of(decal, decals)
+    if size == other_size or not is_contact_rank(rank) or rank_of(other, decals) != rank:
+        return False
+    larger = (1.0 + NESTING_SLACK) * RIM_RADIUS * wp.max(size, other_size)
+    return balls_nested(apart(decal, other, decals), RIM_RADIUS * wp.min(size, other_size), larger)
+
+
+@wp.kernel
+def find_nested(index: IndexedDecals, found: wp.array(dtype=wp.int32)):
+    """Write 1 if a contact decal is nested with a larger one.
+
+    By `balls_nested`, with radii a < b, the distance of their centres is at most b/√(1 − MIN_KEPT_RADIUS²) =
+    1.023 b. The larger one reaches 1.266 b, so the index lists it at the centre of the smaller one.
+    """
+    i = wp.tid()
+    for level in range(index.level_count):
+        span = cell_range(xyz(index.records[RECORD * i]), level, index)
+        for j in range(span[0], span[1]):
+            if parts_image(i, index.ids[j], index.records):
+                found[0] = 1
+
+
+@wp.kernel
+def find_nested_with(
+    changed: wp.array(dtype=wp.int32), records: wp.array(dtype=wp.vec4), found: wp.array(dtype=wp.int32)
+):
+    """Write 1 if a contact decal is nested with one of the changed ones."""
+    i = wp.tid()
+    for k in range(changed.shape[0]):
+        if parts_image(i, changed[k], records):
+            found[0] = 1

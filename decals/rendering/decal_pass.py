@@ -19,10 +19,10 @@ from decals.field.pixel_filter import (
     push_square_step,
     pushed_distance_step,
 )
-from decals.field.radial import balls_nested, is_above, lies_on_top, power
+from decals.field.radial import is_above, lies_on_top, power
 from decals.field.receivers import acts, fade_at
 from decals.index.lookup import next_number_below
-from decals.record import Contact, has_cells
+from decals.record import Contact, balls_nested, has_cells
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.materials import MaterialArrays
@@ -93,7 +93,13 @@ class DecalPass:
         limited, library = decals is not None and decals.limited, ""
         filtered = filtered and materials is None  # maps of materials are not averaged over pixels
         if decals is not None:
-            library = decal_library(contact, layered=decals.layered, limited=limited, filtered=filtered)
+            library = decal_library(
+                contact,
+                layered=decals.layered,
+                limited=limited,
+                parting=decals.parting,
+                filtered=filtered,
+            )
         shining = materials is not None and decals is not None
         variant = {"limited": limited, "filtered": filtered, "materials": shining}
         painting = self._pass(library, posed=rest is not None, **variant)
@@ -196,11 +202,14 @@ FILTER_FUNCTIONS = (
 
 
 @cache
-def decal_library(contact: AnyContact, *, layered: bool, limited: bool, filtered: bool = False) -> str:
+def decal_library(
+    contact: AnyContact, *, layered: bool, limited: bool, parting: bool, filtered: bool = False
+) -> str:
     """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
     constants = (
         f"const float RIM = {float(RIM)!r};\n"
         f"const int decal_contact = {int(contact)};\n"
+        f"const bool decal_parting = {str(parting and int(contact) == Contact.ELASTIC).lower()};\n"
         f"const bool decal_limited = {str(limited).lower()};\n"
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"

@@ -219,8 +219,9 @@ class TargetState:
 
 def _editor_formulas(decals: Decals | DecalEditor) -> tuple[object, ...]:
     """Return the properties of an editor's decals that decide which shader paints them."""
-    editable = isinstance(decals, DecalEditor)
-    return (decals.layered, decals.limited, len(decals) > 0) if editable else ()
+    if not isinstance(decals, DecalEditor):
+        return ()
+    return (decals.layered, decals.limited, decals.parting, len(decals) > 0)
 
 
 def decal_version(scene: SceneLike) -> int:

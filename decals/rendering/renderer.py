@@ -324,7 +324,7 @@ class Renderer:
             for task, status in with_status(plan.tasks):
                 task.run()
                 yield status
-            self._warm.add(plan.key)
+            self._warm.add(self.warmup(scene, options).key)  # it may know nested decals now
 
     def targets_of(self, slot: str) -> Targets | None:
         """Return the targets of a slot's last frame; None before the first."""
@@ -392,7 +392,13 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     has_decals, light = len(scene.decals) > 0, light_file(options.lights)
     formulas, materials = None, has_materials(scene)
     if has_decals:
-        formulas = options.contact, scene.decals.layered, is_limited(scene), _is_filtered(scene, options)
+        formulas = (
+            options.contact,
+            scene.decals.layered,
+            is_limited(scene),
+            uploads.parting(scene),
+            _is_filtered(scene, options),
+        )
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
     tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
@@ -403,7 +409,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
             SHADERS,
             lambda: decal_program(
                 context,
-                _library(scene, options),
+                _library(uploads, scene, options),
                 limited=is_limited(scene),
                 filtered=_is_filtered(scene, options),
                 materials=materials,
@@ -419,7 +425,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
     decals = scene.decals
     index = [WarmupTask(DECALS, lambda: decals.index)] if isinstance(decals, DecalEditor) else []
-    translate = partial(_library, scene, options)
+    translate = partial(_library, uploads, scene, options)
     return [
         *index,
         WarmupTask(DECALS, partial(uploads.decals, scene)),
@@ -433,7 +439,7 @@ def _is_filtered(scene: SceneLike, options: RenderOptions) -> bool:
     return options.filtered and not has_materials(scene)
 
 
-def _library(scene: SceneLike, options: RenderOptions) -> str:
+def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
     """Return the formulas of the decals; nothing for a scene without decals."""
     if not len(scene.decals):
         return ""
@@ -441,5 +447,6 @@ def _library(scene: SceneLike, options: RenderOptions) -> str:
         options.contact,
         layered=scene.decals.layered,
         limited=is_limited(scene),
+        parting=uploads.parting(scene),
         filtered=_is_filtered(scene, options),
     )

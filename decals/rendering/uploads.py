@@ -16,7 +16,7 @@ from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS
 from decals.errors import InvalidScene, TooMuchData
 from decals.images.load import decode_srgb
 from decals.index.editor import LIMITS, RECORDS, DecalEditor
-from decals.index.index import DecalIndex
+from decals.index.index import DecalIndex, has_nested
 from decals.model import Decals
 from decals.receivers import object_mask
 from decals.rendering.context import Context
@@ -291,6 +291,8 @@ class DecalData:
                 "index_table": index.table,
                 "index_ids": index.ids,
             }
+            indexed = index.on("cpu", records=arrays[RECORDS], layered=decals.layered, copy=False)
+            self.parting = has_nested(indexed, len(decals))
         self._loop_limit.check(index, layered=decals.layered, version=self._version)
         self._textures = {
             name: DataTexture(context, array) for name, array in arrays.items() if limited or name != LIMITS
@@ -299,6 +301,8 @@ class DecalData:
 
     def _read_uniforms(self, decals: Decals | DecalEditor, index: DecalIndex) -> None:
         self.layered = decals.layered
+        if isinstance(decals, DecalEditor):
+            self.parting = decals.parting
         self._uniforms = {"index_level_count": index.level_count, "index_mask": index.mask}
 
     def update(self, editor: DecalEditor) -> int:
@@ -488,6 +492,10 @@ class GpuCache(Generic[Resource]):
         self._used.add(key)
         return self._entries[key][1]
 
+    def find(self, *objects: object) -> Resource | None:
+        """Return the resource of these objects, or None before the first call of `get`."""
+        return self._entries.get(tuple(id(item) for item in objects), (None, None))[1]
+
     def sweep(self) -> None:
         """Release the resources that `get` did not return since the last sweep."""
         for key in set(self._entries) - self._used:
@@ -581,6 +589,13 @@ class Uploads:
         if isinstance(decals, DecalEditor):
             data.update(decals)
         return data
+
+    def parting(self, scene: SceneLike) -> bool:
+        """Return True if decals of a scene are nested, as far as known without their index."""
+        if isinstance(scene.decals, DecalEditor):
+            return scene.decals.parting
+        data = self._decals.find(scene.decals, is_limited(scene))
+        return data is not None and data.parting
 
     def images(self, scene: SceneLike) -> ImageArray | None:
         """Return the images of a scene's decals; None without decals."""

@@ -354,7 +354,7 @@ class FrameRenderer:
             if not frame.advance(seconds):
                 return frame.status
         self._progressive = None
-        self._warm.add(plan.key)
+        self._warm.add(self._warmup_plan(scene, options).key)  # it may know nested decals now
         return None
 
     def _continue(

@@ -122,7 +122,7 @@ class Injection:
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
         self._additions = ShaderAdditions(actor)
-        self._variant: tuple[AnyContact, bool, bool] | None = None
+        self._variant: tuple[AnyContact, bool, bool, bool] | None = None
         self._code: dict[ShaderTag, str] = {}
         self._written = False
         injection = weakref.ref(self)
@@ -145,12 +145,15 @@ class Injection:
             return
         self._add_normals()  # the mapper's input may have been replaced
         subplot, data, _ = source
-        variant = subplot.contact, data.layered, data.limited
+        variant = subplot.contact, data.layered, data.limited, data.parting
         if variant != self._variant:
             self._variant, self._code = (
                 variant,
                 _code(
-                    decal_library(subplot.contact, layered=data.layered, limited=data.limited), self._paint
+                    decal_library(
+                        subplot.contact, layered=data.layered, limited=data.limited, parting=data.parting
+                    ),
+                    self._paint,
                 ),
             )
         self._additions.write(self._code)

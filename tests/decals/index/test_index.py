@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from decals.errors import InvalidDecals
-from decals.index.index import DecalIndex, index_on
-from decals.model import Decals
+from decals.index.editor import DecalEditor
+from decals.index.index import DecalIndex, has_nested, index_on
+from decals.model import Decals, Interaction
 from decals.record import NEIGHBOR_REACH
 
 
@@ -289,3 +290,42 @@ def test_the_same_on_a_cuda_device() -> None:
 def test_refuses_arrays_that_are_no_decals(positions: Any, influence: Any, ranks: Any, says: str) -> None:
     with pytest.raises(InvalidDecals, match=says):
         DecalIndex.build(positions, influence, ranks)
+
+
+def excess(decals: Decals) -> float:
+    """Greatest of ka + √(k²a² + b² − a²) − D, in b, over contact decals of a rank with radii a < b."""
+    radii, k = decals.radii.astype(float), 0.21
+    a, b = np.minimum.outer(radii, radii), np.maximum.outer(radii, radii)
+    away = np.linalg.norm(decals.positions[:, None].astype(float) - decals.positions, axis=2)
+    pairs = (a < b) & (decals.ranks[:, None] == decals.ranks) & (decals.interactions == Interaction.PUSH)
+    nested = k * a + np.sqrt((k * a) ** 2 + b * b - a * a) - away
+    return float((nested / b)[pairs].max(initial=-9.0))
+
+
+def test_nested_decals_are_found() -> None:
+    """At once, by an editor, and by its edits of one decal and of many; of equal ones none parts another."""
+    rng, found = np.random.default_rng(3), []
+    for case in range(150):
+        count = int(rng.integers(2, 30))
+        places = rng.random((count, 3)).round(1) * [1, 1, 0.1] * rng.choice([1, 1, 100])
+        radii = 10.0 ** rng.choice([-0.5, -1, rng.uniform(-3, 0), -0.99], count)
+        layers, kinds = rng.integers(0, 3, (2, count)) if case % 2 else np.tile([[0], [1]], (1, count))
+        frame = np.tile([[0, 0, 1.0]], (count, 1)), np.tile([[1.0, 0, 0]], (count, 1))
+        decals = Decals(places, *frame, radii, layers=layers, interactions=kinds)
+        expected = excess(decals)
+        if abs(expected) < 1e-4:
+            continue
+        found.append(expected > 0)
+        assert has_nested(index_on(decals, "cpu"), count) == found[-1]
+        apart = -1000.0 * np.arange(1, count + 1)[:, None] * [1, 1, 1]
+        editor = DecalEditor(decals.replace(positions=apart))
+        assert editor.version
+        assert not editor.parting
+        if case % 3:
+            editor.assign(np.arange(count), decals)
+        else:
+            for number in rng.permutation(count):
+                editor.assign([number], decals[[number]])
+        assert editor.version
+        assert editor.parting == found[-1]
+    assert 30 < sum(found) < len(found) - 30

@@ -1,5 +1,6 @@
 """The decal pass at every pixel: against float64 brute force, against Warp, and the colours that it makes."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
+from decals.index.index import has_nested, index_on
 from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import viewpoint as tile
@@ -24,8 +26,42 @@ from tests.decals.rendering.pictures import (
     view_of,
     wall,
 )
-from tests.decals.shapes import Shape, View, torus
+from tests.decals.shapes import Picture, Shape, View, torus
 from tests.oracles.decals import colors_at
+
+
+@pytest.mark.parametrize("filtered", [False, True])
+def test_without_nested_decals_parting_is_left_out(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, filtered: bool
+) -> None:
+    """It changes no bit, of pictures and of samples. It changes pictures of nested decals."""
+    shape, options = torus(), RenderOptions(size=SIZE, samples=1, filtered=filtered)
+    dense = scattered(shape, 500, 8, radii=(0.2, 0.22))
+    kept: list[int] = []
+    for row, place in enumerate(dense.positions):
+        if (np.linalg.norm(dense.positions[kept] - place, axis=1) > 0.15).all():
+            kept.append(row)
+    assert len(kept) > 100
+    nested = Decals.concatenate([dense[kept], dense[kept[:40]].replace(radii=np.full(40, 0.05))])
+    for decals, same in ((dense[kept], True), (nested, False)):
+        view = replace(view_of(decals, shape), images=(Picture(quarters()),))
+        first, buffers = renderer.render(view, options), renderer.buffers(view, options)
+        seen = buffers.owner >= 0
+        points = decals, buffers.position[seen], buffers.normal[seen]
+        uv = evaluate(*points).uv
+        with monkeypatch.context() as patch:
+            patch.setattr("decals.rendering.uploads.has_nested", lambda *_, value=same: value)
+            patch.setattr("decals.field.evaluate.index_on", index_without_parting)
+            other = renderer.render(replace(view, decals=decals[:]), options)
+            assert (other == first).all() == same
+            assert (evaluate(*points).uv == uv).all() == same
+        assert has_nested(index_on(decals, "cpu"), len(decals)) != same
+
+
+def index_without_parting(*arguments: Any) -> Any:
+    index = index_on(*arguments)
+    index.parting = False
+    return index
 
 
 @pytest.mark.parametrize("mapping", list(ImageMapping))
