@@ -217,7 +217,7 @@ async def creature(picture: str | None = None) -> None:
         assert tree.children[3].end == (-0.9, -1.5, 0.8)
         await browser.keyboard.press("Escape")
         await browser.get_by_text("Sum", exact=True).click()  # another click deselects
-        await browser.get_by_text("Sum", exact=True).click()
+        await browser.get_by_role("button", name="Sum", exact=True).click()
         await until(lambda: window.actions.state.primitive is None)
         window.subplot.vtk_renderer.ResetCamera()
         window.redraw(whole=True)
