@@ -94,7 +94,7 @@ def sandbox(
         Address to serve the page at, such as 0.0.0.0 for all networks. Its URL then has a token, without
         which the page does not work. Default: this machine only.
     share
-        All browsers show one session: one drives, the others watch, and ask for the wheel.
+        All browsers show one session: one drives, the others watch, and ask for control.
     sessions
         Most sessions at the same time. One without a browser is saved and ended after half an hour.
     browser

@@ -28,7 +28,7 @@ LOOKS = frozenset(
 OURS = frozenset({TRIGGER, UPDATE, LIFECYCLE})
 """Messages that call functions of the page, whose errors are shown."""
 
-OF_SERVER = "wheel", "trame__template"
+OF_SERVER = "driving", "trame__template"
 """First parts of the names of values that no browser may change."""
 
 
@@ -47,7 +47,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
     """Checks the messages of all browsers of a server before its functions are called.
 
     Malformed messages are refused without an exception. If the page is shared, only the messages of the
-    browser that drives change something; the others see what it does. The driver passes the wheel to the
+    browser that drives change something; the others see what it does. The driver passes control to the
     browser that asked first. If the driver leaves, the next browser drives.
 
     Parameters
@@ -70,9 +70,9 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         self._asking: list[str] = []
         self._mouse: tuple[str, Callable[[], Any]] | None = None
         self._last_input = ""
-        server.state.wheel = self.wheel("")
-        server.controller.trigger("ask_for_wheel")(self.ask)
-        server.controller.trigger("pass_wheel")(self.pass_wheel)
+        server.state.driving = self.driving("")
+        server.controller.trigger("ask_to_drive")(self.ask)
+        server.controller.trigger("pass_control")(self.pass_control)
         server.add_protocol_to_configure(lambda protocol: protocol.registerLinkProtocol(self))
         server.controller.on_server_bind.add(self._bind)
 
@@ -107,7 +107,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             if name == MOUSE:
                 self._keep_mouse(client, lambda event: call(part, event), *arguments)
             if name == STATE:
-                result["state"]["wheel"] = self.wheel(client)
+                result["state"]["driving"] = self.driving(client)
             return result
 
         return checked
@@ -143,7 +143,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         self._tell()
 
     def onClose(self, client: str) -> None:  # noqa: N802  (wslink's name)
-        """End what the browser was doing, and pass the wheel on."""
+        """End what the browser was doing, and pass control on."""
         del self._numbers[client]
         self._asking = [other for other in self._asking if other != client]
         if self._mouse is not None and self._mouse[0] == client:
@@ -157,14 +157,14 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             self._asking = [other for other in self._asking if other != self._driver]
         self._tell()
 
-    # -- the wheel --------------------------------------------------------------------------------------
+    # -- who drives -----------------------------------------------------------------------------------
 
     def _allows(self, client: str, name: str, arguments: tuple[Any, ...]) -> bool:
-        asks = name == TRIGGER and arguments[:1] == ("ask_for_wheel",)
+        asks = name == TRIGGER and arguments[:1] == ("ask_to_drive",)
         return not self._shared or client == self._driver or name in LOOKS or asks
 
-    def wheel(self, client: str) -> dict[str, Any]:
-        """Return what a browser shows of the wheel."""
+    def driving(self, client: str) -> dict[str, Any]:
+        """Return what a browser shows of who drives."""
         return {
             "shared": self._shared,
             "drives": not self._shared or client == self._driver,
@@ -176,21 +176,21 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         }
 
     def ask(self) -> None:
-        """Ask for the wheel."""
+        """Ask for control."""
         client = self._web.last_active_client_id
         if client != self._driver and client not in self._asking:
             self._asking.append(client)
         self._tell()
 
-    def pass_wheel(self) -> None:
-        """Pass the wheel to the browser that asked first."""
+    def pass_control(self) -> None:
+        """Pass control to the browser that asked first."""
         if self._asking:
             self._end_input()
             self._driver = self._asking.pop(0)
         self._tell()
 
     def _tell(self) -> None:
-        """Send each browser what it shows of the wheel."""
+        """Send each browser what it shows of who drives."""
         if self._shared:
             for client in self._numbers:
-                self.publish("trame.state.topic", {"wheel": self.wheel(client)}, client_id=client)
+                self.publish("trame.state.topic", {"driving": self.driving(client)}, client_id=client)

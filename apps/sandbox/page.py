@@ -262,7 +262,7 @@ class Page:
             html.H1("{{ title }}", classes="text-h6 mx-3")
             for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
                 panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW)
-            panels.build_wheel()
+            panels.build_driver()
             panels.build_files(self.sandbox)
             panels.build_view_menu(self.sandbox)
             self._build_menu("Add", "mdi-plus", "primitives", self.sandbox.add)

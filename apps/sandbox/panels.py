@@ -199,29 +199,29 @@ def build_files(sandbox: Sandbox) -> None:
             vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists", **COMPACT)
 
 
-def build_wheel() -> None:
-    """Build who drives a shared page, and the button that asks for the wheel or passes it."""
-    with html.Div(v_if="wheel.shared", classes="d-flex align-center ga-2 mr-2"):
+def build_driver() -> None:
+    """Build who drives a shared page, and the button that asks for control or passes it."""
+    with html.Div(v_if="driving.shared", classes="d-flex align-center ga-2 mr-2"):
         html.Span(
-            "{{ wheel.drives ? 'You drive' : 'Browser ' + wheel.driver + ' drives' }}, "
-            "{{ wheel.browsers - 1 }} watch",
+            "{{ driving.drives ? 'You drive' : 'Browser ' + driving.driver + ' drives' }}, "
+            "{{ driving.browsers - 1 }} watch",
             classes="text-caption",
             raw_attrs=['role="status"'],
         )
         vuetify3.VBtn(
-            "Pass the wheel to browser {{ wheel.next }}",
-            v_if="wheel.drives && wheel.next",
+            "Pass control to browser {{ driving.next }}",
+            v_if="driving.drives && driving.next",
             size="small",
             variant="tonal",
-            click="trigger('pass_wheel')",
+            click="trigger('pass_control')",
         )
         vuetify3.VBtn(
-            "{{ wheel.asks ? 'Asked for the wheel' : 'Ask for the wheel' }}",
-            v_if="!wheel.drives",
-            disabled=("wheel.asks",),
+            "{{ driving.asks ? 'Asked for control' : 'Ask for control' }}",
+            v_if="!driving.drives",
+            disabled=("driving.asks",),
             size="small",
             variant="tonal",
-            click="trigger('ask_for_wheel')",
+            click="trigger('ask_to_drive')",
         )
 
 

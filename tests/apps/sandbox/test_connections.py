@@ -56,12 +56,12 @@ class Browser:
         self._session = WsLinkSession(self.socket)
         self._listens = asyncio.create_task(self._session.listen())
         await (await self._session.auth(secret="wslink-secret"))
-        self.wheel = (await self.call("trame.state.get"))["state"]["wheel"]
+        self.driving = (await self.call("trame.state.get"))["state"]["driving"]
         self._session.register_subscription("trame.state.topic", self._take)
         return self
 
     def _take(self, changes: dict[str, Any]) -> None:
-        self.wheel = changes.get("wheel", self.wheel)
+        self.driving = changes.get("driving", self.driving)
 
     async def call(self, name: str, *arguments: Any) -> Any:
         return await (await self._session.call(name, list(arguments)))
@@ -114,26 +114,26 @@ async def until(true: Callable[[], object]) -> None:
             await asyncio.sleep(0.01)
 
 
-def test_one_browser_drives_and_passes_the_wheel(vtk_display: None) -> None:
+def test_one_browser_drives_and_passes_control(vtk_display: None) -> None:
     async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
         first, second, third = [await connect() for _ in range(3)]
-        assert [browser.wheel["drives"] for browser in (first, second, third)] == [True, False, False]
+        assert [browser.driving["drives"] for browser in (first, second, third)] == [True, False, False]
         await second.trigger(page.sandbox.select, "0/1")
         await second.mouse((80, 60), action="down")
         await second.call("trame.state.update", [{"key": "theme", "value": "dark"}])
-        await second.trigger("pass_wheel")
+        await second.trigger("pass_control")
         assert (window.actions.state.primitive, page._server.state.theme) == (None, "light")
         await first.trigger(page.sandbox.select, "0/1")
         await first.call("trame.state.update", [{"key": "theme", "value": "dark"}])
         assert (window.actions.state.primitive, page._server.state.theme) == ((0, (1,)), "dark")
         for browser in (third, second):
-            await browser.trigger("ask_for_wheel")
-        await until(lambda: first.wheel["next"] == third.wheel["number"] and second.wheel["asks"])
-        await first.trigger("pass_wheel")
-        await until(lambda: third.wheel["drives"] and not first.wheel["drives"])
-        assert (first.wheel["driver"], first.wheel["browsers"]) == (third.wheel["number"], 3)
+            await browser.trigger("ask_to_drive")
+        await until(lambda: first.driving["next"] == third.driving["number"] and second.driving["asks"])
+        await first.trigger("pass_control")
+        await until(lambda: third.driving["drives"] and not first.driving["drives"])
+        assert (first.driving["driver"], first.driving["browsers"]) == (third.driving["number"], 3)
         await third.close()
-        await until(lambda: second.wheel["drives"])  # it asked
+        await until(lambda: second.driving["drives"])  # it asked
         await second.trigger(page.sandbox.select, "0/0")
         assert window.actions.state.primitive == (0, (0,))
         for browser in (first, second):
@@ -188,7 +188,7 @@ def test_malformed_messages_are_refused_without_an_exception(
         for value in odd:
             await browser.trigger(page.sandbox.set_value, value)
             await browser.trigger(page.sandbox.set_value, value, value, value)
-        changes = [{"key": key, "value": "<b>x</b>"} for key in [*templates, "wheel"]]
+        changes = [{"key": key, "value": "<b>x</b>"} for key in [*templates, "driving"]]
         await browser.call("trame.state.update", changes)
         assert {key: page._server.state[key] for key in templates} == templates
         assert digest(window.document) == before
