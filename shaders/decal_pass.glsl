@@ -49,8 +49,8 @@ Pixel pixel_at(ivec2 texel) {
             rest_up = texelFetch(r_up, texel, 0).xyz;
         }
 #endif
-        vec3 ray = ray_direction(vec2(texel) + 0.5);
 #ifdef FILTERED
+        vec3 ray = ray_direction(vec2(texel) + 0.5);
         vec3 right = surface_step(visible.xyz, texelFetch(g_normal, texel, 0).xyz, ray, ray_right.xyz);
         vec3 up = surface_step(visible.xyz, texelFetch(g_normal, texel, 0).xyz, ray, ray_up.xyz);
 #ifdef POSED
@@ -61,8 +61,8 @@ Pixel pixel_at(ivec2 texel) {
 #endif
         vec4 color = filtered_color(position, normal, right, up);
 #else
-        DecalHit hit = decal_at(position, normal);
-        vec4 color = decal_color(hit, position, normal, ray);
+        DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
+        vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
 #ifdef MATERIALS
         float part = material_normals.w;

@@ -39,6 +39,8 @@ RELOCATION_SCHEDULE = (0.1, 0.8, 0.05)
 MIN_RELOCATION_INTERVAL = 6
 """Least number of steps between two relocations, in which relocated particles come to rest."""
 
+MAX_ITERATIONS = 1_000_000_000
+
 RELOCATION_STEPS_AFTER_DEFORMATION = 60
 """Steps after a deformation within which crowded particles are relocated as well."""
 
@@ -70,7 +72,7 @@ class Relaxation:
         Seed of all random choices, from 0 upward. The same seed gives the same bytes on the same kind of
         machine.
     iterations : int, default: 150
-        Steps of the whole schedule. Further steps continue with the last law of repulsion.
+        Steps of the whole schedule, at most 1,000,000,000. Further steps continue with the last law of repulsion.
     density : callable, optional
         Relative density of particles: a function of ``points[n, 3]`` to numbers above zero, ``[n]``. It
         should change by less than a factor of four between neighbours.
@@ -119,7 +121,7 @@ class Relaxation:
         fixed: ArrayLike | None = None,
         device: str = "cpu",
     ) -> None:
-        self.iterations = whole_number("iterations", iterations, 1, None, InvalidScattering)
+        self.iterations = whole_number("iterations", iterations, 1, MAX_ITERATIONS, InvalidScattering)
         self.steps = self._deformed_at = 0
         self._seed = whole_number("seed", seed, 0, None, InvalidScattering)
         self.domain = Domain(surfaces, seed, density=density, mask=mask, device=device)
@@ -135,7 +137,7 @@ class Relaxation:
         joined = OrientedPoints.joined([fixed_points, sampled])
         order = np.argsort(joined.surface_ids, kind="stable")
         self._fixed: BoolArray = (np.arange(count) < len(fixed_points))[order]
-        first, last, interval = (int(part * iterations) for part in RELOCATION_SCHEDULE)
+        first, last, interval = (int(part * self.iterations) for part in RELOCATION_SCHEDULE)
         self._relocation_steps = set(range(max(first, 1), last + 1, max(interval, MIN_RELOCATION_INTERVAL)))
         self._candidates = CandidatePoints(self.domain, self.sizes_at)
         self._anchors = DensityAnchors(self.sizes_at)
