@@ -72,7 +72,8 @@ class Relaxation:
         Seed of all random choices, from 0 upward. The same seed gives the same bytes on the same kind of
         machine.
     iterations : int, default: 150
-        Steps of the whole schedule, at most 1,000,000,000. Further steps continue with the last law of repulsion.
+        Steps of the whole schedule, at most 1,000,000,000. Further steps continue with the last law of
+        repulsion.
     density : callable, optional
         Relative density of particles: a function of ``points[n, 3]`` to numbers above zero, ``[n]``. It
         should change by less than a factor of four between neighbours.
