@@ -31,7 +31,7 @@ from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.tree import Node
-from blobtree.nodes.values import OPTIONAL, fields_of
+from blobtree.nodes.values import OPTIONAL, fields_of, left_out
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
 from blobtree.validation import Vector, shown
@@ -345,7 +345,8 @@ def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
         record_type = CustomWarpRecord
     else:
         record_type = RECORD_OF_KIND[type(node)]
-    values = {name: getattr(node, name) for name in record_type.__struct_fields__}
+    defaults = {field.name for field in fields_of(type(node)) if left_out(field, getattr(node, field.name))}
+    values = {name: getattr(node, name) for name in record_type.__struct_fields__ if name not in defaults}
     values |= {name: dict(value) for name, value in values.items() if isinstance(value, Attributes)}
     values |= {name: value.name for name, value in values.items() if isinstance(value, Falloff)}
     for name in record_type.references:

@@ -1,6 +1,5 @@
 """Objects of a scene: meshes and BlobTrees by name, and models of other kinds as such objects."""
 
-import copy
 import operator
 import os
 from collections.abc import Iterable, Sequence
@@ -15,6 +14,7 @@ from blobtree import Node
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.colors import ColorLike, color_rgb
 from blobtree.errors import InvalidNode
+from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, node_at
 from blobtree.validation import truth
@@ -39,7 +39,7 @@ CLAY: Color = (0.72, 0.68, 0.62)
 
 
 @dataclass(frozen=True, eq=False)
-class MeshObject:
+class MeshObject(Immutable):
     """A triangle mesh in a scene.
 
     Parameters
@@ -150,7 +150,7 @@ class MeshObject:
 
 
 @dataclass(frozen=True, eq=False)
-class TreeObject:
+class TreeObject(Immutable):
     """A BlobTree in a scene; its colour is an attribute of its field.
 
     Parameters
@@ -274,7 +274,8 @@ def _flags(item: SceneObject) -> dict[str, Paths]:
 
 def flagged(item: SceneObject, **flags: Paths) -> SceneObject:
     """Return an object with other nodes ``hidden`` or ``locked``; its surface is not built again."""
-    twin = copy.copy(item)
+    twin = object.__new__(type(item))
+    vars(twin).update(vars(item))
     vars(twin).pop("_shown_part", None)
     for name, paths in flags.items():
         object.__setattr__(twin, name, paths)

@@ -73,7 +73,8 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     kept: dict[str, Any] = {name: getattr(item, name) for name in _OPTIONS} | {"origin": origin}
     if isinstance(item, TreeObject):
         return TreeRecord(item.name, to_tree_file(item.tree), **kept)
-    kept["crease_angle"] = item.crease_angle
+    if item.crease_angle != CREASE_ANGLE:
+        kept["crease_angle"] = item.crease_angle
     if item.source is not None:
         return MeshRecord(item.name, item.color, source=relative(item.source, folder), **kept)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))

@@ -10,6 +10,8 @@ from blobtree import ISO, Node, polygonize
 from blobtree._typing import BoolArray, Float32Array
 from blobtree.device import known_device, launch
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
+from blobtree.immutable import Immutable
+from blobtree.lazy import Lazy
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
@@ -42,7 +44,7 @@ MAX_PROJECTION_ROUNDS = 4
 """Runs of Newton's method, each from the result of the one before, in `project_without_mesh`."""
 
 
-class ImplicitSurface:
+class ImplicitSurface(Immutable):
     """Iso surface of a BlobTree, as a `Surface`.
 
     Points are projected by Newton's method along the exact field gradient. Where the field is flat, or the
@@ -95,10 +97,13 @@ class ImplicitSurface:
             )
         self._coarse = MeshSurface(coarse.vertices, coarse.faces, device=device)
         self._max_step = _max_step(tree, resolution)
-        self._on_devices: dict[str, DeviceImplicitSurface] = {}
 
     def __repr__(self) -> str:
         return f"ImplicitSurface({self.tree!r})"
+
+    @Lazy
+    def _on_devices(self) -> dict[str, "DeviceImplicitSurface"]:
+        return {}
 
     @property
     def area(self) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device, launch
+from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
@@ -46,7 +47,7 @@ R2_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the R2 sequence (Roberts 2018): powers of the inverse of the plastic number."""
 
 
-class MeshSurface:
+class MeshSurface(Immutable):
     """Triangle mesh as a `Surface`, with a bounding volume hierarchy for all queries.
 
     Degenerate faces and copies of other faces are allowed, but get no samples and no projected points. Faces
@@ -99,7 +100,6 @@ class MeshSurface:
         self._bounds = used.min(axis=(0, 1)), used.max(axis=(0, 1))
         for array in (self.vertices, self.faces, *self._bounds):
             make_read_only(array)
-        self._on_devices: dict[str, DeviceMeshSurface] = {}
 
     def __repr__(self) -> str:
         return f"MeshSurface({len(self.vertices)} vertices, {len(self.faces)} faces)"
@@ -113,6 +113,10 @@ class MeshSurface:
     def bounds(self) -> tuple[Float32Array, Float32Array]:
         """Corners of the box around the faces."""
         return self._bounds
+
+    @Lazy
+    def _on_devices(self) -> dict[str, "DeviceMeshSurface"]:
+        return {}
 
     @Lazy
     def closed(self) -> bool:

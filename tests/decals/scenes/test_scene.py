@@ -1,4 +1,7 @@
+import copy
 import json
+import pickle
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -14,7 +17,9 @@ from decals.images import generate_image
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.files import from_json, is_scene, load_model, load_scene, save_scene, to_json
+from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import MeshObject, TreeObject, bounds_of
+from decals.scenes.pose import PosedMesh, PosedScene, pose
 from decals.scenes.scene import DecalImage, Scene
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32) * np.float32(0.1)
@@ -89,6 +94,56 @@ def test_saving_again_gives_the_same_bytes(tmp_path: Path) -> None:
     save_scene(_scene(), tmp_path / "a.json")
     save_scene(load_scene(tmp_path / "a.json"), tmp_path / "b.json")
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def _through_protocol(protocol: int) -> Callable[[Any], Any]:
+    return lambda value: pickle.loads(pickle.dumps(value, protocol))
+
+
+@pytest.mark.parametrize(
+    "twin_of",
+    [_through_protocol(2), _through_protocol(4), _through_protocol(5), copy.deepcopy],
+    ids=["protocol 2", "protocol 4", "protocol 5", "deep copy"],
+)
+def test_scenes_in_use_are_pickled_and_copied(tmp_path: Path, twin_of: Callable[[Any], Any]) -> None:
+    steel = DecalMaterial("steel", generate_image("rivet"), roughness=0.3)
+    scene = _scene().replace(images=(DecalImage.load("scale"), steel))
+    parts = scene, pose(scene, {"tetra": 2.0 * CORNERS})
+    points = np.array([[0.3, 0.2, 0.1], [0.05, 0.02, 0.03]], np.float32)
+    before = [(item.surface.project(points), item.surface.contains(points)) for item in scene.objects]
+    again, posed = twin_of(parts)
+    assert isinstance(again, Scene)
+    assert isinstance(posed, PosedScene)
+    for name in [field.name for field in fields(Decals)]:
+        array = getattr(again.decals, name)
+        assert _bits(array) == _bits(getattr(scene.decals, name)), name
+        assert not array.flags.writeable, name
+    assert (again.camera, again.drawing) == (scene.camera, scene.drawing)
+    for item, ((positions, normals), inside) in zip(again.objects, before, strict=True):
+        found = item.surface.project(points)
+        assert _bits(found[0]) == _bits(positions)
+        assert _bits(found[1]) == _bits(normals)
+        assert np.array_equal(item.surface.contains(points), inside)
+        assert not any(corner.flags.writeable for corner in item.bounds)
+    mesh, blob = again.objects
+    assert isinstance(blob, TreeObject)
+    assert blob.tree == _tree()
+    assert isinstance(mesh, MeshObject)
+    assert mesh.vertices is mesh.surface.vertices
+    assert not mesh.vertices.flags.writeable
+    assert isinstance(again.images[1], DecalMaterial)
+    for name in ("pixels", "normal", "roughness", "metallic", "occlusion", "emission"):
+        assert np.array_equal(getattr(again.images[1], name), getattr(steel, name)), name
+    assert isinstance(posed.objects[0], PosedMesh)
+    assert posed.objects[0].rest is mesh
+    assert posed.decals is again.decals
+    assert _bits(posed.objects[0].vertices) == _bits(2.0 * CORNERS)
+    for number, one in enumerate((scene, again)):
+        (tmp_path / str(number)).mkdir()
+        save_scene(one, tmp_path / str(number) / "scene.json")
+    folders = [sorted((tmp_path / str(number)).rglob("*")) for number in range(2)]
+    for old, new in zip(*folders, strict=True):
+        assert old.is_dir() or old.read_bytes() == new.read_bytes()
 
 
 def test_numbers_are_the_shortest_that_round_to_the_same_float32(tmp_path: Path) -> None:
