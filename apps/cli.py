@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from cyclopts import App, CycloptsError, UnusedCliTokensError
+from cyclopts import App, CycloptsError, MissingArgumentError, UnusedCliTokensError
 from rich.console import Console
 from rich.markup import escape
 
@@ -168,9 +168,21 @@ def run(tokens: Sequence[str] | None = None) -> int:
             f"expected one value for each option, such as --size 800x600, got also {words!r}; "
             "leave it out, or put a value with spaces in quotes"
         )
+    except MissingArgumentError as error:
+        return _print_error(_missing_text(error))
     except (CycloptsError, ImplicitDecalsError) as error:  # any other is a bug: it shows its traceback
         return _print_error(str(error))
     return result if isinstance(result, int) else 0
+
+
+def _missing_text(error: MissingArgumentError) -> str:
+    """Return what to add to a command: its model or scene, an option such as ``-o FILE``, or a value."""
+    command = " ".join(error.command_chain or ())
+    names = error.argument.names if error.argument is not None else ()
+    if error.keyword is not None or not names:
+        return f"{command}: missing a value after {error.keyword or 'the last option'}"
+    name = min(names, key=len)
+    return f"{command}: missing {name}{' FILE' if name == '-o' else ''}; see implicit-decals {command} --help"
 
 
 def _print_error(message: str) -> int:

@@ -105,18 +105,19 @@ class Decals(Immutable):
         Visible radius in model units: distance of the rim of an undeformed decal from its centre. One number
         stands for all decals.
     images : int32[n], optional
-        Index into the scene's list of images, or NO_IMAGE (-1) for the tint alone. Default 0.
+        Index into the scene's list of images, or NO_IMAGE (-1) for the tint alone; one each, or one for all.
+        Default 0.
     spill : bool[n], optional
-        True if a decal also colours surface that faces away from it, such as the far side of a thin wall.
-        Default False.
+        True if a decal also colours surface that faces away from it, such as the far side of a thin wall; one
+        each, or one for all. Default False.
     interactions : int32[n], optional
         An `Interaction` or its name (``"overlap"``) each, or one for all. Default PUSH.
     layers : int32[n], optional
-        Layers are drawn from the lowest up. Overlapping or independent decals of one layer are drawn in the
-        order of their numbers. Default 0.
+        Layers are drawn from the lowest up; one each, or one for all. Overlapping or independent decals of
+        one layer are drawn in the order of their numbers. Default 0.
     tints : float32[n, 3], optional
-        sRGB colour from 0 to 1 by which the image is multiplied in linear light; or the name of a colour
-        each, or one for all. Default white.
+        sRGB colour from 0 to 1 by which the image is multiplied in linear light, or its name; one each, or
+        one for all. Default white.
     opacities : float32[n], optional
         From 0 (invisible) to 1, the default. One number stands for all decals.
     receivers : str[n], optional

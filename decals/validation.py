@@ -257,8 +257,8 @@ def orthogonal_vectors(tangents: Float64Array, normals: Float64Array) -> Float64
 
 
 def whole_array(name: str, values: Any, count: int, *, low: int, high: int, default: int) -> Int32Array:
-    """Return whole numbers from low to high as a new array; the default in each row for None."""
-    array = np.full(count, default, np.int64) if values is None else np.array(values)
+    """Return whole numbers from low to high as a new array; one stands for all rows, None for the default."""
+    array = np.array(one_or_each(default if values is None else values, count))
     _check_shape(name, array.shape, (count,))
     if (count and array.dtype.kind not in "iu") or array.dtype.kind not in "iuf":
         raise InvalidDecals(f"{name}: expected whole numbers, got {array.dtype}; round or index first")
@@ -293,9 +293,11 @@ def color_values(name: str, values: Any, error: type[ImplicitDecalsError]) -> An
 
 
 def color_array(name: str, values: Any, count: int) -> Float64Array:
-    """Return sRGB colours as a new array ``[count, 3]``; one name stands for all rows, None is white."""
+    """Return sRGB colours as a new array ``[count, 3]``; one stands for all rows, None is white."""
     numbers = color_values(name, values, InvalidDecals)
-    return unit_interval(name, np.tile(numbers, (count, 1)) if is_named(values) else numbers, (count, 3))
+    channels = list(numbers) if isinstance(numbers, list | tuple) or np.ndim(numbers) == 1 else []
+    single = len(channels) == 3 and all(isinstance(one, int | float | np.number) for one in channels)
+    return unit_interval(name, np.tile(numbers, (count, 1)) if single else numbers, (count, 3))
 
 
 def _items(values: Any) -> Any:
@@ -317,8 +319,8 @@ def unit_interval(name: str, values: Any, shape: tuple[int, ...]) -> Float64Arra
 
 
 def bool_array(name: str, values: Any, count: int) -> BoolArray:
-    """Return truth values as a new array; False for None."""
-    array = np.zeros(count, np.bool_) if values is None else np.array(values)
+    """Return truth values as a new array; one stands for all rows, None is False."""
+    array = np.array(one_or_each(False if values is None else values, count))
     _check_shape(name, array.shape, (count,))
     if count and array.dtype != np.bool_:
         raise InvalidDecals(f"{name}: expected True or False, got {array.dtype}; compare or cast it first")

@@ -147,6 +147,9 @@ CALLS: dict[str, Callable[[], object]] = {
     "surrogate in a tree": lambda: blobtree.load("\ud800.json"),
     "surrogate in a mesh": lambda: read_mesh("\ud800.ply"),
     "surrogate in a saved scene": lambda: decals.save_scene(SCENE, "\ud800.json"),
+    "no image to cover with": lambda: decals.cover(BALL, count=1, images=[]),
+    "empty mask": lambda: decals.scatter(BALL, count=3, mask=lambda points: np.zeros(len(points), bool)),
+    "scene as text": lambda: decals.save_scene(SCENE, "a.txt"),
     "NUL in a saved scene": lambda: decals.save_scene(SCENE, "a\0/a.json"),
 }
 

@@ -1,6 +1,7 @@
 """``implicit-decals sandbox``: modelling and decals in the browser."""
 
 import asyncio
+import errno
 import ipaddress
 import secrets
 import signal
@@ -9,8 +10,8 @@ import subprocess
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Collection
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import count
 from pathlib import Path
@@ -153,13 +154,14 @@ def sandbox(
                 ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
             else:
                 ready.add(lambda **_: _announce(host, server.port, query, open_browser=own_browser))
-            server.start(
-                host=host,
-                port=port,
-                open_browser=browser and not query,
-                show_connection_info=False,
-                timeout=0,
-            )
+            with _port_in_use_reported(port):
+                server.start(
+                    host=host,
+                    port=port,
+                    open_browser=browser and not query,
+                    show_connection_info=False,
+                    timeout=0,
+                )
     finally:
         report_unsaved(window, "sandbox")
     return 0
@@ -201,9 +203,22 @@ def _serve_sessions(
     token = _token(host)
     allows_host = (lambda _: True) if token else _is_loopback
     served = Sessions(command, limit=limit, token=token, allows_host=allows_host)
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt), _port_in_use_reported(port):
         return asyncio.run(served.serve(host, port, ready))
     return 0
+
+
+@contextmanager
+def _port_in_use_reported(port: int) -> Iterator[None]:
+    """Raise InvalidInput in place of the system's error that another program has the port."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        raise InvalidInput(
+            f"port {port} is in use; choose another by --port, or --port 0 for a free one"
+        ) from None
 
 
 def _show_window(command: list[str]) -> int:

@@ -326,7 +326,8 @@ def apportion(masses: Float64Array, count: int) -> Int64Array:
         return np.zeros(len(masses), np.int64)
     if not total > 0:
         raise InvalidScattering(
-            f"expected visible area for {count} particles, got none; add a surface or move one"
+            f"expected visible area for {count} particles, got none; "
+            "add a surface, move one, or let `mask` be True somewhere"
         )
     ideal = masses * (count / total)
     counts: Int64Array = np.floor(ideal).astype(np.int64)

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -30,7 +30,7 @@ FRAMING_MARGIN = 1.1
 
 
 def cover(
-    *models: Model | SceneObject,
+    *models: Model | SceneObject | list[Any],
     count: int = 500,
     images: AnyImage | Iterable[AnyImage] = DEFAULT_IMAGE,
     seed: int = 0,
@@ -45,7 +45,7 @@ def cover(
     ----------
     *models : Model or SceneObject
         BlobTrees, pyvista datasets, meshes with ``vertices`` and ``faces`` (trimesh), tuples
-        ``(vertices, faces)``, paths of models, or objects of a scene.
+        ``(vertices, faces)``, paths of models, or objects of a scene; or one list of these.
     count : int
         Number of decals.
     images : image, or sequence of images
@@ -85,10 +85,13 @@ def cover(
     """
     with reporting(progress) as report:
         report("reading models and images", 0.0)
-        objects = as_objects(models, crease_angle=crease_angle)
+        listed = models[0] if len(models) == 1 and isinstance(models[0], list) else models
+        objects = as_objects(listed, crease_angle=crease_angle)
         pictures = as_images(images)
         if not objects:
             raise InvalidScene("expected at least one model, got none")
+        if not pictures:
+            raise InvalidScene("images: expected at least one image, got none; leave it out for the default")
         report("preparing the surfaces", 0.0)
         decals = scatter(
             [item.surface for item in objects],

@@ -118,14 +118,14 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
     scene : Scene
         The scene.
     path : str or path
-        The file; its folder must exist.
+        The file, named ``.json``; its folder must exist.
     progress : callable, optional
         Function of the stage and its finished fraction, 0 to 1, called repeatedly.
 
     Raises
     ------
     InvalidScene
-        If the folder does not exist or cannot be written.
+        If the file has another name, or the folder does not exist or cannot be written.
 
     Examples
     --------
@@ -135,6 +135,8 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
     """
     instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
     path = as_path(path)
+    if path.suffix.lower() != ".json":
+        raise InvalidScene(f"expected a file name that ends in .json, got {path.name!r}; rename the file")
     folder = path.parent
     if not folder.is_dir():
         raise InvalidScene(

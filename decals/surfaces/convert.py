@@ -68,8 +68,9 @@ def as_shape(
     ----------
     model : Model
         A BlobTree. Or a pyvista dataset, whose surface is extracted and triangulated. Or any object with
-        ``vertices`` and ``faces``, such as a trimesh mesh. Or a tuple ``(vertices, faces)`` of arrays. Or the
-        path of a mesh file or of a tree in JSON.
+        ``vertices`` and ``faces``, such as a trimesh mesh. Or a trimesh scene, whose
+        parts are joined. Or a tuple ``(vertices, faces)`` of arrays. Or the path of a mesh file or of a tree
+        in JSON.
     name : str
         Name of the model in messages.
     error : type
@@ -92,6 +93,8 @@ def as_shape(
         return read_shape(model)
     if _is_dataset(model):
         return dataset_triangles(model, name=name)
+    if _is_trimesh_scene(model):
+        model = model.to_geometry()  # all parts as one mesh, or points or curves, which have no faces
     if isinstance(model, MeshLike) and not isinstance(model, type):
         return _array_triangles(model.vertices, model.faces, name)
     if _is_array_pair(model):
@@ -130,13 +133,20 @@ def is_surface(value: object) -> TypeGuard[Surface]:
 def is_model(value: object) -> bool:
     """Return True if the value is one model, so not a sequence of models."""
     known = (Node, str, os.PathLike, MeshLike)
-    return is_surface(value) or isinstance(value, known) or _is_dataset(value) or _is_array_pair(value)
+    datasets = _is_dataset(value) or _is_trimesh_scene(value)
+    return is_surface(value) or isinstance(value, known) or datasets or _is_array_pair(value)
 
 
 def _is_dataset(value: object) -> "TypeGuard[pv.DataSet | pv.MultiBlock]":
     """Return True for a dataset of pyvista, which is not imported for that: a dataset comes from it."""
     pyvista = sys.modules.get("pyvista")
     return pyvista is not None and isinstance(value, pyvista.DataSet | pyvista.MultiBlock)
+
+
+def _is_trimesh_scene(value: object) -> TypeGuard[Any]:
+    """Return True for a scene of trimesh, which is not imported for that."""
+    trimesh = sys.modules.get("trimesh")
+    return trimesh is not None and isinstance(value, trimesh.Scene)
 
 
 def read_shape(path: str | os.PathLike[str]) -> Node | MeshArrays:

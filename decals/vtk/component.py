@@ -14,6 +14,8 @@ import pyvista as pv
 from blobtree import Node
 from blobtree.colors import ColorLike
 from decals.errors import InvalidScene, NoGraphics
+from decals.field.law import AnyContact
+from decals.field.mapping import ImageMapping
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.model import NO_IMAGE, Decals
 from decals.rendering import SceneLike
@@ -25,6 +27,7 @@ from decals.surfaces.convert import Model, as_shape
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
+from decals.vtk.attributes import KnownAttributes
 from decals.vtk.exports import restore_exports, warn_of_exports
 from decals.vtk.frame import WindowContext
 from decals.vtk.subplot import PickResult, SubplotRenderer
@@ -34,7 +37,7 @@ UNUSED_CAMERA = Camera((0.0, 0.0, 1.0))
 
 
 @pv.register_plotter_component("decals")
-class DecalsComponent:
+class DecalsComponent(KnownAttributes):
     """Objects and decals among the actors of a plotter: ``plotter.decals``.
 
     All methods apply to the active subplot.
@@ -55,6 +58,8 @@ class DecalsComponent:
     30
     >>> plotter.show()
     """
+
+    _elsewhere = "subplot"
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
         self._plotter = plotter
@@ -336,6 +341,33 @@ class DecalsComponent:
     @lights.setter
     def lights(self, lights: Lights | str) -> None:
         self.subplot.lights = lights
+
+    @property
+    def contact(self) -> AnyContact:
+        """Contact mode of the active subplot; see `decals.Contact`."""
+        return self.subplot.contact
+
+    @contact.setter
+    def contact(self, contact: AnyContact | str) -> None:
+        self.subplot.contact = contact
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of elastic contact in the active subplot, from 1."""
+        return self.subplot.stiffness
+
+    @stiffness.setter
+    def stiffness(self, stiffness: float) -> None:
+        self.subplot.stiffness = stiffness
+
+    @property
+    def mapping(self) -> ImageMapping:
+        """Image mapping of the active subplot; see `decals.ImageMapping`."""
+        return self.subplot.mapping
+
+    @mapping.setter
+    def mapping(self, mapping: ImageMapping | str) -> None:
+        self.subplot.mapping = mapping
 
     @property
     def subplots(self) -> tuple[SubplotRenderer, ...]:

@@ -33,6 +33,7 @@ from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import finite_number, member, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
+from decals.vtk.attributes import KnownAttributes
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.injection import InjectedDecals
 from decals.vtk.proxy_actor import ProxyActor, box_around
@@ -125,7 +126,7 @@ class FrameStatus(Enum):
     """The frame was drawn."""
 
 
-class SubplotRenderer:
+class SubplotRenderer(KnownAttributes):
     """Draws a scene among the actors of one of pyvista's renderers; ``plotter.decals.subplot`` is one.
 
     Everything may be changed at any time. The plotter's next ``render()`` shows it.
@@ -162,6 +163,13 @@ class SubplotRenderer:
     0
     >>> plotter.close()
     """
+
+    plotter: pv.BasePlotter
+    vtk_renderer: pv.Renderer
+    wait_for_gpu: bool
+    keep_previous_frame: bool
+    status: FrameStatus
+    applied: InjectedDecals
 
     def __init__(
         self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]

@@ -29,6 +29,7 @@ def models(folder: Path) -> dict[str, Any]:
         "tree": BALL,
         "pyvista": pv.Plane(),
         "trimesh": trimesh.Trimesh(*SQUARE),
+        "trimesh scene": trimesh.Scene([trimesh.Trimesh(*SQUARE), trimesh.Trimesh(SQUARE[0] + 2, SQUARE[1])]),
         "arrays": SQUARE,
         "mesh file": folder / "plane.ply",
         "tree file": str(folder / "ball.json"),
@@ -36,7 +37,7 @@ def models(folder: Path) -> dict[str, Any]:
     }
 
 
-KINDS = ("tree", "pyvista", "trimesh", "arrays", "mesh file", "tree file", "object")
+KINDS = ("tree", "pyvista", "trimesh", "trimesh scene", "arrays", "mesh file", "tree file", "object")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -59,6 +60,7 @@ def test_a_model_of_each_kind_is_accepted(kind: str, tmp_path: Path) -> None:
 def test_several_models_become_one_scene() -> None:
     together = decals.scenes.cover.as_scene([BALL, pv.Plane(), SQUARE])
     assert len({item.name for item in together.objects}) == 3
+    assert len(decals.cover([BALL, pv.Plane()], count=2).objects) == 2
 
 
 @pytest.mark.parametrize("wrong", [None, 5, [], {}, ["x.ply"], pv.Sphere])

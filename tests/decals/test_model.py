@@ -109,6 +109,17 @@ def test_packed_record() -> None:
     assert record[3::4].tolist() == [[1, 1, 1, 1]] * 3
 
 
+@pytest.mark.parametrize("tint", [(1, 0.5, 0.25), [1, 0.5, 0.25], np.array([1, 0.5, 0.25])])
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_one_value_stands_for_all(tint: Any, count: int) -> None:
+    decals = some(count, tints=tint, images=7, layers=np.int64(-1), interactions=2, spill=True)
+    assert decals.tints.tolist() == [[1.0, 0.5, 0.25]] * count
+    assert decals.images.tolist() == [7] * count
+    assert decals.layers.tolist() == [-1] * count
+    assert decals.interactions.tolist() == [2] * count
+    assert decals.spill.tolist() == [True] * count
+
+
 @pytest.mark.parametrize("single", [0.25, np.float32(0.25), np.array(0.25)])
 @pytest.mark.parametrize("count", [0, 3])
 def test_one_radius_and_one_opacity_stand_for_all(single: Any, count: int) -> None:

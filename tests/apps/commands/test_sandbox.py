@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+import errno
 import sys
 import unittest.mock
 import webbrowser
@@ -214,3 +215,17 @@ def test_wrong_arguments_are_refused(
     assert run(["sandbox", "--share", *arguments]) == 2
     assert "error:" in capsys.readouterr().err
     assert opened == []
+
+
+def test_a_port_in_use_is_named(
+    folder: Path,
+    opened: list[tuple[Server, EditWindow]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Capture,
+) -> None:
+    def start(*_: Any, **__: Any) -> None:
+        raise OSError(errno.EADDRINUSE, "error while attempting to bind: address already in use")
+
+    monkeypatch.setattr(Server, "start", start)
+    assert run(["sandbox", "--share", "--port", "8123"]) == 2
+    assert "port 8123 is in use; choose another by --port" in capsys.readouterr().err

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import decals
 from decals.editing import Document, EditSession, PointerTools, first_hit, nearest_points, outline, pick
 from decals.editing.actions import Actions
 from decals.errors import ImplicitDecalsError
@@ -39,6 +40,12 @@ def test_a_plotter(plotter: Factory) -> None:
     refused(lambda wrong: pl.decals.add(one(), images=[wrong]), "x", GREY)
     refused(lambda wrong: setattr(pl.decals, "lights", wrong))
     refused(lambda wrong: setattr(pl.decals, "scene", wrong), None)
+    refused(lambda wrong: setattr(pl.decals, "contakt", wrong))
+    refused(lambda wrong: setattr(pl.decals, "samples", wrong))
+    refused(lambda wrong: setattr(subplot, "contakt", wrong))
+    pl.decals.contact, pl.decals.stiffness, pl.decals.mapping = "radial", 3, "chord"
+    assert (subplot.contact, subplot.stiffness) == (decals.Contact.RADIAL, 3.0)
+    assert pl.decals.mapping is subplot.mapping is decals.ImageMapping.CHORD
     refused(lambda wrong: subplot.covers(wrong, 3), -1)
     refused(lambda wrong: subplot.at(3, wrong), -1)
     refused(lambda wrong: subplot.hidden(wrong, 3, (0, 0, 0)), -1)
