@@ -23,7 +23,7 @@ from decals.apps.output import check_output, make_folder, print_path
 from decals.errors import NoGraphics
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
-from decals.window.host_plotter import require_screen
+from decals.vtk.screen import require_screen
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 

@@ -30,6 +30,7 @@ from decals.vtk.adapters import Lights
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.exports import restore_exports, warn_of_exports
 from decals.vtk.frame import WindowContext
+from decals.vtk.screen import require_screen
 from decals.vtk.subplot import PickResult, SubplotRenderer
 
 UNUSED_CAMERA = Camera((0.0, 0.0, 1.0))
@@ -466,6 +467,8 @@ def show(scene: Scene | SceneObject | Model | Sequence[SceneObject | Model], **o
     ------
     InvalidScene
         The argument is neither a `Scene` nor a model.
+    NoGraphics
+        There is no screen for the window.
 
     Examples
     --------
@@ -476,9 +479,12 @@ def show(scene: Scene | SceneObject | Model | Sequence[SceneObject | Model], **o
     """
     shown = as_scene(scene)
     plotter = pv.Plotter()
+    in_window = not plotter.off_screen and not plotter.notebook and not STILL & options.keys()
+    if in_window:
+        require_screen()
     component: DecalsComponent = plotter.decals
     component.add_scene(shown, camera=True)
-    if not plotter.off_screen and not plotter.notebook and not STILL & options.keys():
+    if in_window:
         _show_one_sample_first(plotter)
     if plotter.notebook and "jupyter_backend" not in options:
         options["jupyter_backend"] = REMOTE if all(map(find_spec, SERVING)) else "static"

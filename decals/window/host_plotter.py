@@ -1,8 +1,6 @@
 """Host plotters: the window of an editor, its own or one that the caller provides."""
 
-import os
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,24 +10,20 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
-from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
 from blobtree._typing import Float64Array
 from decals.editing.document import Document
 from decals.editing.pointer_tools import Ray
-from decals.errors import InvalidScene, NoGraphics
-from decals.rendering.gl_libraries import require_gl
+from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Background
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
+from decals.vtk.screen import require_screen
 from decals.vtk.subplot import SubplotRenderer
 
 DEFAULT_SIZE = (1200, 800)
 """Width and height of a window, in pixels."""
-
-OFF_SCREEN_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
-"""VTK's windows that no screen shows; on Linux, VTK takes one of them if there is no X server."""
 
 TITLE = "Implicit Decals"
 """Title of a window, after the name of the file."""
@@ -184,22 +178,6 @@ class SubplotBackup:
 def edits_at(subplot: SubplotRenderer, x: int, y: int) -> bool:
     """Return True if a subplot covers a pixel and a window edits in it."""
     return isinstance(subplot.scene, Document) and subplot.covers(x, y)
-
-
-def require_screen() -> None:
-    """Raise `NoGraphics` if there is no screen for a window; VTK would silently draw off screen."""
-    if not sys.platform.startswith("linux"):
-        return
-    reason = "DISPLAY is not set"
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
-        require_gl()
-        if vtkRenderWindow().GetClassName() not in OFF_SCREEN_WINDOWS:
-            return
-        reason = f"no X server answers at DISPLAY={os.environ.get('DISPLAY', '')!r}"
-    raise NoGraphics(
-        f"expected a screen for the window, got none ({reason}); log in with a desktop, "
-        "use `ssh -X`, or draw pictures with `implicit-decals render`"
-    )
 
 
 @contextmanager

@@ -28,6 +28,7 @@ from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 from decals.validation import describe, whole_number
 from decals.vtk.adapters import weak_callback
+from decals.vtk.screen import require_screen
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
 from decals.vtk.window_title import WindowTitle
 from decals.window.event_bindings import TICK_MILLISECONDS, AsyncTicker, EventBindings, running_loop
@@ -44,7 +45,6 @@ from decals.window.host_plotter import (
     eye_and_target,
     pixels_of,
     ray_through,
-    require_screen,
 )
 from decals.window.overlay import Overlay, PrimitiveHandle
 

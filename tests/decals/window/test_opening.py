@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 
+import decals
 from decals import render
 from decals.errors import InvalidScene, NoGraphics
 from decals.window import EditWindow, edit
@@ -37,8 +39,10 @@ def test_without_a_screen_a_window_says_so(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    with pytest.raises(NoGraphics, match="DISPLAY is not set"):
-        edit(scene())
+    monkeypatch.setattr(pv, "OFF_SCREEN", False)
+    for opened in (edit, decals.show):
+        with pytest.raises(NoGraphics, match="DISPLAY is not set"):
+            opened(scene())
 
 
 def test_the_background_is_that_of_a_rendered_picture() -> None:
