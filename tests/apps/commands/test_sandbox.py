@@ -136,14 +136,14 @@ def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyP
 def test_a_server_refuses_clients_without_its_token() -> None:
     pytest.importorskip("trame")
     from trame.app import get_server
-    from trame_server.client import Client
+    from trame_server.client import Client, ConnectionStatus
 
     async def connected(url: str, **config: Any) -> bool:
         client = Client(url)
         task = asyncio.create_task(client.connect(**config))
         while not task.done():
             await asyncio.sleep(0.01)
-            if client.connected:
+            if client.connected == ConnectionStatus.CONNECTED:  # not already CONNECTING
                 await client.disconnect()
                 await task
                 return True
