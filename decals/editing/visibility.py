@@ -14,6 +14,7 @@ from blobtree.nodes.surgery import path_of
 from decals.editing.document import DecalStates, Document, Edit
 from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
+from decals.index.rows import as_numbers
 from decals.scenes.objects import Paths, SceneObject, TreeObject, flagged
 from decals.scenes.scene import as_layers
 
@@ -106,7 +107,7 @@ class HideDecals:
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        numbers = np.asarray(self.numbers, np.int64)
+        numbers = as_numbers(self.numbers)
         decals = document.decals.take(numbers)  # raises for numbers without a decal
         hidden = DecalStates.existing(numbers, decals).overlaid_on(document.hidden)
         return document.compute_deletion(numbers, hidden=hidden) if len(numbers) else Edit()

@@ -313,7 +313,7 @@ def particle_count(count: int | None, spacing: float | None, mass: float) -> int
         raise InvalidScattering(
             f"spacing: {length:g} makes more than {MAX_PARTICLES:,} particles; take a larger one, or a count"
         )
-    return int(round(2.0 * mass / (np.sqrt(3.0) * length**2)))
+    return int(round(2.0 * mass / np.sqrt(3.0) / length / length))
 
 
 def apportion(masses: Float64Array, count: int) -> Int64Array:
