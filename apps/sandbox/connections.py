@@ -100,10 +100,10 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             try:
                 result = call(part, *arguments, **options)
                 result = await result if inspect.isawaitable(result) else result
-            except Exception as error:
+            except Exception as error:  # functions of trame raise anything for arguments of no page
                 if name in OURS:
                     raise
-                return {"error": f"refused: {error}"}  # trame's functions raise for arguments of no page
+                return {"error": f"refused: {error}"}
             if name == MOUSE:
                 self._keep_mouse(client, lambda event: call(part, event), *arguments)
             if name == STATE:

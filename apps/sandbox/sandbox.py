@@ -512,7 +512,7 @@ class Sandbox:
         key
             Key of the row.
         change
-            What to do: "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate".
+            Action: "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate".
             "hide" shows a hidden row, and "lock" unlocks a locked one.
         value
             New name of an object; or the key of the row to which a node is moved.

@@ -64,7 +64,7 @@ def deepest_block(index: wp.vec3i, near: wp.vec4i, tree: BlockTreeArrays) -> wp.
 
 @wp.func
 def gradient_in_block(p: wp.vec3, block: wp.int32, tree: BlockTreeArrays) -> wp.vec4:
-    """Return (value, ∂x, ∂y, ∂z) at p by the tape of a block, by the whole tape if there is none."""
+    """Return (value, ∂x, ∂y, ∂z) at p from the tape of a block; a block without one takes the whole tape."""
     if block < 0:
         return field_gradient(p, tree.whole, tree.whole_span)
     return field_gradient(p, tree.tape, tree.spans[block])

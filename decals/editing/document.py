@@ -228,7 +228,7 @@ class Document:
 
     @property
     def shown_objects(self) -> list[SceneObject]:
-        """What is to be seen of the objects; see `decals.scenes.objects.shown_objects`."""
+        """The objects without their hidden parts, see `decals.scenes.objects.shown_objects`."""
         return shown_objects(self._objects)
 
     @property

@@ -1,4 +1,4 @@
-"""What is hidden or locked: commands that change it, and the check that others change nothing locked."""
+"""Commands that hide and lock parts of a scene, and the check that others change no locked part."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

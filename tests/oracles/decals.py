@@ -45,10 +45,10 @@ def decals_at(
     contact: str = "elastic",
     on: frozenset[str] | None = None,
 ) -> Any:
-    """What the topmost of `decals` (anything with their arrays) shows at points with unit normals.
+    """Return the topmost of `decals` (any object with their arrays) at points with normals, as a `Reference`.
 
-    reach 1 is the paper; less leaves out whatever is farther than that many influence radii. `on`: labels of
-    the object that the points lie on.
+    A decal acts up to `reach` influence radii; 1 is the paper. `on` holds the labels of the object that the
+    points lie on.
     """
     return _in_chunks(_topmost, decals, points, normals, corrected, reach, contact, on)
 
