@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("aiohttp")
 
 import aiohttp
+from aiohttp import ClientSession as Client
 
 from decals.apps.sandbox import sessions as module
 from decals.apps.sandbox.sessions import Sessions
@@ -34,7 +35,6 @@ async def main():
     pathlib.Path(f"saved {sys.argv[1]}").touch()
 asyncio.run(main())
 """
-Client = aiohttp.ClientSession
 
 
 def serve(check: Callable[[Sessions, str], Awaitable[None]], **options: Any) -> None:
