@@ -2,6 +2,7 @@
 
     python -m tests.bench.fitting                # 100 trees, 10,000 samples each
     python -m tests.bench.fitting --trees 5      # fewer
+    python -m tests.bench.fitting --processes 8  # several trees at a time
 
 A tree is recovered if every parameter comes back within 1e-3 of a model unit (directions as unit vectors).
 The trees are about four units wide. Samples are points of the support with their field values. Trees with
@@ -10,8 +11,11 @@ parameters that the samples do not determine, such as those of primitives that a
 
 import argparse
 import json
+import multiprocessing
 import time
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +44,9 @@ TREES = 100
 RECOVERED = 1e-3
 LARGEST_ERROR = 3.0
 """Largest standard error of a parameter that samples determine, per unit of error of the field."""
+
+TRIED_PER_TREE = 10
+"""Most random trees per tree that samples determine; about half of them do."""
 
 GROUP = 4
 
@@ -132,33 +139,53 @@ def is_determined(tree: Node, points: NDArray[np.float32]) -> bool:
     return bool(np.linalg.matrix_rank(rows.T @ rows) == len(values) and variances.max() <= LARGEST_ERROR**2)
 
 
-def figures(trees: int, samples: int, seed: int = 0) -> dict[str, float]:
-    """Return the recovered part of random trees in percent, and the median seconds of a fit."""
-    errors: list[float] = []
-    seconds: list[float] = []
-    number = 0
-    while len(errors) < trees:
-        rng = np.random.default_rng([seed, number])
-        number += 1
-        model = random_model(rng)
-        points = samples_in(model, rng, samples)
-        if not is_determined(model, points):
-            continue
-        start = perturbed(model, rng)
-        began = time.perf_counter()
-        found = fit(start, points, model(points))
-        seconds.append(time.perf_counter() - began)
-        errors.append(recovery_error(found.tree, model))
-        print(
-            f"tree {number - 1}: error {errors[-1]:.1e} from {recovery_error(start, model):.2f}, "
-            f"{found.evaluations} evaluations, {seconds[-1]:.1f} s",
-            flush=True,
+class Recovery(NamedTuple):
+    """A fit of a random tree."""
+
+    number: int
+    start_error: float
+    error: float
+    evaluations: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return (
+            f"tree {self.number}: error {self.error:.1e} from {self.start_error:.2f}, "
+            f"{self.evaluations} evaluations, {self.seconds:.1f} s"
         )
+
+
+def recovery(number: int, *, samples: int, seed: int) -> Recovery | None:
+    """Fit the random tree of a number; return None if the samples do not determine it."""
+    rng = np.random.default_rng([seed, number])
+    model = random_model(rng)
+    points = samples_in(model, rng, samples)
+    if not is_determined(model, points):
+        return None
+    start = perturbed(model, rng)
+    began = time.perf_counter()
+    found = fit(start, points, model(points))
+    seconds = time.perf_counter() - began
+    error, start_error = (recovery_error(tree, model) for tree in (found.tree, start))
+    return Recovery(number, start_error, error, found.evaluations, seconds)
+
+
+def figures(trees: int, samples: int, seed: int = 0, processes: int = 1) -> dict[str, float]:
+    """Return the recovered part of random trees in percent, and the median seconds of a fit."""
+    found: list[Recovery] = []
+    with multiprocessing.get_context("spawn").Pool(processes) as pool:
+        numbers = range(TRIED_PER_TREE * trees)
+        for fitted in pool.imap(partial(recovery, samples=samples, seed=seed), numbers):
+            if fitted is not None:
+                found.append(fitted)
+                print(fitted, flush=True)
+            if len(found) == trees:
+                break
     return {
-        "fit_recovered": 100.0 * float(np.mean(np.array(errors) <= RECOVERED)),
+        "fit_recovered": 100.0 * float(np.mean([one.error <= RECOVERED for one in found])),
         "fit_trees": float(trees),
-        "fit_undetermined": float(number - trees),
-        "fit_seconds": float(np.median(seconds)),
+        "fit_undetermined": float(found[-1].number + 1 - trees),
+        "fit_seconds": float(np.median([one.seconds for one in found])),
     }
 
 
@@ -168,10 +195,12 @@ def main() -> None:
     )
     parser.add_argument("--trees", type=int, default=TREES, help="number of random trees")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of each tree")
+    parser.add_argument("--processes", type=int, default=1, help="trees at a time")
     parser.add_argument("--quick", action="store_true", help="two trees of 3,000 samples")
     parser.add_argument("--json", type=Path, help="file for the figures")
     arguments = parser.parse_args()
-    result = figures(2, 3000) if arguments.quick else figures(arguments.trees, arguments.samples)
+    trees, samples = (2, 3000) if arguments.quick else (arguments.trees, arguments.samples)
+    result = figures(trees, samples, processes=arguments.processes)
     for name, value in result.items():
         print(f"{name:16} {value:8.1f}")
     if arguments.json:
