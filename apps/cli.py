@@ -43,6 +43,18 @@ implicit-decals render dragon --decals 1000 --camera 1,0.4,1 --save dragon.json 
 
 implicit-decals render dragon.json --size 2400x1800 -o large.png
 """,
+    "animate": """Draw a turntable, or a scene in a sequence of poses.
+
+For example:
+
+implicit-decals animate knot --decals 800 -o turn
+
+implicit-decals animate scene.json --frames 60 -o turn.gif
+
+implicit-decals animate scene.json --poses walk.py -o walk.mp4
+
+implicit-decals animate scene.json --meshes walk_1.ply walk_2.ply walk_3.ply -o walk
+""",
     "edit": """Open models or a scene in an editor window.
 
 For example:

@@ -23,7 +23,19 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     if path.suffix.lower() not in suffixes:
         known = ", ".join(suffixes)
         raise InvalidInput(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
-    folder = path.parent
+    _check_writable(path.parent)
+
+
+def check_animation(path: Path, suffixes: tuple[str, ...]) -> None:
+    """Check that a folder of pictures, or a file of one of these formats, can be written; make the folder."""
+    if path.suffix and not path.is_dir():
+        check_output(path, suffixes)
+    else:
+        make_folder(path)
+        _check_writable(path)
+
+
+def _check_writable(folder: Path) -> None:
     if not folder.is_dir():
         raise InvalidInput(f"the output folder {str(folder)!r} does not exist; create it first")
     try:

@@ -11,6 +11,7 @@ from .record import Contact
 from .scattering.relaxation import Relaxation
 from .scattering.scatter import scatter
 from .scattering.sizing import Sizing
+from .scenes.animation import animate, turntable
 from .scenes.camera import Camera
 from .scenes.cover import cover
 from .scenes.files import load_model, load_scene, save_scene
@@ -40,6 +41,7 @@ __all__ = [
     "Sizing",
     "TreeObject",
     "__version__",
+    "animate",
     "bake",
     "cover",
     "define_contact",
@@ -64,6 +66,7 @@ __all__ = [
     "show",
     "skin",
     "surfaces",
+    "turntable",
     "vtk",
     "window",
 ]

@@ -232,6 +232,11 @@ def call_table() -> Calls:
                 "viewpoint": None,
             },
         ),
+        "turntable": (decals.turntable, {"scene": whole, "count": 3, "turns": 1.0}),
+        "animate": (
+            decals.animate,
+            {"frames": [whole], "path": "a.gif", "size": (8, 6), "rate": 25.0, "samples": 1, "count": 1},
+        ),
         "bake": (
             decals.bake,
             {

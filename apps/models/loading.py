@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
@@ -87,26 +88,28 @@ def import_definitions(modules: Sequence[str] | None) -> None:
         If a module is missing or raises an error; the message names file and line.
     """
     for module in modules or ():
-        path = Path(module)
-        if path.suffix == ".py" and not path.is_file():
-            raise InvalidInput(
-                f"--define: expected a Python file or the name of a module, found no file {module!r}"
-            )
-        try:
-            _import(module)
-        except (Exception, SystemExit) as error:
-            raise InvalidInput(
-                f"--define {module}: {_location(error)}{type(error).__name__}: {error}"
-            ) from error
+        import_module_or_file("--define", module)
 
 
-def _import(module: str) -> None:
+def import_module_or_file(option: str, module: str) -> ModuleType:
+    """Import the module that an option names: a Python file, or a dotted name; errors are those above."""
+    path = Path(module)
+    if path.suffix == ".py" and not path.is_file():
+        raise InvalidInput(
+            f"{option}: expected a Python file or the name of a module, found no file {module!r}"
+        )
+    try:
+        return _import(module)
+    except (Exception, SystemExit) as error:
+        raise InvalidInput(f"{option} {module}: {_location(error)}{type(error).__name__}: {error}") from error
+
+
+def _import(module: str) -> ModuleType:
     """Import a dotted name, or run a file as a module of its name."""
     path = Path(module)
     if path.suffix != ".py":
         _add_search_path(Path.cwd())
-        importlib.import_module(module)
-        return
+        return importlib.import_module(module)
     _add_search_path(path.resolve().parent)
     name = path.stem if path.stem not in sys.modules else f"defined_by_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path.resolve())
@@ -118,6 +121,7 @@ def _import(module: str) -> None:
     except BaseException:
         del sys.modules[name]
         raise
+    return definitions
 
 
 def _add_search_path(folder: Path) -> None:

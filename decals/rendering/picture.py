@@ -89,7 +89,7 @@ class Picture:
         content = BytesIO()
         try:
             if file_format in ("JPEG", "BMP", "PPM"):
-                image = _on_white(image)
+                image = on_white(image)
             image.save(content, file_format)
             write_atomically(path, content.getvalue())
         except OSError as error:
@@ -104,7 +104,8 @@ class Picture:
         return file.getvalue()
 
 
-def _on_white(image: Image.Image) -> Image.Image:
+def on_white(image: Image.Image) -> Image.Image:
+    """Return a picture with alpha on white, as RGB."""
     white = Image.new("RGBA", image.size, (255, 255, 255, 255))
     return Image.alpha_composite(white, image).convert("RGB")
 

@@ -6,7 +6,7 @@ product, not the factors.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -129,6 +129,23 @@ class Camera:
         pixel = 2 * half / height
         corner = -back - half * up - (pixel * width / 2) * right
         return Rays(np.array(self.position), corner, pixel * right, pixel * up)
+
+    def turned(self, degrees: float) -> "Camera":
+        """Return a camera turned about the upward axis through the target, counter-clockwise from above.
+
+        Examples
+        --------
+        >>> import decals
+        >>> position = decals.Camera((0, 1, 5)).turned(90).position
+        >>> tuple(round(x, 6) + 0.0 for x in position)
+        (5.0, 1.0, 0.0)
+        """
+        angle = math.radians(finite_number("degrees", degrees, InvalidScene))
+        axis, offset = _unit(np.array(self.up)), np.subtract(self.position, self.target)
+        along = axis * (axis @ offset)
+        across = offset - along
+        turned = along + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across)
+        return replace(self, position=_triple(turned + np.array(self.target)))
 
     @classmethod
     def framing(
