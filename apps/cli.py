@@ -115,6 +115,14 @@ implicit-decals bake scene.json -o model.glb --size 4096
 
 implicit-decals bake scene.json -o small.glb --vertex-colors
 """,
+    "displace": """Write the surface of a scene, moved by the heights of its decals, as a mesh.
+
+For example:
+
+implicit-decals displace scene.json -o scales.glb
+
+implicit-decals displace scene.json -o scales.ply --edge-length 0.005
+""",
     "gallery": """List the examples, or draw their pictures.
 
 For example:

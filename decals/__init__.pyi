@@ -1,6 +1,7 @@
 from . import editing, errors, field, images, index, rendering, scattering, scenes, surfaces, vtk, window
 from ._version import __version__
 from .baking.bake import bake
+from .baking.displace import displace
 from .errors import ImplicitDecalsError
 from .field.evaluate import evaluate
 from .field.law import ContactLaw, define_contact
@@ -45,6 +46,7 @@ __all__ = [
     "bake",
     "cover",
     "define_contact",
+    "displace",
     "edit",
     "editing",
     "errors",

@@ -47,6 +47,12 @@ Pixel pixel_at(ivec2 texel) {
             normal = texelFetch(r_normal, texel, 0).xyz;
             rest_right = texelFetch(r_right, texel, 0).xyz;
             rest_up = texelFetch(r_up, texel, 0).xyz;
+#ifdef MATERIALS
+            vec3 toward = ray_direction(vec2(texel) + 0.5);
+            posed_normal = texelFetch(g_normal, texel, 0).xyz;
+            posed_right = surface_step(visible.xyz, posed_normal, toward, ray_right.xyz);
+            posed_up = surface_step(visible.xyz, posed_normal, toward, ray_up.xyz);
+#endif
         }
 #endif
 #ifdef FILTERED

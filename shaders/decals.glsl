@@ -17,6 +17,19 @@ uniform sampler2DArray decal_images;  // linear, premultiplied
 bool is_posed;
 vec3 rest_right;
 vec3 rest_up;
+// The same steps in the pose, and the normal there.
+vec3 posed_right;
+vec3 posed_up;
+vec3 posed_normal;
+
+// A direction along the surface at rest, with normal n, as a unit one along the posed surface.
+vec3 posed_direction(vec3 along, vec3 n) {
+    float area = dot(cross(rest_right, rest_up), n);
+    vec3 moved = dot(cross(along, rest_up), n) * posed_right + dot(cross(rest_right, along), n) * posed_up;
+    moved = (area < 0.0 ? -moved : moved) / max(abs(area), 1e-30);
+    moved -= dot(moved, posed_normal) * posed_normal;
+    return moved / max(length(moved), 1e-30);
+}
 #endif
 
 #ifdef MATERIALS
@@ -75,6 +88,12 @@ void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3
     vec2 tilt = maps.xy / alpha;
     // The axis u, turned as the normal is on the way to the point; the inverse of `unroll_step`.
     vec3 axis = normalize(u - dot(u, n) / max(1.0 + dot(n_p, n), 1e-4) * (n_p + n));
+#ifdef POSED
+    if (is_posed) {
+        axis = posed_direction(axis, n);
+        n = posed_normal;
+    }
+#endif
     vec3 normal = tilt.x * axis + tilt.y * cross(n, axis) + sqrt(max(1.0 - dot(tilt, tilt), 1e-4)) * n;
     float part = material_left * opacity;
     material_normals += part * alpha * vec4(normalize(normal), 1.0);

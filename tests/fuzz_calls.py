@@ -87,6 +87,8 @@ def call_table() -> Calls:
     origin, axis = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
     points, directions = [[0.0, 0.0, 2.0]], [[0.0, 0.0, -1.0]]
     pixels = np.zeros((2, 2, 4), np.uint8)
+    stud = decals.DecalMaterial("stud", pixels, height=pixels, relief=0.5)
+    raised = whole.replace(images=[stud] * len(whole.images))
     poses = {one.name: one.vertices for one in whole.objects if isinstance(one, decals.MeshObject)}
     document, numbers = EditSession(whole).document, blobtree.numeric_parameters(tree)
     rated = Point((0, 0, 0), radius=1.0, attributes={"wetness": 1.0})
@@ -150,6 +152,7 @@ def call_table() -> Calls:
                 "occlusion": 1.0,
                 "emission": pixels,
                 "height": pixels,
+                "relief": 0.5,
             },
         ),
         "Scene": (
@@ -245,6 +248,18 @@ def call_table() -> Calls:
                 "size": 16,
                 "samples": 1,
                 "vertex_colors": True,
+                "creases": False,
+            },
+        ),
+        "displace": (
+            decals.displace,
+            {
+                "scene": raised,
+                "edge_length": 0.2,
+                "contact": "elastic",
+                "stiffness": 4.0,
+                "mapping": "chord",
+                "resolution": 8,
                 "creases": False,
             },
         ),

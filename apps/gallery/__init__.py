@@ -26,6 +26,7 @@ Example = Literal[
     "interactions",
     "layers",
     "materials",
+    "relief",
     "contact_modes",
     "size_ratio",
     "mapping_modes",

@@ -110,7 +110,7 @@ def bake(
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
     >>> decals.bake(scene, "ball.glb", size=64, resolution=16)
     """
-    path = _checked_path(path)
+    path = checked_path(path, (SUFFIX,))
     size = whole_number("size", size, MIN_SIZE, MAX_SIZE, InvalidScene)
     samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
@@ -210,7 +210,7 @@ def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Pr
         for first in range(0, len(mesh.vertices), BLOCK_SAMPLES):
             report("colouring vertices", (number + first / len(mesh.vertices)) / len(meshes))
             rows = slice(first, first + BLOCK_SAMPLES)
-            parts.append(colors.at(number, mesh.vertices[rows], mesh.normals[rows]))
+            parts.append(colors.at(number, mesh.places[rows], mesh.facings[rows]))
         linear = np.clip(np.concatenate(parts), 0.0, 1.0).astype(np.float32)
         nodes.append(Node(mesh.name, mesh.vertices, mesh.faces, mesh.normals, colors=linear))
     return nodes
@@ -225,13 +225,14 @@ def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[
     return known.objects, known.decals, pixels, drawing_of(known)
 
 
-def _checked_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a GLB file that can be written, or raise InvalidScene."""
+def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Path:
+    """Return the path of a file with one of these suffixes that can be written, or raise InvalidScene."""
+    known = " or ".join(suffixes)
     if not isinstance(path, str | os.PathLike):
-        raise InvalidScene(f"path: expected the path of a {SUFFIX} file, got {describe(path)}")
+        raise InvalidScene(f"path: expected the path of a {known} file, got {describe(path)}")
     path = Path(path)
-    if path.suffix.lower() != SUFFIX:
-        raise InvalidScene(f"path: expected a file that ends in {SUFFIX}, got {str(path)!r}; rename it")
+    if path.suffix.lower() not in suffixes:
+        raise InvalidScene(f"path: expected a file that ends in {known}, got {str(path)!r}; rename it")
     if path.is_dir():
         raise InvalidScene(f"path: expected a file, {str(path)!r} is a folder; add a file name")
     folder = path.parent

@@ -13,7 +13,9 @@ from blobtree.progress import Progress
 from decals.errors import InvalidMesh, InvalidScene
 from decals.rendering.mesh import split_mesh
 from decals.scenes.objects import MeshObject, TreeObject
+from decals.scenes.pose import PosedMesh
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.normals import vertex_normals
 from decals.validation import describe
 
 
@@ -33,6 +35,8 @@ class BakeMesh:
         Unit normals, those with which the renderer draws the object.
     base_colors : callable
         Function from points ``float32[k, 3]`` to sRGB colours without decals, ``float32[k, 3]``.
+    places, facings : float32[n, 3]
+        Positions and normals at which the decals are evaluated: those of the rest pose.
     """
 
     name: str
@@ -40,15 +44,19 @@ class BakeMesh:
     faces: Int32Array
     normals: Float32Array
     base_colors: Callable[[Float32Array], Float32Array]
+    places: Float32Array
+    facings: Float32Array
 
 
 def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Progress) -> BakeMesh:
     """Return an object of a scene as a mesh; a tree is polygonized.
 
+    A posed mesh keeps all its vertices and faces.
+
     Raises
     ------
     InvalidScene
-        If the object is neither a MeshObject nor a TreeObject.
+        If the object is neither a MeshObject, nor a TreeObject, nor a PosedMesh.
     InvalidMesh
         If a tree has no surface at this resolution.
     InvalidResolution
@@ -60,6 +68,11 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
         return _used_parts(item.name, surface, split.normals, _constant(item.color))
     if isinstance(item, TreeObject):
         return _tree_mesh(item.name, item.tree, resolution, creases, report)
+    if isinstance(item, PosedMesh):
+        normals, facings = (vertex_normals(at, item.faces) for at in (item.vertices, item.rest.vertices))
+        colors = _constant(item.rest.color) if item.colors is None else _nearest(item)
+        places = item.rest.vertices
+        return BakeMesh(item.name, item.vertices, item.faces, normals, colors, places, facings)
     raise InvalidScene(f"expected an object of a scene, got {describe(item)}; wrap it in a MeshObject")
 
 
@@ -83,9 +96,18 @@ def _used_parts(
     """Return the faces with area, and the vertices that they use."""
     rows, faces = np.unique(surface.faces[surface.sound], return_inverse=True)
     corners: Int32Array = faces.reshape(-1, 3).astype(np.int32)
-    return BakeMesh(name, surface.vertices[rows], corners, normals[rows], base_colors)
+    vertices, facings = surface.vertices[rows], normals[rows]
+    return BakeMesh(name, vertices, corners, facings, base_colors, vertices, facings)
 
 
 def _constant(color: tuple[float, float, float]) -> Callable[[Float32Array], Float32Array]:
     """Return a function that gives every point the same colour."""
     return lambda points: np.broadcast_to(np.asarray(color, np.float32), points.shape)
+
+
+def _nearest(item: PosedMesh) -> Callable[[Float32Array], Float32Array]:
+    """Return a function that gives points of the rest pose the colour of the nearest vertex."""
+    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+    vertices, colors = cKDTree(item.rest.vertices), np.asarray(item.color, np.float32)
+    return lambda points: colors[vertices.query(points)[1]]

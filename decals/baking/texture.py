@@ -76,8 +76,8 @@ class _Sheet:
         faces = np.concatenate([part.faces + start for part, start in zip(unwrapped, starts, strict=True)])
         self._flat = MeshSurface(np.column_stack([places, np.zeros(len(places))]), faces)
         pairs = list(zip(meshes, unwrapped, strict=True))
-        self._vertices = np.concatenate([mesh.vertices[part.rows] for mesh, part in pairs])
-        self._normals = np.concatenate([mesh.normals[part.rows] for mesh, part in pairs])
+        self._vertices = np.concatenate([mesh.places[part.rows] for mesh, part in pairs])
+        self._normals = np.concatenate([mesh.facings[part.rows] for mesh, part in pairs])
         self._mesh_of_face = np.repeat(np.arange(len(meshes)), [len(part.faces) for part in unwrapped])
 
     def distances(self, points: Float64Array) -> Float64Array:

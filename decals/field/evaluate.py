@@ -66,6 +66,9 @@ class Samples:
         F after contact (paper, equation 5): 1 at the centre, ½ on rims and contact lines. 0 without owner.
     color : float32[m, 4] or None
         Colour of all decals over each other, linear with premultiplied alpha. None without images.
+    height : float32[m] or None
+        Height of the relief above the surface in model units: heights of all decals over each other, mixed as
+        their colours are. None without a `DecalMaterial` with relief.
     jacobian : float64[m, 2, 3] or None
         Derivative of `uv` by the point along the surface: the gradients of u and v, in the tangent plane.
         NaN without an owner. None if it was not asked for.
@@ -79,6 +82,7 @@ class Samples:
     color: Float32Array | None = None
     jacobian: Float64Array | None = None
     neighbors: Neighbors | None = None
+    height: Float32Array | None = None
 
 
 def evaluate(
@@ -116,7 +120,8 @@ def evaluate(
     index : DecalIndex, optional
         Index of these decals. Built if not given; an editor has its own.
     images : image or sequence of images, optional
-        Images of any kind and size, see `decals.images.image_pixels`, for `Samples.color`.
+        Images of any kind and size, see `decals.images.image_pixels`, for `Samples.color` and
+        `Samples.height`.
     jacobian : bool, optional
         True also returns the derivative of the image coordinates, `Samples.jacobian`.
     normal_derivatives : float[m, 3, 3], optional
@@ -197,15 +202,21 @@ def evaluate(
     wp.launch(
         loaded(_with_law(sample_points, contact), device), count, inputs, [owner, uv, field], device=device
     )
-    color = (
-        None if images is None else _colors(decals, _each_pixels(images), [*inputs, owner], contact, device)
-    )
+    color = height = None
+    if images is not None:
+        listed = each_image(images)
+        pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(listed)]
+        given = [*inputs, owner]
+        color = _colors(decals, texel_arrays(pixels), given, contact, device)
+        reliefs = [image.relief_texels() if hasattr(image, "relief_texels") else None for image in listed]
+        if any(relief is not None for relief in reliefs):
+            height = _heights(decals, reliefs, pixels, given, contact, device)
     derivative = None
     if jacobian:
         center = owner.numpy(), uv.numpy()
         derivative = _jacobians(positions, facings, inputs[2:], center, turns, contact, device)
     near = _neighbors(decals, inputs, owner, contact, device) if neighbors else None
-    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near)
+    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near, height)
 
 
 def _jacobians(
@@ -276,11 +287,6 @@ def _neighbors(
     return Neighbors(offsets, known[found[order]].astype(np.int32), fields[order], pushes[order])
 
 
-def _each_pixels(images: AnyImage | Iterable[AnyImage]) -> list[UInt8Array]:
-    """Return the pixels of one image, or of each of several."""
-    return [image_pixels(image, name=f"image {number}") for number, image in enumerate(each_image(images))]
-
-
 def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array]:
     """Lay out sRGB images of any sizes in one array of texels.
 
@@ -291,17 +297,51 @@ def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array
     texels : float32[t, 4]
         Premultiplied linear colours, row after row, the upper row first.
     """
-    extents, parts, first = [], [], 0
     levels = np.arange(256, dtype=np.float32) / np.float32(255)
     linear = decode_srgb(levels.astype(np.float64)).astype(np.float32)
-    for image in images:
-        height, width = image.shape[:2]
-        extents.append((first, width, height))
-        pixels = image.reshape(-1, 4)
-        parts.append(np.column_stack([linear[pixels[:, :3]] * levels[pixels[:, 3:]], levels[pixels[:, 3]]]))
-        first += width * height
-    texels = np.concatenate([np.zeros((0, 4), np.float32), *parts]).astype(np.float32)
-    return np.array(extents, np.int32).reshape(-1, 3), texels
+    return _laid_out(
+        [
+            np.dstack([linear[image[..., :3]] * levels[image[..., 3:]], levels[image[..., 3]]])
+            for image in images
+        ]
+    )
+
+
+def _laid_out(layers: Sequence[Float32Array]) -> tuple[Int32Array, Float32Array]:
+    """Return the extents and the texels of images ``float32[h, w, 4]`` in one array."""
+    sizes = np.array([(layer.shape[1], layer.shape[0]) for layer in layers], np.int32).reshape(-1, 2)
+    counts = sizes.prod(axis=1)
+    texels = np.concatenate([np.zeros((0, 4), np.float32), *(layer.reshape(-1, 4) for layer in layers)])
+    return np.column_stack([np.cumsum(counts) - counts, sizes]).astype(np.int32), texels
+
+
+def _heights(
+    decals: Decals | DecalEditor,
+    reliefs: Sequence[Float32Array | None],
+    pixels: Sequence[UInt8Array],
+    inputs: list[Any],
+    contact: AnyContact,
+    device: Any,
+) -> Float32Array:
+    """Return heights in model units, mixed as a colour is, with the radius of each decal as its tint."""
+    layers = []
+    for relief, image in zip(reliefs, pixels, strict=True):
+        layer = np.zeros(image.shape, np.float32)
+        layer[..., 3] = image[..., 3] / np.float32(255)
+        if relief is not None:
+            layer[..., 0] = relief
+        layers.append(layer)
+    indexed = inputs[-2]
+    records = indexed.records
+    scaled = records.numpy().copy()
+    shown = scaled[2::RECORD, 3:] >= 0.0
+    scaled[3::RECORD, :3] = np.where(shown, RIM_RADIUS * scaled[::RECORD, 3:], 0.0)
+    indexed.records = wp.array(scaled, dtype=wp.vec4, device=device)
+    try:
+        heights: Float32Array = _colors(decals, _laid_out(layers), inputs, contact, device)[:, 0]
+    finally:
+        indexed.records = records
+    return heights
 
 
 def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any) -> Any:
@@ -337,18 +377,19 @@ def _limit(
 
 def _colors(
     decals: Decals | DecalEditor,
-    images: Sequence[UInt8Array],
+    images: tuple[Int32Array, Float32Array],
     inputs: list[Any],
     contact: AnyContact,
     device: Any,
 ) -> Float32Array:
+    """Return the colours of images by their extents and texels, over each other."""
     rows = decals.decals if isinstance(decals, DecalEditor) else decals
     min_count = int(rows.images.max(initial=NO_IMAGE)) + 1
-    if len(images) < min_count:
+    extents, texels = images
+    if len(extents) < min_count:
         raise InvalidImage(
-            f"images: expected {min_count} or more, got {len(images)}; decals refer to them by number"
+            f"images: expected {min_count} or more, got {len(extents)}; decals refer to them by number"
         )
-    extents, texels = texel_arrays(images)
     colors: Any = wp.zeros(len(inputs[0]), dtype=wp.vec4, device=device)
     arrays: list[Any] = [
         wp.array(extents, dtype=wp.vec3i, device=device),

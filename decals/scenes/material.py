@@ -13,7 +13,7 @@ from blobtree._typing import Float32Array, UInt8Array
 from decals.errors import InvalidImage
 from decals.images.load import AnyImage, decode_srgb, image_pixels
 from decals.scenes.scene import DecalImage
-from decals.validation import describe, is_file
+from decals.validation import describe, is_file, real_number
 
 MAP_NAMES = {
     "pixels": ("basecolor", "base_color", "albedo", "diffuse", "color", "col"),
@@ -34,6 +34,9 @@ FLAT = (128, 128, 255)
 
 MIN_ROUGHNESS = 0.045
 """Least roughness that is drawn: highlights of smoother surface would be smaller than a pixel."""
+
+RIM_TAPER = 0.04
+"""Part of the radius over which heights fall to 0 at the image's rim; at least 3 texels."""
 
 UNSET: Any = None
 """Map that `DecalMaterial` fills in."""
@@ -60,12 +63,16 @@ class DecalMaterial(DecalImage):
     emission : image, optional
         Light that the decal sheds itself, sRGB; stored as uint8[h, w, 3]. By default none.
     height : image or float[h, w], optional
-        Heights, kept for other programs and not drawn; stored as float32[h, w]. By default None.
+        Heights, stored as float32[h, w]. By default None.
+    relief : float
+        Height above the surface where the map is 1, in visible radii of each decal; negative values press the
+        map in. `decals.displace` moves the surface by it. Pictures of a scene show none. By default 0.
 
     Raises
     ------
     InvalidImage
-        A map is no image, has another size or too few channels, or holds values that are not finite.
+        A map is no image, has another size or too few channels, or holds values that are not finite; or the
+        relief is higher than a radius.
 
     Examples
     --------
@@ -84,6 +91,7 @@ class DecalMaterial(DecalImage):
     occlusion: UInt8Array = field(default=UNSET, repr=False)
     emission: UInt8Array = field(default=UNSET, repr=False)
     height: Float32Array | None = field(default=None, repr=False)
+    relief: float = 0.0
 
     if TYPE_CHECKING:  # images of any kind are converted
 
@@ -97,6 +105,7 @@ class DecalMaterial(DecalImage):
             occlusion: AnyImage | float = 1.0,
             emission: AnyImage | None = None,
             height: AnyImage | None = None,
+            relief: float = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -119,6 +128,7 @@ class DecalMaterial(DecalImage):
                     f"got {array.shape[1]} x {array.shape[0]}; scale one of them"
                 )
             object.__setattr__(self, name, array)
+        object.__setattr__(self, "relief", self._checked_relief())
 
     @classmethod
     def load(cls, source: Any, *, folder: Path | None = None, name: str = "") -> "DecalMaterial":
@@ -185,6 +195,36 @@ class DecalMaterial(DecalImage):
         first[..., 3] = self.metallic / np.float32(255)
         light = decode_srgb(self.emission / np.float64(255))
         return first, np.dstack([light, self.occlusion / 255.0]).astype(np.float32)
+
+    def relief_texels(self) -> Float32Array | None:
+        """Return heights in radii, times alpha, as float32[h, w]; None without relief.
+
+        They fall to 0 at the rim of the image, so that the surface has no step at rims and contact lines.
+        """
+        if self.relief == 0.0 or self.height is None:
+            return None
+        rows, columns = self.height.shape
+        x, y = ((2.0 * np.arange(count) + 1.0) / count - 1.0 for count in (columns, rows))
+        inner = 1.0 - np.hypot(x, y[:, None])  # distance from the rim, in radii
+        texel = 2.0 / min(rows, columns)
+        part = np.clip((inner - texel) / max(RIM_TAPER, 3.0 * texel), 0.0, 1.0)
+        taper = part * part * (3.0 - 2.0 * part)
+        alpha = self.pixels[..., 3] / 255.0
+        raised: Float32Array = (self.relief * taper * alpha * self.height).astype(np.float32)
+        return raised
+
+    def _checked_relief(self) -> float:
+        """Return the relief, after a check against the heights."""
+        name = self._name("relief")
+        relief = real_number(name, self.relief, "a number of radii", np.isfinite, InvalidImage)
+        highest = 0.0 if self.height is None else abs(relief) * float(np.abs(self.height).max(initial=0.0))
+        if relief != 0.0 and self.height is None:
+            raise InvalidImage(f"{name}: expected 0 without heights, got {relief:g}; give a height map")
+        if highest > 1.0:
+            raise InvalidImage(
+                f"{name}: expected heights up to 1 radius, got {highest:g}; lower the relief or the heights"
+            )
+        return relief
 
     def _name(self, name: str) -> str:
         return f"material {self.source!r}, {name}"

@@ -26,13 +26,14 @@ class MaterialRecord(Struct, forbid_unknown_fields=True, omit_defaults=True):
     occlusion: str | None = None
     emission: str | None = None
     height: bytes | None = None
+    relief: float = 0.0
 
 
 def material_record(material: DecalMaterial) -> MaterialRecord:
     """Describe a material, with all maps in it."""
     maps = {name: embedded_image(_rgba(getattr(material, name))) for name in PICTURES}
     heights = None if material.height is None else material.height.astype("<f4").tobytes()
-    return MaterialRecord(material.source, **maps, height=heights)
+    return MaterialRecord(material.source, **maps, height=heights, relief=material.relief)
 
 
 def material_of(record: MaterialRecord, folder: Path) -> DecalMaterial:
@@ -52,7 +53,7 @@ def material_of(record: MaterialRecord, folder: Path) -> DecalMaterial:
         if record.height is not None:
             height, width = maps["pixels"].shape[:2]
             maps["height"] = np.frombuffer(record.height, "<f4").reshape(height, width).astype(np.float32)
-        return DecalMaterial(record.name, **maps)
+        return DecalMaterial(record.name, **maps, relief=record.relief)
     except ValueError as error:
         raise InvalidScene(f"material {record.name!r}: expected a height for each pixel ({error})") from error
     except ImplicitDecalsError as error:

@@ -36,10 +36,13 @@ class PosedMesh:
         The mesh in its rest pose.
     vertices : float32[n, 3]
         Positions of its vertices in this pose, relative to the origin of the rest pose.
+    colors : float32[n, 3], optional
+        sRGB colours of its vertices between the decals, in place of that of the rest pose.
     """
 
     rest: MeshObject
     vertices: Float32Array
+    colors: Float32Array | None = None
 
     @property
     def name(self) -> str:
@@ -52,9 +55,9 @@ class PosedMesh:
         return self.rest.faces
 
     @property
-    def color(self) -> Color:
-        """Colour between the decals."""
-        return self.rest.color
+    def color(self) -> Color | Float32Array:
+        """Colour between the decals, or one colour for each vertex."""
+        return self.rest.color if self.colors is None else self.colors
 
     @property
     def crease_angle(self) -> float:

@@ -210,6 +210,7 @@ class _Script:
                 for name, map_ in maps.items()
                 if map_ is not None
             ]
+            given += [f"relief={image.relief!r}"] if image.relief else []
             return f"decals.DecalMaterial({image.source!r}, {', '.join(given)})"
         pixels = self._array(f"image_{len(self.arrays)}", image.pixels)
         return f"decals.DecalImage({image.source!r}, {pixels})"

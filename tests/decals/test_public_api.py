@@ -16,9 +16,8 @@ NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
     "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
-    "animate",
-    "bake", "cover", "define_contact", "edit", "evaluate", "load_image", "load_model", "load_scene",
-    "measure", "pose", "render", "save_scene", "scatter", "show", "skin", "turntable",
+    "animate", "bake", "cover", "define_contact", "displace", "edit", "evaluate", "load_image", "load_model",
+    "load_scene", "measure", "pose", "render", "save_scene", "scatter", "show", "skin", "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["Neighbors", "Samples"],

@@ -46,7 +46,7 @@ def ball() -> MeshObject:
 def uniform(name: str, color: Any, tilt: tuple[int, int], emission: Any = (0, 0, 0), **levels: Any) -> Any:
     """A material of one texel's values everywhere."""
     maps = {"normal": np.array([*tilt, 255], np.uint8), "emission": np.array(emission, np.uint8)}
-    wide = {key: np.broadcast_to(value, (8, 8, 3)) for key, value in maps.items()}
+    wide: dict[str, Any] = {key: np.broadcast_to(value, (8, 8, 3)) for key, value in maps.items()}
     pixels = np.broadcast_to(np.array([*color, 255], np.uint8), (8, 8, 4))
     return DecalMaterial(name, pixels.copy(), **wide, **levels)
 
@@ -191,6 +191,9 @@ def test_without_maps_pictures_are_as_before(renderer: Renderer) -> None:
         ({"roughness": 1.5}, "expected a number from 0 to 1"),
         ({"metallic": np.full((8, 8), np.nan)}, "expected bytes, or floats from 0 to 1"),
         ({"height": np.full((8, 8), np.nan)}, "expected finite heights, got nan in row 0"),
+        ({"height": np.full((8, 8), 0.6), "relief": 2.0}, "expected heights up to 1 radius, got 1.2"),
+        ({"height": np.full((8, 8), 0.6), "relief": np.nan}, "expected a number of radii, got nan"),
+        ({"relief": 0.5}, "give a height map"),
         ({"height": np.zeros((8, 9))}, "expected 8 x 8 pixels"),
         ({"occlusion": "no such file.png"}, "found no file"),
     ],
@@ -245,7 +248,13 @@ def test_folders_of_maps_are_found_by_their_names(tmp_path: Path) -> None:
 def test_files_and_scripts_keep_materials(tmp_path: Path) -> None:
     heights = np.random.default_rng(1).normal(size=(8, 8)).astype(np.float32)
     rich = DecalMaterial(
-        "rich", GOLD.pixels, GOLD.normal, GOLD.roughness, emission=PLASTIC.emission, height=heights
+        "rich",
+        GOLD.pixels,
+        GOLD.normal,
+        GOLD.roughness,
+        emission=PLASTIC.emission,
+        height=heights,
+        relief=0.2,
     )
     scene = scene_of([rich, "scale", PLASTIC], [1.0, 1.0, 0.5])
     scene.save(tmp_path / "scene.json")
@@ -254,7 +263,7 @@ def test_files_and_scripts_keep_materials(tmp_path: Path) -> None:
     for again in loaded:
         assert [type(image) for image in again.images] == [DecalMaterial, DecalImage, DecalMaterial]
         for image, other in zip(scene.images, again.images, strict=True):
-            for name in MAP_NAMES if isinstance(image, DecalMaterial) else ("pixels",):
+            for name in (*MAP_NAMES, "relief") if isinstance(image, DecalMaterial) else ("pixels",):
                 np.testing.assert_array_equal(getattr(image, name), getattr(other, name))
     text = (tmp_path / "scene.json").read_text()
     outside = re.sub('"normal": ?"data:[^"]*"', '"normal":"../secret.png"', text, count=1)

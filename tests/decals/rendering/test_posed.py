@@ -87,6 +87,26 @@ def test_a_moved_model_under_a_moved_camera_looks_the_same(renderer: Renderer) -
     assert np.abs(one.uv - other.uv)[same].max() < 2e-3
 
 
+def test_materials_shine_by_the_normals_of_the_pose(renderer: Renderer) -> None:
+    """A sheet that is tilted as one body, under a camera that tilts with it, looks the same."""
+    item = sheet(side=3)
+    angle = np.radians(65)
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    bumps = np.full((8, 8, 3), (128, 128, 255), np.uint8)
+    bumps[2:6, 2:4], bumps[2:6, 4:6] = (60, 128, 230), (128, 190, 230)
+    steel = decals.DecalMaterial("steel", np.full((8, 8, 3), 0.6), bumps, roughness=0.4, metallic=1.0)
+    scene = covered(item).replace(images=[steel])
+    camera = Camera(
+        position=tuple(turn @ VIEW.position), target=(0, 0, 0), up=tuple(turn @ VIEW.up), fov=40.0
+    )
+    posed = decals.pose(scene, {"sheet": item.vertices @ turn.T}, camera=camera)
+    one, other = (renderer.render(shown, OPTIONS).astype(int) for shown in (scene, posed))
+    assert np.abs(one - other).mean() < 0.2
+    assert (np.abs(one - other).max(axis=2) > 8).mean() < 0.01
+    still = decals.pose(scene, {"sheet": item.vertices})
+    assert np.abs(renderer.render(still, OPTIONS).astype(int) - one).max() <= 2
+
+
 def test_decals_stretch_with_the_surface(renderer: Renderer) -> None:
     """A stretched and bent sheet shows, at each of its points, what the flat one has there."""
     item = sheet()

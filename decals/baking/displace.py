@@ -1,0 +1,301 @@
+"""`displace`: the surface of a scene, moved by the heights of its decals."""
+
+import os
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree.meshing.mesh import Mesh
+from blobtree.meshing.polygonize import polygonize
+from blobtree.progress import Cancel, Progress, reporting
+from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
+from blobtree.validation import truth
+from decals.baking.bake import SUFFIX, SurfaceColors, bake, checked_path
+from decals.baking.meshes import bake_mesh
+from decals.errors import InvalidMesh, InvalidScene
+from decals.field.evaluate import evaluate
+from decals.field.law import AnyContact
+from decals.field.mapping import ImageMapping
+from decals.images.load import encode_srgb
+from decals.index.index import DecalIndex
+from decals.model import Decals
+from decals.rendering.options import Drawing
+from decals.scenes.cover import as_scene
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.pose import PosedMesh, PosedScene
+from decals.scenes.scene import Scene
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.normals import split_at_creases
+from decals.surfaces.subdivide import means, subdivided
+from decals.surfaces.surface import unit_rows
+from decals.surfaces.topology import welded
+from decals.validation import real_number
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+EDGES_PER_RADIUS = 16
+"""Edges along the radius of a decal, by default."""
+
+BLOCK = 1 << 18
+"""Points that are evaluated at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacedScene(PosedScene):
+    """A scene whose surface is moved; its decals lie on the surface at rest. `displace` makes some."""
+
+    def to_polydata(self) -> "pv.PolyData":
+        """Return all objects as one mesh with normals and the colours of surface and decals, as "RGB"."""
+        with reporting() as report:
+            meshes = [bake_mesh(item, resolution=None, creases=False, report=report) for item in self.objects]
+        modes = self.drawing.contact, self.drawing.mapping, self.drawing.stiffness
+        pixels = [image.pixels for image in self.images]
+        colors = SurfaceColors(meshes, self.objects, self.decals, pixels, *modes)
+        first, *others = (
+            to_polydata(
+                Mesh(
+                    mesh.vertices,
+                    mesh.faces,
+                    mesh.normals,
+                    encode_srgb(colors.at(number, mesh.places, mesh.facings)).astype(np.float32),
+                )
+            )
+            for number, mesh in enumerate(meshes)
+        )
+        merged: pv.PolyData = first.append_polydata(*others) if others else first
+        return merged
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the surface to a file with the colours of surface and decals at its vertices.
+
+        Parameters
+        ----------
+        path : str or path
+            The file: glb (with a node for each object), ply (one mesh with colours), vtp (with colours and
+            normals), obj or stl.
+
+        Raises
+        ------
+        InvalidScene
+            The path cannot be used, or the file cannot be written.
+        MissingPackage
+            A GLB file needs the extra ``bake``; the message has the command.
+        """
+        path = checked_path(path, (SUFFIX, *MESH_SUFFIXES))
+        if path.suffix.lower() == SUFFIX:
+            bake(self, path, vertex_colors=True)
+            return
+        try:
+            write_polydata(path, self.to_polydata())
+        except OSError as error:
+            raise InvalidScene(f"could not write {str(path)!r} ({error.strerror})") from error
+
+
+def displace(
+    scene: Scene | str | os.PathLike[str],
+    *,
+    edge_length: float | None = None,
+    contact: AnyContact | str | None = None,
+    stiffness: float | None = None,
+    mapping: ImageMapping | str | None = None,
+    resolution: int | None = None,
+    creases: bool = False,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> DisplacedScene:
+    """Move the surface of a scene along its normals by the heights of its decals.
+
+    Heights are those of `evaluate`: they follow contact as the images do. Objects become fine triangle
+    meshes where decals with relief lie. New vertices on a tree lie on its surface. A closed object stays
+    closed. The surface may pass through itself where heights exceed the radius of curvature of a groove.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A scene, or its file. Some images are a `DecalMaterial` with ``relief``.
+    edge_length : float, optional
+        Greatest length of an edge below a decal with relief, in model units. By default a sixteenth of the
+        decal's radius.
+    contact : Contact or str, optional
+        Contact mode; by default that of the scene, as for stiffness and mapping.
+    stiffness : float, optional
+        Stiffness of elastic contact, from 1.
+    mapping : ImageMapping or str, optional
+        Image mapping: ``"corrected"`` or ``"chord"``.
+    resolution : int, optional
+        Cells along the longest side of a tree's support, before triangles are divided. Default 64.
+    creases : bool
+        Keep the edges that unions, intersections and differences leave on implicit objects.
+    progress : callable, optional
+        Called with a stage and the fraction done.
+    cancel : callable, optional
+        Called often; the work stops if it returns True.
+
+    Returns
+    -------
+    DisplacedScene
+        A scene for `decals.render` and `decals.bake`, with ``to_polydata()`` and ``save(path)``.
+
+    Raises
+    ------
+    InvalidScene
+        No decal has relief, or an option is out of range.
+    InvalidMesh
+        A tree has no surface at this resolution, or edges so short need too many triangles.
+    Cancelled
+        `cancel` returned True.
+
+    See Also
+    --------
+    decals.evaluate : heights at any points, `Samples.height`.
+
+    Examples
+    --------
+    >>> import blobtree, decals, numpy
+    >>> dome = numpy.hypot(*numpy.mgrid[-1:1:32j, -1:1:32j]) < 0.7
+    >>> stud = decals.DecalMaterial("stud", numpy.ones((32, 32, 3)), height=1.0 * dome, relief=0.3)
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12, images=stud)
+    >>> studded = decals.displace(scene, edge_length=0.1, resolution=16)
+    >>> studded.to_polydata().is_manifold
+    True
+    >>> float(studded.to_polydata().length) > 2 * 3**0.5
+    True
+    """
+    known = as_scene(scene)
+    modes = known.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
+    if edge_length is not None:
+        edge_length = real_number("edge_length", edge_length, "a length above 0", _is_positive, InvalidScene)
+    creases = truth("creases", creases, InvalidScene)
+    raised = [image for image, one in enumerate(known.images) if getattr(one, "relief", 0.0) != 0.0]
+    rows = known.decals[np.isin(known.decals.images, raised)]
+    if not len(rows):
+        raise InvalidScene(
+            "expected a decal whose image has relief, got none; give a DecalMaterial height= and relief="
+        )
+    need = _Edges(rows, edge_length)
+    objects: list[SceneObject | PosedMesh] = []
+    index = DecalIndex.of(known.decals)
+    with reporting(progress, cancel) as report:
+        for number, item in enumerate(known.objects):
+            report("dividing triangles", number / len(known.objects))
+            rest, normals, colors = (
+                _fine_mesh(item, need)
+                if isinstance(item, MeshObject)
+                else _fine_tree(item, need, resolution, creases, report)
+            )
+            heights = np.concatenate(
+                [np.zeros(0, np.float32)]
+                + [
+                    _heights(known, modes, index, item, rest.vertices[at], normals[at], report)
+                    for at in (slice(k, k + BLOCK) for k in range(0, len(normals), BLOCK))
+                ]
+            )
+            moved = (rest.vertices + heights[:, None].astype(np.float64) * normals).astype(np.float32)
+            objects.append(PosedMesh(rest, moved, colors) if heights.any() else item)
+    return DisplacedScene(tuple(objects), known.decals, known.images, known.camera, modes)
+
+
+def _is_positive(value: float) -> bool:
+    return value > 0.0
+
+
+def _heights(
+    scene: Scene,
+    modes: Drawing,
+    index: DecalIndex,
+    item: SceneObject,
+    points: Float32Array,
+    normals: Float32Array,
+    report: Progress,
+) -> Float32Array:
+    report("reading heights", 0.0)
+    heights = evaluate(
+        scene.decals,
+        points,
+        normals,
+        mapping=modes.mapping,
+        contact=modes.contact,
+        stiffness=modes.stiffness,
+        index=index,
+        images=scene.images,
+        on=item,
+    ).height
+    assert heights is not None  # there are images with relief
+    return heights
+
+
+class _Edges:
+    """Which edges are too long for the decals near them."""
+
+    def __init__(self, decals: Decals, length: float | None) -> None:
+        self._centers, self._radii = decals.positions.astype(np.float64), decals.radii.astype(np.float64)
+        limits = self._radii / EDGES_PER_RADIUS if length is None else np.full(len(decals), length)
+        self._limits = limits
+
+    def are_long(self, starts: Float64Array, ends: Float64Array) -> BoolArray:
+        """Return True for edges of which a part may lie in a decal, and that are longer than its limit."""
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+        lengths = np.sqrt(((ends - starts) ** 2).sum(axis=1))
+        long = np.zeros(len(lengths), np.bool_)
+        rows = np.flatnonzero(lengths > self._limits.min())
+        if not len(rows):
+            return long
+        middles = cKDTree(0.5 * (starts[rows] + ends[rows]))
+        reaches = self._radii + 0.5 * lengths[rows].max()
+        for decal, near in enumerate(middles.query_ball_point(self._centers, reaches)):
+            own = rows[near]
+            gaps = np.linalg.norm(middles.data[near] - self._centers[decal], axis=1) - 0.5 * lengths[own]
+            long[own[(gaps <= self._radii[decal]) & (lengths[own] > self._limits[decal])]] = True
+        return long
+
+
+FineMesh = tuple[MeshObject, Float32Array, Float32Array | None]
+"""A mesh, and its normals and colours at vertices."""
+
+
+def _fine_mesh(item: MeshObject, need: _Edges) -> FineMesh:
+    """Return a mesh with short edges, with one vertex at each position."""
+    split = split_at_creases(item.vertices, item.faces, item.crease_angle)
+    corners = np.hstack([item.vertices[split.rows], split.normals]).astype(np.float64)
+    rows, faces = subdivided(corners, split.faces.astype(np.int64), need.are_long)
+    same = welded(rows[:, :3].astype(np.float32))
+    kept, number = np.unique(same, return_inverse=True)
+    sums: Float64Array = np.stack([np.bincount(number, axis, len(kept)) for axis in rows[:, 3:].T], axis=1)
+    rest = replace(
+        item, vertices=rows[kept, :3].astype(np.float32), faces=_int32(number.reshape(-1)[faces]), source=None
+    )
+    return rest, unit_rows(sums), None
+
+
+def _fine_tree(
+    item: TreeObject, need: _Edges, resolution: int | None, creases: bool, report: Progress
+) -> FineMesh:
+    """Return the surface of a tree as a mesh with short edges, whose vertices lie on it."""
+    mesh = polygonize(item.tree, resolution=resolution, creases=creases, progress=report)
+    if len(mesh.faces) == 0:
+        raise InvalidMesh(
+            f"object {item.name!r}: expected a tree with a surface, got none in cells of this size; "
+            "increase the resolution"
+        )
+    surface = ImplicitSurface(item.tree)
+
+    def midpoints(rows: Float64Array, ends: Int64Array) -> Float64Array:
+        report("dividing triangles", 0.5)
+        return np.hstack(surface.project(means(rows, ends)[:, :3])).astype(np.float64)
+
+    corners = np.hstack([mesh.vertices, mesh.normals]).astype(np.float64)
+    rows, faces = subdivided(corners, mesh.faces.astype(np.int64), need.are_long, midpoints)
+    options: dict[str, Any] = {name: getattr(item, name) for name in ("labels", "named_only", "origin")}
+    whole: dict[str, Any] = {
+        name: ((),) if () in getattr(item, name) else () for name in ("hidden", "locked")
+    }
+    rest = MeshObject(item.name, rows[:, :3].astype(np.float32), _int32(faces), **options, **whole)
+    return rest, rows[:, 3:].astype(np.float32), item.tree.colors(rest.vertices)
+
+
+def _int32(faces: Int64Array) -> Int32Array:
+    return faces.astype(np.int32)

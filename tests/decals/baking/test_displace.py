@@ -1,0 +1,181 @@
+"""Displaced surfaces: heights against decals in float64, closed meshes, short edges, files."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+from hypothesis import given
+from hypothesis import strategies as st
+
+import decals
+from blobtree import Point
+from decals import DecalMaterial, Scene, TreeObject
+from decals.apps.cli import run
+from decals.baking.displace import DisplacedScene
+from decals.errors import InvalidMesh, InvalidScene
+from decals.scenes.pose import PosedMesh
+from decals.surfaces import subdivide
+from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.subdivide import subdivided
+from tests.decals.baking.glb import Array, ball_and_cube, bilinear, gradient, need, read_attribute
+from tests.decals.meshes import box, icosphere
+from tests.oracles.decals import colors_at
+
+
+def hills(seed: int, *, relief: float) -> DecalMaterial:
+    """A material with smooth random heights from 0 to 1."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0:12, 0:12] / 11
+    heights = 0.5 + 0.5 * np.sin(3 * rng.normal() * x + 4 * rng.normal() * y + rng.normal())
+    return DecalMaterial(f"hills {seed}", gradient(seed), height=heights.astype(np.float32), relief=relief)
+
+
+@pytest.fixture(scope="module")
+def hilly() -> Scene:
+    """A ball and a cube under layered decals: hills, hollows, and tints without image."""
+    return ball_and_cube(count=30).replace(images=[hills(1, relief=0.4), hills(2, relief=-0.3)])
+
+
+@pytest.fixture(scope="module")
+def moved(hilly: Scene) -> DisplacedScene:
+    return decals.displace(hilly, edge_length=0.09)
+
+
+def expected_heights(scene: Scene, points: Array, normals: Array) -> Array:
+    """Heights by brute force in float64: those of all decals over each other, by their alpha."""
+    rows = scene.decals
+
+    def texels(material: Any) -> Array:
+        """Height times alpha, and alpha; heights end smoothly at the rim."""
+        side = len(material.pixels)
+        steps = (np.arange(side) + 0.5) / side * 2 - 1
+        x, y = np.meshgrid(steps, steps)
+        depth = np.clip((1 - np.hypot(x, y) - 2 / side) / max(0.04, 6 / side), 0, 1)
+        alpha = material.pixels[..., 3] / 255
+        height = material.relief * material.height.astype(float) * depth**2 * (3 - 2 * depth)
+        return np.stack([height * alpha, 0 * alpha, 0 * alpha, alpha], axis=-1)
+
+    def paint_of(numbers: Any, uv: Any) -> Any:
+        paint = np.tile([0.0, 0.0, 0.0, 1.0], (len(numbers), 1))
+        for number, material in enumerate(scene.images):
+            mine = rows.images[numbers] == number
+            paint[mine] = bilinear(texels(material), uv[mine])
+        paint[:, 0] *= rows.radii[numbers]
+        return paint * rows.opacities[numbers, None]
+
+    heights: Array = colors_at(rows, points, normals, paint_of)[:, 0]
+    return heights
+
+
+def test_vertices_move_by_the_heights_of_the_decals(hilly: Scene, moved: DisplacedScene) -> None:
+    for item in moved.objects:
+        assert isinstance(item, PosedMesh)
+        steps = item.vertices.astype(float) - item.rest.vertices
+        ball = item.name == "ball"
+        normals = item.rest.vertices / np.linalg.norm(item.rest.vertices, axis=1, keepdims=True)
+        if not ball:  # within its faces
+            normals = np.round((item.rest.vertices - [1.5, 0, 0]) / 0.6 * 0.501)
+        inner = np.abs(normals).sum(axis=1) == 1 if not ball else np.ones(len(normals), np.bool_)
+        want = expected_heights(hilly, item.rest.vertices[inner], normals[inner])
+        got = np.einsum("ij,ij->i", steps[inner], normals[inner])
+        off = np.abs(got - want)
+        assert np.ptp(want) > 0.1
+        assert np.quantile(off, 0.99) < (3e-3 if ball else 2e-5)  # normals of the ball's mesh are not exact
+        across = steps[inner] - got[:, None] * normals[inner]
+        assert np.abs(across).max() < (6e-3 if ball else 1e-6)
+
+
+def test_a_closed_object_stays_closed_and_edges_are_short(hilly: Scene, moved: DisplacedScene) -> None:
+    for item in moved.objects:
+        assert isinstance(item, PosedMesh)
+        assert MeshSurface(item.vertices, item.faces).closed
+        corners = item.rest.vertices[item.faces].astype(float)
+        edges = np.roll(corners, -1, axis=1) - corners
+        lengths = np.linalg.norm(edges, axis=2).reshape(-1)
+        middles = (corners + 0.5 * edges).reshape(-1, 3)
+        raised = hilly.decals[hilly.decals.images >= 0]
+        gaps = np.linalg.norm(middles[:, None] - raised.positions, axis=2) - raised.radii
+        assert lengths[gaps.min(axis=1) < 0].max() <= 0.09
+        assert len(item.faces) == 2 * (len(item.vertices) - 2)  # a sphere: no vertex of its own at a crease
+
+
+def test_a_tree_moves_from_its_exact_surface() -> None:
+    ball = TreeObject("ball", Point((0, 0, 0), radius=1.0, color=(0.9, 0.1, 0.1)))
+    stud = DecalMaterial("stud", np.ones((16, 16, 3)), height=np.ones((16, 16)), relief=0.5)
+    one = decals.Decals([[0, 0, 1.0]], [[0, 0, 1.0]], [[1.0, 0, 0]], [0.4])
+    scene = Scene(objects=[ball], camera=decals.Camera((0, 0, 5)), decals=one, images=stud)
+    shown = decals.displace(scene, resolution=12)
+    item = shown.objects[0]
+    assert isinstance(item, PosedMesh)
+    np.testing.assert_allclose(np.linalg.norm(item.rest.vertices, axis=1), 1.0, atol=1e-5)
+    assert np.linalg.norm(item.vertices, axis=1).max() == pytest.approx(1.2, abs=1e-4)
+    surface = shown.to_polydata()
+    assert surface.is_manifold
+    far = surface.points[:, 2] < 0
+    np.testing.assert_array_equal(surface["RGB"][far][0], [230, 26, 26])
+    np.testing.assert_array_equal(surface["RGB"][surface.points[:, 2].argmax()], [255, 255, 255])
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["ball", "box"]))
+def test_subdivision_of_any_edges_leaves_no_crack(seed: int, shape: str) -> None:
+    """Also between copies of vertices at creases, whose edges run in either direction."""
+    vertices, faces = icosphere(1) if shape == "ball" else (box().vertices, box().faces)
+    corners = vertices[faces].reshape(-1, 3)  # each face has its own vertices
+    rng = np.random.default_rng(seed)
+    direction, least = rng.normal(size=3), rng.uniform(0.2, 1.0)
+
+    def is_long(starts: Array, ends: Array) -> Any:
+        middle = 0.5 * (starts + ends)
+        return np.linalg.norm(starts - ends, axis=1) > least + np.abs(middle @ direction)
+
+    rows, finer = subdivided(corners.astype(float), np.arange(len(corners)).reshape(-1, 3), is_long)
+    surface = MeshSurface(rows, finer)
+    assert surface.closed
+    assert surface.area == pytest.approx(MeshSurface(vertices, faces).area, rel=1e-5)
+    assert len(surface.sound) == len(finer)
+    edges = rows[finer], rows[np.roll(finer, -1, axis=1)]
+    assert not is_long(*(ends.reshape(-1, 3) for ends in edges)).any()
+
+
+def test_too_many_triangles_are_refused(monkeypatch: pytest.MonkeyPatch, hilly: Scene) -> None:
+    monkeypatch.setattr(subdivide, "MAX_FACES", 5000)
+    with pytest.raises(InvalidMesh, match="expected at most 5,000 triangles"):
+        decals.displace(hilly, edge_length=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"edge_length": 0.0}, "edge_length: expected a length above 0, got 0.0"),
+        ({"edge_length": np.nan}, "edge_length"),
+        ({"creases": 3}, "creases"),
+        ({"contact": "soft"}, "contact"),
+        ({"scene": ball_and_cube(count=4)}, "expected a decal whose image has relief, got none"),
+    ],
+)
+def test_wrong_arguments_are_refused(hilly: Scene, change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidScene, match=message):
+        decals.displace(**{"scene": hilly, **change})
+
+
+def test_files(
+    hilly: Scene, moved: DisplacedScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    need("trimesh")
+    monkeypatch.chdir(tmp_path)
+    decals.save_scene(hilly, "scene.json")
+    assert run(["displace", "scene.json", "--edge-length", "0.09", "-o", "hills.ply"]) == 0
+    assert capsys.readouterr().out == "hills.ply\n"
+    read: Any = pv.read("hills.ply")
+    whole = moved.to_polydata()
+    np.testing.assert_array_equal(read.points, whole.points)
+    np.testing.assert_array_equal(read["RGB"], whole["RGB"])
+    moved.save("hills.glb")
+    ball = moved.objects[0]
+    assert isinstance(ball, PosedMesh)
+    np.testing.assert_array_equal(read_attribute(Path("hills.glb"), 0, "POSITION"), ball.vertices)
+    with pytest.raises(InvalidScene, match=r"ends in \.glb or \.ply"):
+        moved.save("hills.txt")
+    assert run(["displace", "nowhere.json", "-o", "hills.ply"]) == 2
