@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider
 from decals.apps.lab.plots import described, drawn
 from decals.apps.lab.relaxing import Recording
+from decals.apps.sandbox.controls import STEPS, Control
 from decals.editing.commands import ReplaceScene, SetValues
 from decals.editing.queries import move_decals
 from decals.errors import ImplicitDecalsError
@@ -146,9 +147,10 @@ class Lab:
             value = self._read(slider.path)
         except InvalidLesson:
             value = None
-        step = slider.step or (slider.high - slider.low) / 200
-        ends = {"low": slider.low, "high": slider.high, "step": step, "choices": list(slider.choices)}
-        return {"number": number, "label": slider.label, "value": value, **ends}
+        step = slider.step or (slider.high - slider.low) / STEPS
+        kind = "choice" if slider.choices else "number"
+        control = Control(slider.label, kind, value, "", "", slider.low, slider.high, step, slider.choices)
+        return {"number": number, **asdict(control)}
 
     def _read(self, path: str) -> Any:
         modes = self._window.actions.state.modes

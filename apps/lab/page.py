@@ -8,7 +8,7 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
 from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
-from decals.apps.sandbox.panels import COMPACT, FIELD, icon_button, named
+from decals.apps.sandbox.panels import FIELD, build_controls, icon_button, named
 from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 330, 350
@@ -95,37 +95,7 @@ class LabPage(Page):
                     icon_button("mdi-close", "leave the lesson", self.sandbox.close_lesson)
                 html.Div(v_html=("lab_text",), classes="lesson")
                 self._build_question()
-                self._build_sliders()
-
-    def _build_sliders(self) -> None:
-        with html.Div(v_for="s in lab_sliders", key="lab_number + s.label", classes="mb-1"):
-            html.Div("{{ s.label }}", classes="text-caption")
-            with html.Div(v_if="!s.choices.length", classes="d-flex align-center"):
-                vuetify3.VSlider(
-                    model_value=("s.value",),
-                    min=("s.low",),
-                    max=("s.high",),
-                    step=("s.step",),
-                    name=("s.label",),
-                    update_modelValue=(self.lab.set_value, "[s.number, $event, false]"),
-                    end=(self.lab.set_value, "[s.number, $event, true]"),
-                    **COMPACT,
-                )
-                vuetify3.VTextField(
-                    model_value=("typeof s.value === 'number' ? Number(s.value.toPrecision(3)) : ''",),
-                    raw_attrs=named("s.label"),
-                    style="max-width: 84px",
-                    change=(self.lab.set_value, "[s.number, $event.target.value, true]"),
-                    **FIELD,
-                )
-            vuetify3.VSelect(
-                v_if="s.choices.length",
-                model_value=("s.value",),
-                items=("s.choices",),
-                raw_attrs=named("s.label"),
-                update_modelValue=(self.lab.set_value, "[s.number, $event, true]"),
-                **FIELD,
-            )
+                build_controls("lab_sliders", self.lab.set_value, who="c.number", key="lab_number + c.name")
 
     @staticmethod
     def _build_values() -> None:

@@ -1,6 +1,7 @@
 """Scenes to begin with, and names of new files."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
 
@@ -21,5 +22,7 @@ def empty_scene(images: Sequence[str], axes: Axes) -> Scene:
     """Return a scene without objects, whose camera looks at the origin."""
     where = parse_view(None, axes)
     corner = np.ones(3, np.float32)
-    camera = Camera.framing((-corner, corner), direction=where.direction, up=where.up)
+    framed = Camera.framing((-corner, corner), direction=where.direction, up=where.up)
+    eye = np.subtract(framed.position, framed.target)
+    camera = replace(framed, position=tuple(eye.tolist()), target=(0.0, 0.0, 0.0))
     return Scene(objects=(), camera=camera, images=tuple(DecalImage.load(source) for source in images))

@@ -1,7 +1,6 @@
 """Controls of a panel, from the parameters that classes of nodes declare."""
 
-import math
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from decals.errors import InvalidEdit
 from decals.validation import describe as describe_value
+from decals.validation import finite_number
 
 SLIDER_REACH = 4.0
 """Largest value of a slider for a number without unit and range, over the present value or 1."""
@@ -35,8 +35,8 @@ class Control:
     name
         Name of the parameter.
     kind
-        "number" (a slider and a field), "vector" and "list" (fields), "color", "choice" or "text" (shown
-        only).
+        "number" (a slider and a field), "field" (a number alone), "vector" and "list" (fields), "color",
+        "choice", "switch" or "text" (shown only).
     value
         The present value: a number, numbers, "#rrggbb", or text.
     doc
@@ -73,8 +73,8 @@ def controls_of(node: Node, size: float) -> list[dict[str, Any]]:
     size
         Size of the object, for the ends of sliders of lengths.
     """
-    declared = parameters_of(type(node))
-    return [asdict(_control(p, getattr(node, name), size)) for name, p in declared.items()]
+    values = ((declared, getattr(node, name)) for name, declared in parameters_of(type(node)).items())
+    return [asdict(_control(declared, value, size)) for declared, value in values if value != {}]
 
 
 def _control(parameter: Parameter, value: Any, size: float) -> Control:
@@ -142,21 +142,18 @@ def parsed(node: Node, name: str, raw: Any) -> Any:
         return None
     if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF, Quantity.CHOICE):
         return raw
-    number: Callable[[Any], Any] = _whole if parameter.whole else _number
+
+    def number(part: Any) -> float:
+        given = number_of(name, part)
+        return round(given) if parameter.whole else given
+
     if isinstance(raw, list | tuple):
         return tuple(tuple(map(number, row)) if isinstance(row, list | tuple) else number(row) for row in raw)
     return number(raw)
 
 
-def _number(raw: Any) -> float:
-    try:
-        return float(raw)
-    except (TypeError, ValueError):
-        raise InvalidEdit(f"expected a number, got {describe_value(raw)}") from None
-
-
-def _whole(raw: Any) -> int:
-    number = _number(raw)
-    if not math.isfinite(number):
-        raise InvalidEdit(f"expected a whole number, got {describe_value(raw)}")
-    return round(number)
+def number_of(name: str, raw: Any) -> float:
+    """Return the finite number that a page sent, as a number or as text, or raise `InvalidEdit`."""
+    with suppress(ValueError):
+        raw = float(raw) if isinstance(raw, str) else raw
+    return finite_number(name, raw, InvalidEdit)

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import asdict
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from blobtree.colors import color_rgb
-from decals.apps.sandbox.controls import STEPS, Control, hex_color
+from decals.apps.sandbox.controls import STEPS, Control, hex_color, number_of
 from decals.editing.action_state import ActionState
 from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius
 from decals.editing.commands import SetValues
@@ -19,7 +20,7 @@ from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Interaction
 from decals.receivers import labels_of
 from decals.record import Contact
 from decals.scenes.objects import bounds_of
-from decals.validation import describe, finite_number
+from decals.validation import describe
 
 PLAIN = "tint alone"
 """Choice of an image that stands for none."""
@@ -72,7 +73,7 @@ def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[
             "choice",
             Interaction(int(last.interactions[0])).name.lower(),
             "push neighbours, lie above them, or below",
-            choices=tuple(one.name.lower() for one in Interaction),
+            choices=_names(Interaction),
         ),
         _slider("layer", int(last.layers[0]), -layers, layers, "drawn from the lowest up", step=1.0),
         Control("spill", "switch", bool(last.spill[0]), "also colours surface that faces away"),
@@ -124,9 +125,9 @@ def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
     """Return what a page sent for a value of decals, or raise `InvalidEdit`."""
     match name:
         case "radius" | "opacity":
-            return finite_number(name, _as_number(raw), InvalidEdit)
+            return number_of(name, raw)
         case "layer":
-            return round(finite_number(name, _as_number(raw), InvalidEdit))
+            return round(number_of(name, raw))
         case "image":
             names = image_names(document)
             if raw not in names:
@@ -145,16 +146,9 @@ def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
             return "" if raw == ANY_OBJECT else raw
         case "fade_angle" | "fade_depth":
             least = (FADE_ANGLES if name == "fade_angle" else FADE_DEPTHS)[0]
-            number = finite_number(name, _as_number(raw), InvalidEdit)
+            number = number_of(name, raw)
             return 0.0 if 0.0 <= number < least else number
     raise InvalidEdit(f"value of decals: expected one of {', '.join(COLUMNS)}, got {describe(name)}")
-
-
-def _as_number(raw: Any) -> float:
-    try:
-        return float(raw)
-    except (TypeError, ValueError):
-        raise InvalidEdit(f"expected a number, got {describe(raw)}") from None
 
 
 def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
@@ -200,23 +194,29 @@ def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
         return
     if not isinstance(name, str) or name not in ("radius", "decal_radius", "density"):
         raise InvalidEdit(f"brush: expected 'radius' or such, got {describe(name)}")
-    number = finite_number(name, _as_number(raw), InvalidEdit)
+    number = number_of(name, raw)
     if number <= 0.0 or (name == "density" and number > 1.0):
         raise InvalidEdit(f"{name}: expected a number above 0{' and at most 1' * (name == 'density')}")
     setattr(brush, name, number)
 
 
-def mode_values(state: ActionState) -> dict[str, Any]:
-    """Return contact mode, stiffness and image mapping, with their choices."""
+def mode_controls(state: ActionState) -> list[dict[str, Any]]:
+    """Return the controls of contact mode, image mapping and stiffness."""
     modes = state.modes
-    return {
-        "contact": modes.contact.name.lower(),
-        "contacts": [mode.name.lower() for mode in Contact],
-        "stiffness": modes.stiffness,
-        "max_stiffness": max(MAX_STIFFNESS, modes.stiffness),
-        "mapping": modes.mapping.name.lower(),
-        "mappings": [mode.name.lower() for mode in ImageMapping],
-    }
+    controls = [
+        Control("contact", "choice", modes.contact.name.lower(), "how decals meet", choices=_names(Contact)),
+        Control(
+            "mapping", "choice", modes.mapping.name.lower(), "how images lie", choices=_names(ImageMapping)
+        ),
+    ]
+    if modes.contact is Contact.ELASTIC:
+        reach = max(MAX_STIFFNESS, modes.stiffness)
+        controls.append(_slider("stiffness", modes.stiffness, 1.0, reach, "of elastic contact", step=0.1))
+    return [asdict(control) for control in controls]
+
+
+def _names(kind: type[Enum]) -> tuple[str, ...]:
+    return tuple(one.name.lower() for one in kind)
 
 
 def set_mode(state: ActionState, name: str, raw: Any) -> None:
@@ -224,7 +224,7 @@ def set_mode(state: ActionState, name: str, raw: Any) -> None:
     parse: dict[str, Callable[[Any], Any]] = {
         "contact": lambda text: text,
         "mapping": lambda text: text,
-        "stiffness": _as_number,
+        "stiffness": lambda raw: number_of("stiffness", raw),
     }
     if not isinstance(name, str) or name not in parse:
         raise InvalidEdit(f"mode: expected one of {', '.join(parse)}, got {describe(name)}")

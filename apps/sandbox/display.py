@@ -1,7 +1,7 @@
 """How the view shows the scene: modes, overlays, a field slice, and cameras."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
 from blobtree.nodes.paths import node_in_world
+from decals.apps.sandbox.controls import Control, number_of
 from decals.apps.views import PRESETS
 from decals.editing.background import Job, Worker
 from decals.editing.document import Document
@@ -27,6 +28,14 @@ from decals.window.host_plotter import pixels_of, ray_through
 MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
 OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
 AXES = "x", "y", "z"
+NO_SLICE = "none"
+CHOICES = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": (NO_SLICE, *AXES)}
+CHOICE_DOCS = {
+    "mode": "how surfaces are drawn",
+    "overlay": "what is measured on them",
+    "slice_axis": "cut the model open across this axis",
+}
+SNAP_DOC = "dragged primitives move by multiples of this distance; 0: freely"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
 
@@ -48,6 +57,7 @@ GIZMO_SIZE = 0.12
 """Length of the axes of the gizmo, in heights of the view."""
 
 MAX_BOOKMARKS = 20
+CAMERA_VALUES = "position", "focal_point", "up", "view_angle", "parallel_scale", "parallel_projection"
 PREFIX = "sandbox "
 """First part of the names of the actors of this module."""
 
@@ -61,14 +71,14 @@ class DisplayOptions:
     mode, overlay
         One of `MODES`, and of `OVERLAYS`.
     slice_axis
-        "" for no slice, or the axis that it is perpendicular to.
+        "none", or the axis that the slice is perpendicular to.
     slice_position
         Place of the slice between the ends of the scene, from 0 to 1.
     """
 
     mode: str = MODES[0]
     overlay: str = OVERLAYS[0]
-    slice_axis: str = ""
+    slice_axis: str = NO_SLICE
     slice_position: float = 0.5
 
 
@@ -109,14 +119,23 @@ class Display:
     def values(self) -> dict[str, Any]:
         """Return plain values for a page."""
         options = self.options
+        controls = [
+            Control(name, "choice", getattr(options, name), doc, choices=CHOICES[name])
+            for name, doc in CHOICE_DOCS.items()
+        ]
+        if options.slice_axis != NO_SLICE:
+            doc = "from one end of the scene to the other"
+            controls.append(
+                Control("slice_position", "number", options.slice_position, doc, "", 0.0, 1.0, 0.01)
+            )
+        parallel = bool(self._window.subplot.vtk_renderer.camera.parallel_projection)
+        controls += [
+            Control("snap", "field", self._window.actions.state.snap, SNAP_DOC, "model units"),
+            Control("orthographic", "switch", parallel, "no perspective"),
+            Control("axes", "switch", self._axes, "show the axes"),
+        ]
         return {
-            "mode": options.mode,
-            "overlay": options.overlay,
-            "slice_axis": options.slice_axis,
-            "slice_position": options.slice_position,
-            "parallel": bool(self._window.subplot.vtk_renderer.camera.parallel_projection),
-            "axes": self._axes,
-            "snap": self._window.actions.state.snap,
+            "controls": [asdict(control) for control in controls],
             "bookmarks": [name for name, _ in self.bookmarks],
             "busy": self._worker.busy,
             "message": self.message,
@@ -125,28 +144,27 @@ class Display:
     # -- modes ------------------------------------------------------------------------------------------
 
     def set_option(self, name: str, value: Any) -> None:
-        """Set an option of `DisplayOptions` by name, or "parallel", "axes" or "snap".
+        """Set an option of `DisplayOptions` by name, or "orthographic", "axes" or "snap".
 
         Raises
         ------
         InvalidEdit
             There is no such option or value.
         """
-        choices = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": ("", *AXES)}
         if not isinstance(name, str):
             raise InvalidEdit(f"view: expected an option such as 'mode', got {describe(name)}")
-        if name in choices:
-            if value not in choices[name]:
+        if name in CHOICES:
+            if value not in CHOICES[name]:
                 raise InvalidEdit(
-                    f"{name}: expected one of {', '.join(choices[name])}, got {describe(value)}"
+                    f"{name}: expected one of {', '.join(CHOICES[name])}, got {describe(value)}"
                 )
         elif name == "slice_position":
-            value = min(max(finite_number(name, value, InvalidEdit), 0.0), 1.0)
-        elif name == "parallel":
+            value = min(max(number_of(name, value), 0.0), 1.0)
+        elif name == "orthographic":
             self._window.subplot.vtk_renderer.camera.parallel_projection = bool(value)
             return
         elif name == "snap":
-            distance = finite_number(name, value, InvalidEdit)
+            distance = number_of("snap", value)
             if distance < 0.0:
                 raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
             self._window.actions.state.snap = distance
@@ -218,7 +236,7 @@ class Display:
             plotter.remove_actor(name, render=False, reset_camera=False)
         plotter.scalar_bars.clear()
         self._names, self.message = [name for name, _, _ in shown], message
-        replaced = bool(shown) and (options.mode != MODES[0] or bool(options.slice_axis))
+        replaced = bool(shown) and (options.mode != MODES[0] or options.slice_axis != NO_SLICE)
         subplot.actor.SetVisibility(not replaced)
         if replaced:  # a scene that is not drawn needs no warm-up
             subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""
@@ -339,9 +357,7 @@ class Display:
         """Keep the present camera."""
         if len(self.bookmarks) == MAX_BOOKMARKS:
             raise InvalidEdit(f"expected at most {MAX_BOOKMARKS} bookmarks; a new scene begins without")
-        view = self._window.subplot.vtk_renderer.camera
-        kept = view.position, view.focal_point, view.up, view.view_angle, view.parallel_scale
-        self.bookmarks.append((f"view {len(self.bookmarks) + 1}", (kept, bool(view.parallel_projection))))
+        self.bookmarks.append((f"view {len(self.bookmarks) + 1}", self.kept_camera()))
 
     def go_to_bookmark(self, number: int) -> None:
         """Look from a kept camera."""
@@ -351,9 +367,17 @@ class Display:
             or number not in range(len(self.bookmarks))
         ):
             raise InvalidEdit(f"bookmark: expected its number, got {describe(number)}")
+        self.restore_camera(self.bookmarks[number][1])
+
+    def kept_camera(self) -> tuple[Any, ...]:
+        """Return the present camera, as `restore_camera` takes it."""
         view = self._window.subplot.vtk_renderer.camera
-        kept, view.parallel_projection = self.bookmarks[number][1]
-        view.position, view.focal_point, view.up, view.view_angle, view.parallel_scale = kept
+        return tuple(getattr(view, name) for name in CAMERA_VALUES)
+
+    def restore_camera(self, kept: tuple[Any, ...]) -> None:
+        """Look from a camera again."""
+        for name, value in zip(CAMERA_VALUES, kept, strict=True):
+            setattr(self._window.subplot.vtk_renderer.camera, name, value)
         self._window.subplot.vtk_renderer.reset_camera_clipping_range()
 
 
@@ -371,7 +395,7 @@ def show(
     mesh = first.append_polydata(*others) if others else first
     shown: Shown = []
     messages = []
-    if options.slice_axis:
+    if options.slice_axis != NO_SLICE:
         shown += _sliced(document, mesh, options, low, high)
     elif options.mode != MODES[0]:
         shown.append(_moded(document, mesh, parts, options.mode))

@@ -29,6 +29,7 @@ NARROW_WINDOW = f"$vuetify.display.width < {NARROW}"
 STYLE = """.v-slider *, .v-field * { transition: none !important }
 .toolbar .v-toolbar__content { overflow-x: auto }
 .toolbar .v-btn-group { flex-shrink: 0 }
+.v-field__input { padding-inline: 8px }
 .row-flag { font-size: 18px; padding: 4px }"""
 """A moved slider would otherwise repaint the panel for 0.3 s, which slows the pictures."""
 
@@ -179,6 +180,7 @@ class Page:
     def refresh(self) -> None:
         """Send the values that have changed since the last look."""
         self.sandbox.settle()
+        self.view.follow_size()
         values = self.values()
         changed = {name: value for name, value in values.items() if self._shown.get(name, self) != value}
         self._shown.update(changed)
@@ -252,6 +254,7 @@ class Page:
 
     def _build_panels(self) -> None:
         """Build the panels of decals and nodes, and the history."""
+        panels.build_scatter(self.sandbox)
         panels.build_decal_panel(self.sandbox)
         self._build_panel()
         panels.build_pick()
@@ -283,7 +286,7 @@ class Page:
 
     @staticmethod
     def _build_menu(label: str, icon: str, family: str, event: Any) -> None:
-        with vuetify3.VMenu(max_height=480):
+        with vuetify3.VMenu(max_height=480, max_width=380):
             with vuetify3.Template(v_slot_activator="{ props }"):
                 vuetify3.VBtn(label, v_bind="props", prepend_icon=icon, size="small")
             with vuetify3.VList(density="compact"):
@@ -291,6 +294,7 @@ class Page:
                     v_for=f"kind in catalog.{family}",
                     key="kind",
                     title=("kind",),
+                    subtitle=("catalog.docs[kind]",),
                     click=(event, "[kind]"),
                 )
 
@@ -388,10 +392,7 @@ class Page:
         with html.Div(v_if="panel.kind", classes="pa-3"):
             html.H2("{{ panel.kind }}", classes="text-subtitle-1")
             html.P("{{ panel.doc }}", classes="text-caption mb-3")
-            with html.Div(v_for="c in panel.controls", key="selected + c.name", classes="mb-3"):
-                panels.build_label()
-                panels.build_number(self.sandbox.set_value)
-                self._build_other_controls()
+            panels.build_controls("panel.controls", self.sandbox.set_value, key="selected + c.name")
             vuetify3.VBtn(
                 "Remove this modifier",
                 v_if="panel.operands === 1",
@@ -399,34 +400,11 @@ class Page:
                 variant="tonal",
                 click=self.sandbox.unwrap,
             )
-        html.P("Select a node in the outline.", v_if="!panel.kind", classes="pa-3 text-caption")
-
-    def _build_other_controls(self) -> None:
-        with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
-            vuetify3.VTextField(
-                v_for="(number, i) in c.value",
-                key="i",
-                model_value=("Number(number.toPrecision(5))",),
-                raw_attrs=named("`${c.name} ${i + 1}`"),
-                change=(self.sandbox.set_component, "[c.name, [i], $event.target.value]"),
-                **FIELD,
-            )
-        with (
-            html.Div(v_if="c.kind === 'list'"),
-            html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
-        ):
-            vuetify3.VTextField(
-                v_for="(number, j) in [].concat(row)",
-                key="j",
-                model_value=("Number(number.toPrecision(5))",),
-                raw_attrs=named("`${c.name} ${i + 1} ${j + 1}`"),
-                change=(
-                    self.sandbox.set_component,
-                    "[c.name, Array.isArray(row) ? [i, j] : [i], $event.target.value]",
-                ),
-                **FIELD,
-            )
-        panels.build_choices(self.sandbox.set_value)
+        html.P(
+            "{{ outline.length > 1 ? 'Select a node in the outline.' : 'Add a primitive.' }}",
+            v_if="!panel.kind",
+            classes="pa-3 text-caption",
+        )
 
     def _build_history(self) -> None:
         vuetify3.VDivider()

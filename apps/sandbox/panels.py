@@ -4,7 +4,6 @@ from typing import Any
 
 from trame.widgets import html, vuetify3
 
-from decals.apps.sandbox.display import AXES, MODES, OVERLAYS
 from decals.apps.sandbox.folder import IMAGES, MODELS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.views import PRESETS
@@ -33,6 +32,9 @@ BRUSH_TEXTS = {
     Brush.ERASE: "erase brush: drag to delete decals",
     Brush.RELAX: "relax brush: drag to even decals out",
 }
+WORDS = "c.name.replaceAll('_', ' ')"
+"""Name of the control ``c`` in words."""
+
 DROP = "dropped = Array.from($event.{}.files)"
 """Send files to the state of the page, which turns them into names and bytes."""
 
@@ -47,63 +49,90 @@ def icon_button(icon: str, text: str, click: Any, **options: Any) -> None:
     vuetify3.VBtn(icon=icon, title=text, raw_attrs=named(f"'{text}'"), size="small", click=click, **options)
 
 
-def build_number(event: Any) -> None:
-    """Build slider and field of the control ``c``; ``event`` receives its name, value and "the last"."""
-    with html.Div(v_if="c.kind === 'number'", classes="d-flex align-center"):
-        vuetify3.VSlider(
-            model_value=("c.value",),
-            min=("c.low",),
-            max=("c.high",),
-            step=("c.step",),
-            name=("c.name.replaceAll('_', ' ')",),
-            update_modelValue=(event, "[c.name, $event, false]"),
-            end=(event, "[c.name, $event, true]"),
-            **COMPACT,
+def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "c.name") -> None:
+    """Build labels and inputs of controls; see `decals.apps.sandbox.controls.Control`.
+
+    Parameters
+    ----------
+    source
+        The list of controls, an expression of the page.
+    event
+        Receives what identifies the control, its value, and False while a slider moves; then, for one number
+        of a vector or a list, the indices of that number.
+    who
+        Expression of what identifies the control ``c``.
+    key
+        Expression that tells the control from those of another selection.
+    """
+    with html.Div(v_for=f"c in {source}", key=key, classes="mb-2"):
+        html.Label(
+            f"{{{{ {WORDS} }}}}{{{{ c.unit ? ', ' + c.unit : '' }}}}",
+            v_if="c.kind !== 'switch'",
+            title=("c.doc",),
+            classes="text-caption",
         )
-        vuetify3.VTextField(
-            model_value=("c.value === null ? '' : Number(c.value.toPrecision(5))",),
-            raw_attrs=named("c.name.replaceAll('_', ' ')"),
-            style="max-width: 92px",
-            change=(event, "[c.name, $event.target.value, true]"),
+        with html.Div(v_if="c.kind === 'number' || c.kind === 'field'", classes="d-flex align-center"):
+            vuetify3.VSlider(
+                v_if="c.kind === 'number'",
+                model_value=("c.value",),
+                min=("c.low",),
+                max=("c.high",),
+                step=("c.step",),
+                name=(WORDS,),
+                update_modelValue=(event, f"[{who}, $event, false]"),
+                end=(event, f"[{who}, $event, true]"),
+                **COMPACT,
+            )
+            _number_field("c.value", WORDS, event, f"[{who}, $event.target.value, true]", "max-width: 84px")
+        with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
+            sent = f"[{who}, $event.target.value, true, [i]]"
+            _number_field(
+                "number", "`${c.name} ${i + 1}`", event, sent, v_for="(number, i) in c.value", key="i"
+            )
+        with (
+            html.Div(v_if="c.kind === 'list'"),
+            html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
+        ):
+            sent = f"[{who}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
+            label = "`${c.name} ${i + 1} ${j + 1}`"
+            _number_field("number", label, event, sent, v_for="(number, j) in [].concat(row)", key="j")
+        html.Input(
+            v_if="c.kind === 'color'",
+            type="color",
+            value=("c.value",),
+            raw_attrs=named(WORDS),
+            style="width: 100%; height: 28px",
+            change=(event, f"[{who}, $event.target.value, true]"),
+        )
+        vuetify3.VSelect(
+            v_if="c.kind === 'choice'",
+            model_value=("c.value",),
+            items=("c.choices",),
+            raw_attrs=named(WORDS),
+            update_modelValue=(event, f"[{who}, $event, true]"),
             **FIELD,
         )
+        vuetify3.VSwitch(
+            v_if="c.kind === 'switch'",
+            model_value=("c.value",),
+            label=(WORDS,),
+            title=("c.doc",),
+            update_modelValue=(event, f"[{who}, $event, true]"),
+            color="primary",
+            **COMPACT,
+        )
+        html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
 
 
-def build_choices(event: Any) -> None:
-    """Build the colour, choice, switch or text of the control ``c``."""
-    html.Input(
-        v_if="c.kind === 'color'",
-        type="color",
-        value=("c.value",),
-        raw_attrs=named("c.name.replaceAll('_', ' ')"),
-        style="width: 100%; height: 28px",
-        change=(event, "[c.name, $event.target.value, true]"),
-    )
-    vuetify3.VSelect(
-        v_if="c.kind === 'choice'",
-        model_value=("c.value",),
-        items=("c.choices",),
-        raw_attrs=named("c.name.replaceAll('_', ' ')"),
-        update_modelValue=(event, "[c.name, $event, true]"),
+def _number_field(value: str, label: str, event: Any, sent: str, style: str = "", **options: Any) -> None:
+    """Build a field for a number, or for nothing."""
+    vuetify3.VTextField(
+        model_value=(f"typeof {value} === 'number' ? Number({value}.toPrecision(5)) : ''",),
+        raw_attrs=named(label),
+        style=style,
+        change=(event, sent),
+        **options,
         **FIELD,
-    )
-    vuetify3.VSwitch(
-        v_if="c.kind === 'switch'",
-        model_value=("c.value",),
-        raw_attrs=named("c.name.replaceAll('_', ' ')"),
-        update_modelValue=(event, "[c.name, $event, true]"),
-        color="primary",
-        **COMPACT,
-    )
-    html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
-
-
-def build_label() -> None:
-    """Build the label of the control ``c``."""
-    html.Label(
-        "{{ c.name.replaceAll('_', ' ') }}{{ c.unit ? ', ' + c.unit : '' }}",
-        title=("c.doc",),
-        classes="text-caption",
     )
 
 
@@ -194,8 +223,16 @@ def build_files(sandbox: Sandbox) -> None:
                 classes="text-caption mt-3 mb-1",
             )
             with html.Div(classes="d-flex ga-2 align-center"):
-                vuetify3.VTextField(v_model=("file_name", ""), raw_attrs=named("'file name'"), **FIELD)
-                vuetify3.VBtn("Write", size="small", click=(sandbox.write_file, "[file_name, replace_file]"))
+                write = sandbox.write_file, "[file_name, replace_file]"
+                vuetify3.VTextField(
+                    v_model=("file_name", ""),
+                    placeholder="model.stl",
+                    raw_attrs=named("'file name'"),
+                    enter=write,
+                    __events=[("enter", "keyup.enter")],
+                    **FIELD,
+                )
+                vuetify3.VBtn("Write", size="small", click=write)
             vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists", **COMPACT)
 
 
@@ -230,50 +267,11 @@ def build_driver() -> None:
 
 def build_view_menu(sandbox: Sandbox) -> None:
     """Build the menu of modes, overlays, slices and cameras."""
-    with vuetify3.VMenu(close_on_content_click=False):
+    with vuetify3.VMenu(close_on_content_click=False, max_height=640):
         with vuetify3.Template(v_slot_activator="{ props }"):
             vuetify3.VBtn("View", v_bind="props", prepend_icon="mdi-eye-outline", size="small")
         with vuetify3.VCard(width=320, classes="pa-3"):
-            for name, items in (
-                ("mode", MODES),
-                ("overlay", OVERLAYS),
-                ("slice_axis", [{"title": "no slice", "value": ""}, *AXES]),
-            ):
-                vuetify3.VSelect(
-                    label=name.replace("_", " "),
-                    model_value=(f"display.{name}",),
-                    items=(f"{name}_items", list(items)),
-                    update_modelValue=(sandbox.set_display, f"['{name}', $event]"),
-                    classes="mb-2",
-                    **FIELD,
-                )
-            vuetify3.VSlider(
-                v_if="display.slice_axis",
-                model_value=("display.slice_position",),
-                min=0,
-                max=1,
-                step=0.01,
-                name="slice position",
-                update_modelValue=(sandbox.set_display, "['slice_position', $event]"),
-                **COMPACT,
-            )
-            vuetify3.VTextField(
-                label="snap of dragged primitives, model units",
-                model_value=("display.snap",),
-                change=(sandbox.set_display, "['snap', Number($event.target.value)]"),
-                classes="mb-2",
-                **FIELD,
-            )
-            with html.Div(classes="d-flex"):
-                for name, label in (("parallel", "orthographic"), ("axes", "axes")):
-                    vuetify3.VSwitch(
-                        model_value=(f"display.{name}",),
-                        label=label,
-                        update_modelValue=(sandbox.set_display, f"['{name}', $event]"),
-                        color="primary",
-                        classes="mr-4",
-                        **COMPACT,
-                    )
+            build_controls("display.controls", sandbox.set_display)
             with html.Div(classes="d-flex flex-wrap ga-1 my-2"):
                 vuetify3.VBtn("Frame selection", size="x-small", click=(sandbox.move_camera, "['frame']"))
                 for name in PRESETS:
@@ -313,43 +311,37 @@ def build_brushes(sandbox: Sandbox) -> None:
 
 
 def build_decal_panel(sandbox: Sandbox) -> None:
-    """Build the panels of the brush, the selected decals, and the contact modes."""
-    with html.Div(v_if="brush.controls.length", classes="pa-3"):
-        html.H2("{{ brush.brush }} brush", classes="text-subtitle-1")
-        with html.Div(v_for="c in brush.controls", key="c.name"):
-            build_label()
-            build_number(sandbox.set_brush)
-    with html.Div(v_if="decal.count", classes="pa-3"):
-        html.H2(
+    """Build the panels of the brush, the selected decals, scattering, and the contact modes."""
+    for shown, title, source, event in (
+        ("brush.controls.length", "{{ brush.brush }} brush", "brush.controls", sandbox.set_brush),
+        (
+            "decal.count",
             "{{ decal.count === 1 ? 'Decal' : decal.count + ' decals' }}",
-            classes="text-subtitle-1",
+            "decal.controls",
+            sandbox.set_decals,
+        ),
+        ("decals", "Contact of {{ decals }} decals", "modes", sandbox.set_mode),
+    ):
+        with html.Div(v_if=shown, classes="pa-3"):
+            html.H2(title, classes="text-subtitle-1")
+            build_controls(source, event)
+
+
+def build_scatter(sandbox: Sandbox) -> None:
+    """Build the button that covers an object with decals."""
+    with html.Div(v_if="outline.length > 1", classes="d-flex align-center ga-2 px-3 pt-3"):
+        vuetify3.VTextField(
+            v_model=("scatter_count", 100),
+            raw_attrs=named("'number of decals'"),
+            style="max-width: 84px",
+            **FIELD,
         )
-        with html.Div(v_for="c in decal.controls", key="c.name", classes="mb-1"):
-            build_label()
-            build_number(sandbox.set_decals)
-            build_choices(sandbox.set_decals)
-    with html.Div(v_if="decals", classes="pa-3"):
-        html.H2("Contact of {{ decals }} decals", classes="text-subtitle-1")
-        for name, choices in (("contact", "contacts"), ("mapping", "mappings")):
-            vuetify3.VSelect(
-                label=name,
-                classes="mb-2",
-                model_value=(f"modes.{name}",),
-                items=(f"modes.{choices}",),
-                update_modelValue=(sandbox.set_mode, f"['{name}', $event]"),
-                **FIELD,
-            )
-        with html.Div(v_if="modes.contact === 'elastic'"):
-            html.Label("stiffness", classes="text-caption")
-            vuetify3.VSlider(
-                model_value=("modes.stiffness",),
-                min=1,
-                max=("modes.max_stiffness",),
-                step=0.1,
-                name="stiffness",
-                update_modelValue=(sandbox.set_mode, "['stiffness', $event]"),
-                **COMPACT,
-            )
+        vuetify3.VBtn(
+            "{{ decals ? 'Scatter again' : 'Scatter decals' }}",
+            size="small",
+            variant="tonal",
+            click=(sandbox.scatter, "[scatter_count]"),
+        )
 
 
 def build_pick() -> None:

@@ -22,11 +22,11 @@ from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog
-from decals.apps.sandbox.controls import controls_of, parsed
+from decals.apps.sandbox.controls import controls_of, number_of, parsed
 from decals.apps.sandbox.decal_panel import (
     brush_values,
     decal_controls,
-    mode_values,
+    mode_controls,
     set_brush,
     set_decal_value,
     set_mode,
@@ -38,6 +38,7 @@ from decals.apps.views import THREE_QUARTER, UPRIGHT
 from decals.editing.commands import AddImage
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject, RemoveObject
+from decals.editing.session import UndoEntry
 from decals.editing.tree_commands import RenameObject
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
@@ -100,10 +101,13 @@ class Sandbox:
         self._window = window
         self._folder = (Path() if folder is None else folder).resolve()
         self.display = Display(window)
+        window.overlay.hide_status()  # the page has its own, and handles
+        window.handle.visible = False
         files = window.actions.files
         files.folder, files.show_view = self._folder, self.display.show_from
         self._lessons, self._start_lesson = list(lessons), start_lesson
         self.in_lesson = False
+        self._before_lesson: tuple[UndoEntry | None, tuple[Any, ...]] | None = None
         self._start: dict[str, Any] = {}
         self.show_start(start)
         self._last_step = math.inf
@@ -139,7 +143,7 @@ class Sandbox:
                 "controls": decal_controls(self._window.document, state.selection),
             },
             "brush": brush_values(window.document, state.brush),
-            "modes": mode_values(state),
+            "modes": mode_controls(state),
             "pick": self._pick(),
             "decals": len(window.document.decals),
         }
@@ -167,13 +171,14 @@ class Sandbox:
         return "   ".join(filter(None, parts))
 
     @staticmethod
-    def catalog() -> dict[str, list[str]]:
-        """Return the names of the kinds that can be added, by family."""
+    def catalog() -> dict[str, Any]:
+        """Return the names of the kinds that can be added, by family, and what each is."""
         return {
             "primitives": catalog.primitives(),
             "modifiers": catalog.modifiers(),
             "combinations": catalog.combinations(),
             "custom": [kind.__name__ for kind in custom_kinds()],
+            "docs": {name: first_line(kind) for name, kind in catalog.kinds().items()},
         }
 
     def _outline(self) -> list[dict[str, Any]]:
@@ -194,7 +199,7 @@ class Sandbox:
         node = self._window.actions.trees.selected_node
         return {
             "kind": type(node).__name__,
-            "doc": (type(node).__doc__ or "").strip().split("\n")[0],
+            "doc": first_line(type(node)),
             "controls": controls_of(node, self._size()),
             "operands": len(node.children),
         }
@@ -236,13 +241,18 @@ class Sandbox:
             trees.select_node(number, path)
             self._marked = [key_of(number, path)]
 
-    def set_value(self, name: str, raw: Any, last: bool = True) -> None:
-        """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`."""
-        trees = self._window.actions.trees
-        self._slide(
-            lambda: trees.set_parameter(name, parsed(trees.selected_node, name, raw), last=bool(last)),
-            last=bool(last),
-        )
+    def set_value(self, name: str, raw: Any, last: bool = True, index: object = ()) -> None:
+        """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`.
+
+        ``index`` leads through lists to the number of the parameter that is set.
+        """
+
+        def step() -> None:
+            trees = self._window.actions.trees
+            value = _exchanged(getattr(trees.selected_node, str(name), ()), index, raw)
+            trees.set_parameter(name, parsed(trees.selected_node, name, value), last=bool(last))
+
+        self._slide(step, last=bool(last))
 
     def _slide(self, step: Callable[[], None], *, last: bool) -> None:
         """Carry out a step of a slider; while it moves, only the newest one, before the next frame."""
@@ -283,13 +293,6 @@ class Sandbox:
         self._slide(
             lambda: self.display.drag_handle(name, phase, x, y, snap=bool(snap)), last=phase != "move"
         )
-
-    def set_component(self, name: str, index: list[int], raw: Any) -> None:
-        """Set one number of a parameter of the selected node: ``index`` leads to it through lists."""
-        with self._reported():
-            node = self._window.actions.trees.selected_node
-            value = parsed(node, name, _exchanged(getattr(node, str(name), ()), index, raw))
-            self._window.actions.trees.set_parameter(name, value)
 
     def add(self, kind: str) -> None:
         """Add a primitive of a kind: blended to the selected node, or as an object."""
@@ -363,12 +366,23 @@ class Sandbox:
                     f"lesson: expected one from 0 to {len(self._lessons) - 1}, got {describe(number)}"
                 )
             self._window.background.require_idle()
+            if not self.in_lesson and self._window.document.objects:
+                self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
             self._start_lesson(number)
             self.in_lesson, self._start = True, {**self._start, "open": False}
 
     def close_lesson(self) -> None:
-        """Leave the lesson; its scene stays, and can be edited."""
+        """Leave the lesson and go back to the scene before it; without one, that of the lesson stays."""
         self.in_lesson = False
+        if self._before_lesson is None:
+            return
+        (entry, camera), self._before_lesson = self._before_lesson, None
+        with self._reported():
+            self._window.background.require_idle(computing=False)
+            session = self._window.session
+            while session.labels and session.next_undo is not entry:
+                session.undo()
+            self.display.restore_camera(camera)
 
     def new_model(self) -> None:
         """Begin an empty scene."""
@@ -462,14 +476,14 @@ class Sandbox:
         return new_file(self._folder, name)
 
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
-        self.in_lesson = False
+        self.in_lesson, self._before_lesson = False, None
         self._window.actions.files.open(load, path)
         self._start = {**self._start, "open": False}
         self.display.bookmarks.clear()
 
     # -- view, decals and outline -----------------------------------------------------------------------
 
-    def set_display(self, name: str, value: Any) -> None:
+    def set_display(self, name: str, value: Any, _last: bool = True) -> None:
         """Set how the view shows the scene; see `Display.set_option`."""
         with self._reported():
             self.display.set_option(name, value)
@@ -487,6 +501,14 @@ class Sandbox:
                 raise InvalidEdit(f"camera: expected one of {', '.join(moves)}, got {describe(name)}")
             moves[name]()
 
+    def scatter(self, count: object) -> None:
+        """Cover the object of the selected node, or every object, with decals."""
+        with self._reported():
+            state = self._window.actions.state
+            objects = range(len(self._window.document.objects))
+            numbers = tuple(objects) if state.primitive is None else (state.primitive[0],)
+            self._window.actions.decals.scatter_over(numbers, round(number_of("count", count)))
+
     def set_decals(self, name: str, raw: Any, last: bool = True) -> None:
         """Set a value of the selected decals to what a control sent."""
         state = self._window.actions.state
@@ -497,7 +519,7 @@ class Sandbox:
         with self._reported():
             set_brush(self._window.actions.state.brush, name, raw)
 
-    def set_mode(self, name: str, raw: Any) -> None:
+    def set_mode(self, name: str, raw: Any, _last: bool = True) -> None:
         """Set contact mode, stiffness or image mapping of the window."""
         with self._reported():
             set_mode(self._window.actions.state, name, raw)
@@ -580,6 +602,11 @@ class Sandbox:
         self._window.redraw(whole=whole)
 
 
+def first_line(kind: type[Node]) -> str:
+    """Return the first line of a class's description, without marks of code."""
+    return (kind.__doc__ or "").strip().split("\n")[0].replace("`", "")
+
+
 def _layer_of(key: object) -> int | None:
     """Return the layer of a row's key; None for other rows."""
     text = str(key).removeprefix("layer ")
@@ -598,7 +625,7 @@ def _given(scene: Scene) -> Callable[[Progress, Cancel], Scene]:
 
 def _exchanged(value: Any, index: object, raw: Any) -> Any:
     """Return nested tuples with one number exchanged."""
-    if index == []:
+    if index in ((), []):
         return raw
     if not isinstance(index, list) or not isinstance(value, tuple) or index[0] not in range(len(value)):
         raise InvalidEdit(f"index: expected that of a number of the parameter, got {describe(index)}")

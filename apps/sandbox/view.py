@@ -95,17 +95,27 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         """Draw a frame at the size of the page's view, and return its pixels."""
         target: Any = self._window.plotter.render_window
         target.GetInteractor().EnableRenderOff()
-        tracked: dict[str, Any] = next(iter(self._delivery.tracking_views.values()), {})
-        if "originalSize" in tracked:
-            size = [int(side * tracked.get("ratio", 1) + 0.5) for side in tracked["originalSize"]]
-            if min(size) > 0 and size != list(target.GetSize()):
-                target.SetSize(size)
+        if (size := self._new_size()) is not None:
+            target.SetSize(size)
         target.Render()
         width, height = target.GetSize()
         picture = vtkWindowToImageFilter(input=target, read_front_buffer=False, should_rerender=False)
         picture.Update()
         pixels: UInt8Array = pv.convert_array(picture.GetOutput().GetPointData().GetScalars())
         return np.ascontiguousarray(pixels.reshape(height, width, 3)[::-1])
+
+    def _new_size(self) -> list[int] | None:
+        """Return the size of the page's view in pixels; None if it is that of the last picture."""
+        views = {} if self._delivery is None else self._delivery.tracking_views
+        tracked: dict[str, Any] = next(iter(views.values()), {})
+        size = [int(side * tracked.get("ratio", 1) + 0.5) for side in tracked.get("originalSize", ())]
+        target: Any = self._window.plotter.render_window
+        return size if size and min(size) > 0 and target and size != list(target.GetSize()) else None
+
+    def follow_size(self) -> None:
+        """Send a new picture if the page's view has another size: trame asks for none."""
+        if self._new_size() is not None:
+            self.update()
 
     def _publish(self, image: bytes, pixels: UInt8Array) -> None:
         height, width, _ = pixels.shape

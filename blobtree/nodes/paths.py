@@ -19,8 +19,8 @@ from blobtree.validation import finite_vector
 _RADII = (Quantity.RADIUS, Quantity.SEMI_AXES, Quantity.RADII)
 _LENGTHS = (Quantity.LENGTH, Quantity.EXTENTS)
 
-RIGID_TOLERANCE = 1e-9
-"""Error of a matrix that still counts as one without scale and shear."""
+SIMILARITY_TOLERANCE = 1e-9
+"""Relative error of a matrix that still counts as one without shear."""
 
 Path = tuple[int, ...]
 """Indices of children, from the root down."""
@@ -159,20 +159,25 @@ def square_matrix(matrix: ArrayLike) -> Float64Array:
 def mapped(node: Node, change: ArrayLike) -> Node:
     """Return a node under an affine map, float64[4, 4], of its own space.
 
-    A point, segment or cone that is only moved, turned or mirrored stays of its kind.
+    A point, segment or cone that is moved, turned, mirrored or scaled as a whole stays of its kind.
     """
     matrix = square_matrix(change)
     if isinstance(node, Transform):
         return node.child.transform(matrix @ square_matrix(node.matrix))
-    rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID_TOLERANCE)
-    if not (rigid and isinstance(node, Point | Segment | Cone)):
+    square = matrix[:3, :3] @ matrix[:3, :3].T
+    scale = float(np.sqrt(square[0, 0]))
+    similar = np.allclose(square, scale**2 * np.eye(3), rtol=0.0, atol=SIMILARITY_TOLERANCE * scale**2)
+    if not (similar and isinstance(node, Point | Segment | Cone)):
         return node.transform(matrix)
-    points: dict[str, Any] = {
-        name: tuple((matrix[:3, :3] @ getattr(node, name) + matrix[:3, 3]).tolist())
-        for name, parameter in parameters_of(type(node)).items()
-        if parameter.quantity is Quantity.POINT
-    }
-    return replace(node, **points)
+    rigid = abs(scale - 1.0) < SIMILARITY_TOLERANCE
+    changed: dict[str, Any] = {}
+    for name, parameter in parameters_of(type(node)).items():
+        value = getattr(node, name)
+        if parameter.quantity is Quantity.POINT:
+            changed[name] = tuple((matrix[:3, :3] @ value + matrix[:3, 3]).tolist())
+        elif parameter.quantity in (Quantity.RADIUS, Quantity.WIDTH) and value is not None and not rigid:
+            changed[name] = scale * value
+    return replace(node, **changed)
 
 
 def moved(node: Node, offset: ArrayLike) -> Node:

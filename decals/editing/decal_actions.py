@@ -226,14 +226,19 @@ class DecalActions:
     @action("scatter", "g", summary="scatter new decals over the object under the cursor", group=Group.MANY)
     def scatter(self, cursor: Cursor) -> None:
         """Replace the decals on an object by as many scattered ones, with another seed each time."""
-        document, number = self._state.session.document, require_pick(cursor).object
+        self.scatter_over((require_pick(cursor).object,))
+
+    def scatter_over(self, numbers: tuple[int, ...], count: int | None = None) -> None:
+        """Replace the decals on objects by scattered ones; without a count, by as many as there are."""
+        document = self._state.session.document
         self._scatter_count += 1
         seed, objects, images = self._scatter_count, document.objects, len(document.images)
         positions = document.decals.column("positions")
 
         def compute(progress: Progress, cancel: Callable[[], bool]) -> Command:
-            count = int((nearest_points(objects, positions).objects == number).sum()) or FIRST_DECAL_COUNT
-            command = ScatterDecals((number,), count, seed)
+            on = nearest_points(objects, positions).objects if count is None else np.zeros(0)
+            wanted = (int(np.isin(on, numbers).sum()) or FIRST_DECAL_COUNT) if count is None else count
+            command = ScatterDecals(numbers, wanted, seed)
             return command.compute_command(objects, images, progress=progress, cancel=cancel)
 
         self._state.background.compute("scatter", compute)

@@ -93,7 +93,7 @@ class TreeActions:
             return
         self._state.primitive = None
         self._select(lambda: pick)
-        self._state.message = "drag the blue ball to move the primitive, press M on it to deselect it"
+        self._state.message = "drag its handle to move the primitive, press M on it to deselect it"
 
     def _selectable(self, pick: SurfacePick) -> tuple[int, Path] | None:
         """Return the primitive at a point; None on a mesh."""

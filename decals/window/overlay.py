@@ -79,6 +79,7 @@ class Overlay:
         self._actor.mapper.dataset = self._lines
         self._actor.use_bounds = False
         self._actor.ForceTranslucentOn()  # so that it writes no depth and occludes nothing
+        self.shows_status = True  # else a page around the plotter shows it
         self._text, self._help_lines = "", KEYS.help_lines()
         self._status: Any = plotter.add_text(
             "", position=(TEXT_MARGIN, 10), font_size=9, color="black", render=False, name="decals-status"
@@ -114,6 +115,8 @@ class Overlay:
     def show_status(self, text: str) -> None:
         """Show a text at the bottom, in several lines if it is too long."""
         self._text = text
+        if not self.shows_status:
+            return
         self._status.SetInput(text)
         size = [0.0, 0.0]
         self._status.GetSize(self._renderer, size)
@@ -124,6 +127,11 @@ class Overlay:
             lines = max(int(height * MAX_STATUS_HEIGHT / size[1]), 1)
             wrapped = textwrap.wrap(text, letters, max_lines=lines, placeholder=ELLIPSIS)
             self._status.SetInput("\n".join(wrapped))
+
+    def hide_status(self) -> None:
+        """Leave the status to a page around the plotter."""
+        self.shows_status = False
+        self._status.SetInput("")
 
     def show_help(self, page: int) -> int:
         """Show a page of the help, from 1, as large as the window allows, or hide it for 0.
@@ -207,6 +215,8 @@ class PrimitiveHandle:
     ----------
     dragging
         True during a drag.
+    visible
+        False if a page around the plotter shows handles of its own.
     """
 
     def __init__(self, renderer: Any, actions: Actions, redraw: Callable[[bool], None]) -> None:
@@ -214,11 +224,11 @@ class PrimitiveHandle:
         self._widget: Any = None
         self._primitive: tuple[int, Path] | None = None
         self._drag_start: Float64Array = np.zeros(3)
-        self.dragging = False
+        self.dragging, self.visible = False, True
 
     def update(self) -> None:
         """Put the ball at the selected primitive, or remove it; a drag is not disturbed."""
-        if self.dragging:
+        if self.dragging or not self.visible:
             return
         primitive = self._actions.state.primitive
         if primitive is None or primitive != self._primitive:

@@ -279,8 +279,9 @@ class EditWindow:
         self._title.show(stage, fraction)
 
     def _show_status(self) -> None:
-        self.overlay.show_status(self._status())
-        self.plotter.render()
+        if self.overlay.shows_status:
+            self.overlay.show_status(self._status())
+            self.plotter.render()
 
     # -- background work --------------------------------------------------------------------------------
 

@@ -50,7 +50,7 @@ def wait(lab: Lab) -> dict[str, Any]:
 
 
 def number_of(lab: Lab, label: str) -> int:
-    return next(int(s["number"]) for s in lab.values()["lab_sliders"] if s["label"].startswith(label))
+    return next(int(s["number"]) for s in lab.values()["lab_sliders"] if s["name"].startswith(label))
 
 
 @pytest.mark.parametrize("number", range(6))

@@ -1,6 +1,5 @@
 """Controls of the sandbox: every parameter has one, and what a page sends back is the parameter's value."""
 
-import math
 from typing import Any
 
 import pytest
@@ -24,7 +23,7 @@ def made(name: str) -> Node:
 def test_every_parameter_has_a_control_whose_value_comes_back(name: str) -> None:
     node = made(name)
     controls = {control["name"]: control for control in controls_of(node, 2.0)}
-    assert list(controls) == list(parameters_of(type(node)))
+    assert list(controls) == [name for name in parameters_of(type(node)) if getattr(node, name) != {}]
     for control in controls.values():
         assert control["doc"]
         if control["kind"] == "text":
@@ -65,7 +64,6 @@ def test_what_a_page_sends_is_parsed() -> None:
     assert parsed(BALL, "width", "") is None
     assert parsed(square, "points", [["0", 1, "2.5"]]) == ((0.0, 1.0, 2.5),)
     assert parsed(catalog.new_node("Noise"), "seed", "7.0") == 7
-    assert math.isnan(parsed(BALL, "radius", "nan"))  # the node refuses it
 
 
 @pytest.mark.parametrize(
@@ -73,6 +71,7 @@ def test_what_a_page_sends_is_parsed() -> None:
     [
         (BALL, "radius", "thick"),
         (BALL, "radius", None),
+        (BALL, "radius", "nan"),
         (BALL, "center", [0, "x", 0]),
         (BALL, "centre", 1),
         (BALL, 7, 1),

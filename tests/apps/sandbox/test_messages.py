@@ -21,7 +21,7 @@ UNDONE = ("close", "camera", "move", "add_image", "save", "save_as", "export")
 ACTIONS = [binding.action for binding in KEYS.bindings if binding.action not in UNDONE]
 KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Nothing"]
 NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
-OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "parallel", "axes"]
+OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "orthographic", "axes"]
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
 CHANGES = ["rename", "remove", "duplicate", "move", "group", "hide", "lock", "isolate"]
 HANDLES = ["move", "move x", "turn y", "scale", "start 0"]
@@ -29,8 +29,8 @@ ALL: dict[str, list[list[Any]]] = {
     "select": [KEYS_OF_ROWS],
     "mark": [KEYS_OF_ROWS],
     "open_lesson": [[0, 1]],
-    "set_value": [NAMES, [0.2, 0.9, 3.0, [0, 0, 1], "#ff0000"], [True, False]],
-    "set_component": [NAMES, [[0], [1], [], [9]], [0.1, "2"]],
+    "set_value": [NAMES, [0.2, 0.9, "3", [0, 0, 1], "#ff0000"], [True, False], [[], [], [0], [1], [9]]],
+    "scatter": [[3, "10", 40]],
     "add": [KINDS],
     "wrap": [KINDS],
     "combine": [KINDS],

@@ -1,5 +1,6 @@
 """Handles of nodes: where they lie, and what a drag of one does; the oracle is plain NumPy."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import decals
-from blobtree import Point, Polyline, Segment, Twist
+from blobtree import Point, Polyline, Segment, Transform, Twist
 from blobtree.nodes.paths import mapped, node_at, node_in_world
 from decals.editing import Actions, EditSession, MirrorPrimitive, TransformPrimitive
 from decals.editing.gizmo import (
@@ -128,9 +129,12 @@ def test_a_transformed_node_is_the_mapped_field(matrix: Any) -> None:
     np.testing.assert_allclose(after(POINTS), before(POINTS @ inverse[:3, :3].T + inverse[:3, 3]), atol=2e-5)
 
 
-def test_rigid_maps_keep_the_kind_and_mirrors_join_like_copies() -> None:
+def test_similar_maps_keep_the_kind_and_mirrors_join_like_copies() -> None:
     turned: Any = mapped(LIMB, turn_about(np.zeros(3), 2, 90.0))
     np.testing.assert_allclose((turned.start, turned.end), [(0, 1, 0), (-1, 2, 0)], atol=1e-12)
+    larger: Any = mapped(replace(LIMB, width=0.3), scale_about(np.zeros(3), 2.0))
+    assert (larger.start, larger.radius, larger.width) == ((2.0, 0.0, 0.0), 2.0 * LIMB.radius, 0.6)
+    assert isinstance(mapped(LIMB, np.diag([1.0, 1.0, 2.0, 1.0])), Transform)
     session = EditSession(decals.cover(TREE, count=5, images=["eye"]))
     session.do(MirrorPrimitive(0, (1,)))
     image: Any = node_at(tree_of(session.document), (2,))

@@ -327,7 +327,7 @@ def test_m_on_another_primitive_selects_that_one(user: UserInput) -> None:
     other = user.actions.state.primitive
     assert None not in (one, other)
     assert one != other
-    assert "drag the blue ball" in user.actions.state.message
+    assert "drag its handle" in user.actions.state.message
     user.tools.key("m", *second)
     assert user.actions.state.primitive is None
     user.tools.key("m", *second)
@@ -346,7 +346,7 @@ def test_primitives_under_the_cursor(user: UserInput) -> None:
     assert user.actions.trees.handle_position == pytest.approx(
         [0, 0, 1], abs=0.03
     )  # on the surface, under the cursor
-    assert "drag the blue ball" in user.actions.state.message
+    assert "drag its handle" in user.actions.state.message
     user.actions.trees.begin_drag()
     for step in (0.1, 0.2, 0.3):
         user.actions.trees.drag((0, step, 0))
