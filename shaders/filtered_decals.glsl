@@ -4,6 +4,7 @@
 //@ include decals.glsl
 const float REACH = 0.575;  // see decals/record.py
 const int ELASTIC = 3;
+const bool PARTED = decal_nested && decal_contact == ELASTIC;  // small decals part the images of larger ones
 const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
 const int SAMPLES = 16;        // parts of pixels with more
@@ -183,7 +184,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                 bool higher = nested ? is_above(other, owner, decal_records) && lies_on_top(n, other, decal_records)
                                      : other_rank > rank || (other_rank == rank && other > owner);
                 nested_count += nested ? 1 : 0;
-                if (decal_parting && nested) {
+                if (PARTED && nested) {
                     add_bump(bumps, q, n, right, up, ball, other_ball, other);
                 }
                 if (higher && outside) {
@@ -234,7 +235,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         vec3 at = first ? q : q + part.y * right + part.z * up;
         vec3 contact = first ? squares : contact_with(decal, across ? owner : -1, at, n, right, up);
         Place place = place_of(decal, at, n, right, up, contact);
-        if (decal_parting) {
+        if (PARTED) {
             if (!first) {
                 bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
                 if (decal == below) {

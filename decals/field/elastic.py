@@ -240,12 +240,12 @@ def sum_of_pushes(
                 )
                 if push > 0.0:
                     squares += square_of_push(distance, push)
-                if index.parting:
+                if index.nested:
                     own_ball = index.records[RECORD * owner]
                     ball = index.records[RECORD * index.ids[j]]
                     bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, index.ids[j], index))
     shift = wp.vec2(0.0, 0.0)
-    if index.parting:
+    if index.nested:
         shift = image_shift(bump, n_q, owner, index)
     return wp.vec3(squares, shift[0], shift[1])
 
@@ -347,7 +347,7 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
         return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
     owner = wp.int32(closest)
     own_ball = index.records[RECORD * closest]
-    if topmost != closest:
+    if index.nested and topmost != closest:
         if holders == 2:
             offset = xyz(topmost_ball) - xyz(own_ball)
             if balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
@@ -374,10 +374,10 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
             push = plane_push(ray, distance, between, radius, RIM_RADIUS * ball[3], index.stiffness)
             if push > 0.0:
                 squares += square_of_push(distance, push)
-            if index.parting:
+            if index.nested:
                 bump = join_bumps(bump, bump_at(q, n_q, own_ball, ball, other, index))
     shift = wp.vec2(0.0, 0.0)
-    if index.parting:
+    if index.nested:
         shift = image_shift(bump, n_q, owner, index)
     if count > MAX_KEPT:
         sums = sum_of_pushes(q, n_q, owner, ray, distance, index)

@@ -185,7 +185,7 @@ def uv_at(
         drawn = image_distance(drawn, wp.length(small), arc[3])
         w = xyz(arc)
     uv = contact_uv(tangent_coordinates(w, normal, tangent), drawn)
-    if index.parting:
+    if index.nested:
         uv += 0.5 * wp.max(1.0 - drawn * drawn, 0.0) * wp.vec2(pushed[1], pushed[2])
     return uv
 

@@ -190,7 +190,7 @@ def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -
                 ):
                     least = own
                     owner = index.ids[j]
-    if holders < 2:
+    if holders < 2 or not index.nested:
         return owner
     return nested_owner(q, n_q, owner, index)
 

@@ -38,15 +38,15 @@ class EditableIndex:
         "index_levels", "index_table" and "index_ids". A change may replace an array.
     stale : bool
         True if `build` must run before the arrays may be read.
-    parting : bool
-        True if contact decals of different size have been nested.
+    nested : bool
+        True if contact decals have been nested.
     parity, floor : int
         Sizes that share levels, as in `DecalIndex`.
     """
 
     def __init__(self) -> None:
         self.arrays: dict[str, NDArray[Any]] = {}
-        self.stale, self.parting = True, False
+        self.stale, self.nested = True, False
         self.parity, self.floor = NO_PARITY, NO_FLOOR
         self._small_edits = 0
         self._level_of: dict[int, int] = {}
@@ -72,9 +72,9 @@ class EditableIndex:
         rows = records.reshape(-1, RECORD, 4)[numbers]
         ranks = np.floor(rows[:, 1, 3]).astype(np.int32)
         index = DecalIndex.build(rows[:, 0, :3], rows[:, 0, 3], ranks)
-        if not self.parting:
+        if not self.nested:
             packed = rows.reshape(-1, 4)
-            self.parting = has_nested(index.on("cpu", records=packed, layered=True, copy=False), len(rows))
+            self.nested = has_nested(index.on("cpu", records=packed, layered=True, copy=False), len(rows))
         levels = np.zeros((MAX_LEVELS, 4), np.float32)
         levels[: index.level_count] = index.levels
         level_of = {round(math.log2(size)): i for i, size in enumerate(index.levels[:, 1].tolist())}
@@ -117,19 +117,19 @@ class EditableIndex:
         return True
 
     def check_nesting(self, records: Float32Array, count: int, changed: Int64Array) -> None:
-        """Update `parting` after a change of some of the first `count` decals."""
-        if self.parting:
+        """Update `nested` after a change of some of the first `count` decals."""
+        if self.nested:
             return
         if len(changed) > MAX_CHECKED_PAIRS // max(count, 1):
             arrays = self.arrays[LEVELS][: self.level_count], self.arrays[TABLE], self.arrays[IDS]
             indexed = indexed_decals(records, *arrays, layered=True, device="cpu")
-            self.parting = has_nested(indexed, count)
+            self.nested = has_nested(indexed, count)
             return
         found, found_on_cpu = _shared(np.zeros(1, np.int32), wp.int32)
         numbers = _shared(changed.astype(np.int32), wp.int32)[1]
         inputs = [numbers, self._indexed(records).records, found_on_cpu]
         wp.launch(loaded(find_nested_with, "cpu"), count, inputs, device="cpu")
-        self.parting = bool(found[0])
+        self.nested = bool(found[0])
 
     def remove(self, records: Float32Array, number: int, log: ChangeLog) -> None:
         """Remove a decal, whose record is still unchanged, from the lists of its cells."""

@@ -152,9 +152,9 @@ class DecalEditor:
         return self._rows.layered
 
     @property
-    def parting(self) -> bool:
-        """True if contact decals have been nested with larger ones, since the index was read first."""
-        return self._index.parting
+    def nested(self) -> bool:
+        """True if contact decals have been nested since the index was read first."""
+        return self._index.nested
 
     @property
     def limited(self) -> bool:

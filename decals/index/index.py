@@ -34,7 +34,7 @@ from decals.index.decal_cells import LEVEL_SHIFT, NO_FLOOR, NO_PARITY
 from decals.index.lookup import IndexedDecals, count_candidates, find_nested, list_candidates
 from decals.model import DEFAULT_RANK, LAYER_LIMIT, MAX_COORDINATE, Decals
 from decals.receivers import EVERYTHING
-from decals.record import DEFAULT_STIFFNESS, RECORD
+from decals.record import DEFAULT_STIFFNESS
 from decals.validation import check_range, finite_array, instance, whole_array
 
 MAX_INFLUENCE = 4.0 * MAX_COORDINATE
@@ -202,18 +202,15 @@ def indexed_decals(
     index.mask = len(table) - 1
     index.ids = wp.array(ids, dtype=wp.int32, device=device, copy=copy)
     index.stiffness = DEFAULT_STIFFNESS
-    index.parting = True
+    index.nested = True
     index.limited, index.surface = False, EVERYTHING
     index.limits = wp.zeros(0, dtype=wp.vec4, device=device)
     return index
 
 
 def has_nested(indexed: Any, count: int) -> bool:
-    """Return True if a contact decal is nested with a larger one among the first `count` of an index."""
+    """Return True if two contact decals are nested among the first `count` of an index."""
     device = indexed.records.device
-    sizes = indexed.records.numpy()[::RECORD, 3][:count]
-    if not count or sizes.min() == sizes.max():
-        return False
     found: Any = wp.zeros(1, dtype=wp.int32, device=device)
     wp.launch(loaded(find_nested, device), count, [indexed], [found], device=device)
     return bool(found.numpy()[0])

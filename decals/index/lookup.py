@@ -39,7 +39,7 @@ MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
     mask="index_mask",
     ids="index_ids",
     stiffness="decal_stiffness",
-    parting="decal_parting",
+    nested="decal_nested",
     limited="decal_limited",
     limits="decal_limits",
     surface="surface_receivers",
@@ -57,8 +57,8 @@ class IndexedDecals:
         Arrays of the index, as `decals.index.index` describes them; the table has ``mask + 1`` slots.
     stiffness
         Stiffness of elastic contact (`decals.field.elastic`).
-    parting
-        True if decals may be nested, so that elastic contact parts images; always True in Warp.
+    nested
+        True if contact decals may be nested; always True in Warp.
     limited, limits
         `decals.model.Decals.limited` and `decals.model.Decals.limits`, which are read where it is True.
     surface
@@ -73,7 +73,7 @@ class IndexedDecals:
     mask: wp.int32
     ids: wp.array(dtype=wp.int32)
     stiffness: wp.float32
-    parting: wp.bool
+    nested: wp.bool
     limited: wp.bool
     limits: wp.array(dtype=wp.vec4)
     surface: wp.int32
@@ -204,29 +204,29 @@ def list_candidates(
 
 
 @wp.func
-def parts_image(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
-    """Return True if two decals of different sizes are nested contact decals of one rank, or nearly so."""
+def are_nested_contact(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True if two decals are nested contact decals of one rank, or nearly so."""
+    rank = rank_of(decal, decals)
+    if decal == other or not is_contact_rank(rank) or rank_of(other, decals) != rank:
+        return False
     size = decals[RECORD * decal][3]
     other_size = decals[RECORD * other][3]
-    rank = rank_of(decal, decals)
-    if size == other_size or not is_contact_rank(rank) or rank_of(other, decals) != rank:
-        return False
     larger = (1.0 + NESTING_SLACK) * RIM_RADIUS * wp.max(size, other_size)
     return balls_nested(apart(decal, other, decals), RIM_RADIUS * wp.min(size, other_size), larger)
 
 
 @wp.kernel
 def find_nested(index: IndexedDecals, found: wp.array(dtype=wp.int32)):
-    """Write 1 if a contact decal is nested with a larger one.
+    """Write 1 if two contact decals are nested.
 
-    By `balls_nested`, with radii a < b, the distance of their centres is at most b/√(1 − MIN_KEPT_RADIUS²) =
+    By `balls_nested`, with radii a ≤ b, the distance of their centres is at most b/√(1 − MIN_KEPT_RADIUS²) =
     1.023 b. The larger one reaches 1.266 b, so the index lists it at the centre of the smaller one.
     """
     i = wp.tid()
     for level in range(index.level_count):
         span = cell_range(xyz(index.records[RECORD * i]), level, index)
         for j in range(span[0], span[1]):
-            if parts_image(i, index.ids[j], index.records):
+            if are_nested_contact(i, index.ids[j], index.records):
                 found[0] = 1
 
 
@@ -237,5 +237,5 @@ def find_nested_with(
     """Write 1 if a contact decal is nested with one of the changed ones."""
     i = wp.tid()
     for k in range(changed.shape[0]):
-        if parts_image(i, changed[k], records):
+        if are_nested_contact(i, changed[k], records):
             found[0] = 1

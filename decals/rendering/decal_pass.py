@@ -97,7 +97,7 @@ class DecalPass:
                 contact,
                 layered=decals.layered,
                 limited=limited,
-                parting=decals.parting,
+                nested=decals.nested,
                 filtered=filtered,
             )
         shining = materials is not None and decals is not None
@@ -203,13 +203,13 @@ FILTER_FUNCTIONS = (
 
 @cache
 def decal_library(
-    contact: AnyContact, *, layered: bool, limited: bool, parting: bool, filtered: bool = False
+    contact: AnyContact, *, layered: bool, limited: bool, nested: bool, filtered: bool = False
 ) -> str:
     """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
     constants = (
         f"const float RIM = {float(RIM)!r};\n"
         f"const int decal_contact = {int(contact)};\n"
-        f"const bool decal_parting = {str(parting and int(contact) == Contact.ELASTIC).lower()};\n"
+        f"const bool decal_nested = {str(nested and contact in (Contact.RADIAL, Contact.ELASTIC)).lower()};\n"
         f"const bool decal_limited = {str(limited).lower()};\n"
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"

@@ -221,7 +221,7 @@ def _editor_formulas(decals: Decals | DecalEditor) -> tuple[object, ...]:
     """Return the properties of an editor's decals that decide which shader paints them."""
     if not isinstance(decals, DecalEditor):
         return ()
-    return (decals.layered, decals.limited, decals.parting, len(decals) > 0)
+    return (decals.layered, decals.limited, decals.nested, len(decals) > 0)
 
 
 def decal_version(scene: SceneLike) -> int:

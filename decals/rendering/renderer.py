@@ -396,7 +396,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
             options.contact,
             scene.decals.layered,
             is_limited(scene),
-            uploads.parting(scene),
+            uploads.nested(scene),
             _is_filtered(scene, options),
         )
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
@@ -447,6 +447,6 @@ def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
         options.contact,
         layered=scene.decals.layered,
         limited=is_limited(scene),
-        parting=uploads.parting(scene),
+        nested=uploads.nested(scene),
         filtered=_is_filtered(scene, options),
     )

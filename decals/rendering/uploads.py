@@ -292,7 +292,7 @@ class DecalData:
                 "index_ids": index.ids,
             }
             indexed = index.on("cpu", records=arrays[RECORDS], layered=decals.layered, copy=False)
-            self.parting = has_nested(indexed, len(decals))
+            self.nested = has_nested(indexed, len(decals))
         self._loop_limit.check(index, layered=decals.layered, version=self._version)
         self._textures = {
             name: DataTexture(context, array) for name, array in arrays.items() if limited or name != LIMITS
@@ -302,7 +302,7 @@ class DecalData:
     def _read_uniforms(self, decals: Decals | DecalEditor, index: DecalIndex) -> None:
         self.layered = decals.layered
         if isinstance(decals, DecalEditor):
-            self.parting = decals.parting
+            self.nested = decals.nested
         self._uniforms = {"index_level_count": index.level_count, "index_mask": index.mask}
 
     def update(self, editor: DecalEditor) -> int:
@@ -590,12 +590,12 @@ class Uploads:
             data.update(decals)
         return data
 
-    def parting(self, scene: SceneLike) -> bool:
+    def nested(self, scene: SceneLike) -> bool:
         """Return True if decals of a scene are nested, as far as known without their index."""
         if isinstance(scene.decals, DecalEditor):
-            return scene.decals.parting
+            return scene.decals.nested
         data = self._decals.find(scene.decals, is_limited(scene))
-        return data is not None and data.parting
+        return data is not None and data.nested
 
     def images(self, scene: SceneLike) -> ImageArray | None:
         """Return the images of a scene's decals; None without decals."""

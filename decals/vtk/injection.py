@@ -145,13 +145,13 @@ class Injection:
             return
         self._add_normals()  # the mapper's input may have been replaced
         subplot, data, _ = source
-        variant = subplot.contact, data.layered, data.limited, data.parting
+        variant = subplot.contact, data.layered, data.limited, data.nested
         if variant != self._variant:
             self._variant, self._code = (
                 variant,
                 _code(
                     decal_library(
-                        subplot.contact, layered=data.layered, limited=data.limited, parting=data.parting
+                        subplot.contact, layered=data.layered, limited=data.limited, nested=data.nested
                     ),
                     self._paint,
                 ),

@@ -142,7 +142,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "apart": {"other": whole(0, DECALS)},
     "is_above": {"other": whole(0, DECALS)},
     "are_nested": {"other": whole(0, DECALS)},
-    "parts_image": {"other": whole(0, DECALS)},
+    "are_nested_contact": {"other": whole(0, DECALS)},
     "size_above": {
         **{name: among(0.5, 1, 2) for name in ("size", "other_size")}, "other": whole(0, DECALS),
     },

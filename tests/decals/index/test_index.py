@@ -293,17 +293,21 @@ def test_refuses_arrays_that_are_no_decals(positions: Any, influence: Any, ranks
 
 
 def excess(decals: Decals) -> float:
-    """Greatest of ka + √(k²a² + b² − a²) − D, in b, over contact decals of a rank with radii a < b."""
+    """Greatest of ka + √(k²a² + b² − a²) − D, in b, over contact decals of a rank with radii a ≤ b."""
     radii, k = decals.radii.astype(float), 0.21
     a, b = np.minimum.outer(radii, radii), np.maximum.outer(radii, radii)
     away = np.linalg.norm(decals.positions[:, None].astype(float) - decals.positions, axis=2)
-    pairs = (a < b) & (decals.ranks[:, None] == decals.ranks) & (decals.interactions == Interaction.PUSH)
+    pairs = (
+        ~np.eye(len(decals), dtype=bool)
+        & (decals.ranks[:, None] == decals.ranks)
+        & (decals.interactions == Interaction.PUSH)
+    )
     nested = k * a + np.sqrt((k * a) ** 2 + b * b - a * a) - away
     return float((nested / b)[pairs].max(initial=-9.0))
 
 
 def test_nested_decals_are_found() -> None:
-    """At once, by an editor, and by its edits of one decal and of many; of equal ones none parts another."""
+    """At once, by an editor, and by its edits of one decal and of many."""
     rng, found = np.random.default_rng(3), []
     for case in range(150):
         count = int(rng.integers(2, 30))
@@ -320,12 +324,12 @@ def test_nested_decals_are_found() -> None:
         apart = -1000.0 * np.arange(1, count + 1)[:, None] * [1, 1, 1]
         editor = DecalEditor(decals.replace(positions=apart))
         assert editor.version
-        assert not editor.parting
+        assert not editor.nested
         if case % 3:
             editor.assign(np.arange(count), decals)
         else:
             for number in rng.permutation(count):
                 editor.assign([number], decals[[number]])
         assert editor.version
-        assert editor.parting == found[-1]
+        assert editor.nested == found[-1]
     assert 30 < sum(found) < len(found) - 30

@@ -31,10 +31,10 @@ from tests.oracles.decals import colors_at
 
 
 @pytest.mark.parametrize("filtered", [False, True])
-def test_without_nested_decals_parting_is_left_out(
+def test_without_nested_decals_their_code_is_left_out(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, filtered: bool
 ) -> None:
-    """It changes no bit, of pictures and of samples. It changes pictures of nested decals."""
+    """That changes no bit, of pictures and of samples. It changes pictures of nested decals."""
     shape, options = torus(), RenderOptions(size=SIZE, samples=1, filtered=filtered)
     dense = scattered(shape, 500, 8, radii=(0.2, 0.22))
     kept: list[int] = []
@@ -43,7 +43,9 @@ def test_without_nested_decals_parting_is_left_out(
             kept.append(row)
     assert len(kept) > 100
     nested = Decals.concatenate([dense[kept], dense[kept[:40]].replace(radii=np.full(40, 0.05))])
-    for decals, same in ((dense[kept], True), (nested, False)):
+    shifted = dense.positions[kept[:40]] + [0.0, 0.0, 0.02]
+    stacked = Decals.concatenate([dense[kept], dense[kept[:40]].replace(positions=shifted)])
+    for decals, same in ((dense[kept], True), (nested, False), (stacked, False)):
         view = replace(view_of(decals, shape), images=(Picture(quarters()),))
         first, buffers = renderer.render(view, options), renderer.buffers(view, options)
         seen = buffers.owner >= 0
@@ -51,16 +53,16 @@ def test_without_nested_decals_parting_is_left_out(
         uv = evaluate(*points).uv
         with monkeypatch.context() as patch:
             patch.setattr("decals.rendering.uploads.has_nested", lambda *_, value=same: value)
-            patch.setattr("decals.field.evaluate.index_on", index_without_parting)
+            patch.setattr("decals.field.evaluate.index_on", index_without_nested)
             other = renderer.render(replace(view, decals=decals[:]), options)
             assert (other == first).all() == same
             assert (evaluate(*points).uv == uv).all() == same
         assert has_nested(index_on(decals, "cpu"), len(decals)) != same
 
 
-def index_without_parting(*arguments: Any) -> Any:
+def index_without_nested(*arguments: Any) -> Any:
     index = index_on(*arguments)
-    index.parting = False
+    index.nested = False
     return index
 
 
