@@ -63,6 +63,29 @@ COMPILING = "compiling kernels for this machine (once)"
 _logger = logging.getLogger(__name__)
 
 
+class NotCompiled(Exception):
+    """Kernels are needed that are not compiled yet, within `without_compiling`."""
+
+
+class _Refusal(threading.local):
+    """Whether this thread may compile."""
+
+    active = False
+
+
+_refusal = _Refusal()
+
+
+@contextmanager
+def without_compiling() -> Iterator[None]:
+    """Within a ``with`` block, raise `NotCompiled` in place of compiling kernels in this thread."""
+    before, _refusal.active = _refusal.active, True
+    try:
+        yield
+    finally:
+        _refusal.active = before
+
+
 class _State:
     """What this process has loaded and compiled."""
 
@@ -111,19 +134,27 @@ def load_together(kernels: Iterable[wp.Kernel], device: Any = None) -> None:
     ------
     UnusableCache
         The kernel cache cannot be written.
+    NotCompiled
+        Some are to compile, and this thread may not.
     """
     warp_device = wp.get_device(device)
     modules = {kernel.module.name: kernel.module for kernel in kernels}
     unloaded = [module for module in modules.values() if not _is_loaded(module, warp_device)]
     if not unloaded:
         return
-    with _state.lock:
+    if not _state.lock.acquire(blocking=not _refusal.active):
+        raise NotCompiled
+    try:
         missing = [module for module in unloaded if not _is_cached(module, warp_device)]
+        if missing and _refusal.active:
+            raise NotCompiled
         if missing:
             _compile(missing, warp_device)
         for module in unloaded:
             _load(module, warp_device)
             _state.loaded[module.name, str(warp_device)] = _module_hash(module, warp_device)
+    finally:
+        _state.lock.release()
 
 
 def _is_loaded(module: wp.Module, device: wp.Device) -> bool:

@@ -541,7 +541,7 @@ class Sandbox:
         """
         with self._reported():
             actions = self._window.actions
-            flag = {"hide": "hidden", "lock": "locked"}.get(change)
+            flag = {"hide": "hidden", "lock": "locked"}.get(str(change))
             if (layer := _layer_of(key)) is not None:
                 if flag is not None:
                     actions.visibility.flag_layer(flag, layer)

@@ -1,6 +1,7 @@
 """State that the actions of one window share: selection, messages, strokes and background jobs."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int64Array
+from blobtree.kernels import NotCompiled, without_compiling
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
 from decals.editing.brushes import BrushSettings
@@ -195,13 +197,20 @@ class ActionState:
 
     def run(self, command: Command, done: Callable[[], None] | None = None) -> None:
         """Carry out a command, in the background if it takes long, then call ``done``."""
-        if takes_long(command):
-            self.background.edit(command.label, step_of(command), done)
-            return
-        self.session.do(command)
-        self.message = command.label
-        if done is not None:
+        step = step_of(command)
+        if takes_long(command) or not self._done_now(step):
+            self.background.edit(command.label, step, done)
+        elif done is not None:
             done()
+
+    def _done_now(self, step: Step) -> bool:
+        """Carry out a step and return True, or return False if kernels must be compiled for it first."""
+        try:
+            with without_compiling() if self.background.threaded else nullcontext():
+                self.message = step(self.session)
+        except NotCompiled:
+            return False
+        return True
 
     def run_latest(self, command: Command) -> None:
         """Carry out a command of a drag; errors become the message."""
@@ -210,9 +219,7 @@ class ActionState:
     def run_latest_step(self, label: str, step: Step, *, long: bool) -> None:
         """Carry out a step of a drag, in the background if it is long; errors become the message."""
         try:
-            if long:
+            if long or not self._done_now(step):
                 self.background.edit_latest(label, step)
-            else:
-                self.message = step(self.session)
         except ImplicitDecalsError as error:
             self.message = str(error)

@@ -239,7 +239,7 @@ class BackgroundJobs:
         threaded: bool,
     ) -> None:
         self._session, self._show, self._end_stroke = session, show, end_stroke
-        self._threaded = threaded
+        self.threaded = threaded
         self._edits, self._saves = Worker(), Worker(finish_at_exit=True)
         self._latest: _Request | None = None
         self._next_save: Job | None = None
@@ -265,7 +265,7 @@ class BackgroundJobs:
         InvalidEdit
             Another edit is running.
         """
-        if not self._threaded:
+        if not self.threaded:
             self._adopted(step(self._session), done)
             return
         self.require_idle()
@@ -291,7 +291,7 @@ class BackgroundJobs:
         InvalidEdit
             Another edit is running.
         """
-        if not self._threaded:
+        if not self.threaded:
             self.edit(label, step_of(work(lambda _stage, _fraction: None, lambda: False)), done)
             return
 
@@ -316,7 +316,7 @@ class BackgroundJobs:
         InvalidEdit
             Another kind of edit is running.
         """
-        if not self._threaded:
+        if not self.threaded:
             self.edit(label, step)
         elif self._following and self._edits.busy and not self._edits.cancelling:
             self._latest = _Request(label, step)
@@ -433,7 +433,7 @@ class BackgroundJobs:
 
     def _start_writing(self, job: Job) -> bool:
         """Start to write a file, and return True, or return False while another one is being written."""
-        if self._threaded:
+        if self.threaded:
             return self._saves.start(job)
         job.work(lambda _stage, _fraction: None, lambda: False)()
         return True

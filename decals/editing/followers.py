@@ -59,7 +59,7 @@ def followers(
     near = np.flatnonzero(
         inside_support(decals.positions, node_in_world(tree, path), node_in_world(item.tree, path))
     )
-    rows = anchor.on_object(near)
+    rows = anchor.on_object(near) if len(near) else near
     positions = decals.positions[rows].astype(np.float64)
     if offset.ndim == 2:
         offset = positions @ (offset[:3, :3] - np.eye(3)).T + offset[:3, 3]
@@ -68,6 +68,9 @@ def followers(
     moves = (weights * np.linalg.norm(offset, axis=-1) > 0) | (
         np.abs(item.tree(targets) - ISO) > FIELD_TOLERANCE
     )
+    if not moves.any():  # nothing to compute, or to compile
+        none = np.zeros((0, 3), np.float32)
+        return numbers[:0], SurfacePoints(none, none, np.zeros(0, np.int32))
     projected = project_without_mesh(item.tree, targets[moves])
     if projected is None:
         projected = item.surface.project(targets[moves])

@@ -14,7 +14,14 @@ import blobtree.kernels as kernels
 from blobtree.device import start_warp
 from blobtree.errors import UnusableCache
 from blobtree.file_lock import FileLock
-from blobtree.kernels import COMPILING, HEADERS, KERNEL_OPTIONS, loaded
+from blobtree.kernels import (
+    COMPILING,
+    HEADERS,
+    KERNEL_OPTIONS,
+    NotCompiled,
+    loaded,
+    without_compiling,
+)
 from blobtree.progress import reporting
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -189,3 +196,20 @@ def test_each_installation_of_warp_has_its_own_headers(
         pass
     (other,) = {*(cache / HEADERS).iterdir()} - {kept}
     assert {file.suffix for folder in (kept, other) for file in folder.iterdir()} == {".pch"}
+
+
+def test_a_thread_that_may_not_compile_raises_and_loads_what_others_compiled(cache: Path) -> None:
+    with pytest.raises(NotCompiled), without_compiling():
+        _doubled()
+    _doubled()
+    _forget()
+    with without_compiling():
+        assert _doubled() == [2.0, 5.0]
+    with ThreadPoolExecutor(1) as other, kernels._state.lock, pytest.raises(NotCompiled):
+        _forget()
+        other.submit(_refused).result()
+
+
+def _refused() -> None:
+    with without_compiling():  # does not wait for a thread that compiles
+        _doubled()

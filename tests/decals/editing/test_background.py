@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blobtree.kernels import NotCompiled
 from decals.editing import (
     Actions,
     DeleteDecals,
@@ -16,6 +17,7 @@ from decals.editing import (
     TurnDecals,
 )
 from decals.editing.background import BUSY, step_of
+from decals.editing.document import Document, Edit
 from decals.errors import InvalidEdit
 from tests.decals.editing.background import LONG, Held, finish, press, threaded
 from tests.decals.editing.scenes import digest, scene
@@ -55,6 +57,30 @@ def test_few_decals_are_changed_at_once() -> None:
     assert not actions.state.background.busy
     actions.state.end_stroke()
     assert actions.state.session.labels == ("larger",)
+
+
+class Uncompiled(ScaleDecals):
+    """A command whose kernels only other threads may compile."""
+
+    def compute(self, document: Document) -> Edit:
+        if threading.current_thread() is threading.main_thread():
+            raise NotCompiled
+        return super().compute(document)
+
+
+def test_edits_whose_kernels_are_to_compile_go_to_the_background() -> None:
+    actions = threaded()
+    state, radius = actions.state, scene().decals.radii[7]
+    state.run(Uncompiled([7], 3.0))
+    assert state.background.busy
+    finish(actions)
+    state.begin_stroke("drag")
+    state.run_latest(Uncompiled([7], 2.0))
+    assert state.background.following
+    finish(actions)
+    state.end_stroke()
+    assert state.session.document.decals[7].radii[0] == pytest.approx(6 * radius)
+    assert state.session.labels == ("scale", "drag")
 
 
 def test_what_hands_do_meanwhile_stays_and_counts() -> None:
