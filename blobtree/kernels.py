@@ -68,7 +68,7 @@ class NotCompiled(Exception):
 
 
 class _Refusal(threading.local):
-    """Whether this thread may compile."""
+    """What this thread may do: it must not compile while ``active``."""
 
     active = False
 

@@ -9,6 +9,7 @@ from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.views import PRESETS
 from decals.editing.actions import KEYS
 from decals.editing.brushes import Brush
+from decals.editing.file_actions import Video
 from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
 
 FIELD = {"density": "compact", "variant": "outlined", "hide_details": True}
@@ -219,11 +220,11 @@ def build_files(sandbox: Sandbox) -> None:
             )
             html.P(
                 "Save or export. The ending is the format: .json scene, .py script, .ply .stl .obj mesh, "
-                ".png picture.",
+                ".png picture, .gif .mp4 video.",
                 classes="text-caption mt-3 mb-1",
             )
             with html.Div(classes="d-flex ga-2 align-center"):
-                write = sandbox.write_file, "[file_name, replace_file]"
+                write = sandbox.write_file, "[file_name, replace_file, file_size, file_video]"
                 vuetify3.VTextField(
                     v_model=("file_name", ""),
                     placeholder="model.stl",
@@ -233,6 +234,21 @@ def build_files(sandbox: Sandbox) -> None:
                     **FIELD,
                 )
                 vuetify3.VBtn("Write", size="small", click=write)
+            vuetify3.VTextField(
+                v_if="/(png|jpg|gif|mp4)$/i.test(file_name)",
+                v_model=("file_size", ""),
+                label="size, such as 1920 x 1080",
+                classes="mt-2",
+                **FIELD,
+            )
+            vuetify3.VSelect(
+                v_if="/(gif|mp4)$/i.test(file_name)",
+                v_model=("file_video", "turntable"),
+                items=("videos", list(map(str, Video))),
+                label="video",
+                classes="mt-2",
+                **FIELD,
+            )
             vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists", **COMPACT)
 
 

@@ -5,6 +5,7 @@ window's session and its actions.
 """
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -36,6 +37,7 @@ from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, 
 from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.views import THREE_QUARTER, UPRIGHT
 from decals.editing.commands import AddImage
+from decals.editing.file_actions import PICTURE_SUFFIXES
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import UndoEntry
@@ -451,16 +453,24 @@ class Sandbox:
         self._window.actions.state.run(AddObject(item), added)
         self._start = {**self._start, "open": False}
 
-    def write_file(self, name: str, replace_existing: bool = False) -> None:
-        """Write a file of the folder whose suffix is the format; see `FileActions.write`."""
+    def write_file(
+        self, name: str, replace_existing: bool = False, size: object = "", video: str = "turntable"
+    ) -> None:
+        """Write a file of the folder whose suffix is the format; see `FileActions.write`.
+
+        A picture without a size, such as "1920 x 1080", is what the view shows, with its mode and overlays.
+        """
         with self._reported():
             if not isinstance(name, str) or not name.strip():
                 raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
-            suffix = Path(name).suffix.lower()
-            if suffix in (".png", ".jpg"):
-                self._save_picture(name, bool(replace_existing))
+            files, replaced = self._window.actions.files, bool(replace_existing)
+            numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
+            if len(numbers) == 2:
+                files.write(name.strip(), replaced, size=(numbers[0], numbers[1]), video=video)
+            elif Path(name).suffix.lower() in PICTURE_SUFFIXES:
+                self._save_picture(name, replaced)
             else:
-                self._window.actions.files.write(name.strip(), bool(replace_existing))
+                files.write(name.strip(), replaced, video=video)
 
     def _save_picture(self, name: str, replace_existing: bool) -> None:
         path = self._window.actions.files.inside(name)

@@ -1,6 +1,7 @@
 """Actions on files: save, save as, export, add images, and close without losing work."""
 
 from collections.abc import Callable
+from enum import StrEnum
 from os import PathLike
 from pathlib import Path
 
@@ -14,14 +15,35 @@ from decals.editing.recovery import RecoveryFile
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, is_builtin
+from decals.rendering.options import Size
+from decals.scenes.animation import VIDEO_SUFFIXES, animate, turntable
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
 from decals.scenes.meshes import write_mesh
+from decals.scenes.render import render
 from decals.scenes.scene import DecalImage, Scene
 from decals.scenes.script import write_script
+from decals.validation import member
 
 UNTITLED = "untitled"
 """Title of a scene without a file."""
+
+PICTURE_SUFFIXES = (".png", ".jpg")
+PICTURE_SIZE = (1280, 720)
+"""Width and height of pictures and videos without a size, in pixels."""
+
+
+class Video(StrEnum):
+    """What a video shows."""
+
+    TURNTABLE = "turntable"
+    """The scene from all sides."""
+    SESSION = "session"
+    """The scene at the beginning of the history, and after each entry."""
+
+
+VIDEO_RATES = {Video.TURNTABLE: 25.0, Video.SESSION: 4.0}
+"""Frames per second."""
 
 NOTHING = object()
 """Mark that no changes were discarded."""
@@ -122,9 +144,15 @@ class FileActions:
         self._state.prompt.begin(TextPrompt(f"export to ({', '.join(MESH_SUFFIXES)})", str(first), accept))
 
     def write(
-        self, text: str, replace: bool, *, suffixes: tuple[str, ...] = (".json", ".py", *MESH_SUFFIXES)
+        self,
+        text: str,
+        replace: bool,
+        *,
+        suffixes: tuple[str, ...] = (".json", ".py", *MESH_SUFFIXES, *PICTURE_SUFFIXES, *VIDEO_SUFFIXES),
+        size: Size = PICTURE_SIZE,
+        video: str = "turntable",
     ) -> None:
-        """Write the scene to a file whose suffix is the format: a scene, a Python script or a mesh.
+        """Write a file whose suffix is the format: a scene, a script, a mesh, a picture or a video.
 
         Parameters
         ----------
@@ -134,8 +162,12 @@ class FileActions:
             If False, a file that exists is an error, but for the scene's own.
         suffixes
             Suffixes that are accepted.
+        size
+            Width and height of pictures and videos, in pixels.
+        video
+            What a video shows; see `Video`.
         """
-        path = self._checked_path(text, suffixes)
+        path, shows = self._checked_path(text, suffixes), member("video", video, Video, InvalidEdit)
         own = self.path is not None and path.absolute() == Path(self.path).absolute()
         if not own:
             _refuse_to_replace(path, replace)
@@ -143,13 +175,20 @@ class FileActions:
         if suffix == ".json":
             self._save_to(path)
             return
-        scene = self._state.session.document.scene
-        camera = self.camera()
-        shown = scene if camera is None else scene.replace(camera=camera)
+        session = self._state.session
+        scene = session.document.scene
+        camera, fork = self.camera() or scene.camera, session.fork()
+        shown = scene.replace(camera=camera)
 
         def write(progress: Progress) -> None:
             if suffix == ".py":
                 write_script(shown, path)
+            elif suffix in PICTURE_SUFFIXES:
+                render(shown, size=size).save(path)
+            elif suffix in VIDEO_SUFFIXES:
+                turned = shows is Video.TURNTABLE
+                frames = turntable(shown) if turned else [s.replace(camera=camera) for s in fork.replay()]
+                animate(frames, path, size=size, rate=VIDEO_RATES[shows], progress=progress)
             else:
                 write_mesh(scene.objects, path, progress=progress)
 

@@ -375,6 +375,16 @@ class Fork(EditSession):
             self.applied += fork.applied
         return adopted
 
+    def replay(self) -> Iterator[Scene]:
+        """Undo everything, then redo it, and yield the scene at the beginning and after each entry."""
+        count = len(self.labels)
+        while self.undo() is not None:
+            pass
+        yield self.document.scene
+        for _ in range(count):
+            self.redo()
+            yield self.document.scene
+
     @property
     def small(self) -> bool:
         """True if so few decals changed that the origin can quickly repeat the edits."""

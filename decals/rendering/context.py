@@ -2,7 +2,8 @@
 
 import sys
 import threading
-from collections.abc import Iterator
+import weakref
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import cached_property
 from types import TracebackType
@@ -15,6 +16,7 @@ from decals.rendering.current_context import kept_current
 from decals.rendering.gl_libraries import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.rendering.pixel_pass import (
     COMPUTE_VERSION,
+    Compiled,
     Defines,
     PassBackend,
     Program,
@@ -31,6 +33,9 @@ from decals.shaders import Source, compose
 
 MIN_VERSION = 330
 """Version of OpenGL that is enough for everything but compute shaders; macOS ends at 410."""
+
+MAX_PROGRAMS = 32
+"""Programs that are kept without being used; without a graphics card, one takes some megabytes."""
 
 MAX_ANISOTROPY = 8.0
 """Greatest ratio of a pixel's footprint in an image at which the image is not blurred."""
@@ -115,8 +120,8 @@ class Context:
         mark_drawing()
         self.gl = gl
         self._owned = owned
-        self._programs: dict[tuple[str, str], moderngl.Program] = {}
-        self._compute_programs: dict[str, moderngl.ComputeShader] = {}
+        self._programs: dict[tuple[str, ...], Program] = {}
+        self._unused: list[Any] = []
         self.requested_backend = backend_named(gl, backend) if backend else None
         self._spare_textures: dict[tuple[tuple[int, int], str], list[moderngl.Texture]] = {}
         self.max_texture_size = int(gl.info["GL_MAX_TEXTURE_SIZE"])
@@ -190,9 +195,7 @@ class Context:
             If the driver refuses them.
         """
         key = vertex.text, fragment.text
-        if key not in self._programs:
-            self._programs[key] = compile_program(self.gl, vertex, fragment)
-        return self._programs[key]
+        return self._kept(key, lambda: compile_program(self.gl, vertex, fragment))
 
     def compute_program(self, source: Source) -> moderngl.ComputeShader:
         """Compile a compute shader, or return the program that was compiled of it before.
@@ -202,9 +205,21 @@ class Context:
         decals.shaders.CompileError
             If the driver refuses it.
         """
-        if source.text not in self._compute_programs:
-            self._compute_programs[source.text] = compile_compute(self.gl, source)
-        return self._compute_programs[source.text]
+        return self._kept((source.text,), lambda: compile_compute(self.gl, source))
+
+    def _kept(self, key: tuple[str, ...], compiled: Callable[[], Compiled]) -> Compiled:
+        """Return a program, compiled if it is not among those that were wanted last."""
+        while self._unused:
+            self._unused.pop().release()
+        program: Any = self._programs.pop(key, None)
+        if program is None:
+            program = compiled()
+        self._programs[key] = program  # the last one now
+        if len(self._programs) > MAX_PROGRAMS:
+            oldest: Any = self._programs.pop(next(iter(self._programs)))
+            weakref.finalize(oldest, self._unused.append, oldest.mglo).atexit = False
+        kept: Compiled = program
+        return kept
 
     def pixel_program(
         self, body: str, targets: int, *, slots: Slots | None = None, defines: Defines | None = None
@@ -245,11 +260,10 @@ class Context:
             return
         with self.current():
             self.clear_spare_textures()
-            programs: list[Program] = [*self._programs.values(), *self._compute_programs.values()]
-            for program in programs:
+            for program in (*self._programs.values(), *self._unused):
                 program.release()
         self._programs.clear()
-        self._compute_programs.clear()
+        self._unused.clear()
         if self._owned:
             with kept_current():
                 self.gl.release()

@@ -205,8 +205,8 @@ def test_a_thread_that_may_not_compile_raises_and_loads_what_others_compiled(cac
     _forget()
     with without_compiling():
         assert _doubled() == [2.0, 5.0]
+    _forget()
     with ThreadPoolExecutor(1) as other, kernels._state.lock, pytest.raises(NotCompiled):
-        _forget()
         other.submit(_refused).result()
 
 

@@ -95,6 +95,20 @@ def test_a_model_is_opened_changed_saved_and_opened_again(
         assert ending is None or written.startswith(ending), sandbox.status
         sandbox.write_file(name)
         assert "exists" in sandbox.status
+    sandbox.select("0")
+    sandbox.add("Point")
+    finish(window)
+    sandbox.write_file("large.png", size="64 x 48")
+    finish(window)
+    sandbox.write_file("steps.gif", size="32 x 24", video="session")
+    finish(window)
+    with Image.open(tmp_path / "large.png") as large, Image.open(tmp_path / "steps.gif") as steps:
+        assert (large.size, steps.size, getattr(steps, "n_frames", 0)) == ((64, 48), (32, 24), 2)
+    for size, video in (("0 x 5", "session"), ("9 x 9", "film"), ("9 x 9", "")):
+        sandbox.write_file("wrong.gif", size=size, video=video)
+        finish(window)
+        assert "expected" in sandbox.status
+    sandbox.perform("undo")
     assert runpy.run_path(str(tmp_path / "ball.py"))["scene"].objects[0].tree == tree
 
 

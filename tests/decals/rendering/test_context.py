@@ -74,6 +74,33 @@ def test_a_program_is_compiled_once(context: Context) -> None:
     assert context.program(*sources) is context.program(*sources)
 
 
+def test_programs_that_were_not_wanted_for_long_are_released(
+    context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAMS", 2)
+
+    def program(number: int) -> moderngl.Program:
+        text = f"#version 330 core\nout vec4 c; void main() {{ c = vec4({number}.0); }}"
+        return context.program(compose("screen.vert"), Source.named("a", text))
+
+    with context.current():
+        used = program(0)
+        for number in (1, 2, 3):
+            program(number)
+        assert len(context._programs) == 2
+        assert used.mglo not in context._unused  # still held here
+        frame = context.gl.simple_framebuffer((2, 2), dtype="f4")
+        frame.use()
+        context.gl.vertex_array(used, []).render(vertices=3)
+        assert context.gl.error == "GL_NO_ERROR"
+        held = used.mglo
+        del used
+        assert held in context._unused
+        program(4)
+        assert held not in context._unused
+        assert program(0) is program(0)
+
+
 def test_a_bad_shader_names_its_file_and_line(context: Context, tmp_path: Path) -> None:
     (tmp_path / "a.frag").write_text("//@ slot ink\nout vec4 c;\nvoid main() { c = ink(); }\n")
     ink = Source.named("ink.glsl", "vec4 ink() {\n    return vec4(missing, 1.0);\n}")
