@@ -2,6 +2,7 @@
 // the object's own colour. DECALS: there are decals; the slot holds decals.glsl. POSED: some objects are posed, and the
 // textures of rest.frag say where their pixels lie in the rest pose. TWO_TARGETS: also write owner, field and uv.
 // LIMITED: decals have receivers or fades. MATERIALS: some images have maps; color.w is then the metalness.
+// RELIEF: some images have heights; the slot relief holds relief.glsl.
 // FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl.
 //@ include camera.glsl
 //@ include pixel.glsl
@@ -21,6 +22,7 @@ uniform isampler2D object_masks;
 int surface_receivers = -1;  // mask of the object at this pixel, see decals/receivers.py
 
 //@ slot decals optional
+//@ slot relief optional
 
 // color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
 Pixel pixel_at(ivec2 texel) {
@@ -67,6 +69,12 @@ Pixel pixel_at(ivec2 texel) {
 #endif
         vec4 color = filtered_color(position, normal, right, up);
 #else
+#ifdef RELIEF
+        vec4 raised = relief_point(position, normal, ray_direction(vec2(texel) + 0.5));
+        position = raised.xyz;
+        relief_normal = relief_normal_at(position, normal);
+        float lit = relief_light_at(position, raised.w, normal);
+#endif
         DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
         vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
@@ -76,6 +84,9 @@ Pixel pixel_at(ivec2 texel) {
             pixel.material = vec4(part * normalize(material_normals.xyz), material_values.x / part);
             pixel.glow = vec4(material_glow.rgb, material_glow.a / part);
             pixel.color.w = material_values.y / part;
+#ifdef RELIEF
+            pixel.material.w += 2.0 * round(RELIEF_LEVELS * lit);
+#endif
         }
 #endif
 #endif

@@ -42,6 +42,9 @@ vec4 material_normals;
 vec2 material_values;
 vec4 material_glow;
 #endif
+#ifdef RELIEF
+vec3 relief_normal;  // at this pixel
+#endif
 
 const float OPAQUE = 0.9999;  // alpha under which no further decal is searched
 
@@ -88,6 +91,10 @@ void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3
     vec2 tilt = maps.xy / alpha;
     // The axis u, turned as the normal is on the way to the point; the inverse of `unroll_step`.
     vec3 axis = normalize(u - dot(u, n) / max(1.0 + dot(n_p, n), 1e-4) * (n_p + n));
+#ifdef RELIEF
+    axis = normalize(axis - dot(axis, relief_normal) * relief_normal);
+    n = relief_normal;
+#endif
 #ifdef POSED
     if (is_posed) {
         axis = posed_direction(axis, n);

@@ -1,6 +1,6 @@
 // The light pass, body of pixels.frag and pixels.comp: painted surface under light. The slot holds studio_light.glsl
 // or lights.glsl; both define `vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo)`, and, of a Material
-// in place of the albedo, `material_color`. MATERIAL_LIGHT: some decals have materials; the slot material is material.glsl.
+// in place of the albedo, `material_color`. MATERIAL_LIGHT: some decals have materials; the slot material is material.glsl. RELIEF: some have relief.
 //@ include pixel.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
@@ -8,6 +8,9 @@ uniform sampler2D g_paint;  // rgb: linear albedo, decals included
 #ifdef MATERIAL_LIGHT
 uniform sampler2D g_material;  // as `material` and `glow` of the decal pass
 uniform sampler2D g_glow;
+#endif
+#ifdef RELIEF
+float relief_lit;  // part of the first light, or of the studio's key, that reaches the relief
 #endif
 
 // A smooth normal may point away from the eye at a silhouette: turn it until it is just visible.
@@ -31,6 +34,10 @@ Pixel pixel_at(ivec2 texel) {
 #ifdef MATERIAL_LIGHT
     vec4 maps = texelFetch(g_material, texel, 0);
     float part = min(length(maps.xyz), 1.0);
+#ifdef RELIEF
+    relief_lit = floor(0.5 * maps.w) / RELIEF_LEVELS;
+    maps.w -= 2.0 * floor(0.5 * maps.w);
+#endif
     if (part > 0.0) {
         vec4 glow = texelFetch(g_glow, texel, 0);
         float metallic = texelFetch(g_paint, texel, 0).w;

@@ -62,6 +62,9 @@ vec3 material_color(ivec2 texel, vec3 position, vec3 normal, Material m) {
     for (int i = 0; i < light_count; i++) {
         vec3 direction;
         float strength = light_strength(i, point, direction);
+#ifdef RELIEF
+        strength *= i == 0 ? relief_lit : 1.0;
+#endif
         light += direct_light(m, toward_eye, -direction, to_linear(strength * lights[4 * i + 2].rgb));
     }
     return tone_mapped(light);

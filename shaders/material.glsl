@@ -41,7 +41,7 @@ vec3 direct_light(Material m, vec3 toward_eye, vec3 toward_light, vec3 light) {
     float visible = 0.5 / (lit * sqrt(seen * seen * (1.0 - squared) + squared)
         + seen * sqrt(lit * lit * (1.0 - squared) + squared));
     vec3 base = reflectance(m);
-    vec3 mirrored = base + (1.0 - base) * pow(1.0 - max(dot(toward_eye, halfway), 0.0), 5.0);
+    vec3 mirrored = base + (1.0 - base) * pow(1.0 - clamp(dot(toward_eye, halfway), 0.0, 1.0), 5.0);
     vec3 diffuse = (1.0 - mirrored) * (1.0 - m.metallic) * m.albedo;
     return lit * light * (diffuse + mirrored * squared / (spread * spread) * visible);
 }

@@ -2,7 +2,7 @@
 // sky over a darker ground. All in linear light.
 //@ include camera.glsl
 //@ include ambient.glsl
-const vec3 KEY_DIRECTION = vec3(-0.55, 0.75, 0.70);  // right, up, back
+//@ include key_light.glsl
 const vec3 FILL_DIRECTION = vec3(0.85, 0.10, 0.45);
 const vec3 KEY_COLOR = vec3(1.00, 0.97, 0.92);
 const vec3 FILL_COLOR = vec3(0.13, 0.14, 0.17);
@@ -13,13 +13,6 @@ const float WRAP = 0.12;       // how far the key reaches beyond its own termina
 const float KEY_SOFTNESS = 0.6;  // how far the key's light, too, is kept out of corners
 const float GLOSS = 60.0;      // Blinn-Phong exponent
 const float SHEEN = 0.22;      // strength of the highlight
-
-// Axes of the camera: right, up, back.
-mat3 camera_frame() {
-    vec3 right = normalize(ray_right.xyz);
-    vec3 up = normalize(ray_up.xyz);
-    return mat3(right, up, cross(right, up));
-}
 
 // `n` points toward the eye; `open_` is the part of the sky that the surroundings leave open, from 0 to 1.
 vec3 shade(vec3 albedo, vec3 n, vec3 toward_eye, float open_) {
@@ -62,6 +55,9 @@ vec3 material_color(ivec2 texel, vec3 position, vec3 normal, Material m) {
     vec3 fill = normalize(frame * FILL_DIRECTION);
     vec3 ambient = mix(GROUND_COLOR, SKY_COLOR, 0.5 + 0.5 * dot(m.normal, frame[1]));
     vec3 light = mix(1.0, open_, KEY_SOFTNESS) * direct_light(m, toward_eye, key, KEY_STRENGTH * KEY_COLOR);
+#ifdef RELIEF
+    light *= relief_lit;
+#endif
     light += open_ * direct_light(m, toward_eye, fill, FILL_COLOR);
     light += environment_light(m, toward_eye, ambient, open_, transpose(frame));
     return tone_mapped(light + m.emission);

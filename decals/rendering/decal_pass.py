@@ -25,7 +25,8 @@ from decals.index.lookup import next_number_below
 from decals.record import Contact, balls_nested, has_cells
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.materials import MaterialArrays
+from decals.rendering.lights import Lighting
+from decals.rendering.materials import MaterialArrays, Relief
 from decals.rendering.pixel_pass import (
     PixelPass,
     Program,
@@ -83,12 +84,14 @@ class DecalPass:
         rest: RestBuffer | None = None,
         masks: DataTexture | None = None,
         materials: MaterialArrays | None = None,
+        relief: Relief | None = None,
+        lights: Lighting | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours.
 
         ``masks`` are those of the objects, see `decals.receivers.object_mask`, for decals that are limited.
-        ``materials`` fill `material_targets` too.
+        ``materials`` fill `material_targets` too. The first of the ``lights`` casts shadows of ``relief``.
         """
         limited, library = decals is not None and decals.limited, ""
         filtered = filtered and materials is None  # maps of materials are not averaged over pixels
@@ -101,7 +104,12 @@ class DecalPass:
                 filtered=filtered,
             )
         shining = materials is not None and decals is not None
-        variant = {"limited": limited, "filtered": filtered, "materials": shining}
+        variant = {
+            "limited": limited,
+            "filtered": filtered,
+            "materials": shining,
+            "relief": shining and relief is not None,
+        }
         painting = self._pass(library, posed=rest is not None, **variant)
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
@@ -117,6 +125,9 @@ class DecalPass:
             others: dict[str, Any] = {} if materials is None else dict(materials.textures)
             if masks is not None:
                 others["object_masks"] = masks.texture
+            if relief is not None:
+                others["decal_reliefs"] = relief.texture
+                relief.use(program, lights)
             for number, (name, other) in enumerate(others.items(), unit + 1 + decals.texture_count):
                 other.use(number)
                 set_uniform(program, name, number)
@@ -156,12 +167,14 @@ def decal_program(
     limited: bool = False,
     filtered: bool = False,
     materials: bool = False,
+    relief: bool = False,
 ) -> Program:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
     file = "filtered_decals.glsl" if filtered else "decals.glsl"
     slots = {"decals": f"//@ include {file}", "functions": library} if library else {}
     variants = {"DECALS": True, "POSED": posed, "LIMITED": limited, "FILTERED": filtered}
-    variants["MATERIALS"] = materials
+    variants |= {"MATERIALS": materials, "RELIEF": relief}
+    slots |= {"relief": "//@ include relief.glsl"} if relief and library else {}
     defines = {name: value and bool(library) for name, value in variants.items()}
     return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines=defines))
 

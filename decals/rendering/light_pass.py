@@ -35,7 +35,7 @@ class LightPass:
         self.light = context.texture(size, "f2")
         self.light.repeat_x = self.light.repeat_y = False  # it may be magnified
         self._context = context
-        self._passes: dict[tuple[str, bool], PixelPass] = {}
+        self._passes: dict[tuple[object, ...], PixelPass] = {}
         self._pass(STUDIO_LIGHT)
 
     def draw(
@@ -47,14 +47,17 @@ class LightPass:
         ambient_radius: float,
         lights: Lighting | None = None,
         materials: Mapping[str, moderngl.Texture] | None = None,
+        relief: bool = False,
         part: Part = WHOLE,
     ) -> None:
         """Light some rows of a rectangle of a tile; all of the tile must be in the G-buffer.
 
         ``ambient_radius`` is the greatest distance, in the scene's units, at which surface keeps out the
-        studio light. Without ``lights`` the studio light is used. ``materials`` are the decal pass's targets.
+        studio light. Without ``lights`` the studio light is used. ``materials`` are the decal pass's targets;
+        with ``relief`` they have shadows.
         """
-        light_pass = self._pass(light_file(lights), materials=bool(materials))
+        shining = bool(materials)
+        light_pass = self._pass(light_file(lights), materials=shining, relief=shining and relief)
         program = light_pass.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_paint": paint}
         use_textures(program, textures | dict(materials or {}))
@@ -67,10 +70,10 @@ class LightPass:
             _use_lights(program, lights)
         light_pass.run(rectangle.rows(part))
 
-    def _pass(self, file: str, *, materials: bool = False) -> PixelPass:
-        key = file, materials
+    def _pass(self, file: str, **variant: bool) -> PixelPass:
+        key = file, *variant.values()
         if key not in self._passes:
-            program = light_program(self._context, file, materials=materials)
+            program = light_program(self._context, file, **variant)
             self._passes[key] = PixelPass(self._context.gl, program, [self.light])
         return self._passes[key]
 
@@ -86,12 +89,12 @@ def light_file(lights: Lighting | None) -> str:
     return STUDIO_LIGHT if lights is None else SCENE_LIGHTS
 
 
-def light_program(context: Context, file: str, *, materials: bool = False) -> Program:
+def light_program(context: Context, file: str, *, materials: bool = False, relief: bool = False) -> Program:
     """Return the program of a kind of light, by its shader file."""
     slots = {"lighting": f"//@ include {file}"}
     if materials:
         slots |= {"material": "//@ include material.glsl", "environment": environment_glsl()}
-    defines = {"MATERIAL_LIGHT": materials}
+    defines = {"MATERIAL_LIGHT": materials, "RELIEF": relief}
     return attach_camera(context.pixel_program(BODY, 1, slots=slots, defines=defines))
 
 

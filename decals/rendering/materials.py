@@ -1,4 +1,4 @@
-"""Maps of materials on the GPU, beside the images of decals: layer i holds the maps of image i."""
+"""Maps and heights of materials on the GPU, beside the images of decals: layer i belongs to image i."""
 
 from collections.abc import Iterator, Sequence
 
@@ -6,9 +6,12 @@ import moderngl
 import numpy as np
 from PIL import Image
 
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Float64Array
+from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
+from decals.rendering.lights import Lighting
 from decals.rendering.options import ImageLike, SceneLike
+from decals.rendering.pixel_pass import Program, set_uniform
 
 
 class MaterialArrays:
@@ -42,6 +45,91 @@ class MaterialArrays:
         """Release the memory."""
         for texture in self.textures.values():
             texture.release()
+
+
+STEPS_PER_RADIUS = 16
+"""Steps of a ray over the radius of the smallest decal with relief."""
+
+RELIEF_LOOKUPS = 64
+"""Most points at which heights are looked up for a pixel, see ``shaders/relief.glsl``."""
+
+
+class ReliefArray:
+    """Heights of images on the GPU: layer i holds those of image i."""
+
+    def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
+        self.texture = context.gl.texture_array((shape[1], shape[0], len(images)), 2, dtype="f4")
+        for layer, image in enumerate(images):
+            texels = np.zeros((*image.pixels.shape[:2], 2), np.float32)
+            texels[..., 1] = image.pixels[..., 3] / np.float32(255)
+            heights = _relief_texels(image)
+            if heights is not None:
+                texels[..., 0] = heights
+            region = (0, 0, layer, shape[1], shape[0], 1)
+            self.texture.write(_resized(texels, shape)[::-1].tobytes(), viewport=region)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+
+    def release(self) -> None:
+        """Release the memory."""
+        self.texture.release()
+
+
+class Relief:
+    """The relief of a scene's decals, for the decal pass.
+
+    Parameters
+    ----------
+    array
+        Heights of the scene's images.
+    scene
+        A scene with relief.
+    """
+
+    def __init__(self, array: ReliefArray, scene: SceneLike) -> None:
+        self.texture = array.texture
+        rows = scene.decals.decals if isinstance(scene.decals, DecalEditor) else scene.decals
+        ranges: Float64Array = np.zeros(
+            (len(scene.images) + 1, 2)
+        )  # the last row is for decals without image
+        for number, image in enumerate(scene.images):
+            heights = _relief_texels(image)
+            if heights is not None:
+                ranges[number] = min(float(heights.min()), 0.0), max(float(heights.max()), 0.0)
+        heights_of = ranges[rows.images] * rows.radii[:, None]
+        raised = heights_of.any(axis=1)
+        self._range = (
+            (float(heights_of[:, 0].min()), float(heights_of[:, 1].max())) if raised.any() else (0, 0)
+        )
+        self._step = float(rows.radii[raised].min()) / STEPS_PER_RADIUS if raised.any() else 1.0
+
+    def use(self, program: Program, lights: Lighting | None) -> None:
+        """Set the uniforms of a program of the decal pass but for the sampler."""
+        set_uniform(program, "relief_range", self._range)
+        set_uniform(program, "relief_step", self._step)
+        set_uniform(program, "relief_light", _first_light(lights))
+
+
+def _first_light(lights: Lighting | None) -> tuple[float, ...]:
+    """Return the light that casts shadows, in the scene's coordinates; see ``shaders/relief.glsl``."""
+    if lights is None or not lights.lights:
+        return (0.0, 0.0, 0.0, 0.0)
+    first, inverse = lights.lights[0], np.linalg.inv(lights.matrix)
+    if first.position is None:
+        return (*(-inverse[:3, :3] @ first.direction).tolist(), 1.0)
+    return (*(inverse[:3, :3] @ first.position + inverse[:3, 3]).tolist(), 2.0)
+
+
+def _relief_texels(image: ImageLike) -> Float32Array | None:
+    """Return the heights of an image in radii, times alpha; None without relief."""
+    texels: Float32Array | None = image.relief_texels() if hasattr(image, "relief_texels") else None
+    return texels
+
+
+def has_relief(scene: SceneLike) -> bool:
+    """Return True if decals of a scene have relief that is drawn: posed objects are drawn without it."""
+    posed = any(hasattr(item, "rest") for item in scene.objects)
+    return has_materials(scene) and not posed and any(getattr(image, "relief", 0.0) for image in scene.images)
 
 
 def has_materials(scene: SceneLike) -> bool:

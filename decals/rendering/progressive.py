@@ -23,6 +23,7 @@ from decals.rendering.context import DEPTH, Context
 from decals.rendering.decal_pass import DecalPass
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
+from decals.rendering.materials import has_relief
 from decals.rendering.mesh import PosedMeshDrawable
 from decals.rendering.options import RenderOptions, SceneLike, Size
 from decals.rendering.pixel_pass import GROUP
@@ -158,6 +159,8 @@ class TargetState:
         Version of the editor.
     options
         Mapping, contact mode, stiffness and lights.
+    relief
+        True if rays are followed over the surface, so that an edit may change pixels far from it.
     """
 
     objects: tuple[object, ...]
@@ -167,11 +170,12 @@ class TargetState:
     formulas: tuple[object, ...]
     version: int
     options: RenderOptions
+    relief: bool
 
     @classmethod
     def of(cls, scene: SceneLike, bounds: Bounds, tile: Tile, options: RenderOptions, *, depth: bool) -> Self:
         """Return the state of a tile of a scene; ``depth``: the targets hold the depth of all objects."""
-        decals = scene.decals
+        decals, relief = scene.decals, has_relief(scene)
         return cls(
             tuple(scene.objects),
             bounds,
@@ -185,10 +189,12 @@ class TargetState:
                 options.contact,
                 options.stiffness,
                 options.filtered,
+                options.lights if relief else None,  # the first casts shadows
                 *_editor_formulas(decals),
             ),
             decal_version(scene),
             options,
+            relief,
         )
 
     def dirty(self, previous: TargetState | None, tile: Tile) -> DirtyRegions:
@@ -210,7 +216,7 @@ class TargetState:
             return ()
         changed = editor.changed_balls(since)
         balls = None
-        if changed is not None:
+        if changed is not None and not self.relief:
             balls = affected_balls(changed, self.options.contact, editor.max_influence)
         if balls is None:
             return (Rectangle(0, 0, tile.width, tile.height),)
@@ -402,11 +408,14 @@ def plan_frame(
         rest,
         uploaded.masks,
         uploaded.materials,
+        uploaded.relief,
+        options.lights,
     )
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     materials = None if uploaded.materials is None else targets.decal_pass.material_targets
-    light_arguments = gbuffer, paint, tile, radius, options.lights, materials
+    relief = uploaded.relief is not None
+    light_arguments = gbuffer, paint, tile, radius, options.lights, materials, relief
     steps += [partial(targets.light_pass.draw, rectangle, *light_arguments) for rectangle in dirty.light]
     return FramePlan(state, steps, dirty.work(tile))
 

@@ -21,7 +21,7 @@ from decals.rendering.decal_pass import decal_library, decal_program
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.gl_libraries import is_forked
 from decals.rendering.light_pass import light_file, light_program, resolve_program
-from decals.rendering.materials import has_materials
+from decals.rendering.materials import has_materials, has_relief
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
 from decals.rendering.options import (
     RenderOptions,
@@ -390,7 +390,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     context = uploads.context
     objects = [warmup_of(context, item) for item in drawn_objects(scene)]
     has_decals, light = len(scene.decals) > 0, light_file(options.lights)
-    formulas, materials = None, has_materials(scene)
+    formulas, materials, relief = None, has_materials(scene), has_relief(scene)
     if has_decals:
         formulas = (
             options.contact,
@@ -413,13 +413,14 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
                 limited=is_limited(scene),
                 filtered=_is_filtered(scene, options),
                 materials=materials,
+                relief=relief,
             ),
         ),
-        WarmupTask(SHADERS, lambda: light_program(context, light, materials=materials)),
+        WarmupTask(SHADERS, lambda: light_program(context, light, materials=materials, relief=relief)),
         WarmupTask(SHADERS, partial(depth_program, context)),
         WarmupTask(SHADERS, partial(resolve_program, context)),
     ]
-    return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light, materials), tasks)
+    return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light, materials, relief), tasks)
 
 
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:

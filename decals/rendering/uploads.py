@@ -21,7 +21,14 @@ from decals.model import Decals
 from decals.receivers import object_mask
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.materials import MaterialArrays, has_materials
+from decals.rendering.materials import (
+    RELIEF_LOOKUPS,
+    MaterialArrays,
+    Relief,
+    ReliefArray,
+    has_materials,
+    has_relief,
+)
 from decals.rendering.options import SceneLike, check_scene, drawn_objects, is_limited
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
@@ -272,13 +279,19 @@ def _iterations(lengths: Int64Array, *, layered: bool) -> int:
 
 
 class DecalData:
-    """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them."""
+    """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them.
 
-    def __init__(self, context: Context, decals: Decals | DecalEditor, *, limited: bool = False) -> None:
+    ``lookups`` is the number of points that are looked up for a pixel.
+    """
+
+    def __init__(
+        self, context: Context, decals: Decals | DecalEditor, *, limited: bool = False, lookups: int = 1
+    ) -> None:
         self._context = context
         self.limited = limited
         self._version = 0
-        self._loop_limit = LoopLimit(context.max_loop_iterations)
+        iterations = context.max_loop_iterations
+        self._loop_limit = LoopLimit(None if iterations is None else iterations // lookups)
         if isinstance(decals, DecalEditor):
             self._version = decals.version
             arrays, index = decals.arrays, decals.index
@@ -517,6 +530,7 @@ class UploadedScene:
     images: ImageArray | None
     masks: DataTexture | None = None
     materials: MaterialArrays | None = None
+    relief: Relief | None = None
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -539,6 +553,7 @@ class Uploads:
         self._decals: GpuCache[DecalData] = GpuCache()
         self._images: GpuCache[ImageArray] = GpuCache()
         self._materials: GpuCache[MaterialArrays] = GpuCache()
+        self._reliefs: GpuCache[ReliefArray] = GpuCache()
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
 
     def scene(self, scene: SceneLike) -> UploadedScene:
@@ -548,7 +563,9 @@ class Uploads:
         drawables = [self.drawable(item) for item in objects]
         masks = self._masks_of(scene, objects)
         images = self.images(scene)
-        return UploadedScene(drawables, self.decals(scene), images, masks, self._materials_of(scene, images))
+        materials = self._materials_of(scene, images)
+        relief = self._relief_of(scene, images)
+        return UploadedScene(drawables, self.decals(scene), images, masks, materials, relief)
 
     def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArrays | None:
         """Return the maps of a scene's images; None without any."""
@@ -558,6 +575,16 @@ class Uploads:
         return self._materials.get(
             lambda: MaterialArrays(self.context, scene.images, shape), images, *scene.images
         )
+
+    def _relief_of(self, scene: SceneLike, images: ImageArray | None) -> Relief | None:
+        """Return the relief of a scene's decals; None without any."""
+        if images is None or not has_relief(scene):
+            return None
+        shape = images.height, images.width
+        array = self._reliefs.get(
+            lambda: ReliefArray(self.context, scene.images, shape), images, *scene.images
+        )
+        return Relief(array, scene)
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
         """Return the masks of objects of a scene; None if its decals are not limited."""
@@ -585,7 +612,13 @@ class Uploads:
         if not len(decals):
             return None
         limited = is_limited(scene)
-        data = self._decals.get(lambda: DecalData(self.context, decals, limited=limited), decals, limited)
+        lookups = RELIEF_LOOKUPS if has_relief(scene) else 1
+        data = self._decals.get(
+            lambda: DecalData(self.context, decals, limited=limited, lookups=lookups),
+            decals,
+            limited,
+            lookups,
+        )
         if isinstance(decals, DecalEditor):
             data.update(decals)
         return data
@@ -594,7 +627,8 @@ class Uploads:
         """Return True if decals of a scene are nested, as far as known without their index."""
         if isinstance(scene.decals, DecalEditor):
             return scene.decals.nested
-        data = self._decals.find(scene.decals, is_limited(scene))
+        lookups = RELIEF_LOOKUPS if has_relief(scene) else 1
+        data = self._decals.find(scene.decals, is_limited(scene), lookups)
         return data is not None and data.nested
 
     def images(self, scene: SceneLike) -> ImageArray | None:
@@ -606,11 +640,11 @@ class Uploads:
 
     def sweep(self) -> None:
         """Release everything that was not used since the last sweep."""
-        for cache in (self._drawables, self._decals, self._images, self._materials):
+        for cache in (self._drawables, self._decals, self._images, self._materials, self._reliefs):
             cache.sweep()
 
     def release(self) -> None:
         """Release everything."""
-        for cache in (self._drawables, self._decals, self._images, self._materials):
+        for cache in (self._drawables, self._decals, self._images, self._materials, self._reliefs):
             cache.release()
         self._release_masks()

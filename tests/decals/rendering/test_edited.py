@@ -15,13 +15,13 @@ from decals.rendering.renderer import Renderer
 from decals.rendering.uploads import DecalData
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import DEFAULT_DIRECTION, Camera
-from decals.scenes.objects import TreeObject
+from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
 
 
 @dataclass
 class EditedScene:
-    objects: tuple[TreeObject, ...]
+    objects: tuple[MeshObject | TreeObject, ...]
     decals: DecalEditor
     images: tuple[DecalImage, ...]
     camera: Camera
