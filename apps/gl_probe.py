@@ -9,7 +9,7 @@ from typing import Any
 
 import moderngl
 
-from decals.rendering.gl_libraries import require_gl
+from blobtree.graphics import require_gl
 
 OLDEST_GL = 210
 GLSL_VERSIONS = (460, 450, 440, 430, 420, 410, 400, 330)

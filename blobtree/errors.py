@@ -14,6 +14,7 @@
     │   ├── UntranslatableFunction            a typed function outside the subset that GLSL shares
     │   └── (decals.errors adds its own)
     ├── MissingPackage(ImportError)           an optional package is not installed
+    ├── NoGraphics(RuntimeError)              no usable OpenGL or no screen; the message says what to do
     ├── UnusableCache                         the folder of compiled kernels cannot be written
     └── Cancelled                             the caller's `cancel` stopped the work
 
@@ -63,6 +64,10 @@ class UntranslatableFunction(InvalidInput):
 
 class MissingPackage(ImplicitDecalsError, ImportError):
     """An optional package is not installed."""
+
+
+class NoGraphics(ImplicitDecalsError, RuntimeError):
+    """No usable OpenGL on this machine, or no screen for a window; the message says what to do."""
 
 
 class UnusableCache(ImplicitDecalsError):

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
+from blobtree.graphics import opens_window
+
 LINE_COLORS = {"lines": (255, 255, 255), "surface": (30, 34, 40)}
 """Colours of the iso-lines in a plot, uint8."""
 
@@ -34,6 +36,11 @@ class FieldSlice(pv.MultiBlock):
         -------
         object
             Result of `pyvista.plot`.
+
+        Raises
+        ------
+        NoGraphics
+            There is no screen for the window.
         """
         blocks: dict[str, Any] = dict(zip(self.keys(), self, strict=True))
         plane = blocks["plane"]
@@ -47,4 +54,5 @@ class FieldSlice(pv.MultiBlock):
                     lines.point_data[COLOR_ARRAY] = colors
                     lines.set_active_scalars(COLOR_ARRAY)
                     shown.append(lines)
+        opens_window(options)
         return pv.plot(shown, **{"lighting": False, "line_width": LINE_WIDTH, **options})

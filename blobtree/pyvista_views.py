@@ -15,7 +15,7 @@ from blobtree.errors import InvalidPoints, InvalidResolution, MissingPackage
 from blobtree.files import replacing, write_atomically
 from blobtree.formulas.falloff import ISO
 from blobtree.tape.model import ImplicitModel
-from blobtree.validation import finite_number, finite_vector, items, shown
+from blobtree.validation import finite_number, finite_vector, is_whole, items, shown
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -159,7 +159,7 @@ def slice_tree(
     from blobtree.field_slice import FieldSlice
 
     levels = _levels(values)
-    if not isinstance(resolution, int | np.integer) or not 1 <= resolution <= MAX_SQUARES:
+    if not is_whole(resolution) or not 1 <= resolution <= MAX_SQUARES:
         raise InvalidResolution(
             f"resolution: expected a whole number of squares from 1 to {MAX_SQUARES}, got {resolution!r}"
         )

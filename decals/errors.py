@@ -12,7 +12,7 @@
     │   ├── InvalidScene                      a scene or scene file that is not consistent
     │   ├── InvalidEdit                       a command that the document cannot take
     │   └── TooMuchData                       more than fits into a texture of this graphics card
-    └── NoGraphics(RuntimeError)              no usable OpenGL; the message says what to install
+    └── (blobtree.errors has the others)
 """
 
 from blobtree.errors import (
@@ -22,6 +22,7 @@ from blobtree.errors import (
     InvalidInput,
     InvalidPoints,
     MissingPackage,
+    NoGraphics,
 )
 
 __all__ = [
@@ -73,7 +74,3 @@ class InvalidEdit(InvalidInput):
 
 class TooMuchData(InvalidInput):
     """More decals, or a larger tree, than fit into a texture of this graphics card."""
-
-
-class NoGraphics(ImplicitDecalsError, RuntimeError):
-    """No usable OpenGL on this machine; the message says what to install."""

@@ -15,8 +15,8 @@ import api_pages  # noqa: E402
 import node_pages  # noqa: E402
 from gallery_scripts import GalleryArguments, PictureScraper  # noqa: E402
 
+from blobtree.graphics import missing_gl_libraries  # noqa: E402
 from decals.apps.gallery import DOWNLOADED  # noqa: E402
-from decals.rendering.gl_libraries import missing_gl_libraries  # noqa: E402
 
 project = "Implicit Decals"
 author = "Implicit Decals contributors"

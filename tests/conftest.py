@@ -8,7 +8,7 @@ import pytest
 import blobtree.kernels as kernels
 from blobtree.custom import definition
 from blobtree.formulas.falloffs import FALLOFF_NAMES
-from decals.rendering.gl_libraries import missing_gl_libraries
+from blobtree.graphics import missing_gl_libraries
 
 gc.disable()  # until all tests are collected: a fifth of the time would be spent on looking for garbage
 

@@ -20,7 +20,7 @@ FORBIDDEN = {
     "shaders": {"blobtree", "decals", "decals.apps", *DRAWING},
     "apps": {"tests"},
 }
-PYVISTA_FILES = ("colors.py", "tree.py", "pyvista_views.py", "field_slice.py", "vtk_errors.py")
+PYVISTA_FILES = ("colors.py", "tree.py", "pyvista_views.py", "field_slice.py", "graphics.py", "vtk_errors.py")
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
 PAGES = "connections.py", "lab.py", "page.py", "panels.py", "sandbox.py", "sessions.py", "view.py"

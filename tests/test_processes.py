@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from blobtree.graphics import install_advice, missing_gl_libraries
 
 TIME_LIMIT = 120.0
 """Seconds after which a child counts as hung."""

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from blobtree import Progress
 from blobtree._typing import Float32Array, Int32Array
+from blobtree.graphics import require_screen
 from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
 from decals.apps.commands.activation import command_lines
 from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, parse_size
@@ -23,7 +24,6 @@ from decals.apps.output import check_output, make_folder, print_path
 from decals.errors import NoGraphics
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
-from decals.vtk.screen import require_screen
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 

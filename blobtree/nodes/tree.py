@@ -22,6 +22,7 @@ from blobtree.derivatives.curvature import Curvatures, curvatures_of, hessians_a
 from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
 from blobtree.formulas.warps import TWIST, SpaceWarp
+from blobtree.graphics import opens_window
 from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
@@ -919,6 +920,8 @@ class Node(ImplicitModel):
             The resolution is not a usable number of cells.
         MissingPackage
             pyvista is not installed.
+        NoGraphics
+            There is no screen for the window.
 
         Examples
         --------
@@ -928,6 +931,7 @@ class Node(ImplicitModel):
         surface = self.to_pyvista(resolution=resolution)
         if not surface.n_points:
             raise InvalidNode("expected a tree with a surface, got none; its parts may be too small")
+        opens_window(options)
         colors = {} if "color" in options else {"scalars": "RGB", "rgb": True}
         return surface.plot(**{**colors, **options})
 

@@ -11,9 +11,9 @@ from typing import Any, Self
 
 import moderngl
 
+from blobtree.graphics import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.errors import NoGraphics
 from decals.rendering.current_context import kept_current
-from decals.rendering.gl_libraries import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.rendering.pixel_pass import (
     COMPUTE_VERSION,
     Compiled,

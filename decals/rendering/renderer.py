@@ -13,13 +13,13 @@ from typing import Self
 import numpy as np
 
 from blobtree._typing import UInt8Array
+from blobtree.graphics import is_forked
 from blobtree.progress import reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.decal_pass import decal_library, decal_program
 from decals.rendering.gbuffer import depth_program
-from decals.rendering.gl_libraries import is_forked
 from decals.rendering.light_pass import light_file, light_program, resolve_program
 from decals.rendering.materials import has_materials, has_relief
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable

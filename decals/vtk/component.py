@@ -13,6 +13,7 @@ import pyvista as pv
 
 from blobtree import Node
 from blobtree.colors import ColorLike
+from blobtree.graphics import opens_window, vtk_warnings_hidden
 from decals.errors import InvalidScene, NoGraphics
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
@@ -30,7 +31,6 @@ from decals.vtk.adapters import Lights
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.exports import restore_exports, warn_of_exports
 from decals.vtk.frame import WindowContext
-from decals.vtk.screen import require_screen
 from decals.vtk.subplot import PickResult, SubplotRenderer
 
 UNUSED_CAMERA = Camera((0.0, 0.0, 1.0))
@@ -415,9 +415,6 @@ SERVING = ("trame_pyvista", "ipywidgets", "nest_asyncio2")
 """Packages that pyvista needs for this backend; the extra ``browser`` installs them."""
 
 
-STILL = {"screenshot", "return_img", "interactive", "auto_close"}
-"""Options of ``Plotter.show`` for pictures, which have all samples at once."""
-
 REFINE_MILLISECONDS = 100
 """Time after the first picture of a window until the one with all samples."""
 
@@ -478,10 +475,9 @@ def show(scene: Scene | SceneObject | Model | Sequence[SceneObject | Model], **o
     >>> decals.show(scene)  # doctest: +SKIP
     """
     shown = as_scene(scene)
-    plotter = pv.Plotter()
-    in_window = not plotter.off_screen and not plotter.notebook and not STILL & options.keys()
-    if in_window:
-        require_screen()
+    in_window = opens_window(options)
+    with vtk_warnings_hidden():
+        plotter = pv.Plotter()
     component: DecalsComponent = plotter.decals
     component.add_scene(shown, camera=True)
     if in_window:

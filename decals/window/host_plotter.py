@@ -12,6 +12,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
+from blobtree.graphics import require_screen, vtk_warnings_hidden
 from decals.editing.document import Document
 from decals.editing.pointer_tools import Ray
 from decals.errors import InvalidScene
@@ -19,7 +20,6 @@ from decals.rendering.options import STUDIO, Background
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
-from decals.vtk.screen import require_screen
 from decals.vtk.subplot import SubplotRenderer
 
 DEFAULT_SIZE = (1200, 800)
@@ -221,7 +221,8 @@ def new_plotter(off_screen: bool, size: tuple[int, int]) -> Any:
     """
     if not off_screen:
         require_screen()
-    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title=TITLE)
+    with vtk_warnings_hidden():
+        plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), title=TITLE)
     plotter.disable_anti_aliasing()
     show_background(plotter, STUDIO)
     return plotter

@@ -11,6 +11,7 @@ import pyvista as pv
 
 import decals.vtk  # noqa: F401  (registers `plotter.decals`)
 from blobtree._typing import Float32Array
+from blobtree.graphics import require_gl, require_screen
 from blobtree.progress import displayed, in_notebook
 from decals.editing.actions import Actions
 from decals.editing.background import BackgroundJobs
@@ -20,7 +21,6 @@ from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.rendering.gl_libraries import require_gl
 from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
 from decals.scenes.objects import SceneObject
@@ -28,7 +28,6 @@ from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 from decals.validation import describe, whole_number
 from decals.vtk.adapters import weak_callback
-from decals.vtk.screen import require_screen
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
 from decals.vtk.window_title import WindowTitle
 from decals.window.event_bindings import TICK_MILLISECONDS, AsyncTicker, EventBindings, running_loop

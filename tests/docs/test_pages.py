@@ -18,10 +18,10 @@ from cyclopts import CycloptsError
 from PIL import Image
 
 from blobtree import Point, load, polygonize
+from blobtree.graphics import install_advice, missing_gl_libraries
 from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.apps.cli import app
-from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
 from decals.rendering.options import Drawing, RenderOptions
 from tests.decals.baking.glb import need
 from tests.docs import published

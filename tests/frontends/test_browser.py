@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from blobtree.graphics import install_advice, missing_gl_libraries
 from tests.display import run_module
 
 pytestmark = pytest.mark.browser

@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
-from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from blobtree.graphics import install_advice, missing_gl_libraries
 
 if TYPE_CHECKING:
 

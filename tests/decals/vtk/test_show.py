@@ -67,6 +67,7 @@ def test_showing_hands_over_to_pyvista(
 
     plotter()
     monkeypatch.setattr(pv.Plotter, "show", shown)
+    monkeypatch.setattr(pv, "OFF_SCREEN", True)
     monkeypatch.setattr(viewer, "find_spec", lambda name: object() if name in served else None)
     real = pv.Plotter
     monkeypatch.setattr(pv, "Plotter", lambda: real(off_screen=True, notebook=notebook))

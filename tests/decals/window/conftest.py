@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from decals.rendering.gl_libraries import install_advice, missing_gl_libraries
+from blobtree.graphics import install_advice, missing_gl_libraries
 from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 from tests.decals.window.driver import Driver

@@ -10,6 +10,7 @@ import pytest
 import pyvista as pv
 
 import decals
+from blobtree import Point
 from decals import render
 from decals.errors import InvalidScene, NoGraphics
 from decals.window import EditWindow, edit
@@ -40,9 +41,16 @@ def test_without_a_screen_a_window_says_so(monkeypatch: pytest.MonkeyPatch) -> N
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(pv, "OFF_SCREEN", False)
-    for opened in (edit, decals.show):
+    ball = Point((0, 0, 0), radius=1.0)
+    for opened in (
+        lambda: edit(scene()),
+        lambda: decals.show(scene()),
+        lambda: ball.plot(resolution=8),
+        lambda: ball.slice(resolution=8).plot(),
+    ):
         with pytest.raises(NoGraphics, match="DISPLAY is not set"):
-            opened(scene())
+            opened()
+    assert np.asarray(ball.plot(resolution=8, off_screen=True, return_img=True)).std() > 1
 
 
 def test_the_background_is_that_of_a_rendered_picture() -> None:

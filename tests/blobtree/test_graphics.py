@@ -2,16 +2,16 @@ from pathlib import Path
 
 import pytest
 
-from decals.errors import NoGraphics
-from decals.rendering.gl_libraries import (
+from blobtree.graphics import (
     GL_LIBRARIES,
     Loader,
     install_advice,
     missing_gl_libraries,
     require_gl,
 )
+from decals.errors import NoGraphics
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 
 
 def loader_without(*absent: str) -> Loader:

@@ -1,20 +1,26 @@
-"""The system libraries that OpenGL needs: a check before anything draws.
+"""What drawing needs of the system: OpenGL's libraries, a process of its own, and a screen for a window.
 
-VTK dies with a segmentation fault where it finds none of them, so everything that renders
-calls :func:`require_gl` first.
+VTK dies with a segmentation fault where it finds no library of OpenGL, so everything that renders
+calls :func:`require_gl` first. Without a screen it draws off screen and returns, so everything that opens
+a window calls :func:`require_screen` first.
 """
 
 import ctypes
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any
 
-from decals.errors import NoGraphics
+from blobtree.errors import NoGraphics
+from blobtree.progress import in_notebook
 
 GL_LIBRARIES: Mapping[str, str] = MappingProxyType({"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"})
 """Libraries loaded at run time on Linux, each with the Debian package that has it."""
+
+OFF_SCREEN_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+"""VTK's windows that no screen shows; on Linux, VTK takes one of them if there is no X server."""
 
 Loader = Callable[[str], object]
 """Loads a shared library by name, or raises `OSError`."""
@@ -65,7 +71,7 @@ def require_gl(*, load: Loader = ctypes.CDLL, platform: str = sys.platform) -> N
 
     Raises
     ------
-    decals.errors.NoGraphics
+    NoGraphics
         With what was expected, what is here, and the command that installs the rest; also in a process
         that was forked after its parent had drawn.
     """
@@ -76,6 +82,68 @@ def require_gl(*, load: Loader = ctypes.CDLL, platform: str = sys.platform) -> N
             f"drawing needs the system libraries {' and '.join(GL_LIBRARIES)}; "
             f"{' and '.join(missing)} cannot be loaded here. {install_advice(missing)}."
         )
+
+
+@contextmanager
+def vtk_warnings_hidden() -> Iterator[None]:
+    """Within a ``with`` block, VTK makes windows without its warning that no X server answers."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    shown = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.GlobalWarningDisplayOff()
+    try:
+        yield
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+
+
+def require_screen() -> None:
+    """Raise `NoGraphics` if there is no screen for a window; VTK would silently draw off screen."""
+    if not sys.platform.startswith("linux"):
+        return
+    reason = "DISPLAY is not set"
+    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        require_gl()
+        from vtkmodules.vtkRenderingCore import vtkRenderWindow
+
+        with vtk_warnings_hidden():
+            if vtkRenderWindow().GetClassName() not in OFF_SCREEN_WINDOWS:
+                return
+        reason = f"no X server answers at DISPLAY={os.environ.get('DISPLAY', '')!r}"
+    raise NoGraphics(
+        f"expected a screen for the window, got none ({reason}); log in with a desktop, "
+        "use `ssh -X`, or draw pictures with `implicit-decals render`"
+    )
+
+
+STILL = {"screenshot", "return_img", "interactive", "auto_close"}
+"""Options of pyvista's ``plot`` and ``show`` for pictures, which need no screen."""
+
+
+def opens_window(options: Mapping[str, Any]) -> bool:
+    """Return True if pyvista's ``plot`` or ``show`` opens a window with these options; check for a screen.
+
+    Parameters
+    ----------
+    options : mapping
+        The arguments by name. Pictures, off-screen plotters and notebooks need no window.
+
+    Raises
+    ------
+    NoGraphics
+        There is no screen for the window, where VTK would silently draw off screen.
+    """
+    import pyvista as pv
+
+    defaults = {"off_screen": pv.OFF_SCREEN, "notebook": pv.global_theme.notebook}
+    chosen = {name: options.get(name) for name in defaults}
+    off_screen, notebook = (defaults[name] if value is None else value for name, value in chosen.items())
+    if notebook is None:
+        notebook = in_notebook()
+    if off_screen or notebook or pv.ON_SCREENSHOT or STILL & options.keys():
+        return False
+    require_screen()
+    return True
 
 
 def _loads(name: str, load: Loader) -> bool:
@@ -108,7 +176,7 @@ def check_not_forked() -> None:
 
     Raises
     ------
-    decals.errors.NoGraphics
+    NoGraphics
         A call of the driver would wait forever.
     """
     if _Process.forked:
