@@ -27,6 +27,7 @@ from blobtree.custom.warp import CustomWarp
 from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.files import write_atomically
 from blobtree.formulas.falloff import WYVILL, Falloff
+from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import parameters_of
@@ -251,7 +252,7 @@ def from_json(text: bytes | str) -> Node:
     except TypeError:
         raise InvalidFile(f"expected JSON as text or bytes, got {type(text).__name__}") from None
     except (msgspec.DecodeError, UnicodeError) as error:
-        raise InvalidFile(f"not a BlobTree of version {VERSION}: {error}") from None
+        raise InvalidFile(f"not a BlobTree of version {VERSION}: {json_reason(error, text)}") from None
     except RecursionError:
         raise InvalidFile("not a BlobTree: nested too deeply") from None
     return from_tree_file(file)

@@ -35,6 +35,7 @@ import msgspec
 from msgspec import Raw, Struct
 
 from blobtree.files import write_atomically
+from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
@@ -314,13 +315,9 @@ def _decode(text: bytes) -> _SceneRecord:
             )
         return msgspec.json.decode(text, type=_SceneRecord)
     except RecursionError:
-        raise InvalidScene("expected a scene, but the file is nested too deeply; correct the file") from None
+        raise InvalidScene(f"not a scene of version {VERSION}: nested too deeply") from None
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise InvalidScene(f"expected a scene, but {_lower_first(str(error))}; correct the file") from error
-
-
-def _lower_first(text: str) -> str:
-    return text[:1].lower() + text[1:]
+        raise InvalidScene(f"not a scene of version {VERSION}: {json_reason(error, text)}") from error
 
 
 def _decal_records(decals: Decals, tell: Progress) -> Iterator[DecalRecord]:

@@ -3,6 +3,7 @@
 VTK's readers of most formats crash or hang on some damaged files, so they run in a process of their own.
 """
 
+import re
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -155,13 +156,14 @@ def read_dataset(path: Path) -> "pv.DataSet | pv.MultiBlock":
 
     from blobtree.vtk_errors import vtk_errors
 
+    cause = None
     try:
         with vtk_errors() as errors:
             dataset = _read_legacy(path) if path.suffix.lower() == ".vtk" else pv.read(path)
     except Exception as error:  # readers and their plugins raise all sorts of exceptions
-        raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(str(error))})") from error
+        errors, cause = [str(error)], error
     if errors:
-        raise InvalidMesh(f"could not read {str(path)!r} as a mesh ({_reason(errors[0])})")
+        raise _unreadable(path, errors[0]) from cause
     # An image or a point set has no boundary that is a surface.
     if not isinstance(dataset, pv.PolyData | pv.UnstructuredGrid | pv.StructuredGrid | pv.MultiBlock):
         raise InvalidMesh(f"expected a surface mesh in {str(path)!r}, got {describe(dataset)}; convert it")
@@ -183,6 +185,14 @@ def _read_legacy(path: Path) -> "pv.DataSet | pv.MultiBlock":
     return dataset
 
 
-def _reason(text: str) -> str:
-    line = (text.strip().splitlines() or [""])[0].rstrip(".")
-    return "it is damaged or of another format" if not line or line.startswith("Algorithm vtk") else line
+def _unreadable(path: Path, text: str) -> InvalidMesh:
+    """Return the exception for a file that a reader of VTK or pyvista refused with a text."""
+    line = (text.strip().splitlines() or [""])[0].rstrip('.!"')
+    if "automatically read by pyvista" in line:
+        return InvalidMesh(
+            f"expected a mesh file, got {str(path)!r}: no reader is known for {path.suffix or 'its name'!r}; "
+            "convert it to .ply, .obj or .stl"
+        )
+    if not line or re.match(r"Algorithm vtk|(VTKExecutionError: )?ERROR: In vtk", line):
+        line = "it is damaged or of another format"
+    return InvalidMesh(f"could not read {str(path)!r} as a mesh ({line}); export it again")

@@ -129,43 +129,49 @@ BROKEN: dict[str, tuple[str, str]] = {
     "no nodes": (document(), "nodes: expected at least one node, got none"),
     "a wrong version": (
         document(BALL, version=2),
-        r"not a BlobTree of version 1: Invalid enum value 2 - at `\$.version`",
+        r"not a BlobTree of version 1: version: unknown value 2$",
     ),
     "a wrong format": (
         document(BALL, format="scene"),
-        r"not a BlobTree of version 1: Invalid enum value 'scene'",
+        r"not a BlobTree of version 1: format: unknown value 'scene'$",
     ),
-    "an unknown field": (document({**BALL, "colour": 1}), r"unknown field `colour` - at `\$.nodes\[0\]`"),
-    "an unknown field outside": (document(BALL, author="x"), r"unknown field `author`"),
+    "an unknown field": (
+        document({**BALL, "colour": 1}),
+        r"0\]: there is no field 'colour'; remove it$",
+    ),
+    "an unknown field outside": (document(BALL, author="x"), "1: there is no field 'author'; remove it$"),
     "an unknown type": (
         document(BALL, {**BALL, "type": "teapot"}),
-        r"Invalid value 'teapot' - at `\$.nodes\[1\].type`",
+        r"nodes\[1\].type: unknown value 'teapot'$",
     ),
-    "no type": (document({"radius": 1}), r"missing required field `type` - at `\$.nodes\[0\]`"),
+    "no type": (document({"radius": 1}), r"nodes\[0\]: the field 'type' is missing$"),
     "a missing field": (
         document({"type": "point", "center": [0, 0, 0]}),
-        r"missing required field `radius` - at `\$.nodes\[0\]`",
+        r"nodes\[0\]: the field 'radius' is missing$",
     ),
     "two coordinates": (
         document({**BALL, "center": [0, 0]}),
-        r"Expected `array` of length 3 - at `\$.nodes\[0\].center`",
+        r"nodes\[0\].center: expected a list of 3 values$",
     ),
     "a word for a number": (
         document({**BALL, "radius": "1"}),
-        r"Expected `float`, got `str` - at `\$.nodes\[0\].radius`",
+        r"nodes\[0\].radius: expected a number, got a text$",
     ),
-    "NaN": (document({**BALL, "radius": float("nan")}), "not a BlobTree of version 1: JSON is malformed"),
+    "NaN": (
+        document({**BALL, "radius": float("nan")}),
+        "valid JSON: invalid character at line 1, column ",
+    ),
     "a place that is no integer": (
         document(BALL, {"type": "sum", "operands": [0.5]}),
-        r"\$.nodes\[1\].operands\[0\]",
+        r"nodes\[1\].operands\[0\]: expected a whole number, got a number$",
     ),
-    "truncated": (document(BALL)[:-20], "not a BlobTree of version 1: Input data was truncated"),
-    "empty": ("", "not a BlobTree of version 1: Input data was truncated"),
-    "no JSON": ("solid cube", "not a BlobTree of version 1: JSON is malformed"),
-    "a list": ("[]", "not a BlobTree of version 1: Expected `object`, got `array`"),
-    "null": ("null", "not a BlobTree of version 1: Expected `object`, got `null`"),
+    "truncated": (document(BALL)[:-20], "not a BlobTree of version 1: the file ends too early$"),
+    "empty": ("", "not a BlobTree of version 1: the file is empty$"),
+    "no JSON": ("solid cube", "it is not valid JSON: invalid character at line 1, column 1$"),
+    "a list": ("[]", "not a BlobTree of version 1: expected an object in braces, got a list$"),
+    "null": ("null", "not a BlobTree of version 1: expected an object in braces, got null$"),
     "deep nesting": ('{"nodes": ' + "[" * 100_000, "not a BlobTree"),
-    "more after the end": (document(BALL) + "{}", "not a BlobTree of version 1: JSON is malformed"),
+    "more after the end": (document(BALL) + "{}", "JSON: trailing characters at line 1, column "),
 }
 
 

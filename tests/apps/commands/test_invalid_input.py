@@ -94,7 +94,11 @@ def _obj(rows: str) -> bytes:
             b'[{"type": "point", "center": [0, 0, 0], "radius": -1, "color": [1, 1, 1]}]}',
             "radius",
         ),
-        ("scene.json", b'{"format": "implicit-decals-scene", "version": 1, "objects": 3}', "$.objects"),
+        (
+            "scene.json",
+            b'{"format": "implicit-decals-scene", "version": 1, "objects": 3}',
+            "objects: expected a list",
+        ),
         ("newer.json", b'{"format": "implicit-decals-scene", "version": 9}', "version 9"),
     ],
 )

@@ -260,29 +260,29 @@ def _broken(change: str, value: object) -> bytes:
         ("format", "something", "implicit-decals-scene"),
         ("version", 2, "version 1"),
         ("camera", KeyError, "camera"),
-        ("camera.fov", "wide", r"\$\.camera\.fov"),
+        ("camera.fov", "wide", r"camera\.fov: "),
         ("camera.fov", 200.0, "fov"),
-        ("camera.position", [0.0, 0.0], r"\$\.camera\.position"),
-        ("decals.3.radius", "big", r"\$\.decals\[3\]\.radius"),
+        ("camera.position", [0.0, 0.0], r"camera\.position: "),
+        ("decals.3.radius", "big", r"decals\[3\]\.radius: "),
         ("decals.3.radius", -1.0, "radii"),
-        ("decals.3.radius", None, r"\$\.decals\[3\]\.radius"),
+        ("decals.3.radius", None, r"decals\[3\]\.radius: "),
         ("decals.3.normal", [0.0, 0.0, 0.0], "normals"),
-        ("decals.3.image", -2, r"\$\.decals\[3\]\.image"),
-        ("decals.3.image", 2**31, r"\$\.decals\[3\]\.image"),
-        ("decals.3.image", 2**64, r"\$\.decals\[3\]\.image"),
-        ("decals.3.layer", 2**64, r"\$\.decals\[3\]\.layer"),
+        ("decals.3.image", -2, r"decals\[3\]\.image: "),
+        ("decals.3.image", 2**31, r"decals\[3\]\.image: "),
+        ("decals.3.image", 2**64, r"decals\[3\]\.image: "),
+        ("decals.3.layer", 2**64, r"decals\[3\]\.layer: "),
         ("decals.3.position", [1e39, 0.0, 0.0], "positions"),
         ("decals.3.radius", 1e308, "radii"),
-        ("decals.3.interaction", "stick", r"\$\.decals\[3\]\.interaction"),
-        ("decals.3.layer", 1.5, r"\$\.decals\[3\]\.layer"),
+        ("decals.3.interaction", "stick", r"decals\[3\]\.interaction: "),
+        ("decals.3.layer", 1.5, r"decals\[3\]\.layer: "),
         ("decals.3.layer", 10**9, "layers"),
         ("decals.3.tint", [1, 2, 3], "tints"),
         ("decals.3.opacity", -1, "opacities"),
         ("decals.3.image", 2, "shows image 2"),
         ("decals.3.colour", "red", "colour"),
-        ("objects.0.type", "cube", r"\$\.objects\[0\]"),
+        ("objects.0.type", "cube", r"objects\[0\]\.type: unknown value"),
         ("objects.0.data", KeyError, "either 'source' or 'data'"),
-        ("objects.0.data.vertices", "not base64!", r"\$\.objects\[0\]\.data\.vertices"),
+        ("objects.0.data.vertices", "not base64!", r"objects\[0\]\.data\.vertices: "),
         ("objects.0.data.faces", "AAAA", "tetra"),
         ("objects.0.color", [2.0, 0.0, 0.0], "colour"),
         ("objects.0.name", "blob", "'blob' twice"),
@@ -311,7 +311,7 @@ def test_a_truncated_scene_is_reported_as_a_scene(tmp_path: Path, share: float) 
     text = to_json(_scene(), folder=tmp_path)
     path = tmp_path / "cut.json"
     path.write_bytes(text[: int(share * len(text))])
-    with pytest.raises(InvalidScene, match=r"cut\.json.*: expected a scene, but input data was truncated"):
+    with pytest.raises(InvalidScene, match=r"cut\.json': not a scene of version 1: the file ends too early$"):
         load_model(path)
 
 
