@@ -8,7 +8,7 @@ cache on disk, under a hash of the source. `loaded` does more than that:
 * Where there are none, the files of all kernels that an operation names (`load_together`) compile at the same
   time, one per core, and report their progress.
 * Processes that start together share the work: each file of kernels is compiled by one of them.
-* A damaged file of the cache is removed, and its kernels are compiled again.
+* A damaged file of the cache is removed, and its kernels are compiled again: `_seal` keeps its checksum.
 * Warp's own headers are parsed once per machine, not once per thread of every process (`_kept_headers`).
 """
 
@@ -50,6 +50,12 @@ SHIPPED = Path(__file__).with_name("compiled")
 
 HEADERS = "headers"
 """Folder of the kernel cache for Warp's parsed headers, 5 MB."""
+
+COMPILED = (".o", ".ptx", ".cubin", ".meta", ".pch")
+"""Suffixes of files whose checksums are kept."""
+
+CHECKSUM = ".checksum"
+"""Suffix of these checksums, after the name of the file."""
 
 CUDA_BLOCK = 256
 """Threads of a block, where a module of kernels sets no other number; Warp's default."""
@@ -198,22 +204,59 @@ def _copy_shipped(folder: Path) -> None:
             with tempfile.NamedTemporaryFile(dir=folder, delete=False) as copy:
                 copy.write(file.read_bytes())
             Path(copy.name).replace(folder / file.name)
+        _seal(folder)
+
+
+def _seal(folder: Path) -> None:
+    """Keep the checksums of the compiled files of a folder that have none, or have changed."""
+    for file in _compiled_files(folder):
+        sealed = file.with_name(f"{file.name}{CHECKSUM}")
+        if not sealed.exists() or sealed.stat().st_mtime_ns < file.stat().st_mtime_ns:
+            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as temporary:
+                temporary.write(_checksum(file))
+            Path(temporary.name).replace(sealed)
+
+
+def _damaged(folder: Path) -> list[Path]:
+    """Return the compiled files of a folder that differ from their checksums.
+
+    Warp and LLVM load some damaged files, such as those full of zeros after a power cut.
+    """
+    sealed = ((file, file.with_name(f"{file.name}{CHECKSUM}")) for file in _compiled_files(folder))
+    return [file for file, sums in sealed if sums.exists() and sums.read_bytes() != _checksum(file)]
+
+
+def _compiled_files(folder: Path) -> list[Path]:
+    return [file for file in folder.iterdir() if file.suffix in COMPILED] if folder.is_dir() else []
+
+
+def _checksum(file: Path) -> bytes:
+    return hashlib.blake2b(file.read_bytes(), digest_size=16).hexdigest().encode()
 
 
 def _load(module: wp.Module, device: wp.Device) -> None:
     """Load a module; remove it from the cache and compile it again if its files are damaged."""
     folder = kernel_cache() / _folder_name(module, device)
-    was_cached = folder.is_dir()
-    with _cache_errors(), nullcontext() if was_cached else _compiling(folder):
-        try:
-            wp.load_module(module, device=device)
-        except Exception as error:  # Warp raises nothing more precise for a damaged file
-            if not was_cached or isinstance(error, OSError):
-                raise
-            _logger.info("removing damaged kernels from %s: %s", folder, error)
-            shutil.rmtree(folder)
-            _copy_shipped(folder)
-            wp.load_module(module, device=device)
+    with _cache_errors():
+        if damaged := _damaged(folder):
+            _remove(folder, damaged)
+        was_cached = folder.is_dir()
+        with nullcontext() if was_cached else _compiling(folder):
+            try:
+                wp.load_module(module, device=device)
+            except Exception as error:  # Warp raises nothing more precise for a damaged file
+                if not was_cached or isinstance(error, OSError):
+                    raise
+                _remove(folder, error)
+                wp.load_module(module, device=device)
+            _seal(folder)
+
+
+def _remove(folder: Path, reason: object) -> None:
+    """Remove damaged kernels from the cache; those of the package take their place."""
+    _logger.info("removing damaged kernels from %s: %s", folder, reason)
+    shutil.rmtree(folder)
+    _copy_shipped(folder)
 
 
 @contextmanager
@@ -244,12 +287,20 @@ def _kept_headers() -> Iterator[None]:
         yield
         return
     kept, used = _headers_folder(), Path(folder_of_thread)
+    for file in _damaged(kept):
+        _unlink_header(file)
     _copy_newer(kept, used)
     yield
     for file in kept.glob("*.pch"):
         if not (used / file.name).exists():
-            file.unlink(missing_ok=True)
+            _unlink_header(file)
     _copy_newer(used, kept)
+    _seal(kept)
+
+
+def _unlink_header(file: Path) -> None:
+    file.unlink(missing_ok=True)
+    file.with_name(f"{file.name}{CHECKSUM}").unlink(missing_ok=True)
 
 
 def _headers_folder() -> Path:

@@ -1,5 +1,6 @@
 """``implicit-decals doctor``: check the software and hardware of this machine, and give advice."""
 
+import errno
 import json
 import os
 import platform
@@ -10,18 +11,21 @@ from dataclasses import dataclass
 from enum import Enum
 from importlib import metadata
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from blobtree.errors import UnusableCache
-from decals.rendering.gl_libraries import GL_LIBRARIES, install_advice, missing_gl_libraries
+from blobtree.graphics import GL_LIBRARIES, install_advice, missing_gl_libraries
 
 PACKAGES = ("numpy", "scipy", "warp-lang", "moderngl", "pyvista", "vtk")
 OLDEST_PYTHON = (3, 11)
 SAMPLES = ("dragon.ply", "horse.vtp")
 OLDEST_GL = 330
+CACHE_BYTES = 8_000_000
+"""Space that compiled kernels need at first."""
 PROBE = (sys.executable, "-m", "decals.apps.gl_probe")
 PROBE_SECONDS = 60.0
 DRIVER_ADVICE = (
@@ -136,10 +140,17 @@ def cache_finding() -> Finding:
     except Exception:  # `warp_finding` reports it
         return Finding("Kernel cache", "unknown, as Warp does not start", Status.NOTE)
     folder = kernel_cache()
-    if os.access(folder, os.W_OK | os.X_OK):
-        return Finding("Kernel cache", str(folder))
-    advice = "Set the environment variable WARP_CACHE_PATH to a folder that can be written."
-    return Finding("Kernel cache", f"{folder} cannot be written", Status.MISSING, advice)
+    elsewhere = "the environment variable WARP_CACHE_PATH to a folder"
+    try:
+        with TemporaryFile(dir=folder) as file:
+            file.write(bytes(CACHE_BYTES))
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            value, advice = "the disk is full", f"Free space there, or set {elsewhere} on another disk."
+        else:
+            value, advice = "it cannot be written", f"Set {elsewhere} that can be written."
+        return Finding("Kernel cache", f"{folder}: {value}", Status.MISSING, advice)
+    return Finding("Kernel cache", str(folder))
 
 
 def library_finding(missing: list[str]) -> Finding:

@@ -1,7 +1,7 @@
 """Kernels are compiled once, taken from the package if they fit, and compiled again if a file is damaged."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, cast
@@ -15,6 +15,7 @@ from blobtree.device import start_warp
 from blobtree.errors import UnusableCache
 from blobtree.file_lock import FileLock
 from blobtree.kernels import (
+    CHECKSUM,
     COMPILING,
     HEADERS,
     KERNEL_OPTIONS,
@@ -92,15 +93,27 @@ def test_kernels_that_another_process_compiles_are_awaited(cache: Path) -> None:
     assert not list(cache.glob("*.lock"))
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.3, 0.9], ids=["empty", "short", "nearly-whole"])
-def test_a_truncated_object_file_is_compiled_again(cache: Path, kept: float) -> None:
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda whole: b"",
+    "nearly whole": lambda whole: whole[: int(0.9 * len(whole))],
+    "zeros": lambda whole: bytes(len(whole)),
+    "no symbols": lambda whole: whole[:-600] + bytes(600),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_object_file_is_compiled_again_without_a_word(
+    cache: Path, capfd: pytest.CaptureFixture[str], damage: Callable[[bytes], bytes]
+) -> None:
     _doubled()
     file = _object_file(cache)
     whole = file.read_bytes()
-    file.write_bytes(whole[: int(kept * len(whole))])
+    file.write_bytes(damage(whole))
     _forget()
+    capfd.readouterr()
     assert _doubled() == [2.0, 5.0]
-    assert _object_file(cache).stat().st_size == len(whole)
+    assert _object_file(cache).read_bytes() == whole
+    assert capfd.readouterr().err == ""
 
 
 def test_a_damaged_description_is_compiled_again(cache: Path) -> None:
@@ -170,18 +183,20 @@ def test_files_of_kernels_that_compile_together_share_parsed_headers(cache: Path
     assert kept.stat().st_mtime_ns == parsed
 
 
-def test_damaged_headers_are_replaced(cache: Path) -> None:
+def test_damaged_headers_are_replaced(cache: Path, capfd: pytest.CaptureFixture[str]) -> None:
     _doubled()
     (kept,) = (cache / HEADERS).glob("*/*.pch")
     whole = kept.read_bytes()
     kept.write_bytes(whole[:1000])
     shutil.rmtree(_object_file(cache).parent)
     _forget()
+    capfd.readouterr()
     with ThreadPoolExecutor(1) as thread:
         assert thread.submit(_doubled).result() == [2.0, 5.0]
         shutil.rmtree(_object_file(cache).parent)
         _forget()
         assert thread.submit(_doubled).result() == [2.0, 5.0]
+    assert capfd.readouterr().err == ""
     assert kept.stat().st_size > len(whole) / 2
 
 
@@ -195,7 +210,7 @@ def test_each_installation_of_warp_has_its_own_headers(
     with kernels._kept_headers():
         pass
     (other,) = {*(cache / HEADERS).iterdir()} - {kept}
-    assert {file.suffix for folder in (kept, other) for file in folder.iterdir()} == {".pch"}
+    assert {file.suffix for folder in (kept, other) for file in folder.iterdir()} == {".pch", CHECKSUM}
 
 
 def test_a_thread_that_may_not_compile_raises_and_loads_what_others_compiled(cache: Path) -> None:

@@ -1,6 +1,8 @@
 """``implicit-decals doctor``: the checks of software, OpenGL and sample meshes, and the report."""
 
+import errno
 import io
+import os
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -11,9 +13,9 @@ from rich.console import Console
 
 from blobtree.device import start_warp
 from blobtree.errors import UnusableCache
+from blobtree.graphics import missing_gl_libraries
 from decals.apps.commands import doctor
 from decals.apps.commands.doctor import Finding, Status
-from decals.rendering.gl_libraries import missing_gl_libraries
 
 
 def shown(findings: list[Finding]) -> tuple[int, str]:
@@ -96,8 +98,20 @@ def test_the_kernel_cache_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "absent"))
     finding = doctor.cache_finding()
     assert finding.status is Status.MISSING
-    assert finding.value == f"{tmp_path / 'absent'} cannot be written"
+    assert finding.value == f"{tmp_path / 'absent'}: it cannot be written"
     assert "WARP_CACHE_PATH" in finding.advice
+
+
+def test_a_full_disk_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(**_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    start_warp()
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    monkeypatch.setattr(doctor, "TemporaryFile", full)
+    finding = doctor.cache_finding()
+    assert (finding.status, finding.value) == (Status.MISSING, f"{tmp_path}: the disk is full")
+    assert finding.advice.startswith("Free space there, or set the environment variable WARP_CACHE_PATH to")
 
 
 CONTEXT: dict[str, str | int] = {
