@@ -184,10 +184,10 @@ class Sessions:
                     await self._watch()
                 return first.exit_code or 0
             finally:
-                await runner.cleanup()
                 waiting = () if self._waiting is None else (self._waiting,)
                 left = *self._sessions.values(), *self._ending, *waiting
-                await asyncio.gather(*(session.stop() for session in left))
+                # Pages leave once their sessions end; the server alone would wait for them.
+                await asyncio.gather(runner.cleanup(), *(session.stop() for session in left))
 
     async def _watch(self) -> None:
         """End idle sessions and those that are too large."""

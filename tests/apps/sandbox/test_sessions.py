@@ -37,18 +37,28 @@ asyncio.run(main())
 """
 
 
+async def started(**options: Any) -> tuple[Sessions, asyncio.Task[int], str]:
+    """Start a server of sessions; return also its task and its URL."""
+    sessions = Sessions(lambda number: [sys.executable, "-c", PROGRAM, str(number)], **options)
+    port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
+    return sessions, task, f"http://127.0.0.1:{await port}"
+
+
+async def ended(task: asyncio.Task[int]) -> None:
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
 def serve(check: Callable[[Sessions, str], Awaitable[None]], **options: Any) -> None:
     """Serve sessions to a check, then end them."""
 
     async def run() -> None:
-        sessions = Sessions(lambda number: [sys.executable, "-c", PROGRAM, str(number)], **options)
-        port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-        task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
+        sessions, task, url = await started(**options)
         try:
-            await check(sessions, f"http://127.0.0.1:{await port}")
+            await check(sessions, url)
         finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+            await ended(task)
 
     asyncio.run(run())
 
@@ -120,6 +130,21 @@ def test_idle_sessions_are_saved_and_ended_and_their_number_is_limited(
                     await asyncio.sleep(0.02)
 
     serve(check, limit=2)
+
+
+def test_the_server_ends_while_a_page_is_open() -> None:
+    async def run() -> float:
+        _, task, url = await started(limit=1)
+        async with browser() as client:
+            assert await opened(client, url)
+            async with client.ws_connect(f"{url}/ws") as socket:
+                leaving = asyncio.create_task(socket.receive())  # a browser answers the close
+                began = time.monotonic()
+                await ended(task)
+                await leaving
+                return time.monotonic() - began
+
+    assert asyncio.run(run()) < 5.0
 
 
 def test_requests_of_other_pages_and_without_the_token_are_refused() -> None:
