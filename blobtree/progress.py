@@ -171,10 +171,12 @@ class _Work:
         return True
 
     def _text(self, now: float) -> str:
-        """Return the stage, its fraction unless the stage counts itself, and the elapsed seconds."""
+        """Return the stage, its fraction unless the stage counts itself, and the elapsed seconds from 1."""
         stage, fraction = self._stage or "working", self._fraction
         part = f": {100 * fraction:.0f} %" if 0.0 < fraction < 1.0 and ":" not in stage else ""
-        return f"{stage[0].upper()}{stage[1:]}{part} ({now - self._began:.0f} s)"
+        seconds = round(now - self._began)
+        elapsed = f" ({seconds} s)" if seconds else ""  # short work may end a long row of other work
+        return f"{stage[0].upper()}{stage[1:]}{part}{elapsed}"
 
 
 # -- the thread that watches the work -------------------------------------------------------------------
