@@ -7,7 +7,7 @@ import numpy as np
 from PIL import ImageColor
 
 from blobtree.errors import ImplicitDecalsError, InvalidNode, MissingPackage
-from blobtree.validation import real, shown
+from blobtree.validation import real, real_number, shown
 
 Rgb = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
@@ -68,7 +68,7 @@ def _channels(value: object) -> tuple[float, ...]:
         if is_named(value):
             return _named_channels(value)
         values = real(value) if isinstance(value, np.ndarray) else cast(Iterable[Any], value)
-        channels = tuple(float(channel) for channel in values)
+        channels = tuple(map(real_number, values))
     except (TypeError, ValueError, OverflowError):
         return ()
     return channels if len(channels) in (3, 4) and all(0.0 <= c <= 1.0 for c in channels) else ()

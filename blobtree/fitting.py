@@ -28,7 +28,7 @@ from blobtree.nodes.parameters import Quantity
 from blobtree.nodes.tree import Node
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
-from blobtree.validation import items, point_array, positive_number, real, shown
+from blobtree.validation import is_whole, items, point_array, positive_number, real, shown
 
 MAX_EVALUATIONS = 60
 TOLERANCE = 1e-9
@@ -166,7 +166,7 @@ def fit(
 
     checked_tree(tree)
     samples = _Samples(point_array(points), values, normals, normal_weight)
-    if isinstance(max_evaluations, bool) or not isinstance(max_evaluations, int) or max_evaluations < 1:
+    if not is_whole(max_evaluations) or max_evaluations < 1:
         raise InvalidNode(f"max_evaluations: expected a whole number from 1, got {shown(max_evaluations)}")
     free = _free(tree, fixed)
     if samples.count < len(free):

@@ -3,7 +3,7 @@
 import math
 import reprlib
 from collections.abc import Iterable
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,21 +39,33 @@ def items(value: object) -> tuple[Any, ...] | None:
 
 
 def real(values: Any) -> NDArray[Any]:
-    """Return values as an array of any type but complex numbers, for which it raises `TypeError`.
+    """Return values as an array; raise `TypeError` for texts, truth values and complex numbers.
 
-    NumPy only warns when it drops their imaginary parts.
+    NumPy would read digits in texts, count True as 1, and drop imaginary parts.
     """
     array = np.asarray(values)
-    if array.dtype.kind == "c":
-        raise TypeError("complex numbers")
+    if array.size and array.dtype.kind not in "iufO":
+        raise TypeError(f"no real numbers: {array.dtype}")
     return array
+
+
+def real_number(value: Any) -> float:
+    """Return a number as a float; raise `TypeError` for texts, truth values and complex numbers."""
+    if isinstance(value, str | bytes | bool):
+        raise TypeError(f"no real number: {type(value).__name__}")
+    return float(value if isinstance(value, float | int) else real(value))
+
+
+def is_whole(value: object) -> TypeGuard[int | np.integer]:
+    """Return True for a whole number of Python or NumPy; True and False are none."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def finite_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
     try:
         values = real(value) if isinstance(value, np.ndarray) else cast(Iterable[Any], value)
-        numbers = tuple(float(component) for component in values)
+        numbers = tuple(map(real_number, values))
     except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(abs(number) <= LARGEST_NUMBER for number in numbers):
@@ -133,7 +145,7 @@ def _check_size(name: str, number: float) -> None:
 def finite_number(name: str, value: object) -> float:
     """Return `value` as a finite float; raise `InvalidNode` otherwise."""
     try:
-        number = float(cast(Any, value if isinstance(value, float | int | str) else real(value)))
+        number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not abs(number) <= LARGEST_NUMBER:

@@ -29,7 +29,12 @@ def label_names(name: str, text: object, error: type[ImplicitDecalsError]) -> tu
     for part in listed:
         if not isinstance(part, str) or not is_unicode(part) or "\0" in part or "," in part:
             raise error(f"{name}: expected labels of letters, without commas, got {describe(part)}")
-    return tuple(dict.fromkeys(label for part in listed if (label := part.strip())))
+    if text == "":
+        return ()
+    labels = tuple(part.strip() for part in listed)
+    if not all(labels):
+        raise error(f"{name}: expected labels such as 'hull, lid', got an empty one in {describe(text)}")
+    return tuple(dict.fromkeys(labels))
 
 
 def receiver_array(name: str, values: Any, count: int) -> NDArray[Any]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
 from blobtree.colors import color_rgb, is_named
-from blobtree.validation import real
+from blobtree.validation import is_whole, real
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, MissingPackage
 
 T = TypeVar("T")
@@ -53,11 +53,10 @@ def member(name: str, value: Any, kind: type[E], error: type[ImplicitDecalsError
         for one, word in words.items():
             if value.strip().lower() in (word, one.name.lower()):
                 return one
-    try:
-        return kind(value)
-    except ValueError:
-        choices = ", ".join(map(repr, words.values()))
-        raise error(f"{name}: expected one of {choices}, got {describe(value)}") from None
+    if isinstance(value, kind):
+        return value
+    choices = ", ".join(map(repr, words.values()))
+    raise error(f"{name}: expected one of {choices}, got {describe(value)}")
 
 
 def whole_number(name: str, value: Any, low: int, high: int | None, error: type[ImplicitDecalsError]) -> int:
@@ -65,8 +64,7 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
 
     If low is above high, no index is valid: the scene has no such part.
     """
-    known = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if known and low <= value and (high is None or value <= high):
+    if is_whole(value) and low <= value and (high is None or value <= high):
         return int(value)
     if high is None:
         expected = f"a whole number from {low} upward"
@@ -78,9 +76,8 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
 
 
 def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
-    """Return a finite number as a float; True and False count as 1 and 0."""
-    number = int(value) if isinstance(value, bool) else value
-    return real_number(name, number, "a finite number", math.isfinite, error)
+    """Return a finite number as a float."""
+    return real_number(name, value, "a finite number", math.isfinite, error)
 
 
 def real_number(
@@ -121,10 +118,13 @@ def finite_vector(name: str, value: Any, error: type[ImplicitDecalsError]) -> Fl
     return numbers
 
 
-def real_array(name: str, values: ArrayLike, error: type[ImplicitDecalsError]) -> Float64Array:
-    """Return numbers as an array of any shape."""
+def real_array(
+    name: str, values: ArrayLike, error: type[ImplicitDecalsError], *, truths: bool = False
+) -> Float64Array:
+    """Return numbers as an array of any shape; ``truths`` lets True and False count as 1 and 0."""
     try:
-        return np.asarray(real(values), dtype=np.float64)
+        array = np.asarray(values)
+        return np.asarray(array if truths and array.dtype == np.bool_ else real(array), dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as reason:
         raise error(f"{name}: expected numbers, got {describe(values)}") from reason
 
@@ -136,10 +136,14 @@ def function_or_none(name: str, value: Any, error: type[ImplicitDecalsError]) ->
 
 
 def function_values(
-    name: str, function: Callable[..., ArrayLike], *arguments: Any, error: type[ImplicitDecalsError]
+    name: str,
+    function: Callable[..., ArrayLike],
+    *arguments: Any,
+    error: type[ImplicitDecalsError],
+    truths: bool = False,
 ) -> Float64Array:
     """Return the numbers that a user's function returns; the error names a function that fails."""
-    return real_array(name, called(name, function, *arguments, error=error), error)
+    return real_array(name, called(name, function, *arguments, error=error), error, truths=truths)
 
 
 def called(name: str, function: Callable[..., T], *arguments: Any, error: type[ImplicitDecalsError]) -> T:

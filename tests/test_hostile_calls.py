@@ -79,6 +79,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "path of a number": lambda: decals.load_scene(1.5),  # type: ignore[arg-type]
     "image of a number": lambda: decals.load_image(1.5),  # type: ignore[arg-type]
     "margin of nothing": lambda: decals.Camera.framing(([0, 0, 0], [1, 1, 1]), margin=0),
+    "array as JSON": lambda: blobtree.from_json(np.zeros(3)),  # type: ignore[arg-type]
     "surrogate as JSON": lambda: blobtree.from_json("\ud800"),
     "endless cell": lambda: blobtree.polygonize(BALL, cell_size=1e308),
     "fitting of none": lambda: decals.Camera.fitting(WRONG),
@@ -148,6 +149,22 @@ CALLS: dict[str, Callable[[], object]] = {
     "surrogate in a mesh": lambda: read_mesh("\ud800.ply"),
     "surrogate in a saved scene": lambda: decals.save_scene(SCENE, "\ud800.json"),
     "no image to cover with": lambda: decals.cover(BALL, count=1, images=[]),
+    "no direction": lambda: decals.cover(BALL, count=1, direction=(0, 0, 0)),
+    "number as contact": lambda: decals.render(SCENE, contact=1),  # type: ignore[arg-type]
+    "truth as mapping": lambda: decals.render(SCENE, mapping=True),  # type: ignore[arg-type]
+    "comma as receivers": lambda: SPOTS.replace(receivers=","),
+    "empty receiver": lambda: SPOTS.replace(receivers="hull,, lid"),
+    "empty label": lambda: decals.TreeObject("a", BALL, labels=("",)),
+    "truths as radii": lambda: SPOTS.replace(radii=[True] * 3),
+    "truth as opacity": lambda: SPOTS.replace(opacities=True),
+    "truth as field of view": lambda: decals.Camera((0, 0, 4), (0, 0, 0), fov=True),
+    "truth as radius": lambda: Point((0, 0, 0), radius=True),
+    "text as radius": lambda: Point((0, 0, 0), radius="1"),  # type: ignore[arg-type]
+    "text as centre": lambda: Point("123", radius=1.0),  # type: ignore[arg-type]
+    "truths as colour": lambda: Point((0, 0, 0), radius=1.0, color=(True, True, True)),
+    "truths as points": lambda: BALL([[True] * 3]),
+    "truth as resolution": lambda: blobtree.polygonize(BALL, resolution=True),
+    "truth as cell size": lambda: blobtree.polygonize(BALL, cell_size=True),
     "empty mask": lambda: decals.scatter(BALL, count=3, mask=lambda points: np.zeros(len(points), bool)),
     "scene as text": lambda: decals.save_scene(SCENE, "a.txt"),
     "NUL in a saved scene": lambda: decals.save_scene(SCENE, "a\0/a.json"),

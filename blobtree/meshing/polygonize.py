@@ -14,7 +14,6 @@ have one size.
 import logging
 import math
 from functools import partial
-from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -32,7 +31,7 @@ from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.validation import LARGEST_NUMBER, shown, truth
+from blobtree.validation import LARGEST_NUMBER, is_whole, real_number, shown, truth
 
 DEFAULT_RESOLUTION = 64
 
@@ -178,7 +177,7 @@ def polygonize(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"
         )
     chord_error = _chord_error(tree, chord_error)
-    if not isinstance(max_triangles, int | np.integer) or max_triangles < 1:
+    if not is_whole(max_triangles) or max_triangles < 1:
         raise InvalidResolution(f"max_triangles: expected a whole number from 1, got {shown(max_triangles)}")
     truth("creases", creases, InvalidResolution)
     adaptive = truth("adaptive", adaptive, InvalidResolution)
@@ -467,7 +466,7 @@ def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | N
         raise InvalidResolution("expected either resolution or cell_size, got both; drop one")
     if cell_size is None:
         cells = DEFAULT_RESOLUTION if resolution is None else resolution
-        if not isinstance(cells, int | np.integer) or cells < 1:
+        if not is_whole(cells) or cells < 1:
             raise InvalidResolution(
                 f"resolution: expected a whole number of cells from 1, got {shown(resolution)}"
             )
@@ -500,7 +499,7 @@ def _chord_error(tree: ImplicitModel, value: object) -> float:
 def _above_zero(name: str, noun: str, value: object) -> float:
     """Return `value` as a finite number above zero; raise `InvalidResolution` otherwise."""
     try:
-        number = float(cast(Any, value))
+        number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not 0.0 < number <= LARGEST_NUMBER:

@@ -98,7 +98,7 @@ def region_mask(surface: MeshSurface, flags: ArrayLike) -> Callable[[Float32Arra
     """
     instance("surface", surface, MeshSurface, InvalidScattering, "for a tree, give a function of points")
     values, (faces, vertices) = (
-        real_array("flags", flags, InvalidScattering),
+        real_array("flags", flags, InvalidScattering, truths=True),
         (len(surface.faces), len(surface.vertices)),
     )
     if values.shape not in ((faces,), (vertices,)) or not np.isin(values, (0.0, 1.0)).all():

@@ -379,7 +379,7 @@ def _values_at(
     name: str, function: Callable[[Float32Array], ArrayLike], positions: Float32Array
 ) -> Float64Array:
     """Return the checked values of the user's density or mask at positions."""
-    values = function_values(name, function, positions, error=InvalidScattering)
+    values = function_values(name, function, positions, error=InvalidScattering, truths=name == "mask")
     if values.shape != (len(positions),):
         raise InvalidScattering(
             f"{name}: expected shape [{len(positions)}], got {list(values.shape)}; "

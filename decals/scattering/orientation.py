@@ -61,8 +61,10 @@ def as_direction(direction: Direction) -> Direction:
     """
     if isinstance(direction, str):
         return member("direction", direction, Orientation, InvalidScattering)
-    if direction is not None and not isinstance(direction, Orientation) and not callable(direction):
-        _check_vectors(real_array("direction", direction, InvalidScattering), (3,))
+    if direction is None or isinstance(direction, Orientation) or callable(direction):
+        return direction
+    if not _check_vectors(real_array("direction", direction, InvalidScattering), (3,)).any():
+        raise InvalidScattering("direction: expected a direction, got the zero vector; give it a length")
     return direction
 
 

@@ -198,7 +198,7 @@ def test_a_camera_to_save_is_one(tmp_path: Path) -> None:
 @example(value=-(2**63) - 1)
 @given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(), st.none(), st.lists(st.floats())))
 def test_checks_give_what_fits_or_say_what_came(value: Any) -> None:
-    fits = isinstance(value, int | float) and abs(value) <= sys.float_info.max
+    fits = type(value) in (int, float) and abs(value) <= sys.float_info.max
     checked(finite_number, value, fits)
     checked(
         lambda name, number, error: whole_number(name, number, -3, 3, error),
