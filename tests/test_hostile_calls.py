@@ -150,6 +150,8 @@ CALLS: dict[str, Callable[[], object]] = {
     "surrogate in a saved scene": lambda: decals.save_scene(SCENE, "\ud800.json"),
     "no image to cover with": lambda: decals.cover(BALL, count=1, images=[]),
     "no direction": lambda: decals.cover(BALL, count=1, direction=(0, 0, 0)),
+    "upward": lambda: decals.cover(BALL, count=1, up=(0, 0, 1)),  # type: ignore[arg-type]
+    "sizing": lambda: decals.cover(BALL, count=1, sizing="large"),
     "number as contact": lambda: decals.render(SCENE, contact=1),  # type: ignore[arg-type]
     "truth as mapping": lambda: decals.render(SCENE, mapping=True),  # type: ignore[arg-type]
     "comma as receivers": lambda: SPOTS.replace(receivers=","),

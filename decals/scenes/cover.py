@@ -1,18 +1,20 @@
 """From models to a scene in one call: decals over all of them, and a camera that shows them."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.progress import Progress, reporting
-from decals.errors import InvalidScene
+from decals.errors import InvalidScattering, InvalidScene
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.rendering.options import SceneLike, is_scene_like
 from decals.scattering.orientation import Direction
 from decals.scattering.scatter import scatter
+from decals.scattering.sizing import Sizing
 from decals.scenes.camera import THREE_QUARTER, Camera, Vector
 from decals.scenes.files import load_model
 from decals.scenes.objects import SceneObject, as_objects
@@ -20,7 +22,16 @@ from decals.scenes.recipe import Recipe
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
 from decals.surfaces.normals import CREASE_ANGLE
-from decals.validation import instance
+from decals.validation import describe, instance, member
+
+UPWARD: Mapping[str, tuple[Vector, Vector]] = MappingProxyType(
+    {
+        "x": ((1.0, 0.0, 0.0), (0.35, -0.55, 1.0)),
+        "y": ((0.0, 1.0, 0.0), THREE_QUARTER),
+        "z": ((0.0, 0.0, 1.0), (0.55, -1.0, 0.35)),
+    }
+)
+"""For each axis that may point upward: its direction, and the direction from three-quarters in front."""
 
 FRAMING_SAMPLES = 2000
 """Points per object that the camera is fitted to."""
@@ -35,7 +46,9 @@ def cover(
     images: AnyImage | Iterable[AnyImage] = DEFAULT_IMAGE,
     seed: int = 0,
     direction: Direction = None,
-    view_direction: Vector = THREE_QUARTER,
+    sizing: Sizing | str = Sizing.COVERING,
+    view_direction: Vector | None = None,
+    up: str = "y",
     crease_angle: float = CREASE_ANGLE,
     progress: Progress | None = None,
 ) -> Scene:
@@ -55,8 +68,12 @@ def cover(
         Seed of all random choices; equal seeds give equal scenes.
     direction : optional
         Of the images' u axes: None (random), a vector, or a function of points (n, 3) to vectors (n, 3).
-    view_direction : (x, y, z)
-        Direction from the models toward the camera.
+    sizing : Sizing or str
+        Rule for the radii: ``"covering"`` (no gaps), ``"touching"`` (no overlaps) or ``"delaunay"``.
+    view_direction : (x, y, z), optional
+        Direction from the models toward the camera; from three-quarters in front by default.
+    up : {"y", "z", "x"}
+        The axis that points upward in pictures, ``"z"`` for most meshes of pyvista.
     crease_angle : float
         Angle between two faces of a mesh, in degrees, from which their edge is drawn sharp. Objects of a
         scene keep their own.
@@ -83,6 +100,11 @@ def cover(
     >>> len(scene.decals)
     12
     """
+    if not isinstance(up, str) or up not in UPWARD:
+        raise InvalidScene(f"up: expected 'x', 'y' or 'z', got {describe(up)}")
+    upward, toward = UPWARD[up]
+    toward = toward if view_direction is None else view_direction
+    rule = member("sizing", sizing, Sizing, InvalidScattering)
     with reporting(progress) as report:
         report("reading models and images", 0.0)
         listed = models[0] if len(models) == 1 and isinstance(models[0], list) else models
@@ -98,10 +120,11 @@ def cover(
             count=count,
             seed=seed,
             direction=direction,
+            sizing=rule,
             images=len(pictures),
             progress=report,
         )
-        camera = fitting_camera(objects, direction=view_direction)
+        camera = fitting_camera(objects, direction=toward, up=upward)
     recipe = Recipe.of(
         "decals.cover",
         seed=seed,
@@ -109,20 +132,26 @@ def cover(
         count=count,
         images=[picture.source for picture in pictures],
         direction=direction,
-        view_direction=view_direction,
+        sizing=rule.value,
+        view_direction=toward,
+        up=up,
         crease_angle=crease_angle,
     )
     return Scene(objects=tuple(objects), camera=camera, decals=decals, images=pictures, recipe=recipe)
 
 
 def fitting_camera(
-    objects: Sequence[SceneObject], *, direction: Vector = THREE_QUARTER, aspect: float = 4 / 3
+    objects: Sequence[SceneObject],
+    *,
+    direction: Vector = THREE_QUARTER,
+    up: Vector = UPWARD["y"][0],
+    aspect: float = 4 / 3,
 ) -> Camera:
     """Return a camera that looks from a direction and whose picture the objects fill."""
     points: Float32Array = np.concatenate(
         [item.surface.sample(FRAMING_SAMPLES, seed=0)[0] for item in objects]
     )
-    return Camera.fitting(points, direction=direction, aspect=aspect, margin=FRAMING_MARGIN)
+    return Camera.fitting(points, direction=direction, up=up, aspect=aspect, margin=FRAMING_MARGIN)
 
 
 def scene_or_objects(model: object) -> SceneLike | list[SceneObject]:
