@@ -158,7 +158,7 @@ _bench = App(name="bench", help="Measure this machine.", help_format="plaintext"
 _bench.command("decals.apps.commands.bench:table", name="table", help=BENCH_TABLE)
 app.command(_bench)
 app.register_install_completion_command(
-    help="Install completion of commands and options for your shell: bash, zsh or fish."
+    help="Install completion of commands and options for your shell: bash, zsh, fish or PowerShell."
 )
 
 

@@ -81,7 +81,8 @@ def scatter(
     mask : callable, optional
         Where decals may lie: a function of ``points[n, 3]`` to ``bool[n]``.
     fixed : array_like, optional
-        Positions of decals that never move, ``float[k, 3]``.
+        Positions of decals that never move, ``float[k, 3]``. Points off the surfaces are moved to the nearest
+        place on them first.
     regularity : float, default: 1.0
         From 0 (random positions) to 1 (as even as possible). In between the relaxation stops when the
         least distance reaches that share of the one at 1.

@@ -73,6 +73,10 @@ class DecalMeasures:
     contact_length: Float64Array
     nearest: Float64Array
 
+    def __repr__(self) -> str:
+        """Return the number of decals."""
+        return f"DecalMeasures({len(self.nearest)})"
+
 
 @dataclass(frozen=True, eq=False)
 class Measures:

@@ -160,7 +160,7 @@ class Scene:
     decals: Decals = field(default_factory=Decals.empty)
     images: tuple[DecalImage, ...] = ()
     drawing: rendering.Drawing = field(default_factory=lambda: rendering.Drawing())
-    recipe: Recipe | None = None
+    recipe: Recipe | None = field(default=None, repr=False)
     hidden_decals: Decals = field(default_factory=Decals.empty)
     locked_layers: tuple[int, ...] = ()
 
