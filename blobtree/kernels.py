@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ import warp as wp
 
 from blobtree.errors import UnusableCache
 from blobtree.file_lock import FileLock
+from blobtree.files import write_atomically
 from blobtree.progress import Progress, reporting
 
 KERNEL_OPTIONS: dict[str, Any] = {
@@ -208,13 +209,12 @@ def _copy_shipped(folder: Path) -> None:
 
 
 def _seal(folder: Path) -> None:
-    """Keep the checksums of the compiled files of a folder that have none, or have changed."""
+    """Keep the checksums of the compiled files of a folder, if it can be written."""
     for file in _compiled_files(folder):
         sealed = file.with_name(f"{file.name}{CHECKSUM}")
         if not sealed.exists() or sealed.stat().st_mtime_ns < file.stat().st_mtime_ns:
-            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as temporary:
-                temporary.write(_checksum(file))
-            Path(temporary.name).replace(sealed)
+            with suppress(OSError):
+                write_atomically(sealed, _checksum(file))
 
 
 def _damaged(folder: Path) -> list[Path]:
