@@ -70,10 +70,14 @@ Pixel pixel_at(ivec2 texel) {
         vec4 color = filtered_color(position, normal, right, up);
 #else
 #ifdef RELIEF
-        vec4 raised = relief_point(position, normal, ray_direction(vec2(texel) + 0.5));
-        position = raised.xyz;
-        relief_normal = relief_normal_at(position, normal);
-        float lit = relief_light_at(position, raised.w, normal);
+        relief_normal = normal;
+        float lit = 1.0;
+        if (dot(ray_direction(vec2(texel) + 0.5), normal) < 0.0) {  // none on the inside of a surface
+            vec4 raised = relief_point(position, normal, ray_direction(vec2(texel) + 0.5));
+            position = raised.xyz;
+            relief_normal = relief_normal_at(position, normal);
+            lit = relief_light_at(position, raised.w, normal);
+        }
 #endif
         DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
         vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));

@@ -21,21 +21,22 @@ Heights = NDArray[np.float64]
 
 
 def panels() -> Sequence[Panel]:
-    """Cover three bodies, each with one kind of relief, and move their surfaces."""
+    """Move the surfaces of three covered bodies."""
+    return tuple(Panel(displace(scene, edge_length=0.025, resolution=32)) for scene in scenes())
+
+
+def scenes() -> Sequence[Scene]:
+    """Cover three bodies, each with one kind of relief, and step back to see all of it."""
     body = Segment((-0.45, -0.2, 0), (0.45, 0.25, 0), radius=0.5)
     ball = Point((0, 0, 0), radius=0.75)
     pair = Point((-0.3, -0.25, 0), radius=0.6) + Point((0.4, 0.35, 0.1), radius=0.45)
-    return (
-        _raised(cover(body, count=110, images=scales(), direction=(1.0, 0.5, 0.0))),
-        _raised(cover(ball, count=60, images=thorns())),
-        _raised(cover(pair, count=60, images=pebbles())),
+    covered = (
+        cover(body, count=110, images=scales(), direction=(1.0, 0.5, 0.0)),
+        cover(ball, count=60, images=thorns()),
+        cover(pair, count=60, images=pebbles()),
     )
-
-
-def _raised(scene: Scene) -> Panel:
-    """Move the surface of a scene, and step back to see all of it."""
     camera = camera_at((1.9, 2.6, 3.6), fov=26.0, up=(0.0, 1.0, 0.0))
-    return Panel(displace(scene.replace(camera=camera), edge_length=0.025, resolution=32))
+    return tuple(scene.replace(camera=camera) for scene in covered)
 
 
 def scales() -> DecalMaterial:

@@ -19,7 +19,7 @@ from decals.scenes.pose import PosedMesh
 from decals.surfaces import subdivide
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.subdivide import subdivided
-from tests.decals.baking.glb import Array, ball_and_cube, need, read_attribute
+from tests.decals.baking.glb import Array, ball_and_cube, need, read_attribute, read_glb
 from tests.decals.meshes import box, icosphere
 from tests.decals.relief import expected_heights, hills
 
@@ -103,6 +103,28 @@ def test_subdivision_of_any_edges_leaves_no_crack(seed: int, shape: str) -> None
     assert len(surface.sound) == len(finer)
     edges = rows[finer], rows[np.roll(finer, -1, axis=1)]
     assert not is_long(*(ends.reshape(-1, 3) for ends in edges)).any()
+
+
+def test_textures_of_a_posed_mesh_have_the_colours_of_its_rest_pose(tmp_path: Path) -> None:
+    need("trimesh", "xatlas")
+    half = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    sheet = decals.MeshObject("sheet", half, [[0, 1, 2], [0, 2, 3]], (1.0, 1.0, 1.0))
+    spot = decals.Decals([[0.0, 0, 0]], [[0, 0, 1.0]], [[1.0, 0, 0]], [0.5], images=[-1], tints=[[1.0, 0, 0]])
+    scene = Scene(objects=[sheet], camera=decals.Camera((0, 0, 5)), decals=spot)
+    posed = decals.pose(scene, {"sheet": half * [3, 3, 1] + [5, 0, 0]})
+    decals.bake(posed, tmp_path / "posed.glb", size=64)
+    node = read_glb(tmp_path / "posed.glb")["sheet"]
+    assert node.texture is not None
+    assert node.uv is not None
+    assert node.vertices[:, 0].min() == 5.0
+    rng = np.random.default_rng(1)
+    weights = rng.dirichlet((1, 1, 1), 200)
+    corners = node.faces[rng.integers(0, 2, 200)]
+    points, uv = (np.einsum("ij,ijk->ik", weights, rows[corners]) for rows in (node.vertices, node.uv))
+    texels = node.texture[((1 - uv[:, 1]) * 64).astype(int), (uv[:, 0] * 64).astype(int)]
+    distance = np.linalg.norm((points - [5, 0, 0]) / 3, axis=1)
+    assert (texels[distance < 0.45] == [255, 0, 0]).all()
+    assert (texels[distance > 0.55] == 255).all()
 
 
 def test_too_many_triangles_are_refused(monkeypatch: pytest.MonkeyPatch, hilly: Scene) -> None:

@@ -130,6 +130,16 @@ def test_a_picture_is_that_of_the_displaced_mesh(renderers: dict[str, Renderer])
     assert plain[:, :3].max(axis=1).min() > 20  # a light at the eye leaves no pixel black
 
 
+def test_the_inside_of_a_surface_is_flat(renderers: dict[str, Renderer]) -> None:
+    scene = hilly()
+    below = Camera(position=(0.4, -2.0, -3.0), target=(0.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), fov=40.0)
+    buffers = renderers["fragment"].buffers(scene, OPTIONS, viewpoint=below)
+    seen = buffers.owner >= 0
+    expected = decals.evaluate(scene.decals, buffers.position[seen], np.tile(UP, (int(seen.sum()), 1)))
+    assert (expected.owner == buffers.owner[seen]).mean() > 0.995
+    assert np.quantile(np.abs(expected.uv - buffers.uv[seen]), 0.99) < 1e-3
+
+
 def test_an_edit_draws_all_that_it_changes(renderers: dict[str, Renderer]) -> None:
     """A raised decal hides surface far from it at a grazing angle; lights cast other shadows."""
     scene, renderer = hilly(), renderers["fragment"]
