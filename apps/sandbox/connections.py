@@ -1,6 +1,8 @@
 """The browsers that show a page: one of them drives, and input that a browser leaves behind is ended."""
 
+import asyncio
 import inspect
+from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -30,6 +32,57 @@ OURS = frozenset({TRIGGER, UPDATE, LIFECYCLE})
 
 OF_SERVER = "driving", "trame__template"
 """First parts of the names of values that no browser may change."""
+
+
+PICTURES, HEAD_BYTES = b"viewport.image.push.subscription", 256
+"""Name that messages with pictures have among their first bytes."""
+
+
+class Outbox:
+    """Sends messages to one browser: no other waits for it, and only the newest picture is sent.
+
+    Parameters
+    ----------
+    socket
+        The connection; all other attributes are its own.
+    """
+
+    def __init__(self, socket: Any) -> None:
+        self._socket = socket
+        self._messages: deque[bytes] = deque()
+        self._picture = b""
+        self._task: asyncio.Task[None] | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._socket, name)
+
+    @property
+    def behind(self) -> bool:
+        """True while a picture waits."""
+        return bool(self._picture)
+
+    async def send_bytes(self, message: bytes) -> None:
+        """Send a message soon, in the order of calls but for pictures."""
+        if PICTURES in message[:HEAD_BYTES]:
+            self._picture = message
+        else:
+            self._messages.append(message)
+        if self._task is None:
+            self._task = asyncio.get_running_loop().create_task(self._send(), name="messages of a browser")
+
+    async def _send(self) -> None:
+        try:
+            while self._messages or self._picture:
+                if self._messages:
+                    message = self._messages.popleft()
+                else:
+                    message, self._picture = self._picture, b""
+                await self._socket.send_bytes(message)
+        except ConnectionError:  # the browser has left
+            self._messages.clear()
+            self._picture = b""
+        finally:
+            self._task = None
 
 
 @web.middleware
@@ -65,6 +118,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         self._server, self._shared, self._end_input = server, shared, end_input
         self._web: Any = None
         self._numbers: dict[str, int] = {}
+        self._outboxes: dict[str, Outbox] = {}
         self._count = 0
         self._driver = ""
         self._asking: list[str] = []
@@ -132,10 +186,18 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         up = {**event, **dict.fromkeys(buttons, 0), "action": "up"}
         self._mouse = (client, lambda: call(up)) if held else None
 
+    @property
+    def behind(self) -> bool:
+        """True if no browser is ready for another picture."""
+        return bool(self._outboxes) and all(outbox.behind for outbox in self._outboxes.values())
+
     # -- browsers ---------------------------------------------------------------------------------------
 
     def onConnect(self, _request: Any, client: str) -> None:  # noqa: N802  (wslink's name)
-        """Give a new browser its number."""
+        """Give a new browser its number, and an outbox."""
+        for handler in self._web._ws_handlers:
+            if client in handler.connections:
+                handler.connections[client] = self._outboxes[client] = Outbox(handler.connections[client])
         self._count += 1
         self._numbers[client] = self._count
         if not self._driver:
@@ -145,6 +207,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
     def onClose(self, client: str) -> None:  # noqa: N802  (wslink's name)
         """End what the browser was doing, and pass control on."""
         del self._numbers[client]
+        self._outboxes.pop(client, None)
         self._asking = [other for other in self._asking if other != client]
         if self._mouse is not None and self._mouse[0] == client:
             release, self._mouse = self._mouse[1], None

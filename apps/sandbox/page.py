@@ -146,7 +146,7 @@ class Page:
     ) -> None:
         self._server, self._window, self._ends = server, window, done
         self.sandbox = Sandbox(window, **options)
-        Connections(server, shared=shared, end_input=self.sandbox.end_input)
+        self._connections = Connections(server, shared=shared, end_input=self.sandbox.end_input)
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
@@ -233,6 +233,7 @@ class Page:
                     self.view = StreamedView(
                         self._window,
                         self.sandbox.take_step,
+                        lambda: self._connections.behind,
                         style="height: 100%",
                     )
                     self.sandbox.schedule = self.view.update

@@ -20,11 +20,8 @@ from decals.window.frames import FrameState
 QUALITY, COARSE_QUALITY = 92, 75
 """JPEG quality of a picture at rest, and of one while something moves."""
 
-PENDING_MESSAGES = 4
-"""With more messages on their way to the browser than this, the next picture waits."""
-
 PENDING_SECONDS = 0.01
-"""Time between two looks at the messages on their way."""
+"""Time between two looks at browsers that are not ready for another picture."""
 
 
 class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typed
@@ -39,12 +36,20 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         The edited window.
     before_frame
         Called before each frame.
+    behind
+        Returns True while no browser is ready for another picture.
     options
         Options of the element.
     """
 
-    def __init__(self, window: EditWindow, before_frame: Callable[[], None], **options: Any) -> None:
-        self._window, self._before_frame = window, before_frame
+    def __init__(
+        self,
+        window: EditWindow,
+        before_frame: Callable[[], None],
+        behind: Callable[[], bool] = lambda: False,
+        **options: Any,
+    ) -> None:
+        self._window, self._before_frame, self._behind = window, before_frame, behind
         self._outdated = False
         self._task: asyncio.Task[None] | None = None
         self._delivery: Any = None
@@ -78,7 +83,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         try:
             while self._outdated:
                 await asyncio.sleep(0)  # messages that wait are handled first
-                while self._delivery.coreServer.network_monitor.pending > PENDING_MESSAGES:
+                while self._behind():
                     await asyncio.sleep(PENDING_SECONDS)
                 self._before_frame()
                 self._outdated = False

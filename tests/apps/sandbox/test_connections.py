@@ -224,3 +224,46 @@ def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
         assert sent < 2e6
 
     serve(check)
+
+
+def test_nobody_waits_for_a_slow_browser_which_gets_the_newest_picture() -> None:
+    pytest.importorskip("aiohttp")
+    from decals.apps.sandbox.connections import PICTURES, Outbox
+
+    class Socket:
+        closed = False
+
+        def __init__(self) -> None:
+            self.sent: list[bytes] = []
+            self.goes = asyncio.Event()
+
+        async def send_bytes(self, message: bytes) -> None:
+            await self.goes.wait()
+            self.sent.append(message)
+
+    async def watched() -> None:
+        socket = Socket()
+        outbox = Outbox(socket)
+        assert not outbox.behind
+        pictures = [PICTURES + b"%d" % number for number in range(4)]
+        for message in (b"a", *pictures, b"b"):
+            await asyncio.wait_for(outbox.send_bytes(message), 1.0)
+        assert outbox.behind
+        assert not outbox.closed
+        socket.goes.set()
+        while outbox.behind:
+            await asyncio.sleep(0)
+        await outbox.send_bytes(b"c")
+        while len(socket.sent) < 4:
+            await asyncio.sleep(0)
+        assert socket.sent == [b"a", b"b", pictures[-1], b"c"]
+        outbox = Outbox(Broken())
+        await outbox.send_bytes(PICTURES)
+        while outbox.behind:
+            await asyncio.sleep(0)
+
+    class Broken:
+        async def send_bytes(self, message: bytes) -> None:
+            raise ConnectionResetError
+
+    asyncio.run(watched())

@@ -2,7 +2,6 @@
 
 import asyncio
 from io import BytesIO
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -40,7 +39,6 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
         delivery = vtkWebPublishImageDelivery(decode=False)
         delivery.publish = lambda _, message: sent.append(message)
         delivery.addAttachment = lambda content: content
-        delivery.coreServer = SimpleNamespace(network_monitor=SimpleNamespace(pending=0))
         delivery.tracking_views["7"] = {"originalSize": [100, 70], "ratio": 1}
         view._take_over(Protocol(object(), delivery))
         view.update()  # without a loop, nothing is sent
