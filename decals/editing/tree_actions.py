@@ -1,5 +1,6 @@
 """Actions on objects and on the primitives of BlobTrees: select, move, add, resize, join and remove."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -557,7 +558,7 @@ def _place_on(node: Node) -> tuple[Float64Array, float]:
     """Return centre (3,) and size for a new node on top of another one."""
     low, high = node.bounds
     size = float((high - low).max()) * NEW_NODE_SIZE
-    return np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2], np.float64), size
+    return _rounded(np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2], np.float64), size)
 
 
 def _place_of_object(
@@ -567,9 +568,16 @@ def _place_of_object(
     if objects:
         low, high = bounds_of(objects)
         size = float((high - low).max()) * NEW_NODE_SIZE
-        return np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size
+        return _rounded(np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size)
     center = np.asarray(target, np.float64)
-    return center, FIRST_OBJECT_RADIUS * float(np.linalg.norm(np.asarray(eye, np.float64) - center))
+    distance = float(np.linalg.norm(np.asarray(eye, np.float64) - center))
+    return _rounded(center, FIRST_OBJECT_RADIUS * distance)
+
+
+def _rounded(center: Float64Array, size: float) -> tuple[Float64Array, float]:
+    """Return a place and a size with few digits, as people would write them."""
+    digits = 2 - math.floor(math.log10(max(size, 1e-30)))
+    return np.round(center, digits), round(size, digits)
 
 
 def _thickness(node: Node) -> float:
