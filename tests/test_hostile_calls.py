@@ -152,6 +152,12 @@ CALLS: dict[str, Callable[[], object]] = {
     "no direction": lambda: decals.cover(BALL, count=1, direction=(0, 0, 0)),
     "upward": lambda: decals.cover(BALL, count=1, up=(0, 0, 1)),  # type: ignore[arg-type]
     "sizing": lambda: decals.cover(BALL, count=1, sizing="large"),
+    "jacobian": lambda: decals.evaluate(SPOTS, [[0, 0, 1]], [[0, 0, 1]], jacobian=1),  # type: ignore[arg-type]
+    "neighbors": lambda: decals.evaluate(SPOTS, [[0, 0, 1]], [[0, 0, 1]], neighbors="no"),  # type: ignore[arg-type]
+    "on no object": lambda: decals.evaluate(SPOTS, [[0, 0, 1]], [[0, 0, 1]], on=5),
+    "resolution of a mesh": lambda: decals.bake(
+        decals.Scene(objects=(decals.MeshObject("a", *TRIANGLE),), camera=CAMERA), "a.glb", resolution=0
+    ),
     "number as contact": lambda: decals.render(SCENE, contact=1),  # type: ignore[arg-type]
     "truth as mapping": lambda: decals.render(SCENE, mapping=True),  # type: ignore[arg-type]
     "comma as receivers": lambda: SPOTS.replace(receivers=","),

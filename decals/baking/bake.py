@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, UInt8Array
+from blobtree.errors import InvalidResolution
 from blobtree.files import write_atomically
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
@@ -113,6 +114,8 @@ def bake(
     path = checked_path(path, (SUFFIX,))
     size = whole_number("size", size, MIN_SIZE, MAX_SIZE, InvalidScene)
     samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+    if resolution is not None:
+        whole_number("resolution", resolution, 1, None, InvalidResolution)
     modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
     Drawing().overridden(**modes)  # checked before a model is read
     vertex_colors = truth("vertex_colors", vertex_colors, InvalidScene)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import known_device
 from blobtree.kernels import loaded
-from blobtree.validation import real
+from blobtree.validation import real, truth
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.jacobian import image_jacobians
 from decals.field.law import AnyContact, ContactLaw, contact_mode
@@ -174,6 +174,8 @@ def evaluate(
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
     contact = contact_mode(contact, InvalidScene)
     stiffness = stiffness_number(stiffness, InvalidScene)
+    for name, value in (("jacobian", jacobian), ("neighbors", neighbors)):
+        truth(name, value, InvalidScene)
     device = known_device(device)
     positions, facings = _as_rows("points", points), _as_rows("normals", normals)
     count = len(positions)
@@ -365,6 +367,7 @@ def _limit(
     indexed: Any, decals: Decals | DecalEditor, on: object | str | Iterable[str] | None, device: Any
 ) -> None:
     """Give indexed decals their limits, if they have any, and the mask of the surface that they lie on."""
+    labels = () if on is None or hasattr(on, "name") else label_names("on", on, InvalidScene)
     indexed.limited = decals.limited or takes_named_only(on)
     if not indexed.limited:
         return
@@ -372,7 +375,7 @@ def _limit(
     if hasattr(on, "name"):
         indexed.surface = object_mask(on, decals.receiver_table)
     elif on is not None:
-        indexed.surface = surface_mask(label_names("on", on, InvalidScene), decals.receiver_table)
+        indexed.surface = surface_mask(labels, decals.receiver_table)
 
 
 def _colors(

@@ -323,7 +323,7 @@ def _decode(text: bytes) -> _SceneRecord:
 def _decal_records(decals: Decals, tell: Progress) -> Iterator[DecalRecord]:
     """Describe decals, some at a time: numbers become text by calls that let no other thread go on."""
     for first in range(0, len(decals), PART):
-        tell("save", first / len(decals))
+        tell("saving the scene", first / len(decals))
         yield from records_of(decals[first : first + PART])
 
 
