@@ -64,7 +64,7 @@ def measure(
     stiffness
         Stiffness of elastic contact, from 1 to 64.
     mapping
-        Image mapping: corrected or chord.
+        Image mapping: corrected, chord or walked.
     samples
         Number of random points on the models. Default: 200 for each decal.
     seed

@@ -47,7 +47,7 @@ ContactName = Annotated[Literal["product", "min", "radial", "elastic"] | None, P
 Stiffness = Annotated[float | None, Parameter(show_default=False)]
 """An optional stiffness on the command line."""
 
-MappingName = Annotated[Literal["corrected", "chord"] | None, Parameter(show_default=False)]
+MappingName = Annotated[Literal["corrected", "chord", "walked"] | None, Parameter(show_default=False)]
 """An optional image mapping on the command line."""
 
 CreaseAngle = Annotated[float | None, Parameter(show_default=False)]

@@ -15,6 +15,7 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Scope
 from decals.apps.lab.formulas import Evaluate, Measure
 from decals.field.evaluate import Samples, evaluate
+from decals.field.walks import walks_for
 from decals.field.jacobian import folds_of, stretch_of
 from decals.model import Interaction
 from decals.record import Contact
@@ -198,6 +199,7 @@ def _samples(scope: Scope, *, jacobian: bool = False) -> Samples:
         contact=experiment.contact,
         stiffness=experiment.stiffness,
         jacobian=jacobian,
+        walks=walks_for(experiment.mapping, experiment.decals, experiment.objects),
         device="cpu",
     )
 

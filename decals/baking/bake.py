@@ -20,6 +20,7 @@ from decals.errors import InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.walks import walks_for
 from decals.images.load import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
@@ -81,7 +82,7 @@ def bake(
     stiffness : float, optional
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str, optional
-        Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
+        Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
     resolution : int, optional
         Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64.
     creases : bool
@@ -180,6 +181,7 @@ class SurfaceColors:
         self._meshes, self._objects, self._decals, self._images = meshes, objects, decals, images
         self._contact, self._mapping, self._stiffness = contact, mapping, stiffness
         self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
+        self._walks = walks_for(mapping, decals, objects)
 
     def at(self, number: int, points: Float32Array, normals: Float32Array) -> Float64Array:
         """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals."""
@@ -194,6 +196,7 @@ class SurfaceColors:
             index=self._index,
             images=self._images,
             on=self._objects[number],
+            walks=self._walks,
         ).color
         assert over is not None  # there are images, if only an empty list of them
         colors: Float64Array = base * (1.0 - over[:, 3:]) + over[:, :3]

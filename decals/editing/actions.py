@@ -236,7 +236,7 @@ class Actions:
     @action(
         "next_mapping",
         "u",
-        summary="image mapping of the window: corrected, chord",
+        summary="image mapping of the window: corrected, chord, walked",
         group=Group.SCENE,
     )
     def next_mapping(self, _cursor: Cursor) -> None:

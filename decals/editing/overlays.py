@@ -11,6 +11,7 @@ from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.walks import walks_for
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 
 INSIDE = 0.5
@@ -64,6 +65,7 @@ def sample_surface(
         Modes, as for `decals.evaluate`.
     """
     modes: dict[str, Any] = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
+    modes["walks"] = walks_for(mapping, document.decals, document.objects)
     samples = evaluate(document.decals, vertices, normals, **modes)
     inside = np.linalg.norm(samples.uv - INSIDE, axis=1) <= INSIDE
     owners = np.where(inside, samples.owner, -1).astype(np.int32)

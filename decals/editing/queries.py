@@ -386,11 +386,13 @@ def outlines(
     numbers
         Numbers of decals.
     contact, mapping
-        As for `outline`.
+        As for `outline`. The outline of a walked image is drawn as that of a corrected one.
     angles
         Directions in which each outline is sampled.
     """
     mapping = member("mapping", mapping, ImageMapping, InvalidEdit)
+    if mapping is ImageMapping.WALKED:
+        mapping = ImageMapping.CORRECTED
     modes = contact_mode(contact, InvalidEdit), mapping
     numbers = np.asarray(numbers, np.int64)
     decals = document.decals.take(numbers)

@@ -17,6 +17,7 @@ from decals.field.jacobian import image_jacobians
 from decals.field.law import AnyContact, ContactLaw, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
+from decals.field.walks import Walks
 from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
@@ -99,6 +100,7 @@ def evaluate(
     normal_derivatives: ArrayLike | None = None,
     neighbors: bool = False,
     on: object | str | Iterable[str] | None = None,
+    walks: Walks | None = None,
     device: Any = None,
 ) -> Samples:
     """Evaluate decals at surface points: owner, image coordinates, field and colour.
@@ -112,7 +114,7 @@ def evaluate(
     normals : float32[m, 3]
         Geometric normals of the surface there, of any length. A zero normal faces every decal.
     mapping : ImageMapping or str, optional
-        Image mapping: CORRECTED (default) or CHORD.
+        Image mapping: CORRECTED (default), CHORD or WALKED.
     contact : Contact, str or ContactLaw, optional
         Contact mode: ELASTIC (default), PRODUCT, MIN or RADIAL.
     stiffness : float, optional
@@ -131,6 +133,8 @@ def evaluate(
     on : object of a scene, str or sequence of str, optional
         The object that the points lie on, or its labels, so that only decals act that lie on it. By default
         all decals act.
+    walks : Walks, optional
+        Log maps around the decals over their surface, which the mapping WALKED needs.
     device : optional
         Warp device. Default: Warp's default device.
 
@@ -149,7 +153,8 @@ def evaluate(
     InvalidDecals
         No decals, or the index of others.
     InvalidScene
-        An unknown mapping or contact mode, a stiffness out of range, or ``on`` is neither object nor labels.
+        An unknown mapping or contact mode, a stiffness out of range, ``on`` is neither object nor labels, or
+        the mapping is WALKED without walks of these decals.
     InvalidDevice
         Warp has no such device.
 
@@ -191,6 +196,8 @@ def evaluate(
     indexed = _indexed(decals, index, device)
     indexed.stiffness = stiffness
     _limit(indexed, decals, on, device)
+    if mapping is ImageMapping.WALKED:
+        indexed.walked, indexed.walks = True, _walk_texels(walks, len(indexed.records) // RECORD, device)
     owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
     uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
     field: Any = wp.zeros(count, dtype=wp.float32, device=device)
@@ -361,6 +368,17 @@ def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any
             f"index: expected the index of these {len(decals)} decals, got {got}; DecalIndex.of makes it"
         )
     return index.on(device, records=decals.packed(), layered=decals.layered, copy=False)
+
+
+def _walk_texels(walks: Walks | None, count: int, device: Any) -> Any:
+    """Return the texels of walks of so many decals on a device."""
+    if not isinstance(walks, Walks) or len(walks) != count:
+        got = f"those of {len(walks)} decals" if isinstance(walks, Walks) else describe(walks)
+        raise InvalidScene(
+            f"walks: expected walks of these {count} decals for the mapping WALKED, got {got}; "
+            "decals.field.Walks.over(decals, [surface]) makes them"
+        )
+    return wp.array(walks.texels, dtype=wp.vec4, device=device)
 
 
 def _limit(

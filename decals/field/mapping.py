@@ -31,13 +31,15 @@ class ImageMapping(IntEnum):
     --------
     >>> import decals
     >>> list(decals.ImageMapping)
-    [<ImageMapping.CHORD: 0>, <ImageMapping.CORRECTED: 1>]
+    [<ImageMapping.CHORD: 0>, <ImageMapping.CORRECTED: 1>, <ImageMapping.WALKED: 2>]
     """
 
     CHORD = 0
     """Projection onto the tangent plane, at the distance of the chord (paper, equation 4)."""
     CORRECTED = 1
     """Unrolled along the circular arc that the two normals define."""
+    WALKED = 2
+    """Unrolled along the shortest path over the surface (log map), for edges, corners and large decals."""
 
 
 MIN_BEND = 1.0e-37

@@ -30,6 +30,7 @@ from decals.field.mapping import ImageMapping, image_distance, tangent_coordinat
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
 from decals.field.receivers import complement_of
+from decals.field.walk import walked_place
 from decals.index.lookup import ABOVE_ALL, IndexedDecals, cell_range, end_of_lower, rank_range
 from decals.record import (
     NO_FIELD,
@@ -43,6 +44,9 @@ from decals.record import (
 )
 
 wp.set_module_options({"enable_backward": False})
+
+MIN_PLACE = 1.0e-12
+"""Smallest distance in the image by which is divided."""
 
 NO_OWNER = CELL_NO_OWNER
 """Owner of a point outside all rims."""
@@ -179,12 +183,19 @@ def uv_at(
     tangent = xyz(index.records[RECORD * owner + 2])
     w = q - centre
     drawn = rim_distance(pushed[0])
+    place = tangent_coordinates(w, normal, tangent)
     if mapping != ImageMapping.CHORD:
         small = w / visible_radius(owner, index.records)
         arc = unroll(small, normal, n_q)
-        drawn = image_distance(drawn, wp.length(small), arc[3])
-        w = xyz(arc)
-    uv = contact_uv(tangent_coordinates(w, normal, tangent), drawn)
+        place = tangent_coordinates(xyz(arc), normal, tangent)
+        length = arc[3]
+        if index.walked:
+            place = wp.max(length / wp.max(wp.length(place), MIN_PLACE), 1.0) * place
+            walked = walked_place(owner, small, n_q, place, index)
+            place += walked[2] * (wp.vec2(walked[0], walked[1]) - place)
+            length += walked[2] * (wp.max(wp.length(place), wp.length(small)) - length)
+        drawn = image_distance(drawn, wp.length(small), length)
+    uv = contact_uv(place, drawn)
     if index.nested:
         uv += 0.5 * wp.max(1.0 - drawn * drawn, 0.0) * wp.vec2(pushed[1], pushed[2])
     return uv

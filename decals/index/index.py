@@ -205,6 +205,7 @@ def indexed_decals(
     index.nested = True
     index.limited, index.surface = False, EVERYTHING
     index.limits = wp.zeros(0, dtype=wp.vec4, device=device)
+    index.walked, index.walks = False, index.limits
     return index
 
 

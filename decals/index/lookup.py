@@ -43,6 +43,8 @@ MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
     limited="decal_limited",
     limits="decal_limits",
     surface="surface_receivers",
+    walked="decal_walked",
+    walks="decal_walks",
 )
 class IndexedDecals:
     """Records and index of a set of decals on one device; ``shaders/decals.glsl`` has them as uniforms.
@@ -63,6 +65,8 @@ class IndexedDecals:
         `decals.model.Decals.limited` and `decals.model.Decals.limits`, which are read where it is True.
     surface
         Mask of the surface, see `decals.receivers.surface_mask`.
+    walked, walks
+        True in the image mapping WALKED, and `decals.field.walks.Walks.texels`, which are read in it alone.
     """
 
     records: wp.array(dtype=wp.vec4)
@@ -77,6 +81,8 @@ class IndexedDecals:
     limited: wp.bool
     limits: wp.array(dtype=wp.vec4)
     surface: wp.int32
+    walked: wp.bool
+    walks: wp.array(dtype=wp.vec4)
 
 
 @wp.func

@@ -86,21 +86,24 @@ class DecalPass:
         materials: MaterialArrays | None = None,
         relief: Relief | None = None,
         lights: Lighting | None = None,
+        walks: DataTexture | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours.
 
         ``masks`` are those of the objects, see `decals.receivers.object_mask`, for decals that are limited.
         ``materials`` fill `material_targets` too. The first of the ``lights`` casts shadows of ``relief``.
+        The mapping WALKED needs ``walks``, see `Uploads.walks`.
         """
         limited, library = decals is not None and decals.limited, ""
-        filtered = filtered and materials is None  # maps of materials are not averaged over pixels
+        filtered = filtered and materials is None and walks is None  # these are not averaged over pixels
         if decals is not None:
             library = decal_library(
                 contact,
                 layered=decals.layered,
                 limited=limited,
                 nested=decals.nested,
+                walked=walks is not None,
                 filtered=filtered,
             )
         shining = materials is not None and decals is not None
@@ -123,8 +126,9 @@ class DecalPass:
             set_uniform(program, "decal_stiffness", stiffness)
             decals.use(program, unit + 1)
             others: dict[str, Any] = {} if materials is None else dict(materials.textures)
-            if masks is not None:
-                others["object_masks"] = masks.texture
+            for name, data in (("object_masks", masks), ("decal_walks", walks)):
+                if data is not None:
+                    others[name] = data.texture
             if relief is not None:
                 others["decal_reliefs"] = relief.texture
                 relief.use(program, lights)
@@ -216,7 +220,13 @@ FILTER_FUNCTIONS = (
 
 @cache
 def decal_library(
-    contact: AnyContact, *, layered: bool, limited: bool, nested: bool, filtered: bool = False
+    contact: AnyContact,
+    *,
+    layered: bool,
+    limited: bool,
+    nested: bool,
+    walked: bool = False,
+    filtered: bool = False,
 ) -> str:
     """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
     constants = (
@@ -224,6 +234,7 @@ def decal_library(
         f"const int decal_contact = {int(contact)};\n"
         f"const bool decal_nested = {str(nested and contact in (Contact.RADIAL, Contact.ELASTIC)).lower()};\n"
         f"const bool decal_limited = {str(limited).lower()};\n"
+        f"const bool decal_walked = {str(walked).lower()};\n"
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )

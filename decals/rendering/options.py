@@ -81,7 +81,7 @@ class Drawing:
         Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
         paper), ``"min"`` or ``"radial"``.
     mapping : ImageMapping or str
-        Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
+        Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
     background : Background
         Colours behind the objects.
     lights : Lighting, optional

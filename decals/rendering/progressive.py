@@ -410,6 +410,7 @@ def plan_frame(
         uploaded.materials,
         uploaded.relief,
         options.lights,
+        uploaded.walks,
     )
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))

@@ -16,6 +16,7 @@ from blobtree._typing import UInt8Array
 from blobtree.graphics import is_forked
 from blobtree.progress import reporting
 from decals.errors import InvalidPoints, InvalidScene
+from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.decal_pass import decal_library, decal_program
@@ -188,7 +189,7 @@ class Renderer:
         for name, coordinate, side in (("x", x, options.size[0]), ("y", y, options.size[1])):
             whole_number(name, coordinate, 0, side - 1, InvalidPoints)
         with self.context.current():
-            uploaded = self._uploads.scene(scene)
+            uploaded = self._uploads.scene(scene, options.mapping)
             view = PictureView.of(viewpoint_of(scene, viewpoint), options.size, uploaded.bounds)
             targets = self._targets.of(BUFFERS_SLOT, (1, 1))
             self._draw_tile(scene, uploaded, view.part(Rectangle(x, y, 1, 1)), targets, options)
@@ -222,7 +223,7 @@ class Renderer:
     ) -> Iterator[tuple[Tile, Targets]]:
         """Draw tile after tile; the targets hold a tile until the next one is drawn."""
         with self.context.current():
-            uploaded = self._uploads.scene(scene)
+            uploaded = self._uploads.scene(scene, options.mapping)
             view = PictureView.of(viewpoint_of(scene, viewpoint), options.sample_size, uploaded.bounds)
             size = largest_tile(options.size, options.samples, limit=self._max_tile)
             targets = self._targets.of(slot, size)
@@ -274,7 +275,8 @@ class Renderer:
         request = self._request(scene, options, viewpoint)
 
         def plan(targets: Targets, previous: TargetState | None) -> FramePlan:
-            uploaded = self._uploads.scene(scene)  # each time: other frames may be drawn between slices
+            # each time: other frames may be drawn between slices
+            uploaded = self._uploads.scene(scene, options.mapping)
             tile = request.tile(uploaded.bounds)
             self._camera.use(tile)
             return plan_frame(scene, uploaded, tile, options, targets, previous, depth=True)
@@ -398,6 +400,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
             is_limited(scene),
             uploads.nested(scene),
             _is_filtered(scene, options),
+            options.mapping is ImageMapping.WALKED,
         )
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
@@ -430,14 +433,15 @@ def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     return [
         *index,
         WarmupTask(DECALS, partial(uploads.decals, scene)),
+        WarmupTask(DECALS, partial(uploads.walks, scene, options.mapping)),
         WarmupTask(IMAGES, partial(uploads.images, scene)),
         WarmupTask(SHADERS, translate, threaded=True),
     ]
 
 
 def _is_filtered(scene: SceneLike, options: RenderOptions) -> bool:
-    """Return True if decals are averaged over pixels; maps of materials are not."""
-    return options.filtered and not has_materials(scene)
+    """Return True if decals are averaged over pixels; maps of materials and walked images are not."""
+    return options.filtered and not has_materials(scene) and options.mapping is not ImageMapping.WALKED
 
 
 def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
@@ -449,5 +453,6 @@ def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
         layered=scene.decals.layered,
         limited=is_limited(scene),
         nested=uploads.nested(scene),
+        walked=options.mapping is ImageMapping.WALKED,
         filtered=_is_filtered(scene, options),
     )

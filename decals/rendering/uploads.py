@@ -14,6 +14,8 @@ from PIL import Image
 from blobtree._typing import Float32Array, Int64Array, UInt8Array
 from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS
 from decals.errors import InvalidScene, TooMuchData
+from decals.field.mapping import ImageMapping
+from decals.field.walks import Walks
 from decals.images.load import decode_srgb
 from decals.index.editor import LIMITS, RECORDS, DecalEditor
 from decals.index.index import DecalIndex, has_nested
@@ -531,6 +533,7 @@ class UploadedScene:
     masks: DataTexture | None = None
     materials: MaterialArrays | None = None
     relief: Relief | None = None
+    walks: DataTexture | None = None
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -555,17 +558,41 @@ class Uploads:
         self._materials: GpuCache[MaterialArrays] = GpuCache()
         self._reliefs: GpuCache[ReliefArray] = GpuCache()
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
+        self._walks: tuple[tuple[int, ...], tuple[object, ...], Walks, DataTexture] | None = None
 
-    def scene(self, scene: SceneLike) -> UploadedScene:
-        """Return a whole scene; errors are those of `decals.rendering.options.check_scene`."""
+    def scene(self, scene: SceneLike, mapping: ImageMapping = ImageMapping.CORRECTED) -> UploadedScene:
+        """Return a whole scene, with walks for the mapping WALKED; errors are those of `check_scene`."""
         check_scene(scene)
         objects = drawn_objects(scene)
         drawables = [self.drawable(item) for item in objects]
         masks = self._masks_of(scene, objects)
         images = self.images(scene)
         materials = self._materials_of(scene, images)
-        relief = self._relief_of(scene, images)
-        return UploadedScene(drawables, self.decals(scene), images, masks, materials, relief)
+        relief, walks = self._relief_of(scene, images), self.walks(scene, mapping)
+        return UploadedScene(drawables, self.decals(scene), images, masks, materials, relief, walks)
+
+    def walks(self, scene: SceneLike, mapping: ImageMapping) -> DataTexture | None:
+        """Return the walks of a scene's decals over its objects; None in other mappings, or without decals.
+
+        After an edit, only decals that changed walk again.
+        """
+        if mapping is not ImageMapping.WALKED or not len(scene.decals):
+            return None
+        objects = [item for item in drawn_objects(scene) if hasattr(item, "surface")]
+        version = scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
+        key = version, id(scene.decals), *map(id, objects)
+        if self._walks is None or self._walks[0] != key:
+            previous = None if self._walks is None else self._walks[2]
+            walks = Walks.over(scene.decals, objects, previous=previous)
+            self._release_walks()
+            kept_alive = scene.decals, *objects
+            self._walks = key, kept_alive, walks, DataTexture(self.context, walks.texels)
+        return self._walks[3]
+
+    def _release_walks(self) -> None:
+        if self._walks is not None:
+            self._walks[3].release()
+        self._walks = None
 
     def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArrays | None:
         """Return the maps of a scene's images; None without any."""
@@ -648,3 +675,4 @@ class Uploads:
         for cache in (self._drawables, self._decals, self._images, self._materials, self._reliefs):
             cache.release()
         self._release_masks()
+        self._release_walks()

@@ -42,7 +42,7 @@ class DrawingRecord(Struct, forbid_unknown_fields=True):
 
     contact: Literal["product", "min", "radial", "elastic"] = "product"
     stiffness: float = DEFAULT_STIFFNESS
-    mapping: Literal["corrected", "chord"] = "corrected"
+    mapping: Literal["corrected", "chord", "walked"] = "corrected"
     samples: int = 2
     background: _BackgroundRecord | None = None
     lights: _LightingRecord | None = None

@@ -14,6 +14,7 @@ from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of, tangent_axes
 from decals.field.law import AnyContact
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
+from decals.field.walks import walks_for
 from decals.model import Decals, Interaction
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
@@ -198,6 +199,7 @@ def measure(
         raise InvalidScene("expected a scene with an object to measure, got none; add one")
     drawing = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     modes = {name: getattr(drawing, name) for name in ("contact", "stiffness", "mapping")}
+    walks = walks_for(drawing.mapping, scene.decals, scene.objects)
     with reporting(progress) as report:
         report("measuring", 0.0)
         domain = Domain([item.surface for item in scene.objects], seed)
@@ -209,7 +211,7 @@ def measure(
         for number, item in enumerate(scene.objects):
             rows = np.flatnonzero(points.surface_ids == number)
             for part, normals, turns in _drawn(item, points.positions[rows], points.normals[rows], scene):
-                sums.add(part, normals, turns, modes | {"on": item}, rng)
+                sums.add(part, normals, turns, modes | {"on": item, "walks": walks}, rng)
                 done += len(part)
                 report("measuring", done / samples)
     return sums.result(domain.area, samples)

@@ -49,7 +49,7 @@ def render(
     stiffness : float, optional
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str, optional
-        Image mapping: how images lie on curved surface; ``"corrected"`` or ``"chord"``.
+        Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
     background : Background, optional
         Colours behind the objects, such as `decals.rendering.TRANSPARENT`.
     lights : Lighting, optional

@@ -34,6 +34,9 @@ FIELD_TOLERANCE = 1e-4
 RESOLUTION = 64
 """Cells of the coarse mesh along the longest side of the tree's support."""
 
+MAX_RESOLUTION = 128
+"""Largest number of cells along the longest side of the tree's support in `ImplicitSurface.triangulated`."""
+
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
 
@@ -103,6 +106,20 @@ class ImplicitSurface(Immutable):
 
     @Lazy
     def _on_devices(self) -> dict[str, "DeviceImplicitSurface"]:
+        return {}
+
+    def triangulated(self, cell: float) -> MeshSurface:
+        """Return a mesh of the surface with creases and cells of at most this size, within MAX_RESOLUTION."""
+        low, high = self.tree.support
+        cells = float((high - low).max()) / max(cell, 1e-30)
+        resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
+        if resolution not in self._meshes:
+            fine = polygonize(self.tree, resolution=resolution, creases=True, device=self.device)
+            self._meshes[resolution] = MeshSurface(fine.vertices, fine.faces, device=self.device)
+        return self._meshes[resolution]
+
+    @Lazy
+    def _meshes(self) -> dict[int, MeshSurface]:
         return {}
 
     @property

@@ -26,7 +26,7 @@ from decals.surfaces.surface import (
     project_host,
     vectors,
 )
-from decals.surfaces.topology import consistent_winding, first_copies, parts_of, shared_edges, welded
+from decals.surfaces.topology import consistent_winding, edge_twins, first_copies, parts_of, shared_edges, welded
 from decals.validation import whole_number
 
 _logger = logging.getLogger(__name__)
@@ -150,6 +150,11 @@ class MeshSurface(Immutable):
                 part = MeshSurface(self.vertices[rows], corners.reshape(-1, 3), device=self.device)
                 found += [part] if part.closed else []
         return tuple(found)
+
+    @Lazy
+    def triangles(self) -> tuple[Int32Array, Float32Array, Int32Array]:
+        """Return corners ``int32[m, 3]`` and unit normals of all sound faces, and their `edge_twins`."""
+        return self._corners, self._normals, edge_twins(self._welded[self._corners])
 
     @Lazy
     def _winding(self) -> int:

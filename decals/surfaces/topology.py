@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 
 
 def welded(vertices: Float32Array) -> Int64Array:
@@ -157,3 +157,28 @@ def _turned(edges: SharedEdges, count: int) -> BoolArray:
     labels = components(np.concatenate(pairs), 2 * count)
     turned: BoolArray = labels[:count] > labels[count:]
     return turned
+
+
+def edge_twins(corners: Int64Array) -> Int32Array:
+    """Return for side k of face f, from corner k to the next, the same side ``3 f' + k'`` of the neighbour.
+
+    Parameters
+    ----------
+    corners : int64[m, 3]
+        Welded corners of faces that wind alike.
+
+    Returns
+    -------
+    int32[3 m]
+        −1 where a side has no neighbour, or more than one.
+    """
+    starts, ends = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    size = int(corners.max(initial=0)) + 1
+    keys, twins = starts * size + ends, ends * size + starts
+    order = np.argsort(keys, kind="stable")
+    first = np.searchsorted(keys, twins, sorter=order)
+    found = np.searchsorted(keys, twins, side="right", sorter=order) - first
+    alone = np.searchsorted(keys, keys, side="right", sorter=order)
+    alone -= np.searchsorted(keys, keys, sorter=order)
+    result = order[np.minimum(first, len(keys) - 1)]
+    return np.where((found == 1) & (alone == 1), result, -1).astype(np.int32)

@@ -1,0 +1,198 @@
+"""Relays of the walked mapping, for all decals of a scene over its surfaces; `decals.field.walk` reads them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import BoolArray, Float32Array, Int32Array
+from blobtree.kernels import loaded
+from decals.field.mapping import ImageMapping
+from decals.field.walk import GRID, SIDE
+from decals.field.walk_kernels import WalkedMesh, WalkStart, compare_relays, join_relays, place_relays
+from decals.index.editor import RECORDS, DecalEditor
+from decals.model import Decals
+from decals.record import RECORD, RIM_RADIUS
+from decals.surfaces.convert import as_surface
+from decals.surfaces.implicit import ImplicitSurface
+from decals.surfaces.mesh import MeshSurface
+
+TOLERANCE = 0.004
+"""Largest error of the corrected mapping, in visible radii, at which a decal needs no relays."""
+
+FARTHEST = 0.5
+"""Distance of a centre from its surface, in visible radii, from which a decal gets no relays."""
+
+INSIDE = 1e-5
+"""Least weight of a corner of the face in which walks begin: they do not begin on edges."""
+
+CELLS_PER_RADIUS = 8
+"""Cells of the mesh of a BlobTree along the visible radius of the smallest decal."""
+
+LEAST_COSINE = -0.5
+"""Cosine between the normals of a decal and of its face, from which the decal gets relays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walks:
+    """Log maps around decals over their surfaces, for the image mapping WALKED.
+
+    Make them with `Walks.over`. They are those of decals and surfaces at that time.
+
+    Attributes
+    ----------
+    texels : float32[k, 4]
+        First a row (grid or −1, n, 0, 0) for each of n decals, then the grids of relays.
+    """
+
+    texels: Float32Array
+    _rows: Float32Array
+    _meshes: tuple[MeshSurface, ...]
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @classmethod
+    def over(
+        cls, decals: Decals | DecalEditor, models: Iterable[Any], *, previous: "Walks | None" = None
+    ) -> "Walks":
+        """Walk from the centres of decals over surfaces.
+
+        Each decal walks over the surface nearest to its centre. It gets a grid of relays if the corrected
+        mapping would err by more than 0.4 % of its radius.
+
+        Parameters
+        ----------
+        decals : Decals or DecalEditor
+            The decals.
+        models : sequence of models
+            Objects of a scene, meshes, BlobTrees or surfaces.
+        previous : Walks, optional
+            Earlier walks, of which those of decals and surfaces that have not changed are kept.
+
+        Examples
+        --------
+        >>> import decals, pyvista
+        >>> cube = pyvista.Cube()
+        >>> disk = decals.Decals([[0.4, 0, 0.5]], [[0, 0, 1]], [[1, 0, 0]], [0.3])
+        >>> walks = decals.field.Walks.over(disk, [cube])
+        >>> beyond = [[0.5, 0.1, 0.4]]  # 0.1 behind the edge, 0.2 from the centre on the unrolled faces
+        >>> seen = decals.evaluate(disk, beyond, [[1, 0, 0]], mapping="walked", walks=walks)
+        >>> (0.6 * (seen.uv - 0.5)).round(3).tolist()
+        [[0.2..., 0.1...]]
+        """
+        records = decals.arrays[RECORDS] if isinstance(decals, DecalEditor) else decals.packed()
+        rows = records.reshape(-1, RECORD, 4)[:, :3].reshape(-1, 12).copy()
+        radii = RIM_RADIUS * rows[:, 3]
+        meshes = tuple(_meshes(models, radii))
+        slots = np.full(len(rows), -1, np.int64)
+        kept = np.zeros((0, GRID, 4), np.float32)
+        changed = np.ones(len(rows), np.bool_)
+        if previous is not None and [*map(id, previous._meshes)] == [*map(id, meshes)]:
+            shared = min(len(rows), len(previous._rows))
+            changed[:shared] = (rows[:shared] != previous._rows[:shared]).any(axis=1)
+            before = previous.texels[:shared, 0].astype(np.int64)
+            used = ~changed[:shared] & (before >= 0)
+            slots[:shared][used] = np.arange(used.sum())
+            kept = previous.texels[len(previous._rows) :].reshape(-1, GRID, 4)[before[used]]
+        chosen = np.flatnonzero(changed & (radii > 0.0) & np.isfinite(rows).all(axis=1))
+        numbers, grids = _walk(rows[chosen], meshes)
+        slots[chosen[numbers]] = len(kept) + np.arange(len(numbers))
+        heads = np.zeros((len(rows), 4), np.float32)
+        heads[:, 0], heads[:, 1] = slots, len(rows)
+        texels = np.concatenate([heads, kept.reshape(-1, 4), grids.reshape(-1, 4)])
+        return cls(texels, rows, meshes)
+
+
+def walks_for(mapping: ImageMapping, decals: Decals | DecalEditor, objects: Iterable[Any]) -> Walks | None:
+    """Return the walks of decals over the objects with a surface; None in mappings that need none."""
+    if mapping is not ImageMapping.WALKED:
+        return None
+    return Walks.over(decals, [item for item in objects if hasattr(item, "surface")])
+
+
+def _meshes(models: Iterable[Any], radii: Float32Array) -> Iterable[MeshSurface]:
+    """Yield the triangles of models; those of BlobTrees resolve the smallest radius."""
+    least = float(radii[radii > 0].min(initial=np.inf))
+    for model in models:
+        surface = getattr(model, "surface", None)
+        if surface is None:
+            surface = as_surface(model)
+        if isinstance(surface, ImplicitSurface):
+            surface = surface.triangulated(least / CELLS_PER_RADIUS)
+        if isinstance(surface, MeshSurface):
+            yield surface
+
+
+def _walk(rows: Float32Array, meshes: Sequence[MeshSurface]) -> tuple[Int32Array, Float32Array]:
+    """Return the rows of the decals that need relays, and their grids ``float32[g, GRID, 4]``."""
+    best = np.full(len(rows), np.inf)
+    mesh_of = np.full(len(rows), -1)
+    for number, mesh in enumerate(meshes):
+        found = np.linalg.norm(mesh.project(rows[:, :3])[0] - rows[:, :3], axis=1)
+        mesh_of[found < best] = number
+        best = np.minimum(best, found)
+    mesh_of[best > FARTHEST * RIM_RADIUS * rows[:, 3]] = -1
+    numbers, grids = [np.zeros(0, np.int64)], [np.zeros((0, GRID, 4), np.float32)]
+    for number, mesh in enumerate(meshes):
+        own = np.flatnonzero(mesh_of == number)
+        for first in range(0, len(own), BLOCK):
+            part = own[first : first + BLOCK]
+            needed, made = _grids(rows[part], mesh)
+            numbers.append(part[needed])
+            grids.append(made)
+    return np.concatenate(numbers).astype(np.int32), np.concatenate(grids)
+
+
+BLOCK = 256
+"""Decals whose grids are made at once; 441 relays of each take 21 KB."""
+
+
+def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Array]:
+    """Return True for the decals that need relays, and the grids of these."""
+    starts: Any = wp.array(_starts(rows, mesh), dtype=WalkStart, device="cpu")
+    relays = len(rows) * SIDE * SIDE
+    texels: Any = wp.zeros(len(rows) * GRID, dtype=wp.vec4, device="cpu")
+    wp.launch(loaded(place_relays, "cpu"), relays, [starts, _walked(mesh)], [texels], device="cpu")
+    errors: Any = wp.zeros(relays, dtype=wp.float32, device="cpu")
+    frames = [wp.array(rows[:, 4 * k : 4 * k + 3].copy(), dtype=wp.vec3, device="cpu") for k in (1, 2)]
+    wp.launch(loaded(compare_relays, "cpu"), relays, [*frames, texels], [errors], device="cpu")
+    needed = errors.numpy().reshape(len(rows), -1).max(axis=1) > TOLERANCE
+    grids = texels.numpy().reshape(len(rows), GRID, 4)[needed]
+    joined: Any = wp.array(grids.reshape(-1, 4), dtype=wp.vec4, device="cpu")
+    wp.launch(loaded(join_relays, "cpu"), len(grids) * SIDE * SIDE, [joined], device="cpu")
+    return needed, joined.numpy().reshape(-1, GRID, 4)
+
+
+def _walked(mesh: MeshSurface) -> Any:
+    """Return the triangles of a mesh, a `WalkedMesh`."""
+    walked: Any = WalkedMesh()
+    corners, normals, twins = mesh.triangles
+    walked.vertices = wp.array(mesh.vertices, dtype=wp.vec3, device="cpu", copy=False)
+    walked.corners = wp.array(corners.reshape(-1), dtype=wp.int32, device="cpu", copy=False)
+    walked.normals = wp.array(normals, dtype=wp.vec3, device="cpu", copy=False)
+    walked.twins = wp.array(twins, dtype=wp.int32, device="cpu", copy=False)
+    return walked
+
+
+def _starts(rows: Float32Array, mesh: MeshSurface) -> Any:
+    """Return where the walks of decals begin; their axes turn with the normal, from the decal to its face."""
+    centers, normals, tangents = (rows[:, 4 * k : 4 * k + 3].astype(np.float64) for k in range(3))
+    corners, face_normals, _ = mesh.triangles
+    faces, weights = mesh.locate(rows[:, :3])
+    sound = np.searchsorted(mesh.sound, faces)
+    weights = np.maximum(weights, INSIDE)
+    weights /= weights.sum(axis=1, keepdims=True)
+    points = np.einsum("nk,nki->ni", weights, mesh.vertices[corners[sound]] - centers[:, None])
+    up = face_normals[sound].astype(np.float64)
+    facing = (normals * up).sum(axis=1)
+    tilt = (tangents * up).sum(axis=1) / np.maximum(1.0 + facing, 1.0 + LEAST_COSINE)
+    u = tangents - tilt[:, None] * (normals + up)
+    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-30)
+    starts = np.zeros(len(rows), WalkStart.numpy_dtype())
+    starts["centre"], starts["radius"] = centers, RIM_RADIUS * rows[:, 3]
+    starts["point"], starts["u"], starts["v"] = points, u, np.cross(up, u)
+    starts["face"] = np.where(facing > LEAST_COSINE, sound, -1)
+    return starts
