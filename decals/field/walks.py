@@ -85,7 +85,7 @@ class Walks:
         """
         records = decals.arrays[RECORDS] if isinstance(decals, DecalEditor) else decals.packed()
         rows = records.reshape(-1, RECORD, 4)[:, :3].reshape(-1, 12).copy()
-        radii = RIM_RADIUS * rows[:, 3]
+        radii = (RIM_RADIUS * rows[:, 3]).astype(np.float32)
         meshes = tuple(_meshes(models, radii))
         slots = np.full(len(rows), -1, np.int64)
         kept = np.zeros((0, GRID, 4), np.float32)
@@ -157,7 +157,7 @@ def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Arr
     texels: Any = wp.zeros(len(rows) * GRID, dtype=wp.vec4, device="cpu")
     wp.launch(loaded(place_relays, "cpu"), relays, [starts, _walked(mesh)], [texels], device="cpu")
     errors: Any = wp.zeros(relays, dtype=wp.float32, device="cpu")
-    frames = [wp.array(rows[:, 4 * k : 4 * k + 3].copy(), dtype=wp.vec3, device="cpu") for k in (1, 2)]
+    frames: list[Any] = [wp.array(rows[:, 4 * k : 4 * k + 3].copy(), dtype=wp.vec3, device="cpu") for k in (1, 2)]
     wp.launch(loaded(compare_relays, "cpu"), relays, [*frames, texels], [errors], device="cpu")
     needed = errors.numpy().reshape(len(rows), -1).max(axis=1) > TOLERANCE
     grids = texels.numpy().reshape(len(rows), GRID, 4)[needed]
@@ -191,7 +191,8 @@ def _starts(rows: Float32Array, mesh: MeshSurface) -> Any:
     tilt = (tangents * up).sum(axis=1) / np.maximum(1.0 + facing, 1.0 + LEAST_COSINE)
     u = tangents - tilt[:, None] * (normals + up)
     u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-30)
-    starts = np.zeros(len(rows), WalkStart.numpy_dtype())
+    kind: Any = WalkStart
+    starts: Any = np.zeros(len(rows), kind.numpy_dtype())
     starts["centre"], starts["radius"] = centers, RIM_RADIUS * rows[:, 3]
     starts["point"], starts["u"], starts["v"] = points, u, np.cross(up, u)
     starts["face"] = np.where(facing > LEAST_COSINE, sound, -1)
