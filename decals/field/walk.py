@@ -37,7 +37,7 @@ STEPS = 4
 """Steps from relay to relay."""
 TURN = 0.005
 """Smallest difference of normals, 1 − cosine, that counts against a relay."""
-DOUBT = 0.01
+DOUBT = 0.15
 """Squared distance in the image, in spacings, from which a relay counts less than the one that led there."""
 MIN_SHARE = 1.0e-4
 OTHER_FACE = 0.3

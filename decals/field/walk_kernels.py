@@ -140,6 +140,55 @@ def place_relays(
     texels[RELAY * i + 2] = wp.vec4(along_y[0], along_y[1], along_y[2], SINGLE)
 
 
+@wp.func
+def relay_step(
+    i: wp.int32, side: wp.int32, step: wp.vec3, normal: wp.vec3, texels: wp.array(dtype=wp.vec4)
+):
+    """Return how far a relay's place changes along one axis of the grid, per unit of the image.
+
+    It is half the way between its neighbours, `side` relays before and behind. `step` is that of its own walk, for
+    relays at a border of the grid or of a face.
+    """
+    number = i % (SIDE * SIDE) // side % SIDE
+    if number == 0 or number == SIDE - 1:
+        return step
+    ends = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(2):
+        sign = 1 - 2 * k
+        texel = RELAY * (i + sign * side)
+        beyond = texels[texel + 2]
+        offset = float(sign) * (xyz(texels[texel]) - xyz(texels[RELAY * i]))
+        turned = wp.cross(xyz(texels[texel + 1]), xyz(beyond))
+        apart = wp.length(offset) / (SPACING * wp.length(step))
+        if beyond[3] == LOST or apart < 0.5 or apart > 2.0 or wp.dot(turned, normal) < SAME_FACE * wp.length(turned):
+            return step
+        ends += offset
+    ends = ends / (2.0 * SPACING)
+    return ends - wp.dot(ends, normal) * normal
+
+
+@wp.kernel
+def smooth_relays(texels: wp.array(dtype=wp.vec4), smoothed: wp.array(dtype=wp.vec4)):
+    """Write relays with gradients that lead from neighbour to neighbour, so that facets do not show."""
+    i = wp.tid()
+    along_x = xyz(texels[RELAY * i + 1])
+    along_y = xyz(texels[RELAY * i + 2])
+    state = texels[RELAY * i + 2][3]
+    if state != LOST:
+        cross = wp.cross(along_x, along_y)
+        size = wp.length(cross)
+        normal = cross / size
+        x = relay_step(i, 1, wp.cross(along_y, normal) / size, normal, texels)
+        y = relay_step(i, SIDE, wp.cross(normal, along_x) / size, normal, texels)
+        area = wp.dot(wp.cross(x, y), normal)
+        if area > LEAST_STRETCH * wp.length(x) * wp.length(y):
+            along_x = wp.cross(y, normal) / area
+            along_y = wp.cross(normal, x) / area
+    smoothed[RELAY * i] = texels[RELAY * i]
+    smoothed[RELAY * i + 1] = wp.vec4(along_x[0], along_x[1], along_x[2], 0.0)
+    smoothed[RELAY * i + 2] = wp.vec4(along_y[0], along_y[1], along_y[2], state)
+
+
 @wp.kernel
 def compare_relays(
     normals: wp.array(dtype=wp.vec3),

@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.kernels import loaded
 from decals.field.mapping import ImageMapping
 from decals.field.walk import GRID, SIDE
-from decals.field.walk_kernels import WalkedMesh, WalkStart, compare_relays, join_relays, place_relays
+from decals.field.walk_kernels import WalkedMesh, WalkStart, compare_relays, join_relays, place_relays, smooth_relays
 from decals.index.editor import RECORDS, DecalEditor
 from decals.model import Decals
 from decals.record import RECORD, RIM_RADIUS
@@ -154,8 +154,10 @@ def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Arr
     """Return True for the decals that need relays, and the grids of these."""
     starts: Any = wp.array(_starts(rows, mesh), dtype=WalkStart, device="cpu")
     relays = len(rows) * SIDE * SIDE
-    texels: Any = wp.zeros(len(rows) * GRID, dtype=wp.vec4, device="cpu")
-    wp.launch(loaded(place_relays, "cpu"), relays, [starts, _walked(mesh)], [texels], device="cpu")
+    placed: Any = wp.zeros(len(rows) * GRID, dtype=wp.vec4, device="cpu")
+    texels: Any = wp.zeros_like(placed)
+    wp.launch(loaded(place_relays, "cpu"), relays, [starts, _walked(mesh)], [placed], device="cpu")
+    wp.launch(loaded(smooth_relays, "cpu"), relays, [placed], [texels], device="cpu")
     errors: Any = wp.zeros(relays, dtype=wp.float32, device="cpu")
     frames: list[Any] = [wp.array(rows[:, 4 * k : 4 * k + 3].copy(), dtype=wp.vec3, device="cpu") for k in (1, 2)]
     wp.launch(loaded(compare_relays, "cpu"), relays, [*frames, texels], [errors], device="cpu")

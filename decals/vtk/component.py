@@ -209,8 +209,8 @@ class DecalsComponent(KnownAttributes):
         Raises
         ------
         InvalidScene
-            VTK does not draw the actor as polygons, the crease angle is out of range, or the labels are no
-            texts.
+            VTK does not draw the actor as polygons, the crease angle is out of range, the labels are no
+            texts, or the image mapping is WALKED, which needs an object of the scene.
         """
         self.subplot.apply(actor, follow=follow, crease_angle=crease_angle, labels=labels)
         return actor

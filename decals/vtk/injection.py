@@ -279,10 +279,19 @@ class InjectedDecals:
         self, actor: Any, *, follow: bool, crease_angle: float, labels: tuple[str, ...] | None = None
     ) -> None:
         """Show the decals on an actor."""
+        self.check_mapping(self._subplot.mapping, applied=True)
         self._release(self._of(actor))
         self._injections.append(
             Injection(self._subplot, actor, follow=follow, labels=labels, crease_angle=crease_angle)
         )
+
+    def check_mapping(self, mapping: ImageMapping, *, applied: bool = False) -> None:
+        """Raise InvalidScene for a mapping that actors cannot be drawn in, if there are or will be any."""
+        if mapping is ImageMapping.WALKED and (applied or self._injections):
+            raise InvalidScene(
+                "mapping: expected 'corrected' or 'chord' with decals applied to actors of VTK, got 'walked', "
+                "which walks over the objects of the scene; add the mesh with plotter.decals.add_mesh instead"
+            )
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor.

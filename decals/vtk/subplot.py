@@ -299,6 +299,8 @@ class SubplotRenderer(KnownAttributes):
 
     @mapping.setter
     def mapping(self, mapping: ImageMapping | str) -> None:
+        mapping = member("mapping", mapping, ImageMapping, InvalidScene)
+        self.applied.check_mapping(mapping)
         self._draw_with("mapping", mapping)
 
     @property

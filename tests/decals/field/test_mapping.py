@@ -76,7 +76,7 @@ def test_every_small_angle_on_the_sphere(angle: Any) -> None:
 
 @pytest.mark.parametrize(("name", "chord"), [("torus", 0.02), ("ellipsoid", 0.02)])
 def test_what_is_drawn_on_curved_surfaces(name: str, chord: Any) -> None:
-    corrected, projected = (drawn_error(name, mapping=mode) for mode in reversed(ImageMapping))
+    corrected, projected = (drawn_error(name, mapping=mode) for mode in (ImageMapping.CORRECTED, ImageMapping.CHORD))
     print(f"{name}: corrected {corrected:.3%}, chord {projected:.3%} of the radius")
     assert corrected <= 0.005
     assert projected > chord
@@ -231,7 +231,7 @@ def test_lines_of_contact_stay_in_place(contact: Contact) -> None:
     centres = np.array([[np.sin(a), 0, np.cos(a)] for a in (-apart, apart)])
     decals = Decals(centres, centres, [[0, 1, 0]] * 2, [0.5, 0.5])
     line = np.column_stack([0 * aside, np.sin(aside), np.cos(aside)])
-    for mapping in ImageMapping:
+    for mapping in (ImageMapping.CHORD, ImageMapping.CORRECTED):
         for side in (-1e-6, 1e-6):
             q = unit(line + side * np.eye(3)[0])
             seen = evaluate(decals, q, q, mapping=mapping, contact=contact, device="cpu")

@@ -8,6 +8,8 @@ import pytest
 
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
+from decals.field.walks import Walks
+from decals.index.editor import DecalEditor
 from decals.index.index import has_nested, index_on
 from decals.model import Decals
 from decals.record import Contact
@@ -16,6 +18,8 @@ from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
+from decals.scenes.objects import MeshObject
+from decals.surfaces.mesh import MeshSurface
 from tests.decals.rendering.pictures import (
     SIZE,
     compare,
@@ -28,6 +32,10 @@ from tests.decals.rendering.pictures import (
 )
 from tests.decals.shapes import Picture, Shape, View, torus
 from tests.oracles.decals import colors_at
+
+CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)], np.float32)
+SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+CUBE = CORNERS, np.array([face for a, b, c, d in SIDES for face in ((a, b, c), (a, c, d))])
 
 
 @pytest.mark.parametrize("filtered", [False, True])
@@ -66,7 +74,7 @@ def index_without_nested(*arguments: Any) -> Any:
     return index
 
 
-@pytest.mark.parametrize("mapping", list(ImageMapping))
+@pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED])
 @pytest.mark.parametrize(("count", "radii"), [(1, (0.5, 0.6)), (40, (0.2, 0.6)), (800, (0.004, 0.4))])
 def test_every_pixel_is_the_oracles(
     renderer: Renderer, mapping: ImageMapping, count: int, radii: tuple[float, float]
@@ -77,6 +85,32 @@ def test_every_pixel_is_the_oracles(
     owned = compare(view, renderer.buffers(view, RenderOptions(size=SIZE, mapping=mapping)), mapping)
     assert owned.any()
     assert count > 1 or not owned.all()
+
+
+@pytest.mark.parametrize("layered", [False, True])
+def test_every_pixel_of_walked_images(renderer: Renderer, layered: bool) -> None:
+    """On a cube, where many walks cross edges; before and after an edit, as `evaluate` has it."""
+    cube = MeshSurface(*CUBE)
+    centres, normals = cube.sample(12, 3)
+    decals = Decals(centres, normals, np.roll(normals, 1, axis=1), np.linspace(0.4, 0.9, 12))
+    editor = DecalEditor(in_layers(decals, 8) if layered else decals)
+    view = replace(view_of(decals, torus()), objects=(MeshObject("cube", *CUBE),), decals=editor)
+    for moved in (False, True):
+        if moved:
+            editor.assign([3, 5], editor.take([5, 3]))
+        buffers = renderer.buffers(view, RenderOptions(size=SIZE, mapping=ImageMapping.WALKED))
+        seen = buffers.owner >= 0
+        assert seen.mean() > 0.1
+        walks = Walks.over(editor, [cube])
+        points = buffers.position[seen], buffers.normal[seen]
+        samples = evaluate(editor, *points, mapping="walked", walks=walks, device="cpu")
+        same = samples.owner == buffers.owner[seen]
+        assert same.mean() > 0.99
+        errors = np.abs(samples.uv - buffers.uv[seen])[same].max(axis=1)
+        assert np.quantile(errors, 0.995) < 1e-3  # the rest lies on cuts, where two walks are equally long
+        assert (errors > 0.02).mean() < 0.003
+        plain = evaluate(editor, *points, device="cpu")
+        assert (np.abs(plain.uv - buffers.uv[seen])[same].max(axis=1) > 0.02).mean() > 0.1
 
 
 @pytest.mark.parametrize("contact", list(Contact))
