@@ -88,8 +88,8 @@ def render(
         Average images, rims and contact lines over each sample, so that one sample a pixel
         shows decals smoothly.
     mapping
-        Image mapping: corrected for the curvature of the surface, or chord (the paper's projection).
-        Default: that of a saved scene, or corrected.
+        Image mapping: corrected for the curvature of the surface, chord (the paper's projection), or walked
+        along the shortest path, for edges and corners. Default: that of a saved scene, or corrected.
     seed
         Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save

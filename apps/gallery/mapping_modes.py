@@ -1,27 +1,42 @@
 """Image mappings
 ==============
 
-A checkerboard on an implicit finger, in the two image mappings: chord (the paper's projection) and
-corrected (the default), which unrolls the surface.
+A checkerboard on an implicit finger: chord (the paper's projection) and corrected (the default), which unrolls the
+surface. The same over the corner of a cube: corrected and walked, the log map of the surface (compare figure 4).
 """
 
 from collections.abc import Sequence
 
+import pyvista as pv
+
 from blobtree import Segment
-from decals import ImageMapping, Scene, TreeObject
+from decals import ImageMapping, MeshObject, Scene, TreeObject
 from decals.apps.gallery.helpers import CLAY, Panel, camera_at, checker_image, main, single_decal
 
 
 def panels() -> Sequence[Panel]:
-    """Draw a large checkerboard on an implicit finger, once in each mapping."""
+    """Draw a large checkerboard on a finger and over a corner, in two mappings each."""
     finger = TreeObject("finger", Segment((-1.2, 0, 0), (0.35, 0, 0), radius=0.5, color=CLAY))
-    scene = Scene(
+    round_scene = Scene(
         objects=(finger,),
         camera=camera_at((3.1, -2.0, 2.6), target=(0.2, 0, 0.05)),
         images=(checker_image(10),),
         decals=single_decal((0.62, 0, 0.42), (0.55, 0, 0.83), 0.75, tangent=(0.83, 0, -0.55)),
     )
-    return [Panel(scene, mapping=mode) for mode in ImageMapping]
+    block = pv.Cube().triangulate()
+    cube = MeshObject("cube", block.points, block.regular_faces, color=CLAY)
+    sharp_scene = Scene(
+        objects=(cube,),
+        camera=camera_at((2.0, 1.7, 1.8), target=(0.1, 0.1, 0.1)),
+        images=(checker_image(10),),
+        decals=single_decal((0.3, 0.3, 0.5), (0, 0, 1), 0.6),
+    )
+    return [
+        Panel(round_scene, mapping=ImageMapping.CHORD),
+        Panel(round_scene),
+        Panel(sharp_scene),
+        Panel(sharp_scene, mapping=ImageMapping.WALKED),
+    ]
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ oracles of the tests. Other parts:
     --only faults                    stretched, folded, oversized and missing decals on six models
     --only contact                   folds, stretch, continuity and time of all contact modes
     --only filter                    one filtered sample a pixel against many
+    --only walk                      walked image mapping against exact log maps, and its cost
     --only octree                    the paper's octree beside the index
     --only methods                   ray tracer, coordinates at vertices, and fragment shader
     --peers                          mesh-clipped decals, log maps, and texture coordinates at vertices
@@ -122,6 +123,17 @@ def measure_filter(*, quick: bool) -> Figures:
     return figures
 
 
+def measure_walk(*, quick: bool) -> Figures:
+    """Measure the walked image mapping, and print the figures."""
+    from tests.bench import walking
+
+    figures = walking.measure(quick=quick)
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
+    for name, value in figures.items():
+        print(f"{name:28} {value:12.4g}  {walking.TARGETS.get(name, '')}".rstrip())
+    return figures
+
+
 def measure_paper(part: str, *, quick: bool) -> Figures:
     """Measure the paper's octree, or its three methods of drawing, and print the figures."""
     from tests.bench import paper_methods, paper_octree
@@ -156,7 +168,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
     parser.add_argument(
         "--only",
-        choices=["index", "million", "faults", "contact", "filter", "octree", "methods"],
+        choices=["index", "million", "faults", "contact", "filter", "walk", "octree", "methods"],
         help="measure one part",
     )
     parser.add_argument("--peers", action="store_true", help="measure other methods")
@@ -170,6 +182,8 @@ def main() -> None:
         figures = measure_contact(quick=options.quick)
     elif options.only == "filter":
         figures = measure_filter(quick=options.quick)
+    elif options.only == "walk":
+        figures = measure_walk(quick=options.quick)
     elif options.only in ("octree", "methods"):
         figures = measure_paper(options.only, quick=options.quick)
     elif options.only:
