@@ -82,9 +82,7 @@ def from_relay(
 
 
 @wp.func
-def walk_from(
-    start: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals
-) -> wp.vec2:
+def walk_from(start: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
     """Return where a walk from relay to relay ends, for a point at w from the centre."""
     at = start
     for _step in range(STEPS):
@@ -152,9 +150,7 @@ def nearness(distance: wp.float32) -> wp.float32:
 
 
 @wp.func
-def walked_place(
-    owner: wp.int32, w: wp.vec3, n_q: wp.vec3, guess: wp.vec2, index: IndexedDecals
-) -> wp.vec3:
+def walked_place(owner: wp.int32, w: wp.vec3, n_q: wp.vec3, guess: wp.vec2, index: IndexedDecals) -> wp.vec3:
     """Return the place (x, y) of a point at w in the image of its owner, and how far it counts, 0 to 1.
 
     `guess` is its place in the corrected mapping. It also counts alone for decals without relays, which are

@@ -94,9 +94,7 @@ def walk(start: WalkStart, angle: wp.float32, length: wp.float32, mesh: WalkedMe
 
 
 @wp.kernel
-def place_relays(
-    starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp.array(dtype=wp.vec4)
-):
+def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp.array(dtype=wp.vec4)):
     """Write the grids of relays: places, gradients of the image coordinates there, and states."""
     i = wp.tid()
     start = starts[i // (SIDE * SIDE)]
@@ -141,9 +139,7 @@ def place_relays(
 
 
 @wp.func
-def relay_step(
-    i: wp.int32, side: wp.int32, step: wp.vec3, normal: wp.vec3, texels: wp.array(dtype=wp.vec4)
-):
+def relay_step(i: wp.int32, side: wp.int32, step: wp.vec3, normal: wp.vec3, texels: wp.array(dtype=wp.vec4)):
     """Return how far a relay's place changes along one axis of the grid, per unit of the image.
 
     It is half the way between its neighbours, `side` relays before and behind. `step` is that of its own walk, for
@@ -160,7 +156,12 @@ def relay_step(
         offset = float(sign) * (xyz(texels[texel]) - xyz(texels[RELAY * i]))
         turned = wp.cross(xyz(texels[texel + 1]), xyz(beyond))
         apart = wp.length(offset) / (SPACING * wp.length(step))
-        if beyond[3] == LOST or apart < 0.5 or apart > 2.0 or wp.dot(turned, normal) < SAME_FACE * wp.length(turned):
+        if (
+            beyond[3] == LOST
+            or apart < 0.5
+            or apart > 2.0
+            or wp.dot(turned, normal) < SAME_FACE * wp.length(turned)
+        ):
             return step
         ends += offset
     ends = ends / (2.0 * SPACING)

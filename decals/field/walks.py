@@ -11,7 +11,14 @@ from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.kernels import loaded
 from decals.field.mapping import ImageMapping
 from decals.field.walk import GRID, SIDE
-from decals.field.walk_kernels import WalkedMesh, WalkStart, compare_relays, join_relays, place_relays, smooth_relays
+from decals.field.walk_kernels import (
+    WalkedMesh,
+    WalkStart,
+    compare_relays,
+    join_relays,
+    place_relays,
+    smooth_relays,
+)
 from decals.index.editor import RECORDS, DecalEditor
 from decals.model import Decals
 from decals.record import RECORD, RIM_RADIUS
@@ -159,7 +166,9 @@ def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Arr
     wp.launch(loaded(place_relays, "cpu"), relays, [starts, _walked(mesh)], [placed], device="cpu")
     wp.launch(loaded(smooth_relays, "cpu"), relays, [placed], [texels], device="cpu")
     errors: Any = wp.zeros(relays, dtype=wp.float32, device="cpu")
-    frames: list[Any] = [wp.array(rows[:, 4 * k : 4 * k + 3].copy(), dtype=wp.vec3, device="cpu") for k in (1, 2)]
+    frames: list[Any] = [
+        wp.array(rows[:, 4 * k : 4 * k + 3].copy(), dtype=wp.vec3, device="cpu") for k in (1, 2)
+    ]
     wp.launch(loaded(compare_relays, "cpu"), relays, [*frames, texels], [errors], device="cpu")
     needed = errors.numpy().reshape(len(rows), -1).max(axis=1) > TOLERANCE
     grids = texels.numpy().reshape(len(rows), GRID, 4)[needed]

@@ -26,7 +26,14 @@ from decals.surfaces.surface import (
     project_host,
     vectors,
 )
-from decals.surfaces.topology import consistent_winding, edge_twins, first_copies, parts_of, shared_edges, welded
+from decals.surfaces.topology import (
+    consistent_winding,
+    edge_twins,
+    first_copies,
+    parts_of,
+    shared_edges,
+    welded,
+)
 from decals.validation import whole_number
 
 _logger = logging.getLogger(__name__)

@@ -76,7 +76,9 @@ def test_every_small_angle_on_the_sphere(angle: Any) -> None:
 
 @pytest.mark.parametrize(("name", "chord"), [("torus", 0.02), ("ellipsoid", 0.02)])
 def test_what_is_drawn_on_curved_surfaces(name: str, chord: Any) -> None:
-    corrected, projected = (drawn_error(name, mapping=mode) for mode in (ImageMapping.CORRECTED, ImageMapping.CHORD))
+    corrected, projected = (
+        drawn_error(name, mapping=mode) for mode in (ImageMapping.CORRECTED, ImageMapping.CHORD)
+    )
     print(f"{name}: corrected {corrected:.3%}, chord {projected:.3%} of the radius")
     assert corrected <= 0.005
     assert projected > chord

@@ -25,7 +25,9 @@ from tests.decals.field.unfolding import Patch, rms
 @pytest.mark.parametrize("distance", [0.1, 0.3, 0.8])
 def test_images_run_on_over_edges(degrees: float, distance: float) -> None:
     patch = unfolding.edge(degrees, distance)
-    walked, corrected = (rms(patch.errors(1.0, mode)) for mode in (ImageMapping.WALKED, ImageMapping.CORRECTED))
+    walked, corrected = (
+        rms(patch.errors(1.0, mode)) for mode in (ImageMapping.WALKED, ImageMapping.CORRECTED)
+    )
     print(f"walked {walked:.5f}, corrected {corrected:.5f} of the radius")
     assert walked <= 0.003
     assert walked <= corrected
@@ -145,7 +147,7 @@ def test_an_edit_walks_again_for_changed_decals_alone(monkeypatch: pytest.Monkey
         evaluate(editor, points, 0 * points + [0, 0, 1], mapping="walked", walks=walks, device="cpu").uv
         for walks in (after, anew)
     ]
-    assert np.array_equal(*uv)
+    assert np.array_equal(uv[0], uv[1])
 
 
 @pytest.mark.parametrize("walks", [None, "surface", Walks.over(Decals.empty(), [])])
@@ -166,7 +168,13 @@ def test_walks_on_hostile_meshes() -> None:
     decals = Decals(
         np.vstack([soup[:3], [[9, 9, 9.0]], soup[:1]]),
         np.vstack([normal, normal[:1], -normal[:1]]),
-        np.vstack([log_maps.tangents(rng, normal), log_maps.tangents(rng, normal[:1]), log_maps.tangents(rng, normal[:1])]),
+        np.vstack(
+            [
+                log_maps.tangents(rng, normal),
+                log_maps.tangents(rng, normal[:1]),
+                log_maps.tangents(rng, normal[:1]),
+            ]
+        ),
         [0.5, 1.0, 2.0, 1.0, 1.0],
     )
     walks = Walks.over(decals, [surface])

@@ -101,7 +101,9 @@ def corner(x: float, y: float, count: int = 4000) -> Patch:
     direct = np.where(
         axis[:, None] == 2,
         points[:, :2],
-        np.where(axis[:, None] == 0, np.stack([c, points[:, 1]], axis=1), np.stack([points[:, 0], c], axis=1)),
+        np.where(
+            axis[:, None] == 0, np.stack([c, points[:, 1]], axis=1), np.stack([points[:, 0], c], axis=1)
+        ),
     )
     other = np.where(axis[:, None] == 0, np.stack([b, c], axis=1), np.stack([c, a], axis=1))
     other[axis == 2] = 1e3

@@ -94,7 +94,8 @@ def test_every_pixel_of_walked_images(renderer: Renderer, layered: bool) -> None
     centres, normals = cube.sample(12, 3)
     decals = Decals(centres, normals, np.roll(normals, 1, axis=1), np.linspace(0.4, 0.9, 12))
     editor = DecalEditor(in_layers(decals, 8) if layered else decals)
-    view = replace(view_of(decals, torus()), objects=(MeshObject("cube", *CUBE),), decals=editor)
+    objects: Any = {"objects": (MeshObject("cube", *CUBE),), "decals": editor}
+    view = replace(view_of(decals, torus()), **objects)
     for moved in (False, True):
         if moved:
             editor.assign([3, 5], editor.take([5, 3]))
