@@ -1,8 +1,9 @@
 """Image mappings
 ==============
 
-A checkerboard on an implicit finger: chord (the paper's projection) and corrected (the default), which unrolls the
-surface. The same over the corner of a cube: corrected and walked, the log map of the surface (compare figure 4).
+A checkerboard on an implicit finger: chord (the paper's projection) and corrected (the default), which
+unrolls the surface. The same over the corner of a cube (compare figure 4): corrected, and walked, the log map
+of the surface.
 """
 
 from collections.abc import Sequence

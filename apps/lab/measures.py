@@ -15,8 +15,8 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Scope
 from decals.apps.lab.formulas import Evaluate, Measure
 from decals.field.evaluate import Samples, evaluate
-from decals.field.walks import walks_for
 from decals.field.jacobian import folds_of, stretch_of
+from decals.field.walks import walks_for
 from decals.model import Interaction
 from decals.record import Contact
 from decals.scenes.objects import TreeObject

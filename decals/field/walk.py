@@ -1,13 +1,14 @@
-"""Walked mapping: image coordinates from a log map of the surface around each decal, for edges, corners and large decals.
+"""Walked mapping: image coordinates from a log map of the surface around each decal.
 
-`decals.field.walks` walks from the centre of a decal along straightest geodesics and leaves a grid of *relays*:
-surface points whose image coordinates are known, with the gradients of these coordinates. A pixel walks from
-relay to relay towards its own point (`walk_from`), and takes the mean of what the four relays around it say
-(`between_relays`). From each relay the corrected mapping leads on, so a relay is exact on its own face, and of third
-order on curved surface. Relays whose normal is another one, across an edge, do not count where others do.
+It is for edges, corners and large decals. `decals.field.walks` walks from the centre of a decal along
+straightest geodesics and leaves a grid of *relays*: surface points whose image coordinates are known, with
+the gradients of these coordinates. A pixel walks from relay to relay towards its own point (`walk_from`), and
+takes the mean of the places that the four relays around it see (`between_relays`). From each relay the
+corrected mapping leads on, so a relay is exact on its own face, and of third order on curved surface. Relays
+across an edge, with another normal, do not count where others do.
 
-Behind a corner two walks lead to one point. Relays know the image coordinates of the other walk; the shorter one is
-drawn, as the log map demands. All lengths are in visible radii.
+Behind a corner two walks lead to one point. Relays know the image coordinates of the other walk, and the
+shorter one is drawn. All lengths are in visible radii.
 """
 
 # mypy: ignore-errors
@@ -28,11 +29,12 @@ SIDE = 2 * RELAYS_PER_RADIUS + 1
 SPACING = 1.1 / 10.0
 """Distance of neighbouring relays in the image."""
 RELAY = 3
-"""Texels of a relay: (place, u of the other walk), (gradient of x, v of the other walk), (gradient of y, state)."""
+"""Texels of a relay: (point, x of the other walk), (gradient of x, y of the other walk), (gradient of y,
+state)."""
 GRID = RELAY * SIDE * SIDE
 """Texels of a grid."""
 LOST, SINGLE, DOUBLE = 0.0, 1.0, 2.0
-"""States of a relay: its walk ended at a border; it is the only one at its place; another walk leads there too."""
+"""States of a relay: its walk ended at a border; no other walk leads to its point; another one does."""
 STEPS = 4
 """Steps from relay to relay."""
 TURN = 0.005
@@ -43,7 +45,7 @@ MIN_SHARE = 1.0e-4
 OTHER_FACE = 0.3
 """Mean 1 − cosine of normals from which relays lie on another face than the point."""
 AGREEMENT = 0.1
-"""Squared distance that counts as much as a right angle between normals, where the nearest relay is searched."""
+"""Squared distance that counts as much as a right angle between normals, in `nearest_relay`."""
 FAR = 3.0
 """Mean distance of a point from its relays, in spacings, from which only the corrected mapping is drawn."""
 
@@ -67,7 +69,10 @@ def relay_place(column: wp.int32, row: wp.int32) -> wp.vec2:
 def from_relay(
     column: wp.int32, row: wp.int32, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals
 ) -> wp.vec4:
-    """Return the place (x, y) of a point at w as a relay sees it, its distance, and 1 − cosine of the normals, or −1."""
+    """Return the place (x, y) of a point at w as a relay sees it, its distance, and the turn of the normal.
+
+    The turn is 1 − cosine, and −1 for a relay that is lost.
+    """
     texel = first + RELAY * (SIDE * row + column)
     along_x = xyz(index.walks[texel + 1])
     last = index.walks[texel + 2]
@@ -95,7 +100,7 @@ def walk_from(start: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: 
 
 @wp.func
 def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec4:
-    """Return the place (x, y) of a point as the four relays around `at` see it, their mean distance and turn."""
+    """Return the place of a point as the four relays around `at` see it, their mean distance and turn."""
     limit = float(RELAYS_PER_RADIUS) - 1.0
     cell = wp.vec2(
         wp.clamp(wp.floor(at[0] / SPACING), -limit - 1.0, limit),
@@ -107,7 +112,7 @@ def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index
     )
     column = int(cell[0]) + RELAYS_PER_RADIUS
     row = int(cell[1]) + RELAYS_PER_RADIUS
-    sum = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    weighted = wp.vec4(0.0, 0.0, 0.0, 0.0)
     total = wp.float32(0.0)
     for corner in range(4):
         right = corner & 1
@@ -117,11 +122,11 @@ def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index
         doubt = (DOUBT + wp.dot(aside, aside)) * (TURN + seen[3])
         weight = wp.abs(float(1 - right) - share[0]) * wp.abs(float(1 - up) - share[1]) / (doubt * doubt)
         if seen[3] >= 0.0:
-            sum += weight * seen
+            weighted += weight * seen
             total += weight
     if total <= 0.0:
         return wp.vec4(at[0], at[1], FAR * SPACING, 1.0)
-    return sum / total
+    return weighted / total
 
 
 @wp.func

@@ -1,9 +1,11 @@
-"""Warp kernels that make the relays of the walked mapping: straightest geodesics over the triangles of a mesh.
+"""Warp kernels that make the relays of the walked mapping.
 
-A straightest geodesic (Polthier and Schmies 1998) goes straight through a triangle, and across an edge as on the two
-triangles unfolded into a plane. Positions are relative to the centre of the decal, which keeps the digits of float32.
+A straightest geodesic (Polthier and Schmies 1998) goes straight through a triangle, and across an edge as on
+the two triangles unfolded into a plane. Positions are relative to the centre of the decal, which keeps the
+digits of float32.
 """
 
+# ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
 
@@ -32,7 +34,7 @@ LEAST_STRETCH, MOST_STRETCH = 0.2, 5.0
 
 @wp.struct
 class WalkedMesh:
-    """Triangles and their neighbours; twin 3 f' + k' of 3 f + k is the same edge of the neighbouring face, or −1."""
+    """Triangles and their neighbours; the twins are those of `decals.surfaces.topology.edge_twins`."""
 
     vertices: wp.array(dtype=wp.vec3)
     corners: wp.array(dtype=wp.int32)
@@ -42,7 +44,7 @@ class WalkedMesh:
 
 @wp.struct
 class WalkStart:
-    """Where the walks of a decal begin: its centre and radius, a point of a face from there, and two axes in the face."""
+    """Centre and radius of a decal, the point of a face where its walks begin, and two axes in the face."""
 
     centre: wp.vec3
     radius: wp.float32
@@ -111,7 +113,8 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
         return
     normal = mesh.normals[face]
     across = wp.cross(normal, ahead)
-    stretch = wp.float32(0.0)
+    stretch = wp.float32(1.0)
+    total = wp.float32(0.0)
     count = wp.float32(0.0)
     if length > 0.0:
         turn = wp.min(0.5 * SPACING / length, LARGEST_TURN)
@@ -122,12 +125,10 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
                 if wp.dot(mesh.normals[other], normal) > SAME_FACE:
                     seen = sign * wp.dot(beside - end, across) / (length * start.radius * wp.sin(turn))
                     if seen > LEAST_STRETCH and seen < MOST_STRETCH:
-                        stretch += seen
+                        total += seen
                         count += 1.0
     if count > 0.0:
-        stretch = stretch / count
-    else:
-        stretch = 1.0
+        stretch = total / count
     cosine = wp.cos(angle)
     sine = wp.sin(angle)
     along_x = cosine * ahead - sine / stretch * across
@@ -142,8 +143,8 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
 def relay_step(i: wp.int32, side: wp.int32, step: wp.vec3, normal: wp.vec3, texels: wp.array(dtype=wp.vec4)):
     """Return how far a relay's place changes along one axis of the grid, per unit of the image.
 
-    It is half the way between its neighbours, `side` relays before and behind. `step` is that of its own walk, for
-    relays at a border of the grid or of a face.
+    It is half the way between its neighbours, `side` relays before and behind. `step` is that of its own
+    walk, for relays at a border of the grid or of a face.
     """
     number = i % (SIDE * SIDE) // side % SIDE
     if number == 0 or number == SIDE - 1:

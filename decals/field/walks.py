@@ -1,4 +1,4 @@
-"""Relays of the walked mapping, for all decals of a scene over its surfaces; `decals.field.walk` reads them."""
+"""Relays of the walked mapping, for all decals over their surfaces; `decals.field.walk` reads them."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -289,7 +289,7 @@ class InjectedDecals:
         """Raise InvalidScene for a mapping that actors cannot be drawn in, if there are or will be any."""
         if mapping is ImageMapping.WALKED and (applied or self._injections):
             raise InvalidScene(
-                "mapping: expected 'corrected' or 'chord' with decals applied to actors of VTK, got 'walked', "
+                "mapping: expected 'corrected' or 'chord' with decals applied to actors, got 'walked', "
                 "which walks over the objects of the scene; add the mesh with plotter.decals.add_mesh instead"
             )
 

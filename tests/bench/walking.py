@@ -17,7 +17,7 @@ from tests.decals.field.unfolding import Patch, rms
 Figures = dict[str, float]
 
 TARGETS = {"walk_edge": "≤ 0.005", "walk_corner": "≤ 0.005", "walk_rim": "≤ 0.005", "walk_bumpy": "≤ 0.005"}
-"""Largest RMS errors of the drawn coordinates over the radius; ``corrected_`` are those of the default mapping."""
+"""Largest RMS errors of the drawn coordinates over the radius."""
 
 RUNS = 7
 
@@ -41,7 +41,7 @@ def covered(model: pv.PolyData, count: int) -> Scene:
 
 
 def cost(scene: Scene, size: tuple[int, int]) -> Figures:
-    """Return the time of walks for a decal, their memory, and the time of a picture over the corrected one."""
+    """Return time and memory of walks, and the time of a picture over that of the corrected mapping."""
     begin = time.perf_counter()
     walks = Walks.over(scene.decals, scene.objects)
     seconds = time.perf_counter() - begin

@@ -1,4 +1,4 @@
-"""The walked mapping against exact unfoldings; which decals get relays; what is kept after edits; wrong input."""
+"""The walked mapping against exact unfoldings; decals that get relays; edits; wrong input."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Meshes with points whose log maps are known: unfolded faces, a rim by minimisation, bumps by integration."""
+"""Meshes with known log maps: unfolded faces, a rim by minimisation, bumps by integration."""
 
 from dataclasses import dataclass
 from typing import Any
