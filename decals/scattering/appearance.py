@@ -10,7 +10,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, 
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.gap_filling import EVEN
+from decals.scattering.gap_filling import EVEN, center_outsized
 from decals.scattering.mean_normals import mean_normals
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii, turned_normals
@@ -108,8 +108,7 @@ class Appearance:
         jitter = self.jitter or Jitter()
         points = jitter.move(domain, points, spacings, movable, _stream(seed, _POSITION_JITTER_STREAM))
         images_at = points
-        points = self._with_mean_normals(domain, points, spacings)
-        points, radii = self._with_radii(domain, points, images_at.normals, spacings, seed)
+        points, radii = self._with_radii(domain, points, spacings, movable, seed)
         radii = jitter.scale(self.factor * radii, _stream(seed, _SIZE_JITTER_STREAM))
         directions = tangents(points.positions, points.normals, self.direction, _stream(seed, _ANGLE_STREAM))
         if jitter.angle:
@@ -136,12 +135,21 @@ class Appearance:
         return OrientedPoints(points.positions, normals, points.surface_ids)
 
     def _with_radii(
-        self, domain: Domain, points: OrientedPoints, own: Float32Array, spacings: Float32Array, seed: int
+        self,
+        domain: Domain,
+        centers: OrientedPoints,
+        spacings: Float32Array,
+        movable: BoolArray,
+        seed: int,
     ) -> tuple[OrientedPoints, Float64Array]:
-        """Return the points, some turned by `turned_normals`, and radii by the sizing.
+        """Return the decals at centres, with their own normals, and radii by the sizing.
+
+        For covering radii at even density, some are moved by `center_outsized` and turned by
+        `turned_normals`.
 
         A surface without particles is not sampled.
         """
+        points = self._with_mean_normals(domain, centers, spacings)
         if self.sizing is Sizing.TOUCHING:
             return points, touching_radii(points)
         counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
@@ -155,10 +163,17 @@ class Appearance:
             return projected[np.flatnonzero(allowed)]
 
         expected = EXPECTED_RADIUS * spacings.astype(np.float64)
-        normals = turned_normals(points, own, samples, expected)
-        points = OrientedPoints(points.positions, normals, points.surface_ids)
+
+        def aim(centers: OrientedPoints) -> OrientedPoints:
+            bent = self._with_mean_normals(domain, centers, spacings)
+            normals = turned_normals(bent, centers.normals, samples, expected)
+            return OrientedPoints(centers.positions, normals, centers.surface_ids)
+
         even = bool(spacings.max() <= EVEN * spacings.min())
-        return points, covering_radii(points, samples, project, _stream(seed, _TRIAL_STREAM), even=even)
+        if even:
+            centers = center_outsized(domain, centers, movable, spacings, samples, aim)
+        decals = aim(centers)
+        return decals, covering_radii(decals, samples, project, _stream(seed, _TRIAL_STREAM), even=even)
 
     def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
         if self.choice is ImageChoice.SIZE:

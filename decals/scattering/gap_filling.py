@@ -1,4 +1,7 @@
-"""Last moves of a relaxation: particles beside wide gaps move toward the middle of their cells."""
+"""Particles beside wide gaps, and decals that would be outsized, move toward the middle of their cells."""
+
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,7 +31,22 @@ MOVE = 0.5
 ENCLOSING_STEPS = 24
 """Steps toward the centre of the least ball around points (Bădoiu and Clarkson 2003)."""
 
+OUTSIZED = 1.3
+"""Ratio of a decal's radius to the median, at samples alone, from which it moves."""
+
+CENTERING_ROUNDS = 6
+"""Largest number of rounds in which outsized decals move."""
+
+MIN_DISTANCE = 0.7
+"""Least distance of a decal that moved, in spacings."""
+
+NEIGHBORS = 8
+"""Nearest decals whose largest radius must fall when a decal moves."""
+
 _SAMPLE_STREAM = 11
+
+Aim: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
+"""A function of centres, with the normals of their surfaces, to these with the normals of decals there."""
 
 
 def fill_gaps(
@@ -75,6 +93,75 @@ def fill_gaps(
         positions[rows], normals[rows] = moved.positions, moved.normals
         points = OrientedPoints(positions, normals, points.surface_ids)
     return points
+
+
+def center_outsized(
+    domain: Domain,
+    centers: OrientedPoints,
+    movable: BoolArray,
+    sizes: Float32Array,
+    samples: OrientedPoints,
+    aim: Aim,
+) -> OrientedPoints:
+    """Return centres of decals, those of outsized decals moved toward the middle of their cells.
+
+    The decals' normals decide which of them face a point, so that beside lips and thin walls some cells are
+    larger than those of the particles. A decal stays where its move would make one of its neighbours larger,
+    or bring it nearer to one than `MIN_DISTANCE`.
+
+    Parameters
+    ----------
+    domain
+        The surfaces.
+    centers
+        The centres, with the normals of their surfaces.
+    movable
+        True for centres that may move, ``bool[n]``.
+    sizes
+        Spacing at each centre, ``float32[n]``.
+    samples
+        Points spread evenly over the area to cover.
+    aim
+        Returns the decals of centres.
+    """
+    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+    movable = movable.copy()
+    radii, owners = _cells(aim(centers), samples)
+    for _ in range(CENTERING_ROUNDS):
+        rows = np.flatnonzero(movable & (radii > OUTSIZED * np.median(radii)))
+        if len(rows) == 0:
+            break
+        moved = _moved(domain, centers, rows, samples.positions, owners)
+        tree = FacingTree(centers.positions, centers.normals)
+        keep = np.flatnonzero(_far_enough(tree, centers, moved, rows, sizes, MIN_DISTANCE))
+        rows, moved = rows[keep], moved[keep]
+        if len(rows) == 0:
+            break
+        positions, normals = centers.positions.copy(), centers.normals.copy()
+        positions[rows], normals[rows] = moved.positions, moved.normals
+        trial = OrientedPoints(positions, normals, centers.surface_ids)
+        count = min(NEIGHBORS, len(centers))
+        around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
+        after = _cells(aim(trial), samples)
+        worse = after[0][around].max(axis=1) >= radii[around].max(axis=1)
+        if worse.any():
+            back = rows[worse]
+            movable[back] = False
+            positions[back], normals[back] = centers.positions[back], centers.normals[back]
+            after = _cells(aim(trial), samples)
+        centers, (radii, owners) = trial, after
+    return centers
+
+
+def _cells(decals: OrientedPoints, samples: OrientedPoints) -> tuple[Float64Array, Int64Array]:
+    """Return the distance of each decal's farthest sample, and the decal nearest to each sample."""
+    tree = FacingTree(decals.positions, decals.normals)
+    distances, indices = tree.nearest(samples.positions, samples.normals)
+    radii, owners = np.zeros(len(decals)), indices[:, 0]
+    owned = owners >= 0
+    np.maximum.at(radii, owners[owned], distances[owned, 0])
+    return radii, owners
 
 
 def _moved(

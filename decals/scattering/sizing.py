@@ -1,7 +1,7 @@
 """Radii of decals: gap-free, touching, or by the paper's rule."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TypeAlias
 
@@ -10,7 +10,9 @@ import numpy as np
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.progress import reporting
+from decals.field.radial import TOP_MARGIN
 from decals.model import FACING_LIMIT
+from decals.record import MIN_KEPT_RADIUS
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import FacingTree
 from decals.surfaces.surface import unit_rows
@@ -45,7 +47,8 @@ heights of the centre above that surface and of that surface above the decal's, 
 
 EVEN_AROUND, MAX_ASIDE, MIN_ASIDE = 0.995, 0.05, 0.3
 """Least cosine between the normals of a decal and of its surface where the surface around it is flat; largest
-cosine between the normals of such a decal and of surface that it sees edge-on; and least height of that
+cosine between the normals of such a decal and of surface that it sees edge-on, and for other decals the
+largest absolute value; and least height of that
 surface's points over the centre, along their normals, in distances."""
 
 TURN_MARGIN = 0.03
@@ -57,7 +60,7 @@ MAX_TURN = 20.0
 CORNER_TOLERANCE = 1.02
 """Ratio of the distances from two decals up to which a point is a corner of both Voronoi cells."""
 
-CANDIDATES = 4
+CANDIDATES = 6
 """Nearest decals that face a point and may own it, whatever their radii."""
 
 ARC_REACH = 2.0
@@ -66,7 +69,7 @@ ARC_REACH = 2.0
 SPARE = 0.015
 """Share of its radius by which a decal grows beyond a bare point."""
 
-SEARCHES = ((0.5, 0.94), (0.3, 0.95), (0.2, 0.96), (0.1, 0.97), (0.05, 0.98))
+SEARCHES = ((0.5, 0.8), (0.3, 0.9), (0.3, 0.94), (0.2, 0.96), (0.1, 0.97), (0.05, 0.98))
 """Rounds that look for bare points: spread of random points in mean distances of the samples, and distance of
 the points around which they lie from their owners, in the owners' radii. The last round is repeated."""
 
@@ -166,7 +169,8 @@ def turned_normals(
     cosines = np.einsum("ni,ni->n", normals[owners], samples.normals.astype(np.float64))
     squared = np.einsum("ni,ni->n", offsets, offsets)
     flat = (np.einsum("ni,ni->n", normals, own.astype(np.float64)) > EVEN_AROUND)[owners]
-    edge_on = flat & (cosines < MAX_ASIDE) & (heights > MIN_ASIDE * np.sqrt(squared))
+    seen_aside = (flat | (cosines > -MAX_ASIDE)) & (cosines < MAX_ASIDE)
+    edge_on = seen_aside & (heights > MIN_ASIDE * np.sqrt(squared))
     behind = owned & (((cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)) | edge_on)
     rows = owners[behind]
     away = unit_rows(_sums(samples.normals[behind], rows, len(decals))).astype(np.float64)
@@ -302,36 +306,84 @@ class _OwnedPoints:
     """Points, and the nearest `CANDIDATES` decals that face each: distances and indices, -1 for none.
 
     `lengths` are the distances along the surface, at which images end; straight ones for decals beyond
-    `ARC_REACH`. All three are ``[n, k]``.
+    `ARC_REACH`. All three are ``[n, k]``. `centers` are all decals.
     """
 
     points: OrientedPoints
     lengths: Float64Array
     distances: Float64Array
     decals: Int64Array
+    centers: OrientedPoints
 
     def __getitem__(self, rows: Int64Array) -> "_OwnedPoints":
-        return _OwnedPoints(self.points[rows], self.lengths[rows], self.distances[rows], self.decals[rows])
+        return replace(
+            self,
+            points=self.points[rows],
+            lengths=self.lengths[rows],
+            distances=self.distances[rows],
+            decals=self.decals[rows],
+        )
 
     def powers(self, radii: Float64Array) -> Float64Array:
         """Return the powers of points, which decide between cells (`decals.field.radial`); ∞ for no decal."""
         return np.where(self.decals >= 0, self.distances**2 - radii[self.decals] ** 2, np.inf)
 
+    def owners(self, radii: Float64Array) -> Int64Array:
+        """Return the columns of the owners, ``[n]``: of least power, or the smallest that is nested above it.
+
+        `decals.field.radial.nested_owner` is the rule.
+        """
+        powers = self.powers(radii)
+        columns: Int64Array = powers.argmin(axis=1)
+        lowest = np.take_along_axis(self.decals, columns[:, None], axis=1)
+        smaller = (powers <= 0.0) & (radii[self.decals] < radii[lowest])
+        rows = np.flatnonzero(smaller.any(axis=1))
+        rows = rows[(smaller[rows] & self._nested(self.decals[rows], lowest[rows], radii)).any(axis=1)]
+        decals, own = self.decals[rows], powers[rows]
+        facing = np.einsum("nki,ni->nk", self.centers.normals[decals], self.points.normals[rows])
+        above = (
+            smaller[rows] & self._nested(decals, lowest[rows], radii) & (facing > FACING_LIMIT + TOP_MARGIN)
+        )
+        for column in range(decals.shape[1]):
+            lower = own < own[:, column : column + 1]
+            parted = lower & ~self._nested(decals, decals[:, column : column + 1], radii)
+            above[:, column] &= ~parted.any(axis=1)
+        top = np.where(above, radii[decals], np.inf).argmin(axis=1)
+        columns[rows] = np.where(above.any(axis=1), top, columns[rows])
+        return columns
+
+    def _nested(self, decals: Int64Array, others: Int64Array, radii: Float64Array) -> BoolArray:
+        """Return True for pairs of decals that are nested: `decals.record.balls_nested`."""
+        offsets = self.centers.positions[decals].astype(np.float64) - self.centers.positions[others]
+        squared = np.einsum("...i,...i->...", offsets, offsets)
+        smaller, larger = (choose(radii[decals], radii[others]) for choose in (np.minimum, np.maximum))
+        difference = larger**2 - smaller**2
+        least = 2.0 * MIN_KEPT_RADIUS * np.sqrt(squared)
+        nested: BoolArray = (squared - difference <= least * smaller) | (
+            squared + difference <= least * larger
+        )
+        return nested
+
     def shares(self, radii: Float64Array) -> Float64Array:
         """Return the distance from the owner in its radii, ``[n]``; above 1 the point is bare."""
-        columns = self.powers(radii).argmin(axis=1)[:, None]
+        columns = self.owners(radii)[:, None]
         lengths, owners = (np.take_along_axis(a, columns, 1)[:, 0] for a in (self.lengths, self.decals))
         result: Float64Array = np.where(owners >= 0, lengths, 0.0) / radii[owners]
         return result
 
-    def risky(self, radii: Float64Array, share: float) -> "_OwnedPoints":
-        """Return the points nearest to bare of each three decals that meet, beyond a share of the radius."""
+    def risky(self, radii: Float64Array, share: float, apart: float) -> "_OwnedPoints":
+        """Return points beyond a share of the radius: the ones nearest to bare in each cube of side `apart`.
+
+        Points of one cube are compared if the same three decals meet there.
+        """
         shares = self.shares(radii)
         rows = np.flatnonzero(shares > share)
         nearest = np.argsort(self.powers(radii)[rows], axis=1)[:, :3]
         corners = np.take_along_axis(self.decals[rows], nearest, axis=1)
-        order = np.lexsort((-shares[rows], *corners.T))
-        return self[rows[order[_firsts(corners[order])]]]
+        cubes = np.floor(self.points.positions[rows].astype(np.float64) / (apart or 1.0)).astype(np.int64)
+        places = np.hstack([corners, cubes])
+        order = np.lexsort((-shares[rows], *places.T))
+        return self[rows[order[_firsts(places[order])]]]
 
     def joined(self, other: "_OwnedPoints") -> "_OwnedPoints":
         """Return the points of both."""
@@ -340,6 +392,7 @@ class _OwnedPoints:
             np.concatenate([self.lengths, other.lengths]),
             np.concatenate([self.distances, other.distances]),
             np.concatenate([self.decals, other.decals]),
+            self.centers,
         )
 
     def peaks(self, least: Float64Array) -> "_OwnedPoints":
@@ -370,7 +423,7 @@ def _find_owners(tree: FacingTree, points: OrientedPoints, decals: OrientedPoint
     n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
     lengths = distances.copy()
     lengths[close] = _arc_lengths(offsets, n_p, n_q)
-    return _OwnedPoints(points, lengths, distances, indices)
+    return _OwnedPoints(points, lengths, distances, indices, decals)
 
 
 def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
@@ -445,7 +498,7 @@ def _close_gaps(
     clean = 0
     for turn in range(MAX_SEARCHES):
         spread, share = SEARCHES[min(turn, len(SEARCHES) - 1)]
-        owned = owned.risky(radii, share)
+        owned = owned.risky(radii, share, sample_distance)
         trials = _random_points_around(owned.points, TRIALS_PER_RISK, spread * sample_distance, rng)
         owned = owned.joined(find(trials))
         clean = 0 if _cover(radii, owned, limits, speck) else clean + 1
@@ -461,7 +514,10 @@ def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck
     lowest = np.sort(powers, axis=1)
     others = np.minimum(np.where(powers == lowest[:, :1], lowest[:, 1:2], lowest[:, :1]), 0.0)
     needed = np.maximum(bare.lengths, np.sqrt(np.maximum(bare.distances**2 - others, 0.0)))
-    possible = (bare.decals >= 0) & (needed <= limits[bare.decals])
+    columns, owners = np.arange(CANDIDATES), bare.owners(radii)[:, None]
+    on_top = owners != powers.argmin(axis=1)[:, None]
+    needed = np.where(on_top, bare.lengths, needed)
+    possible = (bare.decals >= 0) & (needed <= limits[bare.decals]) & (~on_top | (columns == owners))
     needed = np.minimum((1.0 + SPARE) * needed, limits[bare.decals])
     factors = np.where(possible, needed / radii[bare.decals], np.inf)
     best = factors.argmin(axis=1)

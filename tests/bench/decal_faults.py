@@ -19,14 +19,14 @@ COUNT = 300
 """Decals on each model."""
 
 
-def measure(*, quick: bool) -> dict[str, float]:
+def measure(seed: int = 1, *, quick: bool) -> dict[str, float]:
     """Cover each model evenly, and measure it at points that the scattering did not use."""
     samples = 50_000 if quick else 1_000_000
     figures: dict[str, float] = {}
     for name, model in FAULT_MODELS.items():
-        relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*model()), count=COUNT, seed=1)
+        relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*model()), count=COUNT, seed=seed)
         relaxation.run()
-        layout = relaxation.to_decals(seed=1)
+        layout = relaxation.to_decals(seed=seed)
         found = distortion(layout, visible(name), samples)
         figures |= {
             f"stretch5_{name}": found.stretched,

@@ -61,18 +61,19 @@ def test_images_bend_over_the_edges_of_parts(name: str) -> None:
     assert found.bare == 0  # though images end at the arc, which is longer than the chord
 
 
-@pytest.mark.parametrize("name", ["cup", "bowl"])
-def test_lips_and_ragged_borders_get_no_outsized_decals(name: str) -> None:
+@pytest.mark.parametrize(("name", "seed"), [("cup", 1), ("cup", 5), ("bowl", 3)])
+def test_lips_and_ragged_borders_get_no_outsized_decals(name: str, seed: int) -> None:
     """A cup's wall is thinner than the spacing: its floor faces decals outside, its lip few decals."""
     mesh = FAULT_MODELS[name]()
-    relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*mesh), count=300, seed=1)
+    relaxation = decals.Relaxation(decals.surfaces.MeshSurface(*mesh), count=300, seed=seed)
     relaxation.run()
-    layout = relaxation.to_decals(seed=1)
+    layout = relaxation.to_decals(seed=seed)
     assert layout.radii.max() <= 1.5 * np.median(layout.radii)
     assert relaxation.statistics().rho >= 0.87
     found = distortion(layout, mesh, 30_000)
-    assert found.stretched <= 0.0035
+    assert found.stretched <= 0.003
     assert found.folded <= 5e-4
+    assert found.bare == 0
     assert found.bare == 0
 
 

@@ -103,7 +103,7 @@ def test_sides_of_a_thin_wall_are_covered_separately() -> None:
     sides = [decals[decals.normals[:, 2] * side > 0.5] for side in (1, -1)]
     for side in sides:
         assert len(side) == pytest.approx(192, abs=15)
-        assert rho(side.positions, side.normals, 1.0) > 0.8
+        assert rho(side.positions, side.normals, 1.0) > 0.7  # decals beside the rim move
         points, normals = wall.sample(10_000, seed=8)
         inner = (normals @ side.normals[0] > 0.5) & (np.abs(points[:, :2]).max(axis=1) < 0.45)
         assert inner.sum() > 3000
