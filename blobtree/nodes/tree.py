@@ -50,6 +50,7 @@ from blobtree.tape.attributes import (
     rest_tape,
 )
 from blobtree.tape.model import ImplicitModel
+from blobtree.tape.poses import maps_to_rest
 from blobtree.tape.program import Placement
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import Hits, raycast
@@ -720,7 +721,7 @@ class Node(ImplicitModel):
     def _rest_tape(self) -> Tape:
         return rest_tape(self.tape, self._program)
 
-    def rest_coordinates(self, points: ArrayLike) -> Float32Array:
+    def rest_coordinates(self, points: ArrayLike, *, rest: "Node | None" = None) -> Float32Array:
         """Return where points lie in the leaves' own spaces, behind all maps and warps above them.
 
         Where leaves blend, their rest coordinates are averaged with the weights of their colours. Textures
@@ -730,6 +731,9 @@ class Node(ImplicitModel):
         ----------
         points : array-like (n, 3) or (3,)
             Points in the world, or one point, in model units.
+        rest : Node, optional
+            The same tree in another pose: where the points lie in its world instead. It has the same leaves,
+            from left to right, and no warps. A skeleton that moved takes its surroundings along.
 
         Returns
         -------
@@ -740,15 +744,26 @@ class Node(ImplicitModel):
         ------
         InvalidPoints
             The points are not n rows of three finite numbers.
+        InvalidNode
+            `rest` has other leaves, or warps.
 
         Examples
         --------
-        >>> from blobtree import Point
+        >>> from blobtree import Point, Segment
+        >>> arm = Segment((0, 0, 0), (0, 0, 2), radius=0.5)
+        >>> raised = Segment((0, 0, 0), (2, 0, 0), radius=0.5)
+        >>> raised.rest_coordinates([1, 0.5, 0], rest=arm).round(3).tolist()
+        [0.0, 0.5, 1.0]
         >>> Point((1, 0, 0), radius=1.0).rotate((0, 0, 1), 90).rest_coordinates([0, 1, 0]).round(3).tolist()
         [1.0, 0.0, 0.0]
         """
         array, single = points_or_point(points)
-        rows = rest_coordinates_at(self._rest_tape, array)
+        tape = self._rest_tape
+        if rest is not None:
+            if not isinstance(rest, Node):
+                raise InvalidNode(f"rest: expected a BlobTree, got {shown(rest)}; leave it out")
+            tape = rest_tape(self.tape, self._program, maps_to_rest(self, self._program, rest))
+        rows = rest_coordinates_at(tape, array)
         return rows[0] if single else rows
 
     def interval(self, lower: ArrayLike, upper: ArrayLike) -> tuple[float, float]:

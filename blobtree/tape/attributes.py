@@ -82,16 +82,25 @@ def labels_at(
     return np.where(weights.max(axis=1) > 0.0, chosen, default)
 
 
-def rest_tape(tape: Tape, program: list[Instruction]) -> Tape:
-    """Return a tape with maps of primitives in its data region, for `rest_kernels.own_position`."""
+def rest_tape(tape: Tape, program: list[Instruction], to_rest: Float64Array | None = None) -> Tape:
+    """Return a tape with maps of leaves in its data region, for `rest_kernels.own_position`.
+
+    The maps lead to the leaves' own spaces, or where `to_rest` (leaves, 4, 4) leads from there.
+    """
     region, indices = DataRegion(), np.full(len(_attributes(program)), -1.0)
     first = 0
     for run in (step for step in program if isinstance(step, Run)):
         count = len(run.primitives)
-        if isinstance(run.kind, Skeleton) and not run.stretched:  # others carry their maps
-            placements, placed_by = distinct_placements(run.primitives)
+        folded = isinstance(run.kind, Skeleton) and not run.stretched  # others carry their maps
+        placements, placed_by = distinct_placements(run.primitives)
+        if folded and to_rest is None:
             maps = [region.add(np.linalg.inv(placement.matrix)[:3]) for placement in placements]
             indices[first : first + count] = tape.start + np.array(maps)[placed_by]
+        elif to_rest is not None:
+            own = np.linalg.inv([placement.matrix for placement in placements])[placed_by]
+            part = to_rest[first : first + count]
+            ways = part @ own if folded else part
+            indices[first : first + count] = [tape.start + region.add(way[:3]) for way in ways]
         first += count
     channels = np.pad(indices[:, None], ((0, 0), (0, CHANNELS - 1)))
     indexed, moved = _with_channels(tape, program, channels), len(region.texels)

@@ -1,7 +1,8 @@
-"""Posed scenes: meshes that deform, with decals that stretch with them.
+"""Posed scenes: meshes and trees that deform, with decals that stretch with them.
 
-Decals lie on the rest pose. Each pixel of a posed mesh finds its place in the rest pose, and decals and their
-contact are evaluated there. So a decal keeps its place and its neighbours in every pose.
+Decals lie on the rest pose. Each pixel of a posed object finds its place in the rest pose, and decals and
+their contact are evaluated there. So a decal keeps its place and its neighbours in every pose. A posed tree
+is drawn as a mesh, whose vertices know their places on the tree at rest.
 This removes the limitation that section 3.5 of the paper states.
 """
 
@@ -11,16 +12,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree.errors import InvalidNode
 from blobtree.validation import real, truth
 from decals.errors import InvalidScene
 from decals.model import Decals
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
-from decals.scenes.objects import Box, Color, MeshObject, SceneObject
+from decals.scenes.objects import Box, Color, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, instance
+from decals.validation import describe, instance, whole_number
+
+TREE_RESOLUTION = 96
+"""Cells along the longest side of the mesh of a posed tree."""
 
 WEIGHT_ERROR = 1e-3
 """Largest difference of a vertex's summed skin weights from 1."""
@@ -38,11 +44,14 @@ class PosedMesh:
         Positions of its vertices in this pose, relative to the origin of the rest pose.
     colors : float32[n, 3], optional
         sRGB colours of its vertices between the decals, in place of that of the rest pose.
+    tree : TreeObject, optional
+        The posed tree that this is the mesh of.
     """
 
     rest: MeshObject
     vertices: Float32Array
     colors: Float32Array | None = None
+    tree: TreeObject | None = None
 
     @property
     def name(self) -> str:
@@ -108,24 +117,33 @@ class PosedScene:
 
 
 def pose(
-    scene: Scene, poses: Mapping[str, ArrayLike], *, rigid: bool = False, camera: Camera | None = None
+    scene: Scene,
+    poses: Mapping[str, ArrayLike | Node],
+    *,
+    rigid: bool = False,
+    camera: Camera | None = None,
+    resolution: int = TREE_RESOLUTION,
 ) -> PosedScene:
-    """Pose meshes of a scene; its decals stretch with them.
+    """Pose meshes and trees of a scene; their decals stretch with them.
 
-    Decals are evaluated in the rest pose, so a point of the mesh has the same owner, contact and image place
-    in all poses. Objects that are not posed are drawn as they are.
+    Decals are evaluated in the rest pose, so a point of the surface has the same owner, contact and image
+    place in all poses. Objects that are not posed are drawn as they are. A posed tree is drawn as a mesh.
 
     Parameters
     ----------
     scene : Scene
-        Scene with meshes in their rest pose, and decals on them.
-    poses : mapping from str to float[n, 3]
-        For some mesh objects, by name: new positions of all vertices.
+        Scene with objects in their rest pose, and decals on them.
+    poses : mapping from str to float[n, 3] or Node
+        For some objects, by name: new positions of all vertices of a mesh; or the posed tree, with the same
+        leaves as the tree at rest, from left to right. Warps bend and twist it, and skeletons may move; see
+        `blobtree.Node.rest_coordinates`. The tree at rest has no warps.
     rigid : bool
         True for decals that keep their shape: each moves and turns with the nearest triangle of a posed mesh,
         and meets its neighbours in the new pose.
     camera : Camera, optional
         Camera in place of the scene's.
+    resolution : int
+        Cells along the longest side of the mesh of a posed tree.
 
     Returns
     -------
@@ -134,7 +152,8 @@ def pose(
     Raises
     ------
     InvalidScene
-        No mesh has such a name, or the positions are not as many as its vertices.
+        No object has such a name, the positions are not as many as its vertices, or a posed tree has other
+        leaves than the tree at rest.
 
     See Also
     --------
@@ -154,14 +173,15 @@ def pose(
     instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
     if not isinstance(poses, Mapping):
         raise InvalidScene(f"poses: expected positions by the names of objects, got {describe(poses)}")
-    meshes = {item.name: item for item in scene.objects if isinstance(item, MeshObject)}
+    whole_number("resolution", resolution, 4, 2048, InvalidScene)
+    items = {item.name: item for item in scene.objects}
     for name in poses:
-        if name not in meshes:
-            known = ", ".join(repr(mesh) for mesh in meshes) or "none"
+        if name not in items:
+            known = ", ".join(repr(item) for item in items) or "none"
             raise InvalidScene(
-                f"poses: expected names of meshes of the scene ({known}), got {describe(name)}"
+                f"poses: expected names of objects of the scene ({known}), got {describe(name)}"
             )
-    posed = {name: _posed_mesh(meshes[name], vertices) for name, vertices in poses.items()}
+    posed = {name: _posed(items[name], given, resolution) for name, given in poses.items()}
     view = scene.camera
     if camera is not None:
         view = instance("camera", camera, Camera, InvalidScene, "leave it out for the scene's")
@@ -181,6 +201,8 @@ def _as_object(item: SceneObject | PosedMesh) -> SceneObject:
     """Return a posed mesh as a mesh without another pose; other objects as they are."""
     if not isinstance(item, PosedMesh):
         return item
+    if item.tree is not None:
+        return item.tree
     return replace(item.rest, vertices=item.vertices, source=None)
 
 
@@ -198,12 +220,12 @@ def _carried(scene: Scene, posed: Mapping[str, PosedMesh]) -> Decals:
     nearest = np.argmin(distances, axis=0) if len(decals) else np.zeros(0, np.int64)
     for number, item in enumerate(scene.objects):
         own = np.flatnonzero(nearest == number)
-        if item.name not in posed or not len(own) or not isinstance(item, MeshObject):
+        if item.name not in posed or not len(own):
             continue
-        faces, weights = item.surface.locate(decals.positions[own])
+        mesh = posed[item.name]
+        faces, weights = mesh.rest.surface.locate(decals.positions[own])
         before, after = (
-            vertices.astype(np.float64)[item.faces[faces]]
-            for vertices in (item.vertices, posed[item.name].vertices)
+            vertices.astype(np.float64)[mesh.faces[faces]] for vertices in (mesh.rest.vertices, mesh.vertices)
         )
         offsets = decals.positions[own] - np.einsum("nc,nca->na", weights, before)
         turns = _frames(after) @ _frames(before).transpose(0, 2, 1)
@@ -226,6 +248,38 @@ def _frames(corners: Float64Array) -> Float64Array:
     ]
     frames: Float64Array = np.stack([*units, np.cross(*units)], axis=2)
     return frames
+
+
+def _posed(item: SceneObject, given: ArrayLike | Node, resolution: int) -> PosedMesh:
+    """Return an object in a pose."""
+    if isinstance(item, TreeObject):
+        if not isinstance(given, Node):
+            raise InvalidScene(f"pose of {item.name!r}: expected the posed tree, got {describe(given)}")
+        return _posed_tree(item, given, resolution)
+    if isinstance(given, Node):
+        raise InvalidScene(f"pose of {item.name!r}: expected positions of vertices, got a tree")
+    return _posed_mesh(item, given)
+
+
+def _posed_tree(item: TreeObject, tree: Node, resolution: int) -> PosedMesh:
+    """Return the mesh of a posed tree, with the places of its vertices on the tree at rest."""
+    moved = replace(item, tree=tree.translate(np.negative(item.origin)) if any(item.origin) else tree)
+    mesh = polygonize(moved.tree, resolution=resolution)
+    try:
+        places = moved.tree.rest_coordinates(mesh.vertices, rest=item.tree)
+    except InvalidNode as error:
+        raise InvalidScene(f"pose of {item.name!r}: {error}") from error
+    if not np.isfinite(places).all():
+        raise InvalidScene(f"pose of {item.name!r}: expected a surface near its leaves; it has other parts")
+    rest = MeshObject(
+        item.name,
+        item.surface.project(places)[0],
+        mesh.faces,
+        origin=item.origin,
+        labels=item.labels,
+        named_only=item.named_only,
+    )
+    return PosedMesh(rest, mesh.vertices, moved.tree.colors(mesh.vertices), moved)
 
 
 def _posed_mesh(rest: MeshObject, vertices: ArrayLike) -> PosedMesh:

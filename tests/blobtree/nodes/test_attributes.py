@@ -188,6 +188,33 @@ def test_rest_coordinates_are_those_of_float64(name: str) -> None:
     assert np.isnan(tree.rest_coordinates(points)[tree(points) == 0.0]).all()
 
 
+def test_places_on_a_tree_at_rest() -> None:
+    """Each leaf of a posed tree takes its surroundings to those of the leaf at rest."""
+    arm = Segment((0, 0, 0), (0, 0, 2), radius=0.5)
+    points = points_around(np.random.default_rng(5), arm, 200)
+    for moved in (
+        arm.rotate((1, 2, 3), 40).translate((1, 2, 3)),
+        arm.scale((1, 2, 0.5)).rotate((0, 1, 0), 30),
+        arm.twist(70.0),
+    ):
+        expected = rest(moved, points.astype(np.float64))[1]
+        inside = moved(points) > 1e-2
+        found = moved.rest_coordinates(points[inside], rest=arm)
+        np.testing.assert_allclose(found, expected[inside], atol=2e-5)
+    lifted = Segment((0, 0, 0), (4, 0, 0), radius=0.25)
+    found = lifted.rest_coordinates([[1, 0.25, 0], [3, 0, 0.1]], rest=arm)
+    np.testing.assert_allclose(found, [[0, 0.5, 0.5], [-0.2, 0, 1.5]], atol=1e-5)
+    pair, swapped = A.translate((0, 0, 3)) + B.rotate((0, 0, 1), 30), A + B.twist(20.0)
+    places = np.array([[0.2, 0.1, 0.3]])
+    assert np.isfinite(swapped.rest_coordinates(places, rest=pair)).all()
+    ball = Superquadric((1, 0, 0), (1, 1, 2))
+    grown = Superquadric((0, 0, 0), (2, 2, 2))
+    np.testing.assert_allclose(grown.rest_coordinates([1.0, 1.0, 1.0], rest=ball), [1.5, 0.5, 1.0], atol=1e-6)
+    for wrong in (arm + arm, A, arm.twist(3.0), 3):
+        with pytest.raises(InvalidNode, match="rest: expected"):
+            arm.rest_coordinates(points, rest=wrong)  # type: ignore[arg-type]
+
+
 def test_rest_coordinates_of_a_primitive_with_a_width_are_not_its_color() -> None:
     tree = Point((0, 0, 0), radius=1.0, width=0.5).scale((1, 2, 1)).translate((1, 2, 3))
     np.testing.assert_allclose(tree.rest_coordinates([[1.2, 2.6, 3.1]]), [[0.2, 0.3, 0.1]], atol=1e-6)

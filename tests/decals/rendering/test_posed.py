@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import decals
-from blobtree import Point
+from blobtree import Node, Point, Segment
 from decals import Camera, Decals, MeshObject, Scene, TreeObject
 from decals.errors import InvalidScene
 from decals.rendering import Buffers, Renderer, RenderOptions
@@ -185,6 +185,95 @@ def test_rigid_decals_move_and_turn_with_their_triangles() -> None:
     np.testing.assert_array_equal(moved.positions[-1], alone.positions[0])
 
 
+def limb(end: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Node:
+    return Segment((0, 0, -1), (0, 0, 0), radius=0.4) + Segment((0, 0, 0), end, radius=0.35)
+
+
+def covered_limb(count: int = 60) -> Scene:
+    body = TreeObject("limb", limb())
+    positions, normals = body.surface.sample(count, 3)
+    radii = np.random.default_rng(1).uniform(0.1, 0.3, count)
+    scattered = Decals(positions, normals, np.cross(normals, [0.0, 0.0, 1.0]), radii)
+    view = Camera(position=(5.0, 1.0, 1.0), up=(0.0, 0.0, 1.0), fov=30.0)
+    return Scene(objects=(body,), decals=scattered, images=(decals.DecalImage.load("tile"),), camera=view)
+
+
+def untwisted(points: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    """Places, or normals at the height of places, before a twist about the z axis."""
+    angle = -np.radians(degrees) * points[:, 2]
+    x, y = points[:, 0], points[:, 1]
+    return np.column_stack(
+        [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, points[:, 2]]
+    )
+
+
+def check_twist(renderer: Renderer, scene: Scene, degrees: float) -> Buffers:
+    """Check that a twisted tree shows, at each pixel, what its own point at rest shows."""
+    seen = buffers(renderer, decals.pose(scene, {"limb": limb().twist(degrees)}))
+    shown = seen.object_id >= 0
+    rest = untwisted(seen.position[shown].astype(np.float64), degrees)
+    normals = -limb().gradient(rest)
+    expected = decals.evaluate(scene.decals, rest, normals)
+    same = expected.owner == seen.owner[shown]
+    assert same.mean() > 0.998
+    pixel = 0.5 * 2 * 5.2 * np.tan(np.radians(15)) / SIZE[1] / scene.decals.radii.min()
+    drift = np.abs(expected.uv - seen.uv[shown])[same].max(axis=1)
+    assert np.quantile(drift, 0.999) < 0.5 * pixel
+    return seen
+
+
+def test_decals_stretch_with_a_tree(renderer: Renderer) -> None:
+    scene = covered_limb()
+    first = check_twist(renderer, scene, 40.0)
+    again = check_twist(renderer, scene, 40.0)
+    for name in ("owner", "uv", "color"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
+    raised = buffers(renderer, decals.pose(scene, {"limb": limb((0.0, 0.8, 0.6))}))
+    shown = raised.object_id >= 0
+    assert (raised.owner[shown] >= 0).mean() > 0.5
+    assert (raised.position[shown][:, 1] > 0.6).sum() > 100
+
+
+@pytest.mark.slow
+def test_decals_do_not_flicker_over_100_frames(renderer: Renderer) -> None:
+    scene = covered_limb()
+    for frame in range(100):
+        check_twist(renderer, scene, 60.0 * np.sin(2 * np.pi * frame / 100))
+
+
+def test_rigid_decals_turn_with_a_tree() -> None:
+    scene = covered_limb(20)
+    turned = limb().rotate((0, 1, 0), 50).translate((1, 2, 3))
+    posed = decals.pose(scene, {"limb": turned}, rigid=True)
+    assert isinstance(posed.objects[0], TreeObject)
+    assert posed.objects[0].tree is turned
+    cosine, sine = np.cos(np.radians(50)), np.sin(np.radians(50))
+    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    expected = scene.decals.positions @ turn.T + [1, 2, 3]
+    np.testing.assert_allclose(posed.decals.positions, expected, atol=2e-3)
+    np.testing.assert_allclose(posed.decals.normals, scene.decals.normals @ turn.T, atol=2e-2)
+    np.testing.assert_array_equal(posed.decals.radii, scene.decals.radii)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (np.zeros((3, 3)), "expected the posed tree, got array"),
+        (
+            Point((0, 0, 0), radius=1.0),
+            r"rest: expected the leaves of the posed tree \(1: Point\), got 2: Segm",
+        ),
+    ],
+)
+def test_invalid_poses_of_trees(given: Any, message: str) -> None:
+    with pytest.raises(InvalidScene, match=message):
+        decals.pose(covered_limb(3), {"limb": given})
+    with pytest.raises(InvalidScene, match="resolution"):
+        decals.pose(covered_limb(3), {"limb": limb()}, resolution=0)
+    with pytest.raises(InvalidScene, match="expected positions of vertices, got a tree"):
+        decals.pose(covered(sheet(), count=3), {"sheet": limb()})
+
+
 def test_a_posed_scene_is_drawn_only() -> None:
     posed = decals.pose(covered(sheet(), count=3), {"sheet": sheet().vertices})
     with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
@@ -196,7 +285,7 @@ def test_a_posed_scene_is_drawn_only() -> None:
 @pytest.mark.parametrize(
     ("poses", "message"),
     [
-        ({"ball": np.zeros((3, 3))}, "expected names of meshes of the scene"),
+        ({"ball": np.zeros((3, 3))}, "expected names of objects of the scene"),
         ({"sheet": np.zeros((3, 3))}, r"expected shape \[1089, 3\], got \[3, 3\]; a pose has the vertices"),
         ({"sheet": np.full((1089, 3), np.nan)}, "expected finite numbers"),
         ({"sheet": "here"}, "expected numbers of shape"),
