@@ -1,7 +1,7 @@
 """Checks of arguments: each returns the checked value, or raises an error that says what was expected."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from enum import Enum, IntEnum
 from importlib import import_module
 from pathlib import Path
@@ -57,6 +57,13 @@ def member(name: str, value: Any, kind: type[E], error: type[ImplicitDecalsError
         return value
     choices = ", ".join(map(repr, words.values()))
     raise error(f"{name}: expected one of {choices}, got {describe(value)}")
+
+
+def one_of(name: str, value: object, choices: Collection[str], error: type[ImplicitDecalsError]) -> str:
+    """Return a text that is one of the choices."""
+    if not isinstance(value, str) or value not in choices:
+        raise error(f"{name}: expected one of {', '.join(choices)}, got {describe(value)}")
+    return value
 
 
 def whole_number(name: str, value: Any, low: int, high: int | None, error: type[ImplicitDecalsError]) -> int:

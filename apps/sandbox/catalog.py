@@ -17,7 +17,7 @@ from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf
 from blobtree.nodes.values import OPTIONAL, fields_of
 from decals.errors import InvalidEdit
-from decals.validation import describe
+from decals.validation import one_of
 
 PLACES = np.array([(-0.6, 0.0, 0.0), (0.0, 0.5, 0.0), (0.6, 0.0, 0.0), (0.0, -0.5, 0.0)])
 """Points of a new primitive in turn: a planar, convex loop."""
@@ -73,9 +73,7 @@ def kinds() -> dict[str, type[Node]]:
 def checked_kind(name: object) -> type[Node]:
     """Return the class of a name, or raise `InvalidEdit`."""
     known = kinds()
-    if not isinstance(name, str) or name not in known:
-        raise InvalidEdit(f"kind: expected one of {', '.join(known)}, got {describe(name)}")
-    return known[name]
+    return known[one_of("kind", name, known, InvalidEdit)]
 
 
 def operand_count(kind: type[Node]) -> int:

@@ -9,8 +9,7 @@ from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from decals.errors import InvalidEdit
-from decals.validation import describe as describe_value
-from decals.validation import finite_number
+from decals.validation import finite_number, one_of
 
 SLIDER_REACH = 4.0
 """Largest value of a slider for a number without unit and range, over the present value or 1."""
@@ -135,9 +134,7 @@ def parsed(node: Node, name: str, raw: Any) -> Any:
         The node has no such parameter, or the text is no number.
     """
     declared = parameters_of(type(node))
-    if not isinstance(name, str) or name not in declared:
-        raise InvalidEdit(f"parameter: expected one of {', '.join(declared)}, got {describe_value(name)}")
-    parameter = declared[name]
+    parameter = declared[one_of("parameter", name, declared, InvalidEdit)]
     if parameter.quantity is Quantity.WIDTH and raw in (None, ""):
         return None
     if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF, Quantity.CHOICE):

@@ -20,24 +20,27 @@ from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Interaction
 from decals.receivers import labels_of
 from decals.record import Contact
 from decals.scenes.objects import bounds_of
-from decals.validation import describe
+from decals.validation import describe, one_of
 
 PLAIN = "tint alone"
 """Choice of an image that stands for none."""
 
 COLUMNS = {
-    "radius": "radii",
-    "opacity": "opacities",
-    "image": "images",
-    "tint": "tints",
-    "interaction": "interactions",
-    "layer": "layers",
-    "spill": "spill",
-    "receivers": "receivers",
-    "fade_angle": "fade_angles",
-    "fade_depth": "fade_depths",
+    "radius": ("radii", "visible radius, in model units"),
+    "opacity": ("opacities", "from invisible to opaque"),
+    "image": ("images", "image"),
+    "tint": ("tints", "colour that multiplies the image"),
+    "interaction": ("interactions", "push neighbours, lie above them, or below"),
+    "layer": ("layers", "drawn from the lowest up"),
+    "spill": ("spill", "also colours surface that faces away"),
+    "receivers": ("receivers", "objects that it lies on"),
+    "fade_angle": ("fade_angles", "degrees between the normals at which it has faded away; 0: no fade"),
+    "fade_depth": (
+        "fade_depths",
+        "distance from its plane, in radii, at which it has faded away; 0: no fade",
+    ),
 }
-"""Arrays of `decals.Decals` by the names of their controls."""
+"""Arrays of `decals.Decals` by the names of their controls, and what they mean."""
 
 ANY_OBJECT = "any object"
 """Choice of receivers that stands for all objects."""
@@ -56,49 +59,33 @@ def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[
     if not selection:
         return []
     last = document.decals[selection[-1]]
+    value = {name: getattr(last, array)[0] for name, (array, _) in COLUMNS.items()}
     low, high = bounds_of(document.objects) if document.objects else (np.zeros(3), np.ones(3))
-    reach = max(0.25 * float((high - low).max()), float(last.radii[0]))
-    image = int(last.images[0])
-    names = image_names(document)
-    layers = max(LAYERS, abs(int(last.layers[0])))
-    controls = [
-        _slider("radius", float(last.radii[0]), reach / STEPS, reach, "visible radius, in model units"),
-        _slider("opacity", float(last.opacities[0]), 0.0, 1.0, "from invisible to opaque"),
-        Control("image", "choice", names[image + 1], "image", choices=tuple(names)),
-        Control(
-            "tint", "color", hex_color(tuple(last.tints[0].tolist())), "colour that multiplies the image"
-        ),
-        Control(
-            "interaction",
-            "choice",
-            Interaction(int(last.interactions[0])).name.lower(),
-            "push neighbours, lie above them, or below",
-            choices=_names(Interaction),
-        ),
-        _slider("layer", int(last.layers[0]), -layers, layers, "drawn from the lowest up", step=1.0),
-        Control("spill", "switch", bool(last.spill[0]), "also colours surface that faces away"),
-        Control(
-            "receivers",
-            "choice",
-            str(last.receivers[0]) or ANY_OBJECT,
-            "objects that it lies on",
-            choices=tuple(receiver_choices(document, str(last.receivers[0]))),
-        ),
-        _slider(
-            "fade_angle",
-            float(last.fade_angles[0]),
-            0.0,
-            FADE_ANGLES[1],
-            "degrees between the normals at which it has faded away; 0: no fade",
-        ),
-        _slider(
-            "fade_depth",
-            float(last.fade_depths[0]),
-            0.0,
-            max(MAX_DEPTH, float(last.fade_depths[0])),
-            "distance from its plane, in radii, at which it has faded away; 0: no fade",
-        ),
-    ]
+    reach = max(0.25 * float((high - low).max()), float(value["radius"]))
+    layers, depth = max(LAYERS, abs(int(value["layer"]))), max(MAX_DEPTH, float(value["fade_depth"]))
+    ends = {
+        "radius": (reach / STEPS, reach),
+        "opacity": (0.0, 1.0),
+        "layer": (-layers, layers),
+        "fade_angle": (0.0, FADE_ANGLES[1]),
+        "fade_depth": (0.0, depth),
+    }
+    names, receivers = image_names(document), str(value["receivers"])
+    others: dict[str, tuple[str, Any, tuple[str, ...]]] = {
+        "image": ("choice", names[int(value["image"]) + 1], tuple(names)),
+        "tint": ("color", hex_color(tuple(value["tint"].tolist())), ()),
+        "interaction": ("choice", Interaction(int(value["interaction"])).name.lower(), _names(Interaction)),
+        "spill": ("switch", bool(value["spill"]), ()),
+        "receivers": ("choice", receivers or ANY_OBJECT, tuple(receiver_choices(document, receivers))),
+    }
+    controls = []
+    for name, (_, doc) in COLUMNS.items():
+        if name in ends:
+            step = 1.0 if name == "layer" else None
+            controls.append(_slider(name, value[name].item(), *ends[name], doc, step=step))
+        else:
+            kind, shown, choices = others[name]
+            controls.append(Control(name, kind, shown, doc, choices=choices))
     return [asdict(control) for control in controls]
 
 
@@ -130,16 +117,11 @@ def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
             return round(number_of(name, raw))
         case "image":
             names = image_names(document)
-            if raw not in names:
-                raise InvalidEdit(f"image: expected one of {', '.join(names)}, got {describe(raw)}")
-            return names.index(raw) + NO_IMAGE
+            return names.index(one_of(name, raw, names, InvalidEdit)) + NO_IMAGE
         case "tint":
             return color_rgb("tint", raw, InvalidEdit)
         case "interaction":
-            names = [one.name.lower() for one in Interaction]
-            if raw not in names:
-                raise InvalidEdit(f"interaction: expected one of {', '.join(names)}, got {describe(raw)}")
-            return int(Interaction[raw.upper()])
+            return int(Interaction[one_of(name, raw, _names(Interaction), InvalidEdit).upper()])
         case "spill":
             return bool(raw)
         case "receivers":
@@ -157,7 +139,7 @@ def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> N
     value = parsed_decal_value(state.session.document, name, raw)
     label = f"set {name}"
     state.begin_series((label, state.selection), label)
-    state.run_latest(SetValues.each(numbers, label, **{COLUMNS[name]: value}))
+    state.run_latest(SetValues.each(numbers, label, **{COLUMNS[name][0]: value}))
     if last:
         state.end_stroke()
 
@@ -188,9 +170,7 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
 def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
     """Set the brush, or one of its numbers, to what a page sent."""
     if name == "brush":
-        if raw not in list(Brush):
-            raise InvalidEdit(f"brush: expected one of {', '.join(Brush)}, got {describe(raw)}")
-        brush.brush = Brush(raw)
+        brush.brush = Brush(one_of("brush", raw, list(Brush), InvalidEdit))
         return
     if not isinstance(name, str) or name not in ("radius", "decal_radius", "density"):
         raise InvalidEdit(f"brush: expected 'radius' or such, got {describe(name)}")
@@ -226,6 +206,4 @@ def set_mode(state: ActionState, name: str, raw: Any) -> None:
         "mapping": lambda text: text,
         "stiffness": lambda raw: number_of("stiffness", raw),
     }
-    if not isinstance(name, str) or name not in parse:
-        raise InvalidEdit(f"mode: expected one of {', '.join(parse)}, got {describe(name)}")
-    setattr(state.modes, name, parse[name](raw))
+    setattr(state.modes, name, parse[one_of("mode", name, parse, InvalidEdit)](raw))

@@ -1,7 +1,7 @@
 """How the view shows the scene: modes, overlays, a field slice, and cameras."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,7 +20,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, finite_number
+from decals.validation import finite_number, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through
@@ -151,30 +151,24 @@ class Display:
         InvalidEdit
             There is no such option or value.
         """
-        if not isinstance(name, str):
-            raise InvalidEdit(f"view: expected an option such as 'mode', got {describe(name)}")
-        if name in CHOICES:
-            if value not in CHOICES[name]:
-                raise InvalidEdit(
-                    f"{name}: expected one of {', '.join(CHOICES[name])}, got {describe(value)}"
-                )
-        elif name == "slice_position":
-            value = min(max(number_of(name, value), 0.0), 1.0)
-        elif name == "orthographic":
-            self._window.subplot.vtk_renderer.camera.parallel_projection = bool(value)
-            return
-        elif name == "snap":
-            distance = number_of("snap", value)
-            if distance < 0.0:
-                raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
-            self._window.actions.state.snap = distance
-            return
-        elif name == "axes":
-            self._show_axes(bool(value))
-            return
-        else:
-            raise InvalidEdit(f"view: expected an option such as 'mode', got {describe(name)}")
-        self.options = DisplayOptions(**{**vars(self.options), name: value})
+        view = self._window.subplot.vtk_renderer.camera
+        match name:
+            case "orthographic":
+                view.parallel_projection = bool(value)
+            case "axes":
+                self._show_axes(bool(value))
+            case "snap":
+                distance = number_of("snap", value)
+                if distance < 0.0:
+                    raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
+                self._window.actions.state.snap = distance
+            case "slice_position":
+                position = min(max(number_of(name, value), 0.0), 1.0)
+                self.options = replace(self.options, slice_position=position)
+            case _:
+                chosen: Any = {one_of("view", name, CHOICES, InvalidEdit): value}
+                one_of(name, value, CHOICES[name], InvalidEdit)
+                self.options = replace(self.options, **chosen)
 
     def _show_axes(self, shown: bool) -> None:
         plotter = self._window.plotter
@@ -310,8 +304,7 @@ class Display:
         snap
             Move, turn and scale in round steps.
         """
-        if phase not in ("begin", "move", "end"):
-            raise InvalidEdit(f"phase: expected begin, move or end, got {describe(phase)}")
+        one_of("phase", phase, ("begin", "move", "end"), InvalidEdit)
         trees, (width, height) = self._window.actions.trees, self._window.plotter.window_size
         right, down = (min(max(finite_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
         ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
@@ -344,9 +337,8 @@ class Display:
 
     def look_from(self, name: str) -> None:
         """Look at the present target from a side; see `PRESETS`."""
-        if not isinstance(name, str) or name not in PRESETS:
-            raise InvalidEdit(f"side: expected one of {', '.join(PRESETS)}, got {describe(name)}")
-        view, toward = self._window.subplot.vtk_renderer.camera, np.array(PRESETS[name])
+        toward = np.array(PRESETS[one_of("side", name, PRESETS, InvalidEdit)])
+        view = self._window.subplot.vtk_renderer.camera
         target = np.array(view.focal_point)
         distance = float(np.linalg.norm(np.array(view.position) - target))
         view.position = tuple((target + distance * toward).tolist())
@@ -361,12 +353,7 @@ class Display:
 
     def go_to_bookmark(self, number: int) -> None:
         """Look from a kept camera."""
-        if (
-            isinstance(number, bool)
-            or not isinstance(number, int)
-            or number not in range(len(self.bookmarks))
-        ):
-            raise InvalidEdit(f"bookmark: expected its number, got {describe(number)}")
+        number = whole_number("bookmark", number, 0, len(self.bookmarks) - 1, InvalidEdit)
         self.restore_camera(self.bookmarks[number][1])
 
     def kept_camera(self) -> tuple[Any, ...]:

@@ -47,7 +47,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.files import is_scene_file, load_model
 from decals.scenes.objects import MeshObject, SceneObject, bounds_of
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe
+from decals.validation import describe, one_of, whole_number
 from decals.window import EditWindow
 
 REST_SECONDS = 1.0
@@ -105,6 +105,7 @@ class Sandbox:
         self.display = Display(window)
         window.overlay.hide_status()  # the page has its own, and handles
         window.handle.visible = False
+        window.redraw(whole=True)
         files = window.actions.files
         files.folder, files.show_view = self._folder, self.display.show_from
         self._lessons, self._start_lesson = list(lessons), start_lesson
@@ -346,8 +347,7 @@ class Sandbox:
         with self._reported():
             session = self._window.session
             total = len(session.labels) + len(session.undone_labels)
-            if isinstance(entry, bool) or not isinstance(entry, int) or not 0 <= entry <= total:
-                raise InvalidEdit(f"history: expected an entry from 0 to {total}, got {describe(entry)}")
+            entry = whole_number("history", entry, 0, total, InvalidEdit)
             self._window.background.require_idle(computing=False)
             while len(session.labels) > entry:
                 session.undo()
@@ -363,10 +363,7 @@ class Sandbox:
     def open_lesson(self, number: int) -> None:
         """Start one of the lessons."""
         with self._reported():
-            if isinstance(number, bool) or number not in range(len(self._lessons)):
-                raise InvalidEdit(
-                    f"lesson: expected one from 0 to {len(self._lessons) - 1}, got {describe(number)}"
-                )
+            number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
             self._window.background.require_idle()
             if not self.in_lesson and self._window.document.objects:
                 self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
@@ -394,8 +391,7 @@ class Sandbox:
     def open_sample(self, name: str) -> None:
         """Open a sample with scattered decals."""
         with self._reported():
-            if name not in SAMPLES:
-                raise InvalidEdit(f"sample: expected one of {', '.join(SAMPLES)}, got {describe(name)}")
+            one_of("sample", name, SAMPLES, InvalidEdit)
 
             def load(progress: Progress, _cancel: Cancel) -> Scene:
                 direction = axes_of(name).preset(THREE_QUARTER)
@@ -507,9 +503,7 @@ class Sandbox:
                 "keep": self.display.add_bookmark,
                 "go": lambda: self.display.go_to_bookmark(value),
             }
-            if not isinstance(name, str) or name not in moves:
-                raise InvalidEdit(f"camera: expected one of {', '.join(moves)}, got {describe(name)}")
-            moves[name]()
+            moves[one_of("camera", name, moves, InvalidEdit)]()
 
     def scatter(self, count: object) -> None:
         """Cover the object of the selected node, or every object, with decals."""

@@ -84,7 +84,7 @@ def test_lessons_are_started_and_left(window: EditWindow) -> None:
     wrong: list[Any] = [2, -1, True, None, "0", []]
     for number in wrong:
         sandbox.open_lesson(number)
-        assert "lesson: expected one from 0 to 1" in sandbox.status
+        assert "lesson: expected a whole number from 0 to 1" in sandbox.status
     assert (started, sandbox.in_lesson, sandbox.values()["start"]["open"]) == ([], False, True)
     sandbox.open_lesson(1)
     assert (started, sandbox.in_lesson, sandbox.values()["start"]["open"]) == ([1], True, False)
