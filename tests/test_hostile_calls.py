@@ -77,6 +77,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "complex colour": lambda: Point((0, 0, 0), radius=1.0, color=np.zeros(3, complex)),  # type: ignore[arg-type]
     "complex radius": lambda: Point((0, 0, 0), radius=1j),  # type: ignore[arg-type]
     "path of a number": lambda: decals.load_scene(1.5),  # type: ignore[arg-type]
+    "image of no name": lambda: decals.load_image(""),
     "image of a number": lambda: decals.load_image(1.5),  # type: ignore[arg-type]
     "margin of nothing": lambda: decals.Camera.framing(([0, 0, 0], [1, 1, 1]), margin=0),
     "array as JSON": lambda: blobtree.from_json(np.zeros(3)),  # type: ignore[arg-type]

@@ -2,9 +2,11 @@
 
 import base64
 import io
+import logging
 import os
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
 
@@ -47,6 +49,7 @@ AnyImage: TypeAlias = str | os.PathLike[str] | Image.Image | NDArray[Any] | HasP
 DEFAULT_IMAGE = "scale"
 """Image of decals for which no image is given."""
 
+_DAMAGED = "it is damaged or of another kind, so export it again"
 _ADVICE = "give a picture such as PNG or JPEG, or one of: " + ", ".join(BUILTIN_IMAGES)
 
 
@@ -80,7 +83,7 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
     >>> decals.load_image("scale").shape
     (256, 256, 4)
     """
-    if not isinstance(reference, str):
+    if not isinstance(reference, str) or not reference:
         raise InvalidImage(f"reference: expected the name or the path of an image, got {describe(reference)}")
     if is_builtin(reference) or _has_invalid_color(reference, folder):
         return generate_image(reference)
@@ -214,7 +217,7 @@ def _picture_pixels(picture: Image.Image, name: str) -> UInt8Array:
         picture.load()
         return _to_rgba(ImageOps.exif_transpose(picture))
     except (OSError, SyntaxError, ValueError) as error:
-        raise InvalidImage(f"could not read the image {name!r} ({error}): {_ADVICE}") from error
+        raise InvalidImage(f"could not read the image {name!r} ({error}); {_DAMAGED}") from error
 
 
 def _has_invalid_color(reference: str, folder: Path | None) -> bool:
@@ -255,7 +258,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     [128, 128, 128, 255]
     """
     if not is_file(path):
-        raise InvalidImage(f"expected an image, found no file {str(path)!r}: {_ADVICE}")
+        raise InvalidImage(f"expected an image, found no file {str(path)!r}; {_ADVICE}")
     return _read_picture(path, str(path))
 
 
@@ -265,11 +268,12 @@ def _read_picture(file: Path | io.BytesIO, name: str) -> UInt8Array:
         # Pillow warns of odd tags, and of sizes, for which MAX_IMAGE_EDGE is the limit.
         with (
             warnings.catch_warnings(action="ignore"),
+            _without_log(),
             Image.open(file, formats=PICTURE_FORMATS) as picture,
         ):
             return _picture_pixels(picture, name)
     except UnidentifiedImageError as error:
-        raise InvalidImage(f"expected an image, {name!r} is not a picture: {_ADVICE}") from error
+        raise InvalidImage(f"expected an image, {name!r} is not a picture; {_ADVICE}") from error
     except Image.DecompressionBombError as error:
         raise InvalidImage(
             f"expected an image of 1 to {MAX_IMAGE_EDGE} pixels a side, "
@@ -278,7 +282,19 @@ def _read_picture(file: Path | io.BytesIO, name: str) -> UInt8Array:
     except (OSError, SyntaxError, ValueError) as error:
         if isinstance(error, InvalidImage):
             raise
-        raise InvalidImage(f"could not read the image {name!r} ({error}): {_ADVICE}") from error
+        raise InvalidImage(f"could not read the image {name!r} ({error}); {_DAMAGED}") from error
+
+
+@contextmanager
+def _without_log() -> Iterator[None]:
+    """Within a ``with`` block, Pillow logs no errors; without a handler, Python prints them."""
+    logger = logging.getLogger("PIL")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _check_size(picture: Image.Image, name: str) -> None:

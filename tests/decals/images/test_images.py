@@ -187,8 +187,19 @@ def test_truncated_picture(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)
     path = _save(tmp_path / "a.png", noise)
     path.write_bytes(path.read_bytes()[:3000])
-    with pytest.raises(InvalidImage, match="could not read"):
+    with pytest.raises(InvalidImage, match=r"could not read .*; it is damaged"):
         read_image(path)
+
+
+def test_a_damaged_picture_is_one_error_without_log(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = _save(tmp_path / "a.tif", np.zeros((4, 4, 3), np.uint8))
+    samples_per_pixel = bytes((0x15, 1, 3, 0, 1, 0, 0, 0))
+    content = path.read_bytes()
+    assert samples_per_pixel + b"\3\0" in content
+    path.write_bytes(content.replace(samples_per_pixel + b"\3\0", samples_per_pixel + b"\3\x7f"))
+    with pytest.raises(InvalidImage, match=r"a\.tif"):
+        read_image(path)
+    assert not caplog.records
 
 
 @pytest.mark.parametrize("size", [(MAX_IMAGE_EDGE + 1, 1), (2 * MAX_IMAGE_EDGE, 2 * MAX_IMAGE_EDGE)])
