@@ -1,12 +1,14 @@
 """Hessians against differences in float64, and curvatures against those of known surfaces."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from blobtree import Box, InvalidPoints, Node, Point, Torus
 from tests.blobtree.custom_kinds import CUSTOM_TREES
-from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, points_around, random_trees
+from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, RandomTrees, points_around
 from tests.oracles import blobtree as oracle
 
 Numbers = NDArray[np.float64]
@@ -26,13 +28,13 @@ def second_differences(node: Node, points: Numbers, step: float) -> Numbers:
     return np.stack(rows, axis=1)
 
 
-TREES = {
-    "solids": random_trees(seed=8, count=5, more=SOLIDS),
+TREES: dict[str, Sequence[Node]] = {
+    "solids": RandomTrees(seed=8, count=5, more=SOLIDS),
     "custom": CUSTOM_TREES[:2],
-    "shapes": random_trees(seed=6, count=5, depth=2, more=SHAPES),
-    "fields": random_trees(seed=6, count=6, depth=2, more=FIELDS),
-    "deformed": random_trees(seed=6, count=4, depth=2, more=DEFORMED),
-    "contacts": random_trees(seed=6, count=4, depth=2, more=CONTACTS),
+    "shapes": RandomTrees(seed=6, count=5, depth=2, more=SHAPES),
+    "fields": RandomTrees(seed=6, count=6, depth=2, more=FIELDS),
+    "deformed": RandomTrees(seed=6, count=4, depth=2, more=DEFORMED),
+    "contacts": RandomTrees(seed=6, count=4, depth=2, more=CONTACTS),
 }
 
 
