@@ -55,7 +55,7 @@ def test_parameters_come_back_from_field_values() -> None:
 
 
 def test_parameters_come_back_from_the_surface() -> None:
-    points, normals = surface_samples(MODEL, 700)
+    points, normals = surface_samples(MODEL, 400)
     start = with_numeric_values(
         perturbed(MODEL, np.random.default_rng(3), amount=0.4), numeric_parameters(MODEL)[:1], [2.0]
     )

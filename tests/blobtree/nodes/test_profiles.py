@@ -79,6 +79,9 @@ PRIMITIVES: dict[str, tuple[Any, tuple[float, float, float]]] = {
 }
 """Makers of primitives, and a point on the surface of each, of which x is the direction outwards."""
 
+SHARED = PRIMITIVES["ring"][0](falloff="soft_object") + PRIMITIVES["stroke"][0](falloff="staircase")
+SHARED.tape  # noqa: B018  (trees of library and custom kinds then share its kernels)
+
 DIRECT: tuple[Any, ...] = (
     Superquadric((0, 0, 0), (0.8, 0.5, 0.6), 0.5, 0.8),
     Gyroid((0, 0, 0), (3, 3, 3), period=2.0, thickness=0.4),

@@ -5,6 +5,8 @@ from typing import Any
 import pytest
 
 from decals.editing.actions import KEYS
+from decals.scenes.scene import Scene
+from tests.decals.editing.scenes import scene
 
 LONG = "expected an existing folder for the scene, found none at 'a/folder/that/is/not/there'; make it first"
 
@@ -50,7 +52,9 @@ def test_a_line_that_fits_is_left_as_it_is(opened: Any) -> None:
 
 @pytest.mark.parametrize(("size", "pages"), [((400, 300), 2), ((1200, 800), 1)])
 def test_the_help_fits_into_the_window(opened: Any, size: tuple[int, int], pages: int) -> None:
-    driver = opened()
+    driver = opened(
+        Scene(objects=scene().objects[1:], camera=scene().camera)
+    )  # no decals: large pictures take long
     window, overlay = driver.window, driver.window.overlay
     window.plotter.window_size = size
     window.plotter.render()
