@@ -198,9 +198,10 @@ CHECKS: dict[str, Callable[[Session], None]] = {
 
 @pytest.fixture
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of no other size and samples are small and coarse."""
+    """Pictures and windows of no other size and samples are small and coarse."""
     monkeypatch.setattr(RenderOptions.__init__, "__defaults__", ((240, 180),))
     coarse = {field.name: field.default for field in fields(Drawing)} | {"samples": 1}
+    monkeypatch.setattr(pv.global_theme, "window_size", [240, 180])
     for kind in (Drawing, RenderOptions):
         monkeypatch.setattr(kind.__init__, "__kwdefaults__", coarse)
     assert RenderOptions() == RenderOptions(size=(240, 180), samples=1)

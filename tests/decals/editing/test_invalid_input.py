@@ -131,15 +131,30 @@ def session() -> Any:
     return EditSession(scene())
 
 
-@pytest.mark.filterwarnings("ignore:overflow")
-@pytest.mark.parametrize("name", COMMANDS)
-@settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-    deadline=None,
-    max_examples=40,
+EACH_COMMAND = pytest.mark.parametrize("name", COMMANDS)
+ANY_NUMBER = settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], deadline=None
 )
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+@EACH_COMMAND
+@settings(ANY_NUMBER, max_examples=15)
 @given(x=anything)
 def test_commands_do_something_or_say_why_not(session: Any, name: str, x: Any) -> None:
+    do_and_undo(session, name, x)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:overflow")
+@EACH_COMMAND
+@settings(ANY_NUMBER, max_examples=80)
+@given(x=anything)
+def test_commands_do_something_or_say_why_not_many_times(session: Any, name: str, x: Any) -> None:
+    do_and_undo(session, name, x)
+
+
+def do_and_undo(session: EditSession, name: str, x: Any) -> None:
     before = digest(session.document)
     try:
         session.do(COMMANDS[name](x))
