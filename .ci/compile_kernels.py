@@ -47,12 +47,7 @@ def compile_all(cache: Path) -> None:
         for value in vars(importlib.import_module(name)).values()
         if isinstance(value, wp.Kernel) and value.module.name == name
     ]
-    with_gradients = [
-        instruction_set_for(
-            base.skeletons, (*base.operators, GRADIENT_BLEND), base.warps, base.fields, base.falloffs
-        )
-        for base in (BUILT_IN, library())
-    ]
+    with_gradients = [instruction_set_for((*base.rows, GRADIENT_BLEND)) for base in (BUILT_IN, library())]
     instances = [library().kernel_for(kernel) for kernel in kernels]
     instances += [
         blends.kernel_for(kernel)

@@ -4,6 +4,7 @@ import warp as wp
 
 from blobtree.cells.grid import BRANCHING, BRANCHING_BITS, CHILDREN, KEY_DIGITS
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -15,7 +16,7 @@ class LevelBlocks:
     blocks: wp.array(dtype=wp.vec3i)
     keys: wp.array(dtype=wp.int64)
     spans: wp.array(dtype=wp.vec2i)
-    tape: wp.array(dtype=wp.vec4)
+    tape: Texels
 
 
 @wp.struct
@@ -38,12 +39,12 @@ class CellBlocks:
     blocks: wp.array(dtype=wp.vec3i)
     keys: wp.array(dtype=wp.int64)
     spans: wp.array(dtype=wp.vec2i)
-    tape: wp.array(dtype=wp.vec4)
+    tape: Texels
     base: wp.vec3i
     corner: wp.vec3
     cell: wp.float32
     """Side of a cell."""
-    whole: wp.array(dtype=wp.vec4)
+    whole: Texels
     whole_span: wp.vec2i
 
 

@@ -14,14 +14,13 @@ from blobtree.cells.refine_kernels import SURELY_OUTSIDE, write_block
 from blobtree.formulas.skeletons import HALF_DIAGONAL
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import FIELD, STRETCHED
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.func
-def reaches(
-    code: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.bool:
+def reaches(code: wp.int32, center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) -> wp.bool:
     """Return True if a primitive may differ from 0 somewhere in the cube center ± half."""
     r = wp.vec2()
     if code >= FIELD:
@@ -38,7 +37,7 @@ def reaches(
 def count_reaching(
     first: wp.int32,
     pieces: wp.array(dtype=wp.vec4i),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     grid: ChildGrid,
     flags: wp.array(dtype=wp.int32),
     texels: wp.array(dtype=wp.int32),
@@ -71,7 +70,7 @@ def count_reaching(
 def write_reaching(
     first: wp.int32,
     pieces: wp.array(dtype=wp.vec4i),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     grid: ChildGrid,
     starts: wp.array(dtype=wp.int32),
     out: wp.array(dtype=wp.vec4),

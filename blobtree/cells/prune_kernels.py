@@ -34,13 +34,16 @@ from blobtree.tape.dispatch import (
     direct_stride,
     is_convex,
     min_influence,
+    operator_choice,
+    operator_range,
+    starts_from_zero,
     stride,
     warp_extent,
     warp_forward,
     warp_stretch,
 )
 from blobtree.tape.evaluators import direct_bounds, profile_value, to_local
-from blobtree.transpile.specialize import unrolled
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -67,9 +70,7 @@ def widened(r: wp.vec2) -> wp.vec2:
 
 
 @wp.func
-def ball_range(
-    kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
+def ball_range(kind: wp.int32, center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) -> wp.vec2:
     """Return the range of a primitive over the ball around the cube center ± half."""
     c = closest(kind, center, tape, at)
     distances = squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence(kind, tape, at))
@@ -77,9 +78,7 @@ def ball_range(
 
 
 @wp.func
-def primitive_range(
-    kind: wp.int32, center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
+def primitive_range(kind: wp.int32, center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) -> wp.vec2:
     """Return the range of a primitive over the cube center ± half."""
     if kind == POINT_CODE:
         distances = box_to_point(center, half, tape, at)
@@ -89,12 +88,7 @@ def primitive_range(
 
 @wp.func
 def distances_in_box(
-    kind: wp.int32,
-    center: wp.vec3,
-    half: wp.vec3,
-    radius: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    at: wp.int32,
+    kind: wp.int32, center: wp.vec3, half: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.vec2:
     """Bounds on |x − skeleton| / influence over what a ball and the box center ± half have in common.
 
@@ -112,9 +106,7 @@ def distances_in_box(
 
 
 @wp.func
-def direct_range(
-    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec2:
+def direct_range(kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec2:
     """Return the range of a direct field over a ball in front of its map, which is at tape[at]."""
     local = to_local(center, tape, at)
     bounds = direct_bounds(kind, local, radius * tape[at + 3][0], tape, at + PREFIX)
@@ -135,12 +127,7 @@ def absent(r: wp.vec2) -> wp.bool:
 
 @wp.func
 def stretched_range(
-    kind: wp.int32,
-    point: wp.vec3,
-    extent: wp.vec3,
-    radius: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    at: wp.int32,
+    kind: wp.int32, point: wp.vec3, extent: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.vec2:
     """Return the range of a primitive with a map, and maybe a profile, at tape[at]; see `range_anywhere`."""
     profile = tape[at + 3]
@@ -161,7 +148,7 @@ def stretched_range(
 
 
 @wp.func
-def extent_to_local(half: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def extent_to_local(half: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return half the size of the box around a box behind the map at tape[at]."""
     return wp.vec3(row_extent(tape[at], half), row_extent(tape[at + 1], half), row_extent(tape[at + 2], half))
 
@@ -172,38 +159,12 @@ def row_extent(row: wp.vec4, half: wp.vec3) -> wp.float32:
     return wp.abs(row[0]) * half[0] + wp.abs(row[1]) * half[1] + wp.abs(row[2]) * half[2]
 
 
-@unrolled
-def operator_range(
-    operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec2:
-    """Return the range of an operator's result."""
-    result = wp.vec2()
-    for code in range(wp.static(len(OPERATORS))):
-        if operator == code:
-            result = wp.static(OPERATORS[code].range)(a, b, parameter, tape)
-    return result
-
-
-@unrolled
-def operator_choice(
-    operator: wp.int32, a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.int32:
-    """Return the operands on which an operator's result depends, as KEEP_…."""
-    result = int(KEEP_BOTH)
-    for code in range(wp.static(len(OPERATORS))):
-        if operator == code:
-            result = wp.static(OPERATORS[code].choice)(a, b, parameter, tape)
-    return result
-
-
-@unrolled
+@wp.func
 def first_operator(operator: wp.int32) -> wp.int32:
     """Return the operator that folds a first operand into the empty field: `operator` itself if it can."""
-    result = int(SUM_CODE)
-    for code in range(wp.static(len(OPERATORS))):
-        if operator == code and wp.static(OPERATORS[code].starts_from_zero):
-            result = operator
-    return result
+    if starts_from_zero(operator):
+        return operator
+    return SUM_CODE
 
 
 @wp.func
@@ -215,7 +176,7 @@ def range_anywhere(
     half: wp.float32,
     extent: wp.vec3,
     ball: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
 ) -> wp.vec2:
     """Return the range of a primitive over the cube point ± half.
@@ -231,13 +192,7 @@ def range_anywhere(
 
 
 @wp.func
-def copy_texels(
-    source: wp.array(dtype=wp.vec4),
-    first: wp.int32,
-    count: wp.int32,
-    target: wp.array(dtype=wp.vec4),
-    at: wp.int32,
-) -> None:
+def copy_texels(source: Texels, first: wp.int32, count: wp.int32, target: Texels, at: wp.int32) -> None:
     """Copy texels source[first : first + count] to target[at :], in ascending order."""
     for k in range(count):
         target[at + k] = source[first + k]
@@ -252,7 +207,7 @@ def fold_range(
     end: wp.int32,
     run_at: wp.int32,
     run: wp.vec4,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
 ) -> tuple[wp.vec2, wp.int32, wp.int32, wp.vec4, wp.bool]:
     """Fold a primitive of range `r` into the accumulator.
 
@@ -285,7 +240,7 @@ def pop_range(
     accumulator: wp.vec2,
     accumulator_start: wp.int32,
     end: wp.int32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     out: wp.array(dtype=wp.vec4),
     start: wp.int32,
     write: wp.bool,
@@ -319,7 +274,7 @@ def pop_range(
 def prune(
     center: wp.vec3,
     half: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
     out: wp.array(dtype=wp.vec4),
     start: wp.int32,
@@ -450,11 +405,7 @@ def prune(
 
 @wp.kernel
 def measure_range(
-    center: wp.vec3,
-    half: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-    out: wp.array(dtype=wp.vec4),
+    center: wp.vec3, half: wp.float32, tape: Texels, span: wp.vec2i, out: wp.array(dtype=wp.vec4)
 ) -> None:
     """Write the range of the field over the cube center ± half, as the first two components."""
     out[0] = prune(center, half, tape, span, tape, 0, False)

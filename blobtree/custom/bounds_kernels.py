@@ -17,6 +17,7 @@ from blobtree.formulas.skeletons import Skeleton
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import closest, stride
 from blobtree.tape.instruction_set import single_skeleton_set
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -55,7 +56,7 @@ def direction_of(number: wp.int32) -> wp.vec3:
 @wp.kernel
 def _measure_boxes(
     first: wp.int32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     reaches: wp.array(dtype=wp.float32),
     shrinkings: wp.int32,
     directions: wp.int32,

@@ -4,6 +4,7 @@ import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_gradient
+from blobtree.texels import Texels
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -14,7 +15,7 @@ gradient_derivative = directional_derivative(field_gradient, ["q"])
 @wp.kernel
 def evaluate_hessians(
     points: wp.array(dtype=wp.vec3),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
     gradients: wp.array(dtype=wp.vec4),
     hessians: wp.array2d(dtype=wp.vec4),

@@ -4,6 +4,7 @@ import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_value
+from blobtree.texels import Texels
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -16,7 +17,7 @@ def evaluate_sensitivities(
     points: wp.array(dtype=wp.vec3),
     rows: wp.array(dtype=wp.int32),
     columns: wp.array(dtype=wp.int32),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     tangents: wp.array2d(dtype=wp.vec4),
     span: wp.vec2i,
     out: wp.array(dtype=wp.float32),

@@ -20,11 +20,13 @@ from blobtree.formulas.operators import (
     intersection_like_choice,
     intersection_partials,
     intersection_range,
+    monotone_range,
     ricci_norm,
     ricci_partials,
     union_partials,
     widened_range,
 )
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -36,9 +38,7 @@ R_NOTHING = wp.constant(1e-12)
 
 
 @wp.func
-def superelliptic_partials(
-    a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec3:
+def superelliptic_partials(a: wp.float32, b: wp.float32, parameter: wp.float32, tape: Texels) -> wp.vec3:
     """F = l + ((a − l)ⁿ + (b − l)ⁿ)^(1/n) with l = ½ − width; negative terms are 0 (Rockwood 1989).
 
     Rockwood's surfaces are P = 1 − Σ [1 − Pᵢ / rᵢ]₊ᵗ = 0 with Pᵢ = 0 on a surface. Here Pᵢ = ½ − fᵢ, r is
@@ -59,7 +59,7 @@ def superelliptic_slope(
     max_a: wp.float32,
     max_b: wp.float32,
     parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
 ) -> wp.float32:
     """Hölder, as in the blend of Ricci."""
     exponent = tape[int(parameter)][1]
@@ -67,18 +67,7 @@ def superelliptic_slope(
 
 
 @wp.func
-def superelliptic_range(
-    a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec2:
-    """F is monotone in both operands."""
-    smallest = superelliptic_partials(a[0], b[0], parameter, tape)[0]
-    return wp.vec2(smallest, superelliptic_partials(a[1], b[1], parameter, tape)[0])
-
-
-@wp.func
-def superelliptic_choice(
-    a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.int32:
+def superelliptic_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.int32:
     """Return the larger operand where the other one stays below its width."""
     least = 0.5 - tape[int(parameter)][0]
     if b[1] <= 0.0 or b[1] <= wp.min(least, a[0]):
@@ -149,17 +138,23 @@ def r_partial(numerator: wp.float32, d: wp.float32, e: wp.float32, weight: wp.fl
 
 
 @wp.func
-def r_union_partials(a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
-    """F = φ⁻¹(φ(a) ∨ φ(b)): a union whose field is smooth everywhere but where a = b = ½."""
-    if a <= R_NOTHING or b <= R_NOTHING:
-        return union_partials(a, b, 0.0)
+def r_met(a: wp.float32, b: wp.float32, side_a: wp.float32, side_b: wp.float32, side: wp.float32) -> wp.vec3:
+    """Return F = φ⁻¹(z) and its partial derivatives; side · z = side_a φ(a) ∧ side_b φ(b), sides are ±1."""
     d = wp.min(2.0 * a, 1.0)
     e = wp.min(2.0 * b, 1.0)
-    x = (2.0 * a - 1.0) * e
-    y = (2.0 * b - 1.0) * d
-    joined = -r_meet(-x, -y)
-    by_a = r_partial(joined, d, e, r_weight(-x, -y))
-    return wp.vec3(r_field(joined, d, e), by_a, r_partial(joined, e, d, r_weight(-y, -x)))
+    x = side_a * (2.0 * a - 1.0) * e
+    y = side_b * (2.0 * b - 1.0) * d
+    met = side * r_meet(x, y)
+    by_a = side * side_a * r_partial(met, d, e, r_weight(x, y))
+    return wp.vec3(r_field(met, d, e), by_a, side * side_b * r_partial(met, e, d, r_weight(y, x)))
+
+
+@wp.func
+def r_union_partials(a: wp.float32, b: wp.float32, parameter: wp.float32) -> wp.vec3:
+    """F = φ⁻¹(φ(a) ∨ φ(b)), x ∨ y = −(−x ∧ −y): a union, smooth everywhere but where a = b = ½."""
+    if a <= R_NOTHING or b <= R_NOTHING:
+        return union_partials(a, b, 0.0)
+    return r_met(a, b, -1.0, -1.0, -1.0)
 
 
 @wp.func
@@ -167,13 +162,7 @@ def r_intersection_partials(a: wp.float32, b: wp.float32, parameter: wp.float32)
     """F = φ⁻¹(φ(a) ∧ φ(b)): an intersection whose field is smooth everywhere but where a = b = ½."""
     if a <= R_NOTHING or b <= R_NOTHING:
         return intersection_partials(a, b, 0.0)
-    d = wp.min(2.0 * a, 1.0)
-    e = wp.min(2.0 * b, 1.0)
-    x = (2.0 * a - 1.0) * e
-    y = (2.0 * b - 1.0) * d
-    met = r_meet(x, y)
-    by_a = r_partial(met, d, e, r_weight(x, y))
-    return wp.vec3(r_field(met, d, e), by_a, r_partial(met, e, d, r_weight(y, x)))
+    return r_met(a, b, 1.0, 1.0, 1.0)
 
 
 @wp.func
@@ -181,13 +170,7 @@ def r_difference_partials(a: wp.float32, b: wp.float32, parameter: wp.float32) -
     """F = φ⁻¹(φ(a) ∧ −φ(b)): a difference whose field is smooth everywhere but where a = b = ½."""
     if a <= R_NOTHING or b <= R_NOTHING:
         return wp.vec3(a, 1.0, 0.0)
-    d = wp.min(2.0 * a, 1.0)
-    e = wp.min(2.0 * b, 1.0)
-    x = (2.0 * a - 1.0) * e
-    y = (1.0 - 2.0 * b) * d
-    met = r_meet(x, y)
-    by_a = r_partial(met, d, e, r_weight(x, y))
-    return wp.vec3(r_field(met, d, e), by_a, -r_partial(met, e, d, r_weight(y, x)))
+    return r_met(a, b, 1.0, -1.0, 1.0)
 
 
 @wp.func
@@ -220,27 +203,6 @@ def r_difference_slope(
 ) -> wp.float32:
     """As in the intersection by a, and as in the union by b."""
     return 2.0 * slope_a + r_steepest(max_a) * slope_b
-
-
-@wp.func
-def r_union_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
-    """F is monotone in both operands."""
-    smallest = r_union_partials(a[0], b[0], 0.0)[0]
-    return widened_range(smallest, r_union_partials(a[1], b[1], 0.0)[0])
-
-
-@wp.func
-def r_intersection_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
-    """F is monotone in both operands."""
-    smallest = r_intersection_partials(a[0], b[0], 0.0)[0]
-    return widened_range(smallest, r_intersection_partials(a[1], b[1], 0.0)[0])
-
-
-@wp.func
-def r_difference_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
-    """F rises with a and falls with b."""
-    smallest = r_difference_partials(a[0], b[1], 0.0)[0]
-    return widened_range(smallest, r_difference_partials(a[1], b[0], 0.0)[0])
 
 
 # -- smooth extremes ------------------------------------------------------------------------------------
@@ -280,13 +242,6 @@ def smooth_intersection_slope(
     if larger < 0.0:
         return 0.75 * larger
     return larger
-
-
-@wp.func
-def smooth_intersection_range(a: wp.vec2, b: wp.vec2, width: wp.float32) -> wp.vec2:
-    """F is monotone in both operands."""
-    smallest = smooth_intersection_partials(a[0], b[0], width)[0]
-    return widened_range(smallest, smooth_intersection_partials(a[1], b[1], width)[0])
 
 
 @wp.func
@@ -419,13 +374,6 @@ def clean_union_slope(
 
 
 @wp.func
-def clean_union_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
-    """F is monotone in both operands."""
-    smallest = clean_union_partials(a[0], b[0], 0.0)[0]
-    return widened_range(smallest, clean_union_partials(a[1], b[1], 0.0)[0])
-
-
-@wp.func
 def clean_union_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     """Return an operand that is 1 + √2 times the other: then k ≤ 2 a b / (a + b) ≤ |a − b|."""
     if b[1] <= 0.0 or a[0] >= 2.4143 * b[1]:
@@ -459,9 +407,7 @@ def controllable_root(a: wp.float32, b: wp.float32, left: wp.float32, right: wp.
 
 
 @wp.func
-def controllable_partials(
-    a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec3:
+def controllable_partials(a: wp.float32, b: wp.float32, parameter: wp.float32, tape: Texels) -> wp.vec3:
     """F = C, where an elliptical arc joins the lines of level C of both operands (Barthe et al. 2004).
 
     F is a where b ≤ a tan θ₁, and b where a ≤ b tan θ₂. Between these rays of the (a, b) plane the level line
@@ -489,7 +435,7 @@ def controllable_slope(
     max_a: wp.float32,
     max_b: wp.float32,
     parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
 ) -> wp.float32:
     """F is a norm of non-negative operands, so slopes combine by F itself."""
     p = tape[int(parameter)]
@@ -497,19 +443,7 @@ def controllable_slope(
 
 
 @wp.func
-def controllable_range(
-    a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec2:
-    """F is monotone in both operands."""
-    p = tape[int(parameter)]
-    smallest = controllable_value(a[0], b[0], p[0], p[1])
-    return widened_range(smallest, controllable_value(a[1], b[1], p[0], p[1]))
-
-
-@wp.func
-def controllable_choice(
-    a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.int32:
+def controllable_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.int32:
     """Return the operand outside whose ray the other one stays."""
     p = tape[int(parameter)]
     if b[1] <= p[0] * a[0] or b[1] <= 0.0:
@@ -539,12 +473,6 @@ def masked_slope(
 
 
 @wp.func
-def masked_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32) -> wp.vec2:
-    """F is monotone in both operands."""
-    return widened_range(masked_partials(a[0], b[0], 0.0)[0], masked_partials(a[1], b[1], 0.0)[0])
-
-
-@wp.func
 def masked_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     """Return a alone inside the surface of b, and nothing where an operand is absent."""
     if a[1] <= 0.0 or b[1] <= 0.0:
@@ -570,18 +498,24 @@ SUPERELLIPTIC = Operator(
     "superelliptic",
     superelliptic_partials,
     superelliptic_slope,
-    superelliptic_range,
+    monotone_range(superelliptic_partials),
     superelliptic_choice,
     monotone=True,
 )
 R_UNION = Operator(
-    "r_union", r_union_partials, r_union_slope, r_union_range, blend_choice, commutes=False, monotone=True
+    "r_union",
+    r_union_partials,
+    r_union_slope,
+    monotone_range(r_union_partials),
+    blend_choice,
+    commutes=False,
+    monotone=True,
 )
 R_INTERSECTION = Operator(
     "r_intersection",
     r_intersection_partials,
     r_intersection_slope,
-    r_intersection_range,
+    monotone_range(r_intersection_partials),
     intersection_like_choice,
     commutes=False,
     starts_from_zero=False,
@@ -592,7 +526,7 @@ R_DIFFERENCE = Operator(
     "r_difference",
     r_difference_partials,
     r_difference_slope,
-    r_difference_range,
+    monotone_range(r_difference_partials, falls_with_b=True),
     difference_like_choice,
     commutes=False,
     starts_from_zero=False,
@@ -602,7 +536,7 @@ SMOOTH_INTERSECTION = Operator(
     "smooth_intersection",
     smooth_intersection_partials,
     smooth_intersection_slope,
-    smooth_intersection_range,
+    monotone_range(smooth_intersection_partials),
     smooth_intersection_choice,
     commutes=False,
     starts_from_zero=False,
@@ -623,7 +557,7 @@ CLEAN_UNION = Operator(
     "clean_union",
     clean_union_partials,
     clean_union_slope,
-    clean_union_range,
+    monotone_range(clean_union_partials),
     clean_union_choice,
     commutes=False,
     monotone=True,
@@ -632,7 +566,7 @@ CONTROLLABLE = Operator(
     "controllable",
     controllable_partials,
     controllable_slope,
-    controllable_range,
+    monotone_range(controllable_partials),
     controllable_choice,
     commutes=False,
     monotone=True,
@@ -641,7 +575,7 @@ MASKED = Operator(
     "masked",
     masked_partials,
     masked_slope,
-    masked_range,
+    monotone_range(masked_partials),
     masked_choice,
     commutes=False,
     starts_from_zero=False,

@@ -18,6 +18,7 @@ can reach ½.
 import warp as wp
 
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, Operator, Support
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -70,9 +71,7 @@ def pressed_value(a: wp.float32, m: wp.float32, width: wp.float32, height: wp.fl
 
 
 @wp.func
-def press_partials(
-    a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec3:
+def press_partials(a: wp.float32, b: wp.float32, parameter: wp.float32, tape: Texels) -> wp.vec3:
     """Return F, ∂F/∂a and ∂F/∂b; the parameters are (ratio, width, height)."""
     p = tape[int(parameter)]
     m = rated_field(b, p[0])
@@ -106,7 +105,7 @@ def press_slope(
     max_a: wp.float32,
     max_b: wp.float32,
     parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
 ) -> wp.float32:
     """Bound |∇F|: ∂F/∂a ≤ 1 + 1.5 · height / FADE, |∂F/∂b| ≤ r′."""
     p = tape[int(parameter)]
@@ -116,18 +115,22 @@ def press_slope(
 
 
 @wp.func
-def press_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec2:
-    """F rises with a; over b it rises up to the top of the bulge and falls behind."""
-    p = tape[int(parameter)]
-    low = rated_field(b[0], p[0])[0]
-    high = rated_field(b[1], p[0])[0]
+def pressed_range(a: wp.vec2, low: wp.float32, high: wp.float32, p: wp.vec4) -> wp.vec2:
+    """F rises with a; over m from `low` to `high` it rises up to the top of the bulge and falls behind."""
     top = wp.clamp(0.5 - 2.0 * p[2], low, high)
     smallest = wp.min(pressed_value(a[0], low, p[1], p[2]), pressed_value(a[0], high, p[1], p[2]))
     return wp.vec2(smallest, pressed_value(a[1], top, p[1], p[2]))
 
 
 @wp.func
-def press_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.int32:
+def press_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.vec2:
+    """F rises with a; over b it rises up to the top of the bulge and falls behind."""
+    p = tape[int(parameter)]
+    return pressed_range(a, rated_field(b[0], p[0])[0], rated_field(b[1], p[0])[0], p)
+
+
+@wp.func
+def press_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.int32:
     """Return the dependence of a pressed solid: on itself alone where the obstacle's region ends."""
     p = tape[int(parameter)]
     if a[1] <= 0.0 or a[1] <= rated_field(b[0], p[0])[0] - 0.5:
@@ -138,17 +141,7 @@ def press_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(d
 
 
 @wp.func
-def bulged_value(a: wp.float32, m: wp.float32, width: wp.float32, height: wp.float32) -> wp.float32:
-    """Return F(a, m) without compression."""
-    if m >= 0.5:
-        return a
-    return pressed_value(a, m, width, height)
-
-
-@wp.func
-def bulge_partials(
-    a: wp.float32, b: wp.float32, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec3:
+def bulge_partials(a: wp.float32, b: wp.float32, parameter: wp.float32, tape: Texels) -> wp.vec3:
     """Return F, ∂F/∂a and ∂F/∂b of a solid that bulges, but is not compressed."""
     if rated_field(b, tape[int(parameter)][0])[0] >= 0.5:
         return wp.vec3(a, 1.0, 0.0)
@@ -156,18 +149,15 @@ def bulge_partials(
 
 
 @wp.func
-def bulge_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.vec2:
-    """F rises with a; over b it rises up to the top of the bulge and falls behind."""
+def bulge_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.vec2:
+    """F rises with a; over b it rises up to the top of the bulge and falls behind, up to b = ½."""
     p = tape[int(parameter)]
-    low = rated_field(b[0], p[0])[0]
-    high = rated_field(b[1], p[0])[0]
-    top = wp.clamp(0.5 - 2.0 * p[2], low, high)
-    smallest = wp.min(bulged_value(a[0], low, p[1], p[2]), bulged_value(a[0], high, p[1], p[2]))
-    return wp.vec2(smallest, bulged_value(a[1], top, p[1], p[2]))
+    low = wp.min(rated_field(b[0], p[0])[0], 0.5)
+    return pressed_range(a, low, wp.min(rated_field(b[1], p[0])[0], 0.5), p)
 
 
 @wp.func
-def bulge_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)) -> wp.int32:
+def bulge_choice(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.int32:
     """Return the dependence of a bulge: on the solid alone inside the obstacle and beyond its region."""
     p = tape[int(parameter)]
     if a[1] <= 0.0:

@@ -26,6 +26,7 @@ import math
 import warp as wp
 
 from blobtree.formulas.fields import FieldKind
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -120,7 +121,7 @@ def chord_in_kernel(start: wp.vec3, axis: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def convolution_segment(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def convolution_segment(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (f, ∇f); tape[at] = (start, 1/τ there), tape[at + 1] = (end, 1/τ there)."""
     start = tape[at]
     end = tape[at + 1]
@@ -157,9 +158,7 @@ def convolution_segment(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32)
 
 
 @wp.func
-def convolution_segment_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def convolution_segment_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return (smallest f, largest f, largest |∇f|) over a ball.
 
     A part of the segment that the kernel of any point of the ball reaches is reached from the centre by a
@@ -243,7 +242,7 @@ def arc_margin(local: wp.vec3, arc_radius: wp.float32) -> wp.float32:
 
 
 @wp.func
-def convolution_arc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def convolution_arc(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (f, ∇f) of a circular arc.
 
     tape[at] = (centre, 1/τ), tape[at + 1] = (from the centre to the middle of the arc, cosine of half its
@@ -292,9 +291,7 @@ def convolution_arc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 
 @wp.func
-def convolution_arc_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def convolution_arc_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return (smallest f, largest f, largest |∇f|) over a ball, as of a segment."""
     texel = tape[at]
     half = wp.vec2(tape[at + 1][3], tape[at + 2][3])
@@ -372,7 +369,7 @@ def triangle_edge(a: wp.vec3, edge: wp.vec3, normal: wp.vec3, margin: wp.float32
 
 
 @wp.func
-def convolution_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def convolution_triangle(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (f, ∇f); tape[at] = (corner a, 1/τ); tape[at + 1] = (b − a, 0); tape[at + 2] = (c − a, 0).
 
     tape[at + 3] = (unit normal, 0), which float32 could not compute for slivers.
@@ -425,9 +422,7 @@ def distance_to_triangle(a: wp.vec3, to_b: wp.vec3, to_c: wp.vec3, normal: wp.ve
 
 
 @wp.func
-def convolution_triangle_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def convolution_triangle_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return (smallest f, largest f, largest |∇f|) over a ball."""
     corner = tape[at]
     z = corner[3]

@@ -8,7 +8,8 @@ bracket the minima. No start value can lead to the wrong one of two minima.
 
 import warp as wp
 
-from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
+from blobtree.formulas.skeletons import JOINT_YIELD, Skeleton, min_influence_of_one
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -20,19 +21,12 @@ ROOT_TOLERANCE = 1e-7
 
 POLISH_STEPS = 3
 
-JOINT_YIELD = 4e-6
-"""Part of the influence by which a curve is weaker at a joint than the one that goes on there.
-
-The joint is not the closest point where the next curve has a closer one, but float32 may not show it in the
-distances: a closest point at a distance of 3e-4 along the curve has the same one.
-"""
-
 POLISH_LIMIT = 4e-3
 """Longest step of `polished`: beside a centre of curvature, a root in float32 is that far off."""
 
 
 @wp.func
-def closest_on_arc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_arc(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (centre, influence); tape[at + 1], tape[at + 2] = (r·u, cos h), (r·v, sin h).
 
     The arc of radius r reaches from −h to h about the unit vector u; v is perpendicular to u in its plane.
@@ -152,7 +146,7 @@ def extrema(c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.vec4:
 
 
 @wp.func
-def curve_point(t: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def curve_point(t: wp.float32, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return the point of a curve, and the influence there."""
     last = tape[at + 3]
     cubic = wp.vec4(last[0], last[1], last[2], 0.0)
@@ -160,7 +154,7 @@ def curve_point(t: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> w
 
 
 @wp.func
-def curve_ratio(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def curve_ratio(t: wp.float32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
     """Return (|q − c(t)| / s(t))²."""
     c = curve_point(t, tape, at)
     w = q - wp.vec3(c[0], c[1], c[2])
@@ -168,7 +162,7 @@ def curve_ratio(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 
 @wp.func
-def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def polished(t: wp.float32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
     """Return t after Newton steps for N(t) = ½ (|c − q|²)' s − |c − q|² s'.
 
     Its vectors cancel less than the coefficients of N. Lengths are in units of s(0), for squares overflow.
@@ -198,7 +192,7 @@ def polished(t: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.in
 
 
 @wp.func
-def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at + k] = coefficient of tᵏ in (c(t), s(t)), k from 0 to 3; s is constant if that of t³ is not 0.
 
     s has no term in t³. In its place stand the ends at which another curve goes on: 1 start, 2 end, 3 both.
@@ -256,7 +250,7 @@ def closest_on_curve(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) ->
 
 
 @wp.func
-def min_influence_of_curve(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def min_influence_of_curve(tape: Texels, at: wp.int32) -> wp.float32:
     """Return the smallest of the influences s₀, s₀ + s₁ / 2, s₀ + s₁ + s₂, whose hull holds all of s(t)."""
     start = tape[at][3]
     first = tape[at + 1][3]

@@ -18,6 +18,7 @@ import warp as wp
 from blobtree._typing import Box, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import UNKNOWN_EXTENT, SpaceWarp
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -60,14 +61,14 @@ def taper_scale(z: wp.float32, p: wp.vec4) -> wp.float32:
 
 
 @wp.func
-def taper_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def taper_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Divide x and y by the scale."""
     r = taper_scale(q[2], tape[at])
     return wp.vec3(q[0] / r, q[1] / r, q[2])
 
 
 @wp.func
-def taper_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def taper_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Divide by the scale too, and add its change along z."""
     p = tape[at]
     r = taper_scale(q[2], p)
@@ -76,7 +77,7 @@ def taper_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 
 @wp.func
-def taper_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def taper_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return the norm at the smallest scale, and at the largest distance from the axis."""
     p = tape[at]
     r = wp.min(taper_scale(q[2] - reach, p), taper_scale(q[2] + reach, p))
@@ -97,7 +98,7 @@ def taper_box(lower: Float64Array, upper: Float64Array, parameters: tuple[float,
 
 
 @wp.func
-def shear_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def shear_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Move by −(p₁, p₂) per unit of height between p₃ and p₄."""
     p = tape[at]
     rise = wp.clamp(q[2], p[3], tape[at + 1][0]) - p[3]
@@ -105,7 +106,7 @@ def shear_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp
 
 
 @wp.func
-def shear_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def shear_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Add the change of the motion along z."""
     p = tape[at]
     inside = within_limits(q[2], 0.0, p[3], tape[at + 1][0])
@@ -113,7 +114,7 @@ def shear_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 
 @wp.func
-def shear_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def shear_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return the norm of a shear."""
     p = tape[at]
     inside = within_limits(q[2], reach, p[3], tape[at + 1][0])
@@ -135,21 +136,21 @@ def shear_box(lower: Float64Array, upper: Float64Array, parameters: tuple[float,
 
 
 @wp.func
-def stretch_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def stretch_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Move by −p₁ per unit of height between p₂ and p₃; p₁ is 1 − 1 / factor."""
     p = tape[at]
     return wp.vec3(q[0], q[1], q[2] - p[1] * (wp.clamp(q[2], p[2], p[3]) - p[2]))
 
 
 @wp.func
-def stretch_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def stretch_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Divide the part along z by the factor."""
     p = tape[at]
     return wp.vec3(g[0], g[1], g[2] * (1.0 - p[1] * within_limits(q[2], 0.0, p[2], p[3])))
 
 
 @wp.func
-def stretch_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def stretch_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return 1 / factor, or 1 if that is more."""
     p = tape[at]
     return wp.max(1.0, 1.0 - p[1] * within_limits(q[2], reach, p[2], p[3]))
@@ -174,7 +175,7 @@ def stretch_box(lower: Float64Array, upper: Float64Array, parameters: tuple[floa
 
 
 @wp.func
-def limited_twist_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def limited_twist_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Rotate about z by −p₁ per unit of height between p₂ and p₃."""
     p = tape[at]
     angle = p[1] * (wp.clamp(q[2], p[2], p[3]) - p[2])
@@ -184,7 +185,7 @@ def limited_twist_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int3
 
 
 @wp.func
-def limited_twist_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def limited_twist_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Rotate back, and add the change of the rotation along z."""
     p = tape[at]
     angle = p[1] * (wp.clamp(q[2], p[2], p[3]) - p[2])
@@ -197,9 +198,7 @@ def limited_twist_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4)
 
 
 @wp.func
-def limited_twist_stretch(
-    q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.float32:
+def limited_twist_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return the norm of the shear by |p₁| · distance from the axis."""
     p = tape[at]
     far = wp.sqrt(q[0] * q[0] + q[1] * q[1]) + reach
@@ -247,7 +246,7 @@ def bend_turn(place: wp.vec4, half: wp.vec4) -> wp.vec2:
 
 
 @wp.func
-def bend_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def bend_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Unroll the arc about y through p₁ per unit of height between p₂ and p₃."""
     p = tape[at]
     k = wp.abs(p[1])
@@ -269,7 +268,7 @@ def bend_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.
 
 
 @wp.func
-def bend_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def bend_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Turn back; in the arc, heights change faster near the axis."""
     p = tape[at]
     if p[1] == 0.0:
@@ -294,7 +293,7 @@ def bend_to_cut(place: wp.vec4) -> wp.float32:
 
 
 @wp.func
-def bend_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def bend_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return radius of the bend / distance from its axis, bounded because the tree is empty near it.
 
     A ball around the axis, or across the cut, holds points whose images lie far apart. The bound is then so
@@ -319,7 +318,7 @@ def bend_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), a
 
 
 @wp.func
-def bend_extent(q: wp.vec3, half_size: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def bend_extent(q: wp.vec3, half_size: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Bound the image of a box within the arc, or beyond one of its ends, and of no other box.
 
     At q, a is the extent of the box away from the axis and b across, over the radius of the bend.
@@ -420,7 +419,7 @@ def _require_room(nearest: float, bottom: float, top: float, k: float, low: floa
 
 
 @wp.func
-def noise_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def noise_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Add p₁ plane waves d sin(ω · q + phase); each is two texels, (ω, phase) and (d, |d| |ω|)."""
     moved = q
     for i in range(int(tape[at][1])):
@@ -432,7 +431,7 @@ def noise_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp
 
 
 @wp.func
-def noise_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def noise_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Add ω (d · g) cos(ω · q + phase) of each wave."""
     pulled = g
     for i in range(int(tape[at][1])):
@@ -445,7 +444,7 @@ def noise_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 
 @wp.func
-def noise_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def noise_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return 1 + Σ |d| |ω| · the largest |cos|, which changes by at most |ω| per unit."""
     bound = float(1.0)
     for i in range(int(tape[at][1])):
@@ -483,7 +482,7 @@ def wendland_steepness(distance: wp.float32) -> wp.float32:
 
 
 @wp.func
-def curve_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def curve_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Add Σ w φ(|q − c| p₂) over p₁ centres c; each is two texels, (c, 0) and (w, |w|)."""
     p = tape[at]
     moved = q
@@ -496,7 +495,7 @@ def curve_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp
 
 
 @wp.func
-def curve_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def curve_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Add ∇φ (w · g) of each centre."""
     p = tape[at]
     pulled = g
@@ -510,7 +509,7 @@ def curve_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 
 @wp.func
-def curve_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def curve_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return 1 + Σ |w| · the largest slope of φ within reach; the slope is largest at STEEPEST_WENDLAND."""
     p = tape[at]
     bound = float(1.0)

@@ -13,6 +13,7 @@ from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.noise import LARGEST_NOISE, STEEPEST_NOISE, gradient_noise
 from blobtree.formulas.operators import ricci_partials
 from blobtree.formulas.windows import smooth_step, smooth_step_slope, steepest_smooth_step
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -38,7 +39,7 @@ def signed(magnitude: wp.float32, number: wp.float32) -> wp.float32:
 
 
 @wp.func
-def superquadric_norm(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def superquadric_norm(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (h, ∇h) of h = ((|x/a|ᵐ + |y/b|ᵐ)^(n/m) + |z/c|ⁿ)^(1/n), which is 1 on the superquadric.
 
     This is Barr's inside–outside function to the power ε₁/2, with m = 2/ε₂ and n = 2/ε₁. As a norm it grows
@@ -60,15 +61,13 @@ def superquadric_norm(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -
 
 
 @wp.func
-def superquadric_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def superquadric_distance(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (u, ∇u) of u = RIM · h."""
     return superquadric_norm(q, tape, at) * RIM
 
 
 @wp.func
-def superquadric_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def superquadric_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Bound u over a ball; tape[at + 2][0] is the largest slope of h, which is that of a norm."""
     steepest = RIM * tape[at + 2][0]
     u = RIM * superquadric_norm(center, tape, at)[0]
@@ -95,7 +94,7 @@ def gyroid(x: wp.vec3, rate: wp.float32) -> wp.vec4:
 
 
 @wp.func
-def gyroid_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def gyroid_distance(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (u, ∇u) of u = |G| / s; tape[at + 1][3] = rate, tape[at + 2][0] = 1 / s."""
     middle = tape[at]
     u = gyroid(q - wp.vec3(middle[0], middle[1], middle[2]), tape[at + 1][3]) * tape[at + 2][0]
@@ -105,9 +104,7 @@ def gyroid_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 
 @wp.func
-def gyroid_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def gyroid_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Bound u over a ball, in which |G| changes by at most √3 · rate · radius."""
     rate = tape[at + 2][0]
     steepest = STEEPEST_GYROID * tape[at + 1][3] * rate
@@ -118,7 +115,7 @@ def gyroid_bounds(
 
 
 @wp.func
-def noise_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def noise_value_gradient(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (f, ∇f) of f = s(½ + (n − level) / 2 softness), s being `smooth_step`.
 
     tape[at + 1][3] = 1 / wavelength; tape[at + 2] = (level, 1 / (2 softness), seed, 0).
@@ -133,7 +130,7 @@ def noise_value_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
 
 
 @wp.func
-def noise_bounds(center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def noise_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Bound f over a ball, in which the noise changes by at most STEEPEST_NOISE · radius / wavelength."""
     middle = tape[at]
     rate = tape[at + 1][3]

@@ -140,6 +140,11 @@ class Falloff:
     def __repr__(self) -> str:
         return repr(self.name)
 
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """Rim, steepest distance and steepest slope."""
+        return self.rim, self.steepest_distance, self.steepest_slope
+
 
 WYVILL = Falloff("wyvill", wyvill_value, wyvill_slope, RIM, STEEPEST_DISTANCE, STEEPEST_SLOPE)
 

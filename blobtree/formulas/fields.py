@@ -38,6 +38,11 @@ class FieldKind:
     digest: str = ""
     """Digest of the sources of a custom kind."""
 
+    @property
+    def stride(self) -> int:
+        """Number of texels on the tape behind the map: the parameters and the colour."""
+        return self.parameters + 1
+
 
 FIELDS: tuple[FieldKind, ...] = ()
 """Every kind of the core, none; further kinds are those of the library and of users."""

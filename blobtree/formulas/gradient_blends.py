@@ -8,6 +8,7 @@ directions changes, in radians per unit; it is `UNBOUNDED` where none is known.
 import warp as wp
 
 from blobtree.formulas.operators import Operator, blend_choice, union_partials, widened_range
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -84,7 +85,7 @@ def gradient_blend_partials(
     a: wp.float32,
     b: wp.float32,
     parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     direction_a: wp.vec3,
     direction_b: wp.vec3,
 ) -> wp.vec3:
@@ -108,7 +109,7 @@ def gradient_blend_slope(
     max_a: wp.float32,
     max_b: wp.float32,
     parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     turn: wp.float32,
 ) -> wp.float32:
     """|F'| ≤ |∂F/∂a| |a'| + |∂F/∂b| |b'| + |∂F/∂o| |o'|.
@@ -130,9 +131,7 @@ def gradient_blend_slope(
 
 
 @wp.func
-def gradient_blend_range(
-    a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> wp.vec2:
+def gradient_blend_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Texels) -> wp.vec2:
     """F lies between the union and the full blend without c, 3(a + b)/4 + (a − b)²/(4(a + b)): both rise."""
     total = a[1] + b[1]
     if total <= 0.0:

@@ -26,6 +26,9 @@ from enum import Enum
 
 import warp as wp
 
+from blobtree.texels import Texels
+from blobtree.transpile.specialize import defined, parameter_count, warp_function
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -259,6 +262,25 @@ def widened_range(smallest: wp.float32, largest: wp.float32) -> wp.vec2:
         wp.max(smallest - CUSTOM_ROUNDING * (1.0 + smallest), 0.0),
         largest + CUSTOM_ROUNDING * (1.0 + largest),
     )
+
+
+def monotone_range(partials: wp.Function, *, falls_with_b: bool = False) -> wp.Function:
+    """Return the range of an operator that never falls as a grows, nor as b does (or never rises with b)."""
+    names = ["a", "b", "parameter", "tape"][: parameter_count(partials)]
+    types = {"a": wp.vec2, "b": wp.vec2, "parameter": wp.float32, "tape": Texels}
+    low, high = ("a[0], b[1]", "a[1], b[0]") if falls_with_b else ("a[0], b[0]", "a[1], b[1]")
+    key, rest = f"{partials.key}_range", ", ".join(["", *names[2:]])
+    text = (
+        f"def {key}({', '.join(names)}):\n"
+        f"    return widened_range(partials({low}{rest})[0], partials({high}{rest})[0])\n"
+    )
+    scope = {"partials": partials, "widened_range": widened_range, "__name__": partials.func.__module__}
+    function = defined(key, text, scope)
+    function.__doc__ = (
+        "F rises with a and falls with b." if falls_with_b else "F is monotone in both operands."
+    )
+    function.__annotations__ = {name: types[name] for name in names} | {"return": wp.vec2}
+    return warp_function(function)
 
 
 # -- the table ------------------------------------------------------------------------------------------

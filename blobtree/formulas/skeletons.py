@@ -13,20 +13,29 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from blobtree.texels import Texels
+
 wp.set_module_options({"enable_backward": False})
+
+JOINT_YIELD = 4e-6
+"""Part of the influence by which a skeleton is weaker at a joint than the one that goes on there.
+
+The joint is not the closest point where the next skeleton has a closer one, but float32 may not show it in
+the distances: a closest point at a distance of 3e-4 along the skeleton has the same one.
+"""
 
 HALF_DIAGONAL = math.sqrt(3.0)
 """Distance from a cube's centre to its corners, in half sides."""
 
 
 @wp.func
-def closest_on_point(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_point(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (centre, influence)."""
     return tape[at]
 
 
 @wp.func
-def closest_on_segment(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_segment(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (start, influence); tape[at + 1] = (end − start, 1 / length² or 0)."""
     start = tape[at]
     axis = tape[at + 1]
@@ -38,7 +47,7 @@ def closest_on_segment(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
 
 
 @wp.func
-def closest_on_cone(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_cone(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (start, influence there); tape[at + 1] = (end − start, influence at the end).
 
     With x along the axis and y beside it, (y² + (x − τ)²) / (s₀ + kτ)² is least at τ = x + k y² / (s₀ + k x);
@@ -70,7 +79,7 @@ def closest_on_cone(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 
 @wp.func
-def closest_on_circle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_circle(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (centre, influence); tape[at + 1] = (unit axis, radius of the circle)."""
     center = tape[at]
     axis = tape[at + 1]
@@ -86,7 +95,7 @@ def closest_on_circle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -
 
 
 @wp.func
-def closest_on_disc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_disc(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (centre, influence); tape[at + 1] = (unit axis, radius of the disc)."""
     center = tape[at]
     axis = tape[at + 1]
@@ -99,7 +108,7 @@ def closest_on_disc(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 
 @wp.func
-def closest_on_box(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_box(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (centre, influence); tape[at + 1] = (lengths along the axes, 0)."""
     center = tape[at]
     size = tape[at + 1]
@@ -112,13 +121,13 @@ def closest_on_box(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> w
 
 
 @wp.func
-def min_influence_of_one(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def min_influence_of_one(tape: Texels, at: wp.int32) -> wp.float32:
     """Return the influence radius of a skeleton that has one."""
     return tape[at][3]
 
 
 @wp.func
-def min_influence_of_cone(tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def min_influence_of_cone(tape: Texels, at: wp.int32) -> wp.float32:
     """Return the influence radius at the thinner end."""
     return wp.min(tape[at][3], tape[at + 1][3])
 
@@ -135,7 +144,7 @@ def squared_distances_to_ball(
 
 
 @wp.func
-def box_to_point(center: wp.vec3, half: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec2:
+def box_to_point(center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) -> wp.vec2:
     """Exact bounds on (|x − point| / influence)² over the cube center ± half."""
     point = tape[at]
     nearest = float(0.0)
@@ -163,6 +172,11 @@ class Skeleton:
     """True for a convex set with one influence radius: distances along a ray are then convex."""
     digest: str = ""
     """Digest of the sources of a custom kind."""
+
+    @property
+    def stride(self) -> int:
+        """Number of texels of a primitive on the tape: its parameters and its colour."""
+        return self.parameters + 1
 
 
 POINT = Skeleton("point", closest_on_point, min_influence_of_one, parameters=1, convex=True)

@@ -3,12 +3,13 @@
 import warp as wp
 
 from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def closest_on_cylinder(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_cylinder(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (start of the axis, influence); tape[at + 1] = (end − start, radius of the cylinder)."""
     start = tape[at]
     end = tape[at + 1]

@@ -14,6 +14,7 @@ import warp as wp
 
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -39,7 +40,7 @@ def box_distance(x: wp.vec3, half: wp.vec3) -> wp.vec4:
 
 
 @wp.func
-def sampled_distance(u: wp.vec3, counts: wp.vec4, tape: wp.array(dtype=wp.vec4), data: wp.int32) -> wp.vec4:
+def sampled_distance(u: wp.vec3, counts: wp.vec4, tape: Texels, data: wp.int32) -> wp.vec4:
     """Return (d, ∇d) in cells at u, in cells from the first grid point, without the box."""
     x = wp.clamp(u[0], 0.0, counts[0] - 1.0)
     y = wp.clamp(u[1], 0.0, counts[1] - 1.0)
@@ -79,7 +80,7 @@ def grid_box_distance(u: wp.vec3, counts: wp.vec4) -> wp.vec4:
 
 
 @wp.func
-def volume_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def volume_distance(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (u, ∇u) of sampled distances d: u = RIM + d / s.
 
     tape[at] = (first texel of the samples, first grid point); tape[at + 1] = (1 / spacing, 1 / s, growth in
@@ -99,9 +100,7 @@ def volume_distance(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> 
 
 
 @wp.func
-def volume_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def volume_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Bound u over a ball by the largest slope of the samples; the box's distance has slope 1."""
     first = tape[at]
     shape = tape[at + 1]

@@ -19,6 +19,7 @@ import numpy as np
 import warp as wp
 
 from blobtree._typing import Box, Float64Array
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -27,7 +28,7 @@ UNKNOWN_EXTENT = wp.constant(1e18)
 
 
 @wp.func
-def twist_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def twist_forward(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Rotate about z by −p₁·z."""
     p = tape[at]
     c = wp.cos(p[1] * q[2])
@@ -36,7 +37,7 @@ def twist_forward(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp
 
 
 @wp.func
-def twist_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def twist_pullback(q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Rotate back, and add the change of the rotation along z."""
     p = tape[at]
     c = wp.cos(p[1] * q[2])
@@ -47,7 +48,7 @@ def twist_pullback(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp
 
 
 @wp.func
-def twist_stretch(q: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def twist_stretch(q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return ‖J‖ = (k + √(k² + 4)) / 2: a rotation and a shear by k = |p₁| · distance from the axis."""
     k = wp.abs(tape[at][1]) * (wp.sqrt(q[0] * q[0] + q[1] * q[1]) + reach)
     return 0.5 * (k + wp.sqrt(k * k + 4.0))
@@ -60,7 +61,7 @@ def twist_box(lower: Float64Array, upper: Float64Array, _parameters: tuple[float
 
 
 @wp.func
-def unknown_extent(q: wp.vec3, half: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def unknown_extent(q: wp.vec3, half: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return a large size: the ball that `stretch` gives is all that is known."""
     return wp.vec3(UNKNOWN_EXTENT, UNKNOWN_EXTENT, UNKNOWN_EXTENT)
 

@@ -7,6 +7,8 @@ the window, so it ends smoothly: its surface closes inside the box, where f · w
 
 import warp as wp
 
+from blobtree.texels import Texels
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -68,7 +70,7 @@ def window_bounds(x: wp.vec3, radius: wp.float32, half: wp.vec3, fade: wp.float3
 
 
 @wp.func
-def box_window(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def box_window(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (w, ∇w) at q of a box with tape[at] = (middle, fade) and tape[at + 1] = (half lengths, ·)."""
     middle = tape[at]
     half = tape[at + 1]
@@ -77,9 +79,7 @@ def box_window(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.ve
 
 
 @wp.func
-def box_window_bounds(
-    center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def box_window_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return `window_bounds` over a ball for such a box."""
     middle = tape[at]
     half = tape[at + 1]

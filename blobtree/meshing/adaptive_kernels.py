@@ -14,6 +14,7 @@ from blobtree.meshing.distance_kernels import CONVERGED, NEWTON_STEPS
 from blobtree.meshing.vertex_kernels import EDGE_FIRST, EDGE_LAST, VertexArrays, is_unconverged, write_vertex
 from blobtree.tape.evaluate_kernels import project_to_surface
 from blobtree.tape.interpreter import field_color, field_gradient, field_value
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -28,7 +29,7 @@ class BlockTreeArrays:
     keys: wp.array(dtype=wp.int64)
     """Of the blocks of the base, which come first."""
     spans: wp.array(dtype=wp.vec2i)
-    tape: wp.array(dtype=wp.vec4)
+    tape: Texels
     children: wp.array(dtype=wp.int32)
     """By cell, the block that refines it; negative if none does."""
     base: wp.vec3i
@@ -38,7 +39,7 @@ class BlockTreeArrays:
     """Side of a cell of the finest level."""
     depth: wp.int32
     """The finest level, the base being 0."""
-    whole: wp.array(dtype=wp.vec4)
+    whole: Texels
     whole_span: wp.vec2i
 
 

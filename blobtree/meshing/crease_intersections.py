@@ -14,6 +14,7 @@ import warp as wp
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.crease_branches import branch_at
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -49,12 +50,7 @@ def reference_of(references: References, k: wp.int32) -> wp.vec3:
 
 @wp.func
 def branch_plane(
-    x: wp.vec3,
-    references: References,
-    k: wp.int32,
-    cell: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
+    x: wp.vec3, references: References, k: wp.int32, cell: wp.float32, tape: Texels, span: wp.vec2i
 ) -> wp.vec4:
     """Return (unit normal, signed distance up to `cell`) of branch k's tangent plane; 0 where it is flat."""
     branch = branch_at(x, reference_of(references, k), tape, span)
@@ -98,7 +94,7 @@ def gauss_newton_step(
     axis: wp.int32,
     plane: wp.float32,
     cell: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
 ) -> wp.vec4:
     """Return the step from x onto the tangent planes of the members, and 1; 0 if the planes give no step.
@@ -145,7 +141,7 @@ def intersect_branches(
     axis: wp.int32,
     plane: wp.float32,
     cell: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
 ) -> wp.vec4:
     """Return the point near `start` where the members meet on the surface, and the last step in cells.
@@ -190,7 +186,7 @@ def intersect_in_cell(
     members: wp.int32,
     low: wp.vec3,
     cell: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
 ) -> wp.vec4:
     """Return an intersection of the members: in the cell, else on its faces, else near it."""
@@ -215,7 +211,7 @@ def intersect_in_cell(
 
 @wp.func
 def mean_normal(
-    x: wp.vec3, references: References, members: wp.int32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+    x: wp.vec3, references: References, members: wp.int32, tape: Texels, span: wp.vec2i
 ) -> wp.vec3:
     """Return the outward mean of the members' unit normals at x."""
     total = wp.vec3()
@@ -228,7 +224,7 @@ def mean_normal(
 
 @wp.func
 def crease_tangent(
-    x: wp.vec3, references: References, members: wp.int32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+    x: wp.vec3, references: References, members: wp.int32, tape: Texels, span: wp.vec2i
 ) -> wp.vec3:
     """Return the unit direction of the crease of two branches at x."""
     first = wp.vec3()

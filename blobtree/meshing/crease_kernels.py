@@ -35,6 +35,7 @@ from blobtree.meshing.distance_kernels import distance_at, value_at
 from blobtree.meshing.dual_kernels import CellPatches, sample_index
 from blobtree.meshing.vertex_kernels import VertexArrays
 from blobtree.tape.interpreter import field_color, field_value
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -221,10 +222,7 @@ def visible_intersection(sheets: Sheets, low: wp.vec3, cells: CellBlocks, span: 
 
 @wp.kernel
 def find_choices(
-    first: wp.int32,
-    spans: wp.array(dtype=wp.vec2i),
-    tape: wp.array(dtype=wp.vec4),
-    choosing: wp.array(dtype=wp.uint8),
+    first: wp.int32, spans: wp.array(dtype=wp.vec2i), tape: Texels, choosing: wp.array(dtype=wp.uint8)
 ) -> None:
     """Write 1 for each block whose tape has an operator with kinks, 0 for the others."""
     i = first + wp.tid()

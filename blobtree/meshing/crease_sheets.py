@@ -10,6 +10,7 @@ from blobtree.meshing.crease_branches import branch_at
 from blobtree.meshing.crease_intersections import MAX_BRANCHES, MIN_SINE
 from blobtree.meshing.vertex_kernels import EDGE_FIRST, EDGE_LAST
 from blobtree.tape.interpreter import field_value
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -51,12 +52,7 @@ def cell_corner(low: wp.vec3, cell: wp.float32, corner: wp.int32) -> wp.vec3:
 
 @wp.func
 def edge_crossing(
-    a: wp.vec3,
-    b: wp.vec3,
-    value_a: wp.float32,
-    value_b: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
+    a: wp.vec3, b: wp.vec3, value_a: wp.float32, value_b: wp.float32, tape: Texels, span: wp.vec2i
 ) -> wp.vec3:
     """Return where an edge crosses the surface, by the Illinois variant of regula falsi."""
     low = float(0.0)
@@ -99,7 +95,7 @@ def gather_sheets(
     low: wp.vec3,
     cell: wp.float32,
     values: CornerValues,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
 ) -> Sheets:
     """Return the sheets of a patch, one per label of its crossings."""
@@ -125,9 +121,7 @@ def gather_sheets(
 
 
 @wp.func
-def continues(
-    reference: wp.vec3, r: wp.vec3, cell: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
-) -> wp.bool:
+def continues(reference: wp.vec3, r: wp.vec3, cell: wp.float32, tape: Texels, span: wp.vec2i) -> wp.bool:
     """Return True if the branch of `reference` continues through the crossing r as the surface does there."""
     active = branch_at(r, r, tape, span)
     other = branch_at(r, reference, tape, span)
@@ -138,9 +132,7 @@ def continues(
 
 
 @wp.func
-def without_duplicates(
-    sheets: Sheets, cell: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
-) -> Sheets:
+def without_duplicates(sheets: Sheets, cell: wp.float32, tape: Texels, span: wp.vec2i) -> Sheets:
     """Return the sheets that no other one continues: labels also differ where an operand fades to 0."""
     kept = Sheets()
     for step in range(sheets.count):

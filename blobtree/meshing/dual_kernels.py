@@ -13,6 +13,7 @@ from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.patches import FLIPPED
 from blobtree.tape.interpreter import field_value
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -68,7 +69,7 @@ def sample_blocks(
     listed: wp.array(dtype=wp.int32),
     blocks: wp.array(dtype=wp.vec3i),
     spans: wp.array(dtype=wp.vec2i),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     base: wp.vec3i,
     corner: wp.vec3,
     cell: wp.float32,

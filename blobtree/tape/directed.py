@@ -21,12 +21,10 @@ import warp as wp
 from blobtree.formulas.gradient_blends import UNBOUNDED
 from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.codes import REGISTERS
 from blobtree.tape.dispatch import (
     directed_partials,
     directed_slope,
     is_monotone,
-    paints,
     reads_gradients,
 )
 from blobtree.tape.evaluators import (
@@ -41,6 +39,7 @@ from blobtree.tape.evaluators import (
     gradient_pullback_warp,
     profiled_bound_leaf,
     profiled_gradient_leaf,
+    second_share,
 )
 from blobtree.tape.interpreter import (
     field_bound,
@@ -50,6 +49,7 @@ from blobtree.tape.interpreter import (
     make_interpreter,
 )
 from blobtree.tape.rest_kernels import interpret_rest_coordinates, own_position
+from blobtree.texels import Texels
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -61,9 +61,6 @@ STEEPEST_TURN = wp.constant(6.0)
 
 Directed: Any = wp.types.vector(length=8, dtype=wp.float32)
 """Four numbers, then the direction and one number more; in shaders two vectors of four."""
-
-_Registers4 = wp.types.matrix(shape=(REGISTERS, 4), dtype=wp.float32)
-_Registers8 = wp.types.matrix(shape=(REGISTERS, 8), dtype=wp.float32)
 
 
 @wp.func
@@ -89,12 +86,7 @@ def directed_empty() -> Directed:
 
 @wp.func
 def directed_combine(
-    operator: wp.int32,
-    a: wp.vec4,
-    b: wp.vec4,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> wp.vec4:
     """Return F and its direction."""
     p = directed_partials(operator, a[0], b[0], parameter, tape, direction_of(a), direction_of(b))
@@ -104,11 +96,11 @@ def directed_combine(
 
 DIRECTED = replace(GRADIENT, combine=directed_combine)
 
-interpret_directed = make_interpreter(DIRECTED, _Registers4)
+interpret_directed = make_interpreter(DIRECTED)
 
 
 @wp.func
-def field_direction(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
+def field_direction(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec4:
     """Return (value, direction) of the field at q."""
     return interpret_directed(q, wp.vec3(), 0.0, tape, span)
 
@@ -117,13 +109,13 @@ direction_along = directional_derivative(field_direction, ["q"])
 
 
 @wp.func
-def directed_value(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.float32:
+def directed_value(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.float32:
     """Return the field at q."""
     return field_direction(q, tape, span)[0]
 
 
 @wp.func
-def directed_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
+def directed_gradient(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec4:
     """Return (value, ∂x, ∂y, ∂z) of the field at q."""
     f, by_x = direction_along(q, wp.vec3(1.0, 0.0, 0.0), tape, span)
     f, by_y = direction_along(q, wp.vec3(0.0, 1.0, 0.0), tape, span)
@@ -159,7 +151,7 @@ def directed_bound_leaf(
 def directed_bound_direct(
     kind: wp.int32,
     q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
     color: wp.vec4,
     direction: wp.vec3,
@@ -188,16 +180,14 @@ def directed_profiled_bound_leaf(
 
 
 @wp.func
-def directed_pullback_affine(f: Directed, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> Directed:
+def directed_pullback_affine(f: Directed, tape: Texels, at: wp.int32) -> Directed:
     """Return `f` with its direction pulled back by the transposed map."""
     g = gradient_pullback_affine(wp.vec4(0.0, f[4], f[5], f[6]), tape, at)
     return Directed(f[0], f[1], f[2], f[3], g[1], g[2], g[3], 0.0)
 
 
 @wp.func
-def directed_pullback_warp(
-    kind: wp.int32, f: Directed, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> Directed:
+def directed_pullback_warp(kind: wp.int32, f: Directed, q: wp.vec3, tape: Texels, at: wp.int32) -> Directed:
     """Return `f` with its direction pulled back by a warp."""
     g = gradient_pullback_warp(kind, wp.vec4(0.0, f[4], f[5], f[6]), q, tape, at)
     return Directed(f[0], f[1], f[2], f[3], g[1], g[2], g[3], 0.0)
@@ -205,7 +195,7 @@ def directed_pullback_warp(
 
 @wp.func
 def directed_bound_pullback_warp(
-    kind: wp.int32, f: Directed, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
+    kind: wp.int32, f: Directed, q: wp.vec3, tape: Texels, at: wp.int32
 ) -> Directed:
     """Return `f` with its direction pulled back by a warp, which turns directions by an unknown amount."""
     g = gradient_pullback_warp(kind, wp.vec4(0.0, f[4], f[5], f[6]), q, tape, at)
@@ -223,12 +213,7 @@ def turning(f: Directed, reach: wp.float32) -> wp.float32:
 
 @wp.func
 def directed_bound_combine(
-    operator: wp.int32,
-    a: Directed,
-    b: Directed,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: Directed, b: Directed, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> Directed:
     """Return the bounds of F(a, b) as `evaluators.bound_combine` does, and its direction."""
     p = directed_partials(operator, a[0], b[0], parameter, tape, later_direction(a), later_direction(b))
@@ -268,12 +253,12 @@ DIRECTED_BOUND = replace(
     type=Directed,
 )
 
-interpret_directed_bound = make_interpreter(DIRECTED_BOUND, _Registers8)
+interpret_directed_bound = make_interpreter(DIRECTED_BOUND)
 
 
 @wp.func
 def directed_bound(
-    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, span: wp.vec2i
 ) -> wp.vec3:
     """Return (value at q, bound on the rise of the field, bound on its fall), see `field_bound`."""
     f = interpret_directed_bound(q, direction, reach, tape, span)
@@ -301,7 +286,7 @@ def directed_color_leaf(
 def directed_color_direct(
     kind: wp.int32,
     q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
     color: wp.vec4,
     direction: wp.vec3,
@@ -329,25 +314,12 @@ def directed_profiled_color_leaf(
 
 @wp.func
 def directed_color_combine(
-    operator: wp.int32,
-    a: Directed,
-    b: Directed,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: Directed, b: Directed, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> Directed:
-    """Return F, the colours weighted as in `evaluators.color_combine`, and the direction."""
+    """Return F, the blended colour, and the direction."""
     p = directed_partials(operator, a[0], b[0], parameter, tape, later_direction(a), later_direction(b))
     d = later_direction(a) * p[1] + later_direction(b) * p[2]
-    weight_a = wp.abs(p[1]) * wp.max(a[0], 0.0)
-    weight_b = wp.abs(p[2]) * wp.max(b[0], 0.0)
-    t = float(0.0)
-    if b[0] > a[0]:
-        t = 1.0
-    if weight_a + weight_b > 0.0:
-        t = weight_b / (weight_a + weight_b)
-    if not paints(operator):
-        t = 0.0
+    t = second_share(operator, p, a[0], b[0])
     mixed = a * (1.0 - t) + b * t
     return Directed(p[0], mixed[1], mixed[2], mixed[3], d[0], d[1], d[2], 0.0)
 
@@ -364,11 +336,11 @@ DIRECTED_COLOR = replace(
     type=Directed,
 )
 
-interpret_directed_color = make_interpreter(DIRECTED_COLOR, _Registers8)
+interpret_directed_color = make_interpreter(DIRECTED_COLOR)
 
 
 @wp.func
-def directed_color(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
+def directed_color(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec4:
     """Return (value, red, green, blue) of the field at q."""
     f = interpret_directed_color(q, wp.vec3(), 0.0, tape, span)
     return wp.vec4(f[0], f[1], f[2], f[3])
@@ -376,13 +348,11 @@ def directed_color(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) ->
 
 DIRECTED_REST = replace(DIRECTED_COLOR, paint=own_position)
 
-interpret_directed_rest = make_interpreter(DIRECTED_REST, _Registers8)
+interpret_directed_rest = make_interpreter(DIRECTED_REST)
 
 
 @wp.func
-def directed_rest(
-    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
-) -> wp.vec4:
+def directed_rest(q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, span: wp.vec2i) -> wp.vec4:
     """Return (value, rest coordinates) at q."""
     f = interpret_directed_rest(q, direction, reach, tape, span)
     return wp.vec4(f[0], f[1], f[2], f[3])

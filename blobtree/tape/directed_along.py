@@ -14,6 +14,7 @@ from blobtree.tape.evaluators import (
     gradient_pullback_warp,
     profiled_gradient_leaf,
 )
+from blobtree.texels import Texels
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -59,19 +60,14 @@ def profiled_leaf_along(
 
 
 @wp.func
-def pullback_affine_along(f: Directed, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> Directed:
+def pullback_affine_along(f: Directed, tape: Texels, at: wp.int32) -> Directed:
     """Return `f` in front of an affine map."""
     return changing(gradient_pullback_affine(now(f), tape, at), gradient_pullback_affine(change(f), tape, at))
 
 
 @wp.func
 def pullback_warp_along(
-    kind: wp.int32,
-    f: Directed,
-    q: wp.vec3,
-    velocity: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
-    at: wp.int32,
+    kind: wp.int32, f: Directed, q: wp.vec3, velocity: wp.vec3, tape: Texels, at: wp.int32
 ) -> Directed:
     """Return `f` in front of a warp, where the point is q."""
     g, d = _pullback_warp(kind, now(f), change(f), q, velocity, tape, at)
@@ -80,12 +76,7 @@ def pullback_warp_along(
 
 @wp.func
 def combine_along(
-    operator: wp.int32,
-    a: Directed,
-    b: Directed,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: Directed, b: Directed, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> Directed:
     """Return F, its direction, and their change."""
     f, d = _combine(operator, now(a), change(a), now(b), change(b), reach, parameter, tape)

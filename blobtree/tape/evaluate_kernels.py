@@ -5,6 +5,7 @@ import warp as wp
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_bound, field_color, field_gradient, field_value
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -19,7 +20,7 @@ STALLED = 1e-4
 
 @wp.func
 def project_to_surface(
-    p: wp.vec3, longest_step: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+    p: wp.vec3, longest_step: wp.float32, tape: Texels, span: wp.vec2i
 ) -> tuple[wp.vec3, wp.vec4]:
     """Return the point that Newton's method for f = ISO reaches from p, and (f, ∇f) there.
 
@@ -48,10 +49,7 @@ def project_to_surface(
 
 @wp.kernel
 def evaluate_values(
-    points: wp.array(dtype=wp.vec3),
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-    out: wp.array(dtype=wp.float32),
+    points: wp.array(dtype=wp.vec3), tape: Texels, span: wp.vec2i, out: wp.array(dtype=wp.float32)
 ) -> None:
     """Write `field_value` at each point."""
     i = wp.tid()
@@ -60,10 +58,7 @@ def evaluate_values(
 
 @wp.kernel
 def evaluate_gradients(
-    points: wp.array(dtype=wp.vec3),
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-    out: wp.array(dtype=wp.vec4),
+    points: wp.array(dtype=wp.vec3), tape: Texels, span: wp.vec2i, out: wp.array(dtype=wp.vec4)
 ) -> None:
     """Write `field_gradient` at each point."""
     i = wp.tid()
@@ -75,7 +70,7 @@ def evaluate_bounds(
     points: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     reach: wp.array(dtype=wp.float32),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
     out: wp.array(dtype=wp.vec3),
 ) -> None:
@@ -86,10 +81,7 @@ def evaluate_bounds(
 
 @wp.kernel
 def evaluate_colors(
-    points: wp.array(dtype=wp.vec3),
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-    out: wp.array(dtype=wp.vec4),
+    points: wp.array(dtype=wp.vec3), tape: Texels, span: wp.vec2i, out: wp.array(dtype=wp.vec4)
 ) -> None:
     """Write `field_color` at each point."""
     i = wp.tid()
@@ -100,7 +92,7 @@ def evaluate_colors(
 def project_points(
     points: wp.array(dtype=wp.vec3),
     longest_step: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),

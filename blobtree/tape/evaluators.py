@@ -52,6 +52,7 @@ from blobtree.tape.dispatch import (
     warp_pullback,
     warp_stretch,
 )
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -60,14 +61,14 @@ BALL_MARGIN = wp.constant(1.0 + 1e-6)
 
 
 @wp.func
-def to_local(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def to_local(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return a point in the space behind the map at tape[at]."""
     x = wp.vec4(q[0], q[1], q[2], 1.0)
     return wp.vec3(wp.dot(tape[at], x), wp.dot(tape[at + 1], x), wp.dot(tape[at + 2], x))
 
 
 @wp.func
-def direction_to_local(v: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def direction_to_local(v: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return a direction in the space behind the map at tape[at]."""
     x = wp.vec4(v[0], v[1], v[2], 0.0)
     return wp.vec3(wp.dot(tape[at], x), wp.dot(tape[at + 1], x), wp.dot(tape[at + 2], x))
@@ -125,7 +126,7 @@ def profile_steepest(nearest: wp.float32, farthest: wp.float32, profile: wp.vec4
 
 
 @wp.func
-def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (value, ∇f) of a direct field: its kind's function, falloff, window and weight.
 
     tape[at − 1] is its profile.
@@ -151,9 +152,7 @@ def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: wp.array(dtype=wp.ve
 
 
 @wp.func
-def direct_bounds(
-    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def direct_bounds(kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return (smallest value, largest value, largest |∇f|) of a direct field over a ball."""
     profile = tape[at - 1]
     w = wp.vec3(1.0, 1.0, 0.0)
@@ -182,12 +181,7 @@ def direct_bounds(
 
 @wp.func
 def constant_speed(
-    kind: wp.int32,
-    q: wp.vec3,
-    speed: wp.float32,
-    reach: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    at: wp.int32,
+    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.float32:
     """Return `speed`: results at a point alone do not depend on it."""
     return speed
@@ -214,7 +208,7 @@ def value_leaf(
 def value_direct(
     kind: wp.int32,
     q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
     color: wp.vec4,
     direction: wp.vec3,
@@ -240,27 +234,20 @@ def profiled_value_leaf(
 
 
 @wp.func
-def value_pullback_affine(f: wp.float32, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+def value_pullback_affine(f: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return `f`: values are the same in every space."""
     return f
 
 
 @wp.func
-def value_pullback_warp(
-    kind: wp.int32, f: wp.float32, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.float32:
+def value_pullback_warp(kind: wp.int32, f: wp.float32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
     """Return `f`: values are the same in every space."""
     return f
 
 
 @wp.func
 def value_combine(
-    operator: wp.int32,
-    a: wp.float32,
-    b: wp.float32,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: wp.float32, b: wp.float32, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> wp.float32:
     """Return F(a, b)."""
     return partials(operator, a, b, parameter, tape)[0]
@@ -306,7 +293,7 @@ def bound_leaf(
 def bound_direct(
     kind: wp.int32,
     q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
     color: wp.vec4,
     direction: wp.vec3,
@@ -359,27 +346,20 @@ def profiled_bound_leaf(
 
 
 @wp.func
-def bound_pullback_affine(f: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
+def bound_pullback_affine(f: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return `f`: slopes along the ray are the same in every space."""
     return f
 
 
 @wp.func
-def bound_pullback_warp(
-    kind: wp.int32, f: wp.vec3, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec3:
+def bound_pullback_warp(kind: wp.int32, f: wp.vec3, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return `f`: slopes along the ray are the same in every space."""
     return f
 
 
 @wp.func
 def bound_scale_speed(
-    kind: wp.int32,
-    q: wp.vec3,
-    speed: wp.float32,
-    reach: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-    at: wp.int32,
+    kind: wp.int32, q: wp.vec3, speed: wp.float32, reach: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.float32:
     """Return `speed` times the warp's largest stretch in the ball within reach."""
     return speed * warp_stretch(kind, q, reach * speed, tape, at)
@@ -387,12 +367,7 @@ def bound_scale_speed(
 
 @wp.func
 def bound_combine(
-    operator: wp.int32,
-    a: wp.vec3,
-    b: wp.vec3,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: wp.vec3, b: wp.vec3, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> wp.vec3:
     """Return the bounds of F(a, b).
 
@@ -432,7 +407,7 @@ def gradient_leaf(
 def gradient_direct(
     kind: wp.int32,
     q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
     color: wp.vec4,
     direction: wp.vec3,
@@ -464,16 +439,14 @@ def profiled_gradient_leaf(
 
 
 @wp.func
-def gradient_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def gradient_pullback_affine(f: wp.vec4, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (value, ∇f) pulled back by the transposed map."""
     g = tape[at] * f[1] + tape[at + 1] * f[2] + tape[at + 2] * f[3]
     return wp.vec4(f[0], g[0], g[1], g[2])
 
 
 @wp.func
-def gradient_pullback_warp(
-    kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec4:
+def gradient_pullback_warp(kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (value, ∇f) pulled back by the warp's transposed Jacobian, then by the transposed map."""
     g = warp_pullback(kind, to_local(q, tape, at), wp.vec3(f[1], f[2], f[3]), tape, at + 3)
     return gradient_pullback_affine(wp.vec4(f[0], g[0], g[1], g[2]), tape, at)
@@ -481,12 +454,7 @@ def gradient_pullback_warp(
 
 @wp.func
 def gradient_combine(
-    operator: wp.int32,
-    a: wp.vec4,
-    b: wp.vec4,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32, tape: Texels
 ) -> wp.vec4:
     """Return (F, ∇F) by the chain rule."""
     p = partials(operator, a[0], b[0], parameter, tape)
@@ -509,7 +477,7 @@ def color_leaf(
 def color_direct(
     kind: wp.int32,
     q: wp.vec3,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     at: wp.int32,
     color: wp.vec4,
     direction: wp.vec3,
@@ -536,48 +504,49 @@ def profiled_color_leaf(
 
 
 @wp.func
-def color_pullback_affine(f: wp.vec4, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def color_pullback_affine(f: wp.vec4, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return `f`: colours are the same in every space."""
     return f
 
 
 @wp.func
-def color_pullback_warp(
-    kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> wp.vec4:
+def color_pullback_warp(kind: wp.int32, f: wp.vec4, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return `f`: colours are the same in every space."""
     return f
 
 
 @wp.func
-def color_combine(
-    operator: wp.int32,
-    a: wp.vec4,
-    b: wp.vec4,
-    reach: wp.float32,
-    parameter: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
-) -> wp.vec4:
-    """Return F and the colours weighted by |∂F/∂a|·a and |∂F/∂b|·b; the stronger operand's if both are 0.
+def second_share(operator: wp.int32, p: wp.vec3, a: wp.float32, b: wp.float32) -> wp.float32:
+    """Return the weight of the second operand's colour, from the operands and F's partial derivatives.
 
-    An operator that does not paint keeps the first operand's colour. An operand below 0 gives no colour.
+    Colours have the weights |∂F/∂a|·a and |∂F/∂b|·b; if both are 0, the stronger operand's is taken. An
+    operator that does not paint keeps the first operand's colour. An operand below 0 gives no colour.
     """
-    p = partials(operator, a[0], b[0], parameter, tape)
-    weight_a = wp.abs(p[1]) * wp.max(a[0], 0.0)
-    weight_b = wp.abs(p[2]) * wp.max(b[0], 0.0)
+    weight_a = wp.abs(p[1]) * wp.max(a, 0.0)
+    weight_b = wp.abs(p[2]) * wp.max(b, 0.0)
     t = float(0.0)
-    if b[0] > a[0]:
+    if b > a:
         t = 1.0
     if weight_a + weight_b > 0.0:
         t = weight_b / (weight_a + weight_b)
     if not paints(operator):
         t = 0.0
+    return t
+
+
+@wp.func
+def color_combine(
+    operator: wp.int32, a: wp.vec4, b: wp.vec4, reach: wp.float32, parameter: wp.float32, tape: Texels
+) -> wp.vec4:
+    """Return F and the blended colour."""
+    p = partials(operator, a[0], b[0], parameter, tape)
+    t = second_share(operator, p, a[0], b[0])
     mixed = a * (1.0 - t) + b * t
     return wp.vec4(p[0], mixed[1], mixed[2], mixed[3])
 
 
 @wp.func
-def own_color(q: wp.vec3, c: wp.vec4, color: wp.vec4, tape: wp.array(dtype=wp.vec4)) -> wp.vec4:
+def own_color(q: wp.vec3, c: wp.vec4, color: wp.vec4, tape: Texels) -> wp.vec4:
     """Return the colour of a leaf."""
     return color
 

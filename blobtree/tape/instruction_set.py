@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from threading import RLock
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any
 
 import warp as wp
 
@@ -25,26 +25,19 @@ from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.lazy import Lazy
+from blobtree.tape.dispatch import CORE_TABLES
 from blobtree.transpile.derivative import differentiated, directional_derivative
-from blobtree.transpile.specialize import (
-    original_function,
-    rebind,
-    referenced_values,
-    unrolled,
-    warp_function,
-)
-
-_TABLES = {
-    "SKELETONS": SKELETONS,
-    "OPERATORS": OPERATORS,
-    "WARPS": WARPS,
-    "FIELDS": FIELDS,
-    "FALLOFFS": FALLOFFS,
-}
-"""The core tables by the names under which functions read them: all empty tables are the same object."""
+from blobtree.transpile.specialize import rebind, referenced_values, row_choice, warp_function
 
 Row = Skeleton | Operator | SpaceWarp | FieldKind | Falloff
-AnyRow = TypeVar("AnyRow", bound=Row)
+
+_ROW_OF_TABLE: dict[str, type[Row]] = {
+    "skeletons": Skeleton,
+    "operators": Operator,
+    "warps": SpaceWarp,
+    "fields": FieldKind,
+    "falloffs": Falloff,
+}
 
 _LOCK = RLock()
 """Held while functions are registered: Warp's registry is not safe for threads."""
@@ -69,6 +62,23 @@ class InstructionSet:
     def rows(self) -> tuple[Row, ...]:
         """All rows."""
         return (*self.skeletons, *self.operators, *self.warps, *self.fields, *self.falloffs)
+
+    def with_rows(self, rows: Iterable[Row]) -> "InstructionSet":
+        """Return an instruction set with more rows, behind these in a fixed order."""
+        more = sorted(set(rows).difference(self.rows), key=lambda row: (row.name, row.digest))
+        tables: dict[str, Any] = {
+            name: (*getattr(self, name), *(row for row in more if isinstance(row, kind)))
+            for name, kind in _ROW_OF_TABLE.items()
+        }
+        return InstructionSet(**tables)
+
+    def codes_of(self, rows: Iterable[Row]) -> dict[str, tuple[int, ...]]:
+        """Return the codes of rows, in ascending order, by the names of their tables."""
+        among = set(rows)
+        return {
+            name: tuple(code for code, row in enumerate(getattr(self, name)) if row in among)
+            for name in _ROW_OF_TABLE
+        }
 
     @Lazy
     def reads_gradients(self) -> bool:
@@ -109,28 +119,25 @@ class InstructionSet:
             self._functions[function] = (
                 function if instance is source_function else directional_derivative(instance, varying)
             )
+        if function not in self._functions and (choice := row_choice(function)):
+            rows, module = getattr(self, choice.table), self._module_of(choice.prototype)
+            same = rows is CORE_TABLES[choice.table]
+            self._functions[function] = function if same else choice.over(rows, module)
         if function not in self._functions:
-            loops_over_table = original_function(function)
-            source = loops_over_table or _python_function(function)
-            make = unrolled if loops_over_table else warp_function
+            source = _python_function(function)
             replaced = self._replaced(source)
-            module = self._module_of(source)
-            self._functions[function] = (
-                make(rebind(source, replaced, module=module)) if replaced else function
-            )
+            copy = rebind(source, replaced, module=self._module_of(source)) if replaced else None
+            self._functions[function] = warp_function(copy) if copy else function
         return self._functions[function]
 
     def _replaced(self, function: FunctionType) -> dict[str, Any]:
         """Return the values that replace names in `function`."""
         substitutes = {
-            name: (value, self._substitute(name, value))
-            for name, value in referenced_values(function).items()
+            name: (value, self._substitute(value)) for name, value in referenced_values(function).items()
         }
         return {name: new for name, (old, new) in substitutes.items() if new is not old}
 
-    def _substitute(self, name: str, value: Any) -> Any:
-        if name in _TABLES and value is _TABLES[name]:
-            return getattr(self, name.lower())
+    def _substitute(self, value: Any) -> Any:
         if isinstance(value, wp.Function) and not value.is_builtin():
             return self._instantiate(self._exchanged(value))
         return value
@@ -186,47 +193,30 @@ def library() -> InstructionSet:
         return _created[0]
 
 
-def instruction_set_for(
-    skeletons: Iterable[Skeleton],
-    operators: Iterable[Operator],
-    warps: Iterable[SpaceWarp],
-    fields: Iterable[FieldKind],
-    falloffs: Iterable[Falloff] = (),
-) -> InstructionSet:
+def instruction_set_for(rows: Iterable[Row]) -> InstructionSet:
     """Return an instruction set that has these rows.
 
     That is the smallest existing one, so that a tree with fewer kinds than an earlier tree compiles nothing.
     If none fits, a new one has the rows of BUILT_IN or `library`, and then the custom rows in a fixed order.
     """
-    needed = InstructionSet(tuple(skeletons), tuple(operators), tuple(warps), tuple(fields), tuple(falloffs))
-    rows = set(needed.rows)
-    if rows.issubset(BUILT_IN.rows):
+    needed = set(rows)
+    if needed.issubset(BUILT_IN.rows):
         return BUILT_IN
     with_library = library()
+    reads_gradients = any(isinstance(row, Operator) and row.gradients for row in needed)
     with _LOCK:
         fitting = [
             existing
             for existing in _created
-            if rows.issubset(existing.rows) and existing.reads_gradients == needed.reads_gradients
+            if needed.issubset(existing.rows) and existing.reads_gradients == reads_gradients
         ]
         if fitting:
             return min(fitting, key=lambda existing: len(existing.rows))
-        custom = rows.difference(with_library.rows)
-        base = BUILT_IN if rows.issubset({*BUILT_IN.rows, *custom}) else with_library
-        created = InstructionSet(
-            _extended(base.skeletons, needed.skeletons),
-            _extended(base.operators, needed.operators),
-            _extended(base.warps, needed.warps),
-            _extended(base.fields, needed.fields),
-            _extended(base.falloffs, needed.falloffs),
-        )
+        custom = needed.difference(with_library.rows)
+        base = BUILT_IN if needed.issubset({*BUILT_IN.rows, *custom}) else with_library
+        created = base.with_rows(needed)
         _created.append(created)
         return created
-
-
-def _extended(table: tuple[AnyRow, ...], needed: tuple[AnyRow, ...]) -> tuple[AnyRow, ...]:
-    """Return the rows of a table, then the other needed rows in a fixed order."""
-    return (*table, *sorted(set(needed).difference(table), key=lambda row: (row.name, row.digest)))
 
 
 @cache

@@ -30,6 +30,7 @@ from blobtree.tape.evaluators import (
     direction_to_local,
     to_local,
 )
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -37,7 +38,14 @@ _Points = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
 _Speeds = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
 
 
-def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
+def _registers(result_type: Any) -> Any:
+    """Return the type of the registers for results of a type: a vector, or a matrix with one in each row."""
+    if result_type is wp.float32:
+        return wp.types.vector(length=REGISTERS, dtype=wp.float32)
+    return wp.types.matrix(shape=(REGISTERS, result_type._length_), dtype=wp.float32)
+
+
+def make_interpreter(evaluator: Evaluator) -> wp.Function:
     """Return the interpreter of an evaluator: a function of (q, direction, reach, tape, span).
 
     Slopes are bounded from q along `direction` (unit, or 0 for all directions) as far as `reach`. The tape is
@@ -48,6 +56,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
     pullback_affine, pullback_warp = evaluator.pullback_affine, evaluator.pullback_warp
     scale_speed, paint = evaluator.scale_speed, evaluator.paint
     result_type = evaluator.type
+    registers_type = _registers(result_type)
 
     @wp.func
     def fold(
@@ -57,7 +66,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
         direction: wp.vec3,
         speed: wp.float32,
         reach: wp.float32,
-        tape: wp.array(dtype=wp.vec4),
+        tape: Texels,
         first: wp.int32,
     ) -> result_type:
         """Combine the primitives of a run with the accumulator."""
@@ -85,7 +94,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
         direction: wp.vec3,
         speed: wp.float32,
         reach: wp.float32,
-        tape: wp.array(dtype=wp.vec4),
+        tape: Texels,
         first: wp.int32,
     ) -> result_type:
         """Do the same for a run of primitives that carry their own maps, and profiles."""
@@ -120,7 +129,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
         direction: wp.vec3,
         speed: wp.float32,
         reach: wp.float32,
-        tape: wp.array(dtype=wp.vec4),
+        tape: Texels,
         first: wp.int32,
     ) -> result_type:
         """Do the same for a run of direct fields, each behind its map."""
@@ -139,9 +148,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
         return accumulator
 
     @wp.func
-    def walk(
-        q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
-    ) -> result_type:
+    def walk(q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, span: wp.vec2i) -> result_type:
         """Execute the instructions one after the other."""
         accumulator = empty()
         registers = registers_type()
@@ -194,7 +201,7 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
 
     @wp.func
     def interpret(
-        q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
+        q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, span: wp.vec2i
     ) -> result_type:
         """Execute the tape, without registers if it is a single run: on a GPU they cost more than the run."""
         if span[0] < span[1]:
@@ -208,32 +215,26 @@ def make_interpreter(evaluator: Evaluator, registers_type: Any) -> wp.Function:
     return interpret
 
 
-_Registers1 = wp.types.vector(length=REGISTERS, dtype=wp.float32)
-_Registers3 = wp.types.matrix(shape=(REGISTERS, 3), dtype=wp.float32)
-_Registers4 = wp.types.matrix(shape=(REGISTERS, 4), dtype=wp.float32)
-
-interpret_value = make_interpreter(VALUE, _Registers1)
-interpret_bound = make_interpreter(BOUND, _Registers3)
-interpret_gradient = make_interpreter(GRADIENT, _Registers4)
-interpret_color = make_interpreter(COLOR, _Registers4)
+interpret_value = make_interpreter(VALUE)
+interpret_bound = make_interpreter(BOUND)
+interpret_gradient = make_interpreter(GRADIENT)
+interpret_color = make_interpreter(COLOR)
 
 
 @wp.func
-def field_value(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.float32:
+def field_value(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.float32:
     """Return the field at q."""
     return interpret_value(q, wp.vec3(), 0.0, tape, span)
 
 
 @wp.func
-def field_gradient(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
+def field_gradient(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec4:
     """Return (value, ∂x, ∂y, ∂z) of the field at q."""
     return interpret_gradient(q, wp.vec3(), 0.0, tape, span)
 
 
 @wp.func
-def field_bound(
-    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: wp.array(dtype=wp.vec4), span: wp.vec2i
-) -> wp.vec3:
+def field_bound(q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, span: wp.vec2i) -> wp.vec3:
     """Return (value at q, bound on the rise of the field, bound on its fall) along `direction` up to `reach`.
 
     With a direction of 0 both bound |∇f| over the ball of radius `reach` about q.
@@ -242,6 +243,6 @@ def field_bound(
 
 
 @wp.func
-def field_color(q: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.vec4:
+def field_color(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec4:
     """Return (value, red, green, blue) of the field at q."""
     return interpret_color(q, wp.vec3(), 0.0, tape, span)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.codes import REGISTERS
 from blobtree.tape.evaluators import COLOR, squared_distance, to_local
 from blobtree.tape.interpreter import make_interpreter
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 
 @wp.func
-def own_position(q: wp.vec3, c: wp.vec4, color: wp.vec4, tape: wp.array(dtype=wp.vec4)) -> wp.vec4:
+def own_position(q: wp.vec3, c: wp.vec4, color: wp.vec4, tape: Texels) -> wp.vec4:
     """Return the point in the space of a leaf in place of a colour, if the leaf's field reaches it.
 
     `color` holds the index of the texels with the map to that space, or −1 if q is in it already.
@@ -27,17 +27,12 @@ def own_position(q: wp.vec3, c: wp.vec4, color: wp.vec4, tape: wp.array(dtype=wp
 REST = replace(COLOR, paint=own_position)
 """The evaluator: maps and warps leave rest coordinates as they are, and operators mix them as colours."""
 
-_Registers = wp.types.matrix(shape=(REGISTERS, 4), dtype=wp.float32)
-
-interpret_rest_coordinates = make_interpreter(REST, _Registers)
+interpret_rest_coordinates = make_interpreter(REST)
 
 
 @wp.kernel
 def evaluate_rest_coordinates(
-    points: wp.array(dtype=wp.vec3),
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-    out: wp.array(dtype=wp.vec4),
+    points: wp.array(dtype=wp.vec3), tape: Texels, span: wp.vec2i, out: wp.array(dtype=wp.vec4)
 ) -> None:
     """Write (value, rest coordinates) at each point, NaN where the field is 0."""
     i = wp.tid()

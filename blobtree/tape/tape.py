@@ -61,7 +61,7 @@ from blobtree.tape.codes import (
     WARP_REGISTERS,
 )
 from blobtree.tape.data_region import DataRegion
-from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, instruction_set_for
+from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, Row, instruction_set_for
 from blobtree.tape.program import (
     EnterWarp,
     Instruction,
@@ -166,14 +166,13 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     if warp_registers > WARP_REGISTERS:
         raise InvalidNode(f"tree: warps nest {warp_registers} deep, at most {WARP_REGISTERS} may")
     runs = [step for step in program if isinstance(step, Run)]
-    skeletons = {run.kind for run in runs if isinstance(run.kind, Skeleton)}
-    fields = {run.kind for run in runs if isinstance(run.kind, FieldKind)}
-    warps = {step.warp for step in program if isinstance(step, EnterWarp)}
-    operators = {step.operator for step in program if isinstance(step, Run | Pop)}
+    rows: set[Row] = {run.kind for run in runs}
+    rows |= {WYVILL for kind in rows if isinstance(kind, FieldKind)}  # formulas of direct fields name one
+    rows |= {step.warp for step in program if isinstance(step, EnterWarp)}
+    rows |= {step.operator for step in program if isinstance(step, Run | Pop)}
     carrying = [placed.primitive for run in runs if run.stretched for placed in run.primitives]
-    falloffs = {primitive.profile[0] for primitive in carrying if primitive.profiled}
-    falloffs |= {WYVILL} if fields else set()  # formulas of direct fields name one
-    instruction_set = instruction_set_for(skeletons, operators, warps, fields, falloffs)
+    rows |= {primitive.profile[0] for primitive in carrying if primitive.profiled}
+    instruction_set = instruction_set_for(rows)
     region = DataRegion(precision)
     of_warps = warp_parameters(program)
     texels = [np.concatenate(list(_texels(step, instruction_set, region, of_warps))) for step in program]
@@ -182,16 +181,12 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     return Tape(
         data=np.concatenate([region.texels, *texels]).astype(precision),
         registers=registers,
-        skeletons=tuple(sorted(map(instruction_set.skeletons.index, skeletons))),
-        operators=tuple(sorted(map(instruction_set.operators.index, operators))),
         stretched=any(run.stretched for run in runs if isinstance(run.kind, Skeleton)),
-        warps=tuple(sorted(map(instruction_set.warps.index, warps))),
         warp_registers=warp_registers,
-        fields=tuple(sorted(map(instruction_set.fields.index, fields))),
         instruction_set=instruction_set,
         headers=np.concatenate([[start], ends[:-1]]).astype(np.int64),
         start=start,
-        falloffs=tuple(sorted(map(instruction_set.falloffs.index, falloffs))),
+        **instruction_set.codes_of(rows),
     )
 
 

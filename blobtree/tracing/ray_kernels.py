@@ -14,6 +14,7 @@ from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_bound, field_gradient
+from blobtree.texels import Texels
 from blobtree.transpile.glsl import uniform_struct
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -64,7 +65,7 @@ class RayCells:
     block_size: wp.float32
     counts: wp.vec3i
     tolerance: wp.float32
-    tape: wp.array(dtype=wp.vec4)
+    tape: Texels
     start: wp.int32
     blocks: wp.array(dtype=wp.int32)
 
@@ -76,7 +77,7 @@ def first_hit(
     t_min: wp.float32,
     t_max: wp.float32,
     tolerance: wp.float32,
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     span: wp.vec2i,
 ) -> wp.float32:
     """Return the distance along the unit `direction` to the first point inside in [t_min, t_max], or MISS.

@@ -4,6 +4,7 @@ import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.interpreter import field_color, field_gradient
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -15,7 +16,7 @@ def shade_hits(
     directions: wp.array(dtype=wp.vec3),
     distances: wp.array(dtype=wp.float32),
     spans: wp.array(dtype=wp.vec2i),
-    tape: wp.array(dtype=wp.vec4),
+    tape: Texels,
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     colors: wp.array(dtype=wp.vec3),

@@ -36,7 +36,6 @@ operands (Gourmel et al. 2013) needs it for its own gradient: the chain rule tak
 import ast
 import hashlib
 import inspect
-import linecache
 import re
 import textwrap
 from collections.abc import Iterable, Iterator
@@ -49,7 +48,7 @@ import warp as wp
 
 from blobtree.errors import UntranslatableFunction
 from blobtree.transpile.derivative_rules import CASTS, RULES, STEPS, Rule
-from blobtree.transpile.specialize import original_function, referenced_values, warp_function
+from blobtree.transpile.specialize import defined, referenced_values, row_choice, warp_function
 
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -128,11 +127,7 @@ def _compiled(transformation: "_Transformation") -> wp.Function:
     if transformation.derivative is None:
         callees = {name: _compiled(callee) for name, callee in transformation.callees.items()}
         scope = {**transformation.scope, **callees}
-        text = transformation.text
-        file = f"<blobtree {transformation.name} {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
-        linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-        exec(compile(text, file, "exec"), scope)
-        made: FunctionType = scope[transformation.name]
+        made = defined(transformation.name, transformation.text, scope)
         made.__annotations__ = transformation.annotations()
         made.__module__ = f"{transformation.python.__module__}.derivatives"
         transformation.derivative = warp_function(made)
@@ -182,7 +177,7 @@ class _Transformation:
         self.scope["wp"] = wp
         self.active = set(varying)
         self.types: dict[str, Any] = {}
-        self.depends = original_function(function) is not None
+        self.depends = row_choice(function) is not None
         """The result varies. That of a switch over a table does with the rows of another instruction set."""
         self.lines: list[str] = []
         self.indent = "    "

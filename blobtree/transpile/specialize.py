@@ -1,19 +1,16 @@
-"""Copies of typed functions: over other globals (`rebind`), or with loops over tables unrolled (`unrolled`).
+"""Copies of typed functions over other globals (`rebind`), and functions that choose by a code (`RowChoice`).
 
-`unrolled` replaces ``for code in range(wp.static(len(TABLE)))`` by a copy of the loop's body for each row.
-Warp unrolls such loops too, but only at compile time. The functions in the table are then no reliable part of
-the key of Warp's kernel cache: stale kernels are kept, and others are compiled twice. An unrolled function
-names its callees, so the key covers them. A row's function that declares fewer parameters than the call has
-arguments gets the first ones.
+Warp can unroll a loop over a table too, but only at compile time. The functions in the table are then no
+reliable part of the key of Warp's kernel cache: stale kernels are kept, and others are compiled twice. The
+text of a `RowChoice` names its callees, so the key covers them.
 """
 
-import ast
 import dis
 import hashlib
 import inspect
 import linecache
-import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import CellType, CodeType, FunctionType
 from typing import Any, cast
 
@@ -86,85 +83,64 @@ def _global_names(code: CodeType) -> list[str]:
     return sorted(names.union(*map(_global_names, nested)))
 
 
-_ORIGINALS: dict[wp.Function, FunctionType] = {}
-
-
-def unrolled(function: FunctionType) -> Any:
-    """Unroll the loops over tables in `function` and apply `@wp.func`; callees must be defined before."""
-    result = warp_function(_unroll(function))
-    _ORIGINALS[result] = function
-    return result
-
-
-def original_function(function: wp.Function) -> FunctionType | None:
-    """Return the function from which `unrolled` made this one, or None."""
-    return _ORIGINALS.get(function)
-
-
-def _unroll(function: FunctionType) -> FunctionType:
-    """Return a function of the same name and module without loops over tables."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    (definition,) = tree.body
-    assert isinstance(definition, ast.FunctionDef)
-    definition.decorator_list = []
-    scope = dict(function.__globals__)
-    unroller = _Unroller(scope)
-    text = ast.unparse(ast.fix_missing_locations(unroller.visit(tree))) + "\n"
-    scope |= unroller.row_functions
-    file = f"<blobtree {function.__name__} {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
+def defined(name: str, text: str, scope: dict[str, Any]) -> FunctionType:
+    """Return the function `name` of a generated text, which `inspect` and Warp can read again."""
+    file = f"<blobtree {name} {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
     exec(compile(text, file, "exec"), scope)
-    result: FunctionType = scope[function.__name__]
-    result.__module__ = function.__module__
-    return result
+    function: FunctionType = scope[name]
+    return function
 
 
-class _Unroller(ast.NodeTransformer):
-    """Transformer that unrolls loops over tables and evaluates `wp.static`."""
+@dataclass(frozen=True, eq=False)
+class RowChoice:
+    """A typed function that takes a code, and returns the attribute of that row of a table.
 
-    def __init__(self, scope: dict[str, Any]) -> None:
-        self._scope = scope
-        self._row: dict[str, int] = {}
-        self.row_functions: dict[str, wp.Function] = {}
-        """Functions in the rows of tables, by the names that replace them in the source."""
+    The attribute is a number, a bool or three numbers; or a typed function, which is called with the other
+    parameters. One that declares fewer parameters gets the first ones.
+    """
 
-    def visit_For(self, node: ast.For) -> Any:
-        """Replace the loop by a copy of its body for each row of the table."""
-        match node:
-            case ast.For(
-                target=ast.Name(id=variable),
-                iter=ast.Call(func=ast.Name(id="range"), args=[ast.Call() as limit]),
-            ) if _is_static(limit):
-                return list(self._copies(node, variable, self._evaluate(limit)))
-        return self.generic_visit(node)
+    prototype: FunctionType
+    """Its name, types and docstring; it has no body."""
+    table: str
+    """Name of the table in an instruction set."""
+    attribute: str
 
-    def _copies(self, node: ast.For, variable: str, count: int) -> Iterator[ast.stmt]:
-        for row in range(count):
-            self._row[variable] = row
-            body = ast.parse(ast.unparse(ast.Module(node.body, []))).body
-            yield from (self.visit(statement) for statement in body)
-            del self._row[variable]
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        """Replace the variable of the loop by the number of the row."""
-        return ast.Constant(self._row[node.id]) if node.id in self._row else node
-
-    def visit_Call(self, node: ast.Call) -> Any:
-        """Replace `wp.static(...)` by its value."""
-        if isinstance(node.func, ast.Call) and _is_static(node.func):
-            node.args = node.args[: parameter_count(self._evaluate(node.func))]
-        if not _is_static(node):
-            return self.generic_visit(node)
-        value = self._evaluate(node)
-        if not isinstance(value, wp.Function):
-            return ast.Constant(value)
-        name = f"{value.key}_{len(self.row_functions)}"
-        self.row_functions[name] = value
-        return ast.Name(name, ast.Load())
-
-    def _evaluate(self, node: ast.Call) -> Any:
-        return eval(ast.unparse(node.args[0]), {**self._scope, **self._row})
+    def over(self, rows: Sequence[Any], module: str) -> wp.Function:
+        """Return the function for a table."""
+        code, *arguments = inspect.signature(self.prototype).parameters
+        returned = self.prototype.__annotations__["return"]
+        scope: dict[str, Any] = {"wp": wp, "__name__": module}
+        lines = [
+            f"def {self.prototype.__name__}({', '.join([code, *arguments])}):",
+            f'    """{inspect.getdoc(self.prototype)}"""',
+            f"    result = {_EMPTY.get(returned) or f'wp.{returned.__name__[:4]}()'}",
+        ]
+        for number, row in enumerate(rows):
+            value = getattr(row, self.attribute)
+            if isinstance(value, wp.Function):
+                name = f"{value.key}_{number}"
+                scope[name] = value
+                text = f"{name}({', '.join(arguments[: parameter_count(value)])})"
+            elif isinstance(value, tuple):
+                text = f"wp.vec3{value}"
+            else:
+                text = f"bool({value})" if isinstance(value, bool) else repr(value)
+            lines += [f"    if {code} == {number}:", f"        result = {text}"]
+        function = defined(self.prototype.__name__, "\n".join([*lines, "    return result", ""]), scope)
+        function.__annotations__ = dict(self.prototype.__annotations__)
+        function.__qualname__ = self.prototype.__qualname__
+        result = warp_function(function)
+        _CHOICES[result] = self
+        return result
 
 
-def _is_static(node: ast.Call) -> bool:
-    return ast.unparse(node.func) == "wp.static"
+_EMPTY: dict[Any, str] = {wp.float32: "float(0.0)", wp.int32: "int(0)", wp.bool: "bool(False)"}
+"""Numbers as Warp's variables, by type."""
+
+_CHOICES: dict[wp.Function, RowChoice] = {}
+
+
+def row_choice(function: wp.Function) -> RowChoice | None:
+    """Return how a function chooses by a code, or None if it does not."""
+    return _CHOICES.get(function)

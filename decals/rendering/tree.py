@@ -52,6 +52,7 @@ from blobtree.tracing.ray_kernels import trace_ray
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from blobtree.transpile.derivative import directional_derivative
 from blobtree.transpile.glsl import translate_choice, translate_library
+from blobtree.transpile.specialize import row_choice
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, set_uniform
@@ -82,6 +83,18 @@ _ALONG: dict[Any, tuple[str, ...]] = {
     falloff_slope: ("distance",),
 }
 """Choices by a code of which their gradient needs derivatives, and the parameters that vary."""
+
+
+_CHOOSERS = (
+    warp_forward,
+    warp_pullback,
+    warp_stretch,
+    kind_value_gradient,
+    kind_bounds,
+    falloff_value,
+    falloff_slope,
+)
+"""Functions that choose by a code, beside those of operators."""
 
 
 @dataclass(frozen=True)
@@ -168,8 +181,7 @@ def _library(kinds: Kinds) -> str:
         direction_to_local,
         trace_ray,
     ]
-    flags = [is_monotone, paints, is_distance, is_windowed, *([reads_gradients] if kinds.directed else [])]
-    provided = [*_choices(kinds), *flags, falloff_numbers, field_bound, field_gradient]
+    provided = [*_choices(kinds), *_flags(kinds), falloff_numbers, field_bound, field_gradient]
     return translate_library(functions, provided=provided)
 
 
@@ -188,26 +200,10 @@ def _functions_along(kinds: Kinds, skeletons: list[Skeleton]) -> Iterable[Any]:
 
 
 def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
-    """Return the functions that choose by a code on the tape, and their alternatives."""
-    operators, warps = kinds.instruction_set.operators, kinds.instruction_set.warps
-    fields = kinds.instruction_set.fields
-    falloffs = kinds.instruction_set.falloffs
-    choices: dict[Any, dict[int, Any]] = {
-        directed_partials if kinds.directed else partials: {
-            code: operators[code].partials for code in kinds.operators
-        },
-        directed_slope if kinds.directed else slope: {
-            code: operators[code].slope for code in kinds.operators
-        },
-        warp_forward: {code: warps[code].forward for code in kinds.warps},
-        warp_pullback: {code: warps[code].pullback for code in kinds.warps},
-        warp_stretch: {code: warps[code].stretch for code in kinds.warps},
-        kind_value_gradient: {code: fields[code].value_gradient for code in kinds.fields},
-        kind_bounds: {code: fields[code].bounds for code in kinds.fields},
-        falloff_value: {code: falloffs[code].value for code in kinds.falloffs},
-        falloff_slope: {code: falloffs[code].slope for code in kinds.falloffs},
-    }
-    used = {chooser: among for chooser, among in choices.items() if among}
+    """Return the functions that choose by a code on the tape, and their alternatives in use."""
+    of_operators = (directed_partials, directed_slope) if kinds.directed else (partials, slope)
+    choosers = (*of_operators, *_CHOOSERS)
+    used = {chooser: among for chooser in choosers if (among := _in_use(chooser, kinds))}
     if not kinds.directed:
         return used
     derivatives = {
@@ -218,6 +214,14 @@ def _choices(kinds: Kinds) -> dict[Any, dict[int, Any]]:
         if chooser in used
     }
     return used | derivatives
+
+
+def _in_use(chooser: Any, kinds: Kinds) -> dict[int, Any]:
+    """Return what a function returns or calls for each code in use."""
+    choice = row_choice(chooser)
+    assert choice is not None
+    rows = getattr(kinds.instruction_set, choice.table)
+    return {code: getattr(rows[code], choice.attribute) for code in getattr(kinds, choice.table)}
 
 
 def _derivative_like(choice: Any, chooser: Any, names: tuple[str, ...]) -> Any:
@@ -232,18 +236,14 @@ def _derivative_like(choice: Any, chooser: Any, names: tuple[str, ...]) -> Any:
 
 def _dispatch(kinds: Kinds) -> str:
     """Those functions, each knowing the kinds in use alone."""
-    operators = {code: kinds.instruction_set.operators[code] for code in kinds.operators}
-    fields = {code: kinds.instruction_set.fields[code] for code in kinds.fields}
-    flags = [
-        _flag("is_monotone", {code: row.monotone for code, row in operators.items()}),
-        _flag("paints", {code: row.paints for code, row in operators.items()}),
-        _flag("is_distance", {code: row.distance for code, row in fields.items()}),
-        _flag("is_windowed", {code: row.windowed for code, row in fields.items()}),
-    ]
-    if kinds.directed:
-        flags.append(_flag("reads_gradients", {code: row.gradients for code, row in operators.items()}))
+    flags = (_flag(flag.key, _in_use(flag, kinds)) for flag in _flags(kinds))
     choices = (translate_choice(chooser, among) for chooser, among in _choices(kinds).items())
     return "\n".join([*choices, *flags, _falloff_numbers(kinds)])
+
+
+def _flags(kinds: Kinds) -> list[Any]:
+    """Return the functions of a code that return a bool."""
+    return [is_monotone, paints, is_distance, is_windowed, *([reads_gradients] * kinds.directed)]
 
 
 def _flag(name: str, values: dict[int, bool]) -> str:
@@ -254,12 +254,9 @@ def _flag(name: str, values: dict[int, bool]) -> str:
 
 def _falloff_numbers(kinds: Kinds) -> str:
     """`falloff_numbers` for the falloffs in use."""
-    cases = []
-    for code in kinds.falloffs:
-        row = kinds.instruction_set.falloffs[code]
-        numbers = f"vec3({row.rim!r}, {row.steepest_distance!r}, {row.steepest_slope!r})"
-        cases.append(f"if (kind == {code}) {{ return {numbers}; }}")
-    return f"vec3 falloff_numbers(int kind) {{ {' '.join(cases)} return vec3(0.0); }}"
+    numbers = _in_use(falloff_numbers, kinds).items()
+    cases = " ".join(f"if (kind == {code}) {{ return vec3{row!r}; }}" for code, row in numbers)
+    return f"vec3 falloff_numbers(int kind) {{ {cases} return vec3(0.0); }}"
 
 
 def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) -> Source:
@@ -304,17 +301,17 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
             "direction": "local_direction" if skeleton.convex else "vec3(0.0)",
             "mapped": "direction_to_local(local_direction, tape, map)" if skeleton.convex else "vec3(0.0)",
         }
-        yield _RUN.format(code=code, stride=skeleton.parameters + 1, **names)
+        yield _RUN.format(code=code, stride=skeleton.stride, **names)
         if kinds.stretched:
             yield _STRETCHED_RUN.format(
                 code=code + STRETCHED,
                 **names,
-                stride=skeleton.parameters + PREFIX + 1,
+                stride=skeleton.stride + PREFIX,
                 prefix=PREFIX,
                 field=(_PROFILED_FIELD if kinds.falloffs else _MAPPED_FIELD).format(**names),
             )
     for code in kinds.fields:
-        stride = kinds.instruction_set.fields[code].parameters + PREFIX + 1
+        stride = kinds.instruction_set.fields[code].stride + PREFIX
         yield _DIRECT_RUN.format(code=code + FIELD, kind=code, stride=stride, prefix=PREFIX)
 
 
@@ -362,7 +359,7 @@ def _run_cases_along(kinds: Kinds) -> Iterable[str]:
         skeleton = kinds.instruction_set.skeletons[code]
         closest = directional_derivative(skeleton.closest, ["q"]).key
         yield _RUN_ALONG.format(
-            code=code, stride=skeleton.parameters + 1, closest=closest, leaf=_key(along.leaf_along)
+            code=code, stride=skeleton.stride, closest=closest, leaf=_key(along.leaf_along)
         )
         if kinds.stretched:
             field = f"{_key(along.leaf_along)}(local, velocity, c, drift)"
@@ -371,7 +368,7 @@ def _run_cases_along(kinds: Kinds) -> Iterable[str]:
                 field = f"profile.z == 0.0 ? {field} : {profiled}"
             yield _STRETCHED_RUN_ALONG.format(
                 code=code + STRETCHED,
-                stride=skeleton.parameters + PREFIX + 1,
+                stride=skeleton.stride + PREFIX,
                 prefix=PREFIX,
                 closest=closest,
                 field=field,
@@ -380,7 +377,7 @@ def _run_cases_along(kinds: Kinds) -> Iterable[str]:
         yield _DIRECT_RUN_ALONG.format(
             code=code + FIELD,
             kind=code,
-            stride=kinds.instruction_set.fields[code].parameters + PREFIX + 1,
+            stride=kinds.instruction_set.fields[code].stride + PREFIX,
             prefix=PREFIX,
             direct=directional_derivative(direct_value_gradient, ["q"]).key,
         )

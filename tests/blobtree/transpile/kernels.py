@@ -2,14 +2,14 @@
 
 # mypy: disable-error-code="call-overload"
 
+from typing import Any
+
 import warp as wp
 
 from blobtree.formulas import operators
-from blobtree.transpile.specialize import unrolled
+from blobtree.transpile.specialize import RowChoice
 
 wp.set_module_options({"enable_backward": False})
-
-TABLE = ((2.0, operators.sum_partials), (5.0, operators.union_partials))
 
 
 @wp.func
@@ -68,19 +68,17 @@ def reciprocal(x: wp.float32) -> wp.float32:
     return 1.0 / (x + zero)
 
 
-@unrolled
-def chosen(code: wp.int32, a: wp.float32, b: wp.float32) -> wp.float32:
-    """A row's factor times what its operator makes of two numbers."""
-    result = float(0.0)
-    for row in range(wp.static(len(TABLE))):
-        if code == row:
-            result = wp.static(TABLE[row][0]) * wp.static(TABLE[row][1])(a, b, 0.0)[0]
-    for _other in range(2):
-        result += 1.0
-    return result
+def choose_row(
+    code: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32, unused: wp.float32
+) -> wp.vec3:
+    """What a row's operator makes of two numbers."""
+
+
+CHOICE = RowChoice(choose_row, "operators", "partials")
+chosen: Any = CHOICE.over((operators.SUM, operators.UNION), __name__)
 
 
 @wp.kernel
 def choose(out: wp.array(dtype=wp.float32)) -> None:
     i = wp.tid()
-    out[i] = chosen(i, 3.0, 4.0)
+    out[i] = chosen(i, 3.0, 4.0, 0.0, 0.0)[0]

@@ -9,7 +9,7 @@ import warp as wp
 
 from blobtree.transpile.builtins import BUILTINS
 from blobtree.transpile.python import plain_python, vector
-from blobtree.transpile.specialize import original_function
+from blobtree.transpile.specialize import row_choice
 from tests.blobtree import kernels as custom_functions
 from tests.blobtree.transpile import kernels
 from tests.blobtree.transpile.kernels import real_numbers, reciprocal
@@ -19,7 +19,7 @@ COUNT = 200
 
 
 FUNCTIONS = [
-    *(f for f in typed_functions(kernels) if original_function(f.function) is None),
+    *(f for f in typed_functions(kernels) if row_choice(f.function) is None),
     *(
         f
         for name in ("falloff", "operators")

@@ -1,39 +1,43 @@
-"""Loops over tables written out: what they compute, and that compiled kernels are found again."""
+"""Choices by a code: what they compute, and that compiled kernels are found again."""
 
 import inspect
 import subprocess
 import sys
 from types import FunctionType
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from blobtree.formulas import operators
+from blobtree.formulas.falloff import WYVILL
 from blobtree.tape import dispatch
-from blobtree.transpile.specialize import original_function, rebind, referenced_values, unrolled
-from tests.blobtree.transpile.kernels import TABLE, choose, chosen
+from blobtree.transpile.specialize import rebind, referenced_values, row_choice
+from tests.blobtree.transpile.kernels import CHOICE, choose, chosen
 
 
-def test_a_loop_over_a_table_is_a_copy_of_its_body_per_row() -> None:
+def test_a_choice_by_a_code_calls_the_function_of_the_row() -> None:
     text = inspect.getsource(chosen.func)
-    assert text.count("if code == ") == len(TABLE)
-    assert "wp.static" not in text
-    assert "for _other in range(2)" in text
-    original = original_function(chosen)
-    assert original is not None
-    assert original.__code__.co_firstlineno > 10
+    assert text.count("if code == ") == 2
+    assert "union_partials_1(a, b, parameter)\n" in text  # as many arguments as it declares
+    assert row_choice(chosen) is CHOICE
     out = wp.zeros(3, dtype=wp.float32, device="cpu")
     wp.launch(choose, dim=3, outputs=[out], device="cpu")
-    np.testing.assert_array_equal(out.numpy(), [2.0 * 7.0 + 2.0, 5.0 * 4.0 + 2.0, 2.0])
+    np.testing.assert_array_equal(out.numpy(), [7.0, 4.0, 0.0])
 
 
 def test_another_table_makes_another_function() -> None:
-    table = (*TABLE, (1.0, operators.intersection_partials))
-    original = original_function(chosen)
-    assert original is not None
-    longer = unrolled(rebind(original, {"TABLE": table}, module=__name__))
-    assert inspect.getsource(longer.func).count("if code == ") == 3
+    longer: Any = CHOICE.over(operators.OPERATORS, __name__)
+    assert inspect.getsource(longer.func).count("if code == ") == len(operators.OPERATORS)
     assert inspect.getsource(chosen.func).count("if code == ") == 2
+
+
+def test_a_choice_returns_numbers_of_any_type() -> None:
+    codes = [dispatch.stride, dispatch.is_convex, dispatch.falloff_numbers]
+    texts = [inspect.getsource(function.func) for function in codes]
+    assert "result = 2\n" in texts[0]
+    assert "result = bool(True)\n" in texts[1]
+    assert f"result = wp.vec3{WYVILL.numbers}\n" in texts[2]
 
 
 def test_references_are_globals_and_closures_and_no_attributes() -> None:
@@ -59,6 +63,7 @@ def test_the_dispatchers_name_every_function_of_their_tables() -> None:
 KEY = """\
 import sys
 from types import FunctionType
+from typing import Any
 from importlib import import_module
 import warp as wp
 import blobtree

@@ -109,6 +109,7 @@ BY_NAME: dict[str, Draw] = {
 BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "bound_combine": {key: beside(field, uniform(-2, 5), uniform(0, 5)) for key in "ab"},
     "gradient_combine": {"a": beside(field, uniform(-3, 3, 3)), "b": beside(field, uniform(-3, 3, 3))},
+    "second_share": {"p": uniform(-2.0, 2.0, 3)},
     "color_combine": {"a": beside(field, uniform(0, 1, 3)), "b": beside(field, uniform(0, 1, 3))},
     "direction_to_local": {"v": place},
     "falloff_value": {"kind": among(0), "distance": share},

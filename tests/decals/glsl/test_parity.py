@@ -48,7 +48,7 @@ MODULES = (
     "decals.record",
     "decals.field.ownership",
 )
-OF_WARP_ALONE = {"warp_extent", "unknown_extent"}
+OF_WARP_ALONE = {"operator_choice", "operator_range", "starts_from_zero", "unknown_extent", "warp_extent"}
 """Functions that no shader calls."""
 
 WRITTEN_TWICE = {
