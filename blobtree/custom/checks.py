@@ -4,7 +4,7 @@ They cannot prove a claim, but a wrong function seldom passes.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -105,8 +105,8 @@ def check_skeleton(source: CustomSource, parameters: tuple[Parameter, ...], *, c
         if moved.max() > TOLERANCE * scale:
             worst = int(moved.argmax())
             raise source.refusal(
-                f"{_format(closest_points[worst])} is returned as a point of the skeleton, but for that very "
-                f"point it returns {_format(repeated[worst])}; return the closest point of a fixed set{hint}"
+                f"{shown(closest_points[worst])} is returned as a point of the skeleton, but for that very "
+                f"point it returns {shown(repeated[worst])}; return the closest point of a fixed set{hint}"
             )
         if convex:
             _try_convexity(source, closest, closest_points, arguments, values)
@@ -115,8 +115,8 @@ def check_skeleton(source: CustomSource, parameters: tuple[Parameter, ...], *, c
         if excess.max() > TOLERANCE * scale:
             i, j = np.unravel_index(int(excess.argmax()), excess.shape)
             raise source.refusal(
-                f"for q = {_format(queries[i])} it returns {_format(closest_points[i])}, though "
-                f"{_format(closest_points[j])}, which it returns for {_format(queries[j])}, is nearer; "
+                f"for q = {shown(queries[i])} it returns {shown(closest_points[i])}, though "
+                f"{shown(closest_points[j])}, which it returns for {shown(queries[j])}, is nearer; "
                 f"return the closest point{hint}"
             )
         _try_bounds(source, closest, arguments, values)
@@ -131,13 +131,13 @@ def _try_single_precision(
 ) -> None:
     """Check that distances survive float32, in which devices compute."""
     for q, c in zip(queries, closest_points, strict=True):
-        arguments = [_in_single(value) for value in (tuple(q), *values.values())]
+        arguments = [in_precision(value, np.float32) for value in (tuple(q), *values.values())]
         where = partial(_in_single_precision, q, values)
         other = result_of(source, closest, arguments, where, 3)
         one, two = np.linalg.norm(q - c), np.linalg.norm(q - other)
         if abs(one - two) > SINGLE_TOLERANCE * (1.0 + np.abs(q).max() + np.abs(c).max()):
             raise source.refusal(
-                f"for {where()} it returns {_format(other)}, in double precision {_format(c)}; "
+                f"for {where()} it returns {shown(other)}, in double precision {shown(c)}; "
                 "avoid differences of large numbers and divisions by small ones"
             )
 
@@ -155,19 +155,20 @@ def _try_convexity(
         apart = float(np.linalg.norm(_point(source, closest, middle, arguments, values) - middle))
         if apart > TOLERANCE * (1.0 + np.abs(closest_points).max()):
             raise source.refusal(
-                f"convex: {_format(one)} and {_format(other)} belong to the skeleton, but the middle between "
+                f"convex: {shown(one)} and {shown(other)} belong to the skeleton, but the middle between "
                 f"them is {apart:.6g} away from it{f', with {values}' if values else ''}"
             )
 
 
 def _in_single_precision(q: Floats, values: dict[str, Any]) -> str:
-    return f"q = {_format(q)} and {values}, in single precision,"
+    return f"q = {shown(q)} and {values}, in single precision,"
 
 
-def _in_single(value: Any) -> Any:
+def in_precision(value: Any, precision: Precision) -> Any:
+    """Return a number or a vector in a floating-point type; whole numbers stay as they are."""
     if isinstance(value, tuple):
-        return vector(*value, precision=np.float32)
-    return np.float32(value) if isinstance(value, float) else value
+        return vector(*value, precision=precision)
+    return precision(value) if isinstance(value, float) else value
 
 
 def _try_bounds(
@@ -182,7 +183,7 @@ def _try_bounds(
             c = _point(source, closest, q, arguments, values)
             if np.linalg.norm(c) > FAR_SHARE * distance:
                 raise source.refusal(
-                    f"for q = {_format(q)} it returns {_format(c)}, so its skeleton seems to be unbounded; "
+                    f"for q = {shown(q)} it returns {shown(c)}, so its skeleton seems to be unbounded; "
                     f"end the skeleton at a finite distance{f', with {values}' if values else ''}"
                 )
 
@@ -205,7 +206,7 @@ def _queries(rng: np.random.Generator, arguments: list[Any]) -> Floats:
 def _point(
     source: CustomSource, closest: Callable[..., Any], q: Any, arguments: list[Any], values: dict[str, Any]
 ) -> Floats:
-    return result_of(source, closest, [vector(*q), *arguments], lambda: f"q = {_format(q)} and {values}", 3)
+    return result_of(source, closest, [vector(*q), *arguments], lambda: f"q = {shown(q)} and {values}", 3)
 
 
 def result_of(
@@ -223,17 +224,75 @@ def result_of(
         with np.errstate(all="ignore"):
             result = np.asarray(function(*arguments), np.float64)
     except ArithmeticError as error:
-        raise source.refusal(f"for {where()}: {error}; every point q needs a closest point") from error
+        raise source.refusal(f"for {where()} it fails: {error}; it must have a result everywhere") from error
     except Exception as error:  # the function is the user's own
         raise source.refusal(f"for {where()} it fails: {type(error).__name__}: {error}") from error
     if result.shape != (size,) or not np.isfinite(result).all():
-        raise source.refusal(f"for {where()} it returns {_format(result)}; expected {size} finite numbers")
+        raise source.refusal(f"for {where()} it returns {shown(result)}; expected {size} finite numbers")
     return result
 
 
-def _format(numbers: Any) -> str:
+def shown(numbers: Any) -> str:
+    """Return a number, or several in parentheses, as messages show them."""
     flat = np.ravel(np.asarray(numbers, np.float64)).tolist()
-    return "(" + ", ".join(f"{number:.6g}" for number in flat) + ")"
+    text = ", ".join(f"{number:.6g}" for number in flat)
+    return text if len(flat) == 1 else f"({text})"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A user's function of a point, with one set of values of its other parameters."""
+
+    source: CustomSource
+    values: dict[str, Any]
+    size: int
+    """Number of numbers that it returns."""
+
+    def call(
+        self, function: CustomSource, leading: tuple[Any, ...], size: int, precision: Precision = np.float64
+    ) -> Floats:
+        """Return the result (size,) of a function of leading arguments, the point first, and the values."""
+        plain = function.reference(precision)
+        arguments = [in_precision(value, precision) for value in (*leading, *self.values.values())]
+        return result_of(
+            function,
+            lambda *given: np.atleast_1d(plain(*given)),
+            arguments,
+            lambda: self.where(leading),
+            size,
+        )
+
+    def where(self, leading: tuple[Any, ...]) -> str:
+        """Return the arguments of a call as messages show them."""
+        values = ", ".join(f"{name} = {shown(value)}" for name, value in self.values.items())
+        point = f"q = {shown(leading[0])}" if leading else "these parameters"
+        return point + (f" with {values}" if values else "")
+
+    def at(self, q: Floats, precision: Precision = np.float64) -> Floats:
+        """Return the function's result at a point."""
+        return self.call(self.source, (tuple(q),), self.size, precision)
+
+    def bound(self, claim: float | CustomSource, center: Floats, radius: float) -> float:
+        """Return a claimed bound in a ball."""
+        if isinstance(claim, float):
+            return claim
+        ball = (tuple(center), radius) if len(claim.parameters) > len(self.values) else ()
+        return float(self.call(claim, ball, 1)[0])
+
+
+def trials(
+    source: CustomSource,
+    parameters: tuple[Parameter, ...],
+    size: int,
+    extent: float,
+    points: int,
+    rng: np.random.Generator,
+) -> Iterator[tuple[Trial, Floats]]:
+    """Yield trials with values within the limits, each with points (n, 3) around the origin."""
+    for number in range(TRIALS if parameters else 2):
+        values = {parameter.name: trial_value(parameter, rng, number) for parameter in parameters}
+        spread = extent * rng.choice([0.1, 0.4, 1.0], (points, 1))
+        yield Trial(source, values, size), rng.uniform(-1.0, 1.0, (points, 3)) * spread
 
 
 # -- operators ---------------------------------------------------------------------------------------
@@ -283,7 +342,7 @@ class _Trial:
 
     def call(self, *operands: float) -> str:
         numbers = [f"{float(x):.6g}" for x in operands]
-        return f"F({', '.join([*numbers, *map(_format, (*self.gradients, *self.parameters))])})"
+        return f"F({', '.join([*numbers, *map(shown, (*self.gradients, *self.parameters))])})"
 
 
 def check_operator(source: CustomSource, parameters: tuple[Parameter, ...], claims: Claims) -> None:
@@ -358,8 +417,8 @@ def _try_envelope(
             moved = bounds(*pair)
             if (moved < [low - slack, high - slack]).any():
                 raise trial.source.refusal(
-                    f"envelope: it is {_format(moved)} at {_format(pair)}, and {_format((low, high))} at "
-                    f"{_format((a, b))}; it must be monotone"
+                    f"envelope: it is {shown(moved)} at {shown(pair)}, and {shown((low, high))} at "
+                    f"{shown((a, b))}; it must be monotone"
                 )
 
 

@@ -1,14 +1,15 @@
-"""Parameters and registry of custom kinds: read from typed functions, found by name."""
+"""Definitions of custom kinds: parameters and claims read from typed functions, and a registry by name."""
 
 import copyreg
 import importlib
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
 import warp as wp
 
-from blobtree.custom.source import CustomSource
+from blobtree.custom.source import CustomSource, custom_source, node_class, spelled
 from blobtree.errors import UnknownKind
 from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import Node
@@ -85,6 +86,103 @@ def _limits(source: CustomSource, name: str, limits: Limits) -> tuple[float, flo
     return low, high
 
 
+def point_function(function: Any, returns: Any) -> tuple[CustomSource, list[str]]:
+    """Return a user's function of a point, and the names of its other parameters.
+
+    Raises
+    ------
+    InvalidDefinition
+        It is no typed function with this result, or its first parameter is no point.
+    """
+    source = custom_source(function, returns=returns)
+    first, *names = list(source.parameters) or [""]
+    if source.parameters.get(first) is not wp.vec3:
+        raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
+    return source, names
+
+
+def claimed_function(
+    source: CustomSource,
+    parameters: tuple[Parameter, ...],
+    claim: Any,
+    name: str,
+    leading: Mapping[str, Any],
+    returns: Any,
+    *,
+    needs_leading: bool = True,
+) -> CustomSource:
+    """Return the function of a claim: of the `leading` parameters, by type, and then those of the kind.
+
+    Without `needs_leading` it may be a function of the kind's parameters alone.
+    """
+    bound = custom_source(claim, returns=returns)
+    own = [source.parameters[parameter.name] for parameter in parameters]
+    types = [wp.float32 if kind is float else kind for kind in bound.parameters.values()]
+    own = [wp.float32 if kind is float else kind for kind in own]
+    if types == [*leading.values(), *own] or (types == own and not needs_leading):
+        return bound
+    typed = [f"{key}: {spelled(kind)}" for key, kind in leading.items()]
+    wanted = ", ".join([*typed, *(parameter.name for parameter in parameters)])
+    got = ", ".join(bound.parameters)
+    raise source.refusal(f"{name}: expected a function of ({wanted}), got one of ({got})")
+
+
+def claimed_bound(
+    source: CustomSource,
+    parameters: tuple[Parameter, ...],
+    claim: Any,
+    name: str,
+    ball: tuple[str, str],
+    *,
+    positive: bool,
+) -> float | CustomSource:
+    """Return a claimed bound: a number, or a function of the kind's parameters, and maybe of a ball."""
+    if isinstance(claim, int | float | np.number) and not isinstance(claim, bool):
+        if not (claim > 0.0 if positive else claim >= 0.0) or not claim < np.inf:
+            least = "above 0" if positive else "from 0"
+            raise source.refusal(f"{name}: expected a number {least} or a typed function, got {claim!r}")
+        return float(claim)
+    leading = dict(zip(ball, (wp.vec3, wp.float32), strict=True))
+    return claimed_function(source, parameters, claim, name, leading, wp.float32, needs_leading=False)
+
+
+def bound_call(
+    claim: float | CustomSource, ball: Sequence[str], readings: Sequence[str]
+) -> tuple[str, dict[str, Any]]:
+    """Return the expression of a claimed bound in a generated function, and the functions that it calls."""
+    if isinstance(claim, float):
+        return repr(claim), {}
+    leading = ball if len(claim.parameters) > len(readings) else ()
+    function = claim.function
+    return f"{function.key}({', '.join([*leading, *readings])})", {function.key: function}
+
+
+def tape_readings(
+    parameters: tuple[Parameter, ...], first: int = 0, skipped: int = -1
+) -> tuple[list[str], int]:
+    """Return the expressions that read each parameter from texels t0, t1 and so on, and the number of texels.
+
+    The numbers begin at the place `first`, in floats, and leave out the place `skipped`.
+    """
+    readings, place = [], first
+    for parameter in parameters:
+        components = []
+        for _ in range(parameter.size):
+            place += place == skipped
+            components.append(f"t{place // 4}[{place % 4}]")
+            place += 1
+        if parameter.size > 1:
+            readings.append(f"wp.vec{parameter.size}({', '.join(components)})")
+        else:
+            readings.append(f"int({components[0]})" if parameter.whole else components[0])
+    return readings, -(-place // 4)
+
+
+def texel_lines(count: int) -> str:
+    """Return the lines of a generated function that read its texels."""
+    return "".join(f"    t{i} = tape[at + {i}]\n" for i in range(count))
+
+
 class CustomKind(type):
     """The type of node classes that definitions make."""
 
@@ -117,6 +215,33 @@ def register(kind: CustomKind) -> None:
 def registered(name: str) -> CustomKind | None:
     """Return the kind of this name, None if it is not defined."""
     return _KINDS.get(name)
+
+
+def defined_kind(
+    base: type[Any],
+    source: CustomSource,
+    kind: str,
+    digest: str,
+    parameters: tuple[Parameter, ...],
+    *,
+    check: Callable[[], None],
+    row: Callable[[], Mapping[str, Any]],
+    fields: Sequence[Any] = (),
+) -> Any:
+    """Return the node class of a definition: the registered one, or a new one after `check`.
+
+    `row` returns attributes of the class, such as the row of its table. `fields` follow the parameters.
+    """
+    known = registered(kind)
+    if known is not None and issubclass(known, base) and known.digest == digest:
+        return known
+    check()
+    declared = [(parameter.name, Annotated[Any, parameter]) for parameter in parameters]
+    described = source.python.__doc__ or f"A node of the custom kind {kind!r}."
+    namespace = {"__doc__": described, "kind": kind, "digest": digest, "parameters": parameters, **row()}
+    node: Any = node_class(kind, source, [*declared, *fields], base, namespace)
+    register(node)
+    return node
 
 
 def custom_kinds() -> tuple[CustomKind, ...]:

@@ -12,22 +12,24 @@ rely on the claimed slope, so checks look for samples that contradict it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import warp as wp
 
-from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
-from blobtree.custom.field_checks import FieldClaims, check_field
-from blobtree.custom.source import (
-    CustomSource,
-    custom_source,
-    generated,
-    kind_name,
-    node_class,
-    returned_type,
+from blobtree.custom.definition import (
+    CustomNode,
+    Limits,
+    bound_call,
+    claimed_bound,
+    claimed_function,
+    custom_parameters,
+    defined_kind,
+    point_function,
+    tape_readings,
+    texel_lines,
 )
+from blobtree.custom.field_checks import FieldClaims, check_field
+from blobtree.custom.source import CustomSource, generated, kind_name, returned_type
 from blobtree.formulas.fields import FieldKind
 from blobtree.nodes.fields import BoxedField
 from blobtree.nodes.parameters import Parameter
@@ -67,15 +69,6 @@ class CustomField(CustomNode, BoxedField):
             color: Vector = ...,
             **named: Any,
         ) -> None: ...
-
-
-@dataclass(frozen=True)
-class _Definition:
-    """A user's functions, their parameters and claims."""
-
-    source: CustomSource
-    parameters: tuple[Parameter, ...]
-    claims: FieldClaims
 
 
 def define_field(
@@ -139,73 +132,38 @@ def define_field(
     {'rate': 3.0}
     """
     returns = returned_type(function)
-    source = custom_source(function, returns=wp.vec4 if returns is wp.vec4 else wp.float32)
-    first, *names = list(source.parameters) or [""]
-    if source.parameters.get(first) is not wp.vec3:
-        raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
+    source, names = point_function(function, wp.vec4 if returns is wp.vec4 else wp.float32)
     parameters = custom_parameters(source, names, limits, CustomField)
     kind = kind_name(source, name)
+    ball = {"center": wp.vec3, "radius": wp.float32}
     claims = FieldClaims(
-        _steepest(source, parameters, steepest),
-        None if interval is None else _claim(source, parameters, interval, wp.vec2, "interval"),
+        claimed_bound(source, parameters, steepest, "steepest", ("center", "radius"), positive=False),
+        None
+        if interval is None
+        else claimed_function(source, parameters, interval, "interval", ball, wp.vec2),
         positive_number("extent", extent),
         derived=returns is not wp.vec4,
     )
     digest = source.digest_with(kind, parameters, claims.digest)
-    known = registered(kind)
-    if known is not None and issubclass(known, CustomField) and known.digest == digest:
-        return known
-    check_field(source, parameters, claims)
-    definition = _Definition(source, parameters, claims)
-    node: type[CustomField] = node_class(
-        kind,
-        source,
-        [(parameter.name, Annotated[Any, parameter]) for parameter in parameters],
+    node: type[CustomField] = defined_kind(
         CustomField,
-        {
-            "__doc__": source.python.__doc__ or f"A field by the function {kind!r}.",
-            "kind": kind,
-            "digest": digest,
-            "parameters": parameters,
-            "field_kind": _row(kind, digest, definition),
-        },
+        source,
+        kind,
+        digest,
+        parameters,
+        check=lambda: check_field(source, parameters, claims),
+        row=lambda: {"field_kind": _row(kind, digest, source, parameters, claims)},
     )
-    register(node)
     return node
 
 
-def _steepest(source: CustomSource, parameters: tuple[Parameter, ...], claim: Any) -> float | CustomSource:
-    """Return the claimed slope as a number or a function."""
-    if isinstance(claim, int | float | np.number) and not isinstance(claim, bool):
-        if not 0.0 <= claim < np.inf:
-            raise source.refusal(f"steepest: expected a number from 0 or a typed function, got {claim!r}")
-        return float(claim)
-    return _claim(source, parameters, claim, wp.float32, "steepest")
-
-
-def _claim(
-    source: CustomSource, parameters: tuple[Parameter, ...], function: Any, returns: Any, name: str
-) -> CustomSource:
-    """Return a claim's function, whose parameters must be those of the field, behind a ball or not."""
-    claim = custom_source(function, returns=returns)
-    names, types = list(claim.parameters), list(claim.parameters.values())
-    ball = types[:2] in ([wp.vec3, wp.float32], [wp.vec3, float])
-    expected = [source.parameters[parameter.name] for parameter in parameters]
-    if types[2:] == expected and ball:
-        return claim
-    if types == expected and name == "steepest":
-        return claim
-    wanted = ", ".join(["center: wp.vec3", "radius: wp.float32", *(item.name for item in parameters)])
-    raise source.refusal(f"{name}: expected a function of ({wanted}), got one of ({', '.join(names)})")
-
-
-def _row(kind: str, digest: str, definition: _Definition) -> FieldKind:
+def _row(
+    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], claims: FieldClaims
+) -> FieldKind:
     """Return the row of the table, with functions generated around the user's."""
-    source, parameters, claims = definition.source, definition.parameters, definition.claims
-    texels = -(-(FIRST_NUMBER + sum(parameter.size for parameter in parameters)) // 4)
-    readings = _readings(parameters)
+    readings, texels = tape_readings(parameters, FIRST_NUMBER)
     shared = {
-        "texels": "".join(f"    t{i} = tape[at + {i}]\n" for i in range(texels)),
+        "texels": texel_lines(texels),
         "call": f"{source.function.key}({', '.join(['x', *readings])})",
     }
     value_name = f"custom_{kind}_value_gradient_{digest}"
@@ -218,35 +176,16 @@ def _row(kind: str, digest: str, definition: _Definition) -> FieldKind:
         body = _DERIVED.format(derivative=derivative.key, rest=rest)
     value_gradient = generated(value_name, _VALUE.format(name=value_name, body=body, **shared), scope)
     bounds_name = f"custom_{kind}_bounds_{digest}"
-    scope = {source.function.key: source.function}
-    bounds = generated(
-        bounds_name,
-        _BOUNDS.format(
-            name=bounds_name,
-            slope=_claim_call(claims.steepest, readings, scope),
-            range=_range(definition, shared["call"], readings, scope),
-            **shared,
-        ),
-        scope,
-    )
+    slope, called = bound_call(claims.steepest, ("x", "radius"), readings)
+    scope = {source.function.key: source.function, **called}
+    value = shared["call"] if claims.derived else f"{shared['call']}[0]"
+    between = f"    f = {value}\n    r = wp.vec2(f - slope * radius, f + slope * radius)\n"
+    if claims.interval is not None:
+        call, called = bound_call(claims.interval, ("x", "radius"), readings)
+        between, scope = f"    r = {call}\n", {**scope, **called}
+    text = _BOUNDS.format(name=bounds_name, slope=slope, range=between, **shared)
+    bounds = generated(bounds_name, text, scope)
     return FieldKind(kind, value_gradient, bounds, texels, windowed=True, digest=digest)
-
-
-def _claim_call(claim: float | CustomSource, readings: list[str], scope: dict[str, Any]) -> str:
-    """Return the expression of a claim, and put its function into the scope."""
-    if isinstance(claim, float):
-        return repr(claim)
-    scope[claim.function.key] = claim.function
-    ball = ["x", "radius"] if len(claim.parameters) > len(readings) else []
-    return f"{claim.function.key}({', '.join([*ball, *readings])})"
-
-
-def _range(definition: _Definition, call: str, readings: list[str], scope: dict[str, Any]) -> str:
-    """Return the lines that compute the range of the user's function over a ball."""
-    if definition.claims.interval is not None:
-        return f"    r = {_claim_call(definition.claims.interval, readings, scope)}\n"
-    value = call if definition.claims.derived else f"{call}[0]"
-    return f"    f = {value}\n    r = wp.vec2(f - slope * radius, f + slope * radius)\n"
 
 
 _VALUE = '''\
@@ -276,16 +215,3 @@ def {{name}}(
     high = wp.max(r[1] + {ROUNDING} * (1.0 + wp.abs(r[1])), 0.0)
     return wp.vec3(low, high, slope)
 '''
-
-
-def _readings(parameters: tuple[Parameter, ...]) -> list[str]:
-    """Return the expressions that read each parameter from the texels t0, t1 and so on."""
-    readings, place = [], FIRST_NUMBER
-    for parameter in parameters:
-        components = [f"t{k // 4}[{k % 4}]" for k in range(place, place + parameter.size)]
-        place += parameter.size
-        if parameter.size > 1:
-            readings.append(f"wp.vec{parameter.size}({', '.join(components)})")
-        else:
-            readings.append(f"int({components[0]})" if parameter.whole else components[0])
-    return readings

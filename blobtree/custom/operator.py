@@ -14,13 +14,13 @@ A missing claim costs speed only: fewer cells are pruned.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import warp as wp
 
 from blobtree.custom.checks import Claims, check_directed_operator, check_operator
-from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
-from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.custom.definition import CustomNode, Limits, custom_parameters, defined_kind
+from blobtree.custom.source import CustomSource, custom_source, generated, kind_name
 from blobtree.formulas.gradient_blends import UNBOUNDED
 from blobtree.formulas.operators import (
     Operator,
@@ -28,6 +28,7 @@ from blobtree.formulas.operators import (
     blend_choice,
     difference_like_choice,
     intersection_like_choice,
+    monotone_range,
     unclaimed_choice,
     widened_range,
 )
@@ -139,25 +140,24 @@ def define_operator(
     digest = source.digest_with(
         kind, parameters, bound_digest, like, monotone, order_free, *(["gradients"] * gradients)
     )
-    known = registered(kind)
-    if known is not None and issubclass(known, CustomCombination) and known.digest == digest:
-        return known
     claims = Claims(bound, like, monotone, order_free)
-    if gradients:
-        directional_derivative(source.function, _operands_of(source, gradients=True))  # or refuse it here
-        check_directed_operator(source, parameters, claims)
-    else:
-        check_operator(source, parameters, claims)
-    fields: list[Any] = [(parameter.name, Annotated[float, parameter]) for parameter in parameters]
-    namespace = {
-        "__doc__": source.python.__doc__ or f"A combination by the operator {kind!r}.",
-        "kind": kind,
-        "digest": digest,
-        "parameters": parameters,
-        "operator": (_directed_row if gradients else _row)(kind, digest, source, claims),
-    }
-    node: type[CustomCombination] = node_class(kind, source, fields, CustomCombination, namespace)
-    register(node)
+
+    def check() -> None:
+        if gradients:
+            directional_derivative(source.function, _operands_of(source, gradients=True))  # or refuse it here
+            check_directed_operator(source, parameters, claims)
+        else:
+            check_operator(source, parameters, claims)
+
+    node: type[CustomCombination] = defined_kind(
+        CustomCombination,
+        source,
+        kind,
+        digest,
+        parameters,
+        check=check,
+        row=lambda: {"operator": (_directed_row if gradients else _row)(kind, digest, source, claims)},
+    )
     return node
 
 
@@ -276,7 +276,7 @@ def {name}(
     return k[0] * wp.max(slope_a, 0.0) + k[1] * wp.max(slope_b, 0.0)
 '''
 
-_MONOTONE_RANGE = '''\
+_RANGE = '''\
 def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32{tape}) -> wp.vec2:
     """F is monotone, so its extremes lie at corners."""
     return widened_range({partials}({low}, parameter{passed})[0], {partials}({high}, parameter{passed})[0])
@@ -377,16 +377,17 @@ def _row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operat
     partials = generated(names["partials"], text, {function.key: function})
     text = _SLOPE.format(name=names["slope"], steepest=steepest, **slots)
     slope = generated(names["slope"], text, scope)
-    low, high = shape.corners
-    text = (_MONOTONE_RANGE if claims.monotone else _RANGE).format(
-        name=names["range"], partials=names["partials"], low=low, high=high, steepest=steepest, **slots
-    )
-    scope = {**scope, names["partials"]: partials, "widened_range": widened_range}
+    if claims.monotone:
+        between = monotone_range(partials, falls_with_b=claims.like == "difference")
+    else:
+        text = _RANGE.format(name=names["range"], partials=names["partials"], steepest=steepest, **slots)
+        scope = {**scope, names["partials"]: partials, "widened_range": widened_range}
+        between = generated(names["range"], text, scope)
     return Operator(
         kind,
         partials,
         slope,
-        generated(names["range"], text, scope),
+        between,
         cast("wp.Function", shape.choice),
         commutes=claims.order_free,
         starts_from_zero=claims.like == "blend",

@@ -15,9 +15,9 @@ a map carries that map on the tape. Offsets change its radius.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, field, replace
+from dataclasses import KW_ONLY, field
 from itertools import product
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import warp as wp
@@ -25,8 +25,16 @@ from numpy.typing import NDArray
 
 from blobtree.custom.bounds_kernels import skeleton_boxes
 from blobtree.custom.checks import check_skeleton
-from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
-from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.custom.definition import (
+    CustomNode,
+    Limits,
+    custom_parameters,
+    defined_kind,
+    point_function,
+    tape_readings,
+    texel_lines,
+)
+from blobtree.custom.source import CustomSource, generated, kind_name
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 from blobtree.nodes.parameters import Color, Parameter, Radius
@@ -122,55 +130,35 @@ def define_skeleton(
     >>> Rod(1.0, radius=0.2)([[1.2, 0.0, 0.0]])  # doctest: +SKIP
     array([0.5], dtype=float32)
     """
-    source = custom_source(function, returns=wp.vec3)
-    first, *names = list(source.parameters) or [""]
-    if source.parameters.get(first) is not wp.vec3:
-        raise source.refusal("expected the query point `q: wp.vec3` as its first parameter")
+    source, names = point_function(function, wp.vec3)
     parameters = custom_parameters(source, names, limits, CustomPrimitive)
     kind = kind_name(source, name)
     digest = source.digest_with(kind, parameters, convex)
-    known = registered(kind)
-    if known is not None and issubclass(known, CustomPrimitive) and known.digest == digest:
-        return known
-    check_skeleton(source, parameters, convex=convex)
-    node = _node_class(kind, digest, source, parameters, convex)
-    register(node)
+    node: type[CustomPrimitive] = defined_kind(
+        CustomPrimitive,
+        source,
+        kind,
+        digest,
+        parameters,
+        check=lambda: check_skeleton(source, parameters, convex=convex),
+        row=lambda: {"skeleton": _row(kind, digest, source, parameters, convex=convex)},
+        fields=[("_", KW_ONLY), ("radius", Radius), ("color", Color, field(default=DEFAULT_COLOR))],
+    )
     return node
 
 
-def _node_class(
-    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], convex: bool
-) -> type[CustomPrimitive]:
-    fields: list[Any] = [(parameter.name, Annotated[Any, parameter]) for parameter in parameters]
-    fields += [("_", KW_ONLY), ("radius", Radius), ("color", Color, field(default=DEFAULT_COLOR))]
-    namespace = {
-        "__doc__": source.python.__doc__ or f"A primitive around the skeleton {kind!r}.",
-        "kind": kind,
-        "digest": digest,
-        "parameters": parameters,
-        "skeleton": replace(_row(kind, digest, source, parameters), convex=convex),
-    }
-    node_type: type[CustomPrimitive] = node_class(kind, source, fields, CustomPrimitive, namespace)
-    return node_type
-
-
-def _row(kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...]) -> Skeleton:
+def _row(
+    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], *, convex: bool
+) -> Skeleton:
     """Return the row of the table, with functions generated around the user's."""
-    texels = max(1, -(-(1 + sum(parameter.size for parameter in parameters)) // 4))
-    closest_name = f"custom_{kind}_closest_{digest}"
-    closest = generated(
-        closest_name,
-        _CLOSEST.format(
-            name=closest_name,
-            texels="".join(f"    t{i} = tape[at + {i}]\n" for i in range(texels)),
-            call=f"{source.function.key}({', '.join(['q', *_readings(parameters)])})",
-            influence=INFLUENCE_SLOT,
-        ),
-        {source.function.key: source.function},
-    )
-    return Skeleton(
-        kind, closest, cast(wp.Function, min_influence_of_one), texels, folds_maps=False, digest=digest
-    )
+    readings, texels = tape_readings(parameters, skipped=INFLUENCE_SLOT)
+    texels = max(texels, 1)
+    name = f"custom_{kind}_closest_{digest}"
+    call = f"{source.function.key}({', '.join(['q', *readings])})"
+    text = _CLOSEST.format(name=name, texels=texel_lines(texels), call=call, influence=INFLUENCE_SLOT)
+    closest = generated(name, text, {source.function.key: source.function})
+    smallest = cast(wp.Function, min_influence_of_one)
+    return Skeleton(kind, closest, smallest, texels, folds_maps=False, convex=convex, digest=digest)
 
 
 _CLOSEST = '''\
@@ -179,19 +167,3 @@ def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
 {texels}    c = {call}
     return wp.vec4(c[0], c[1], c[2], t0[{influence}])
 '''
-
-
-def _readings(parameters: tuple[Parameter, ...]) -> list[str]:
-    """Return the expressions that read each parameter from the texels t0, t1 and so on."""
-    readings, place = [], 0
-    for parameter in parameters:
-        components = []
-        for _ in range(parameter.size):
-            place += place == INFLUENCE_SLOT
-            components.append(f"t{place // 4}[{place % 4}]")
-            place += 1
-        if parameter.size > 1:
-            readings.append(f"wp.vec{parameter.size}({', '.join(components)})")
-        else:
-            readings.append(f"int({components[0]})" if parameter.whole else components[0])
-    return readings

@@ -7,7 +7,6 @@ function and all functions that it calls are copied under names that carry a dig
 import ast
 import hashlib
 import inspect
-import linecache
 import re
 import textwrap
 from dataclasses import dataclass, field, make_dataclass
@@ -21,7 +20,7 @@ from blobtree.errors import InvalidDefinition
 from blobtree.nodes.tree import AssociativeCombination, Node
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import Precision, find_changed_constants, plain_python
-from blobtree.transpile.specialize import rebind, referenced_values, warp_function
+from blobtree.transpile.specialize import defined, rebind, referenced_values, warp_function
 
 PLAIN_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
 """Names that are valid in C++, GLSL and JSON."""
@@ -80,8 +79,8 @@ def custom_source(function: Any, *, returns: Any) -> CustomSource:
         raise InvalidDefinition(f"{location}: {python.__name__}: parameter {missing[0]!r} lacks its type")
     if hints.get("return") not in (returns, None) or "return" not in hints:
         raise InvalidDefinition(
-            f"{location}: {python.__name__}: expected it to return {_spelled(returns)}, "
-            f"got {_spelled(hints.get('return'))}; annotate it `-> {_spelled(returns)}`"
+            f"{location}: {python.__name__}: expected it to return {spelled(returns)}, "
+            f"got {spelled(hints.get('return'))}; annotate it `-> {spelled(returns)}`"
         )
     _require_plain_names(python)
     digest = hashlib.sha256("\n".join(_sources(python, ())).encode()).hexdigest()[:12]
@@ -121,12 +120,8 @@ def node_class(
 
 
 def generated(name: str, source: str, scope: dict[str, Any]) -> wp.Function:
-    """Return the typed function `name` of a generated source, which Warp and GLSL read from `linecache`."""
-    file = f"<blobtree {name}>"
-    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    namespace: dict[str, Any] = {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}
-    exec(compile(source, file, "exec"), namespace)
-    return warp_function(namespace[name])
+    """Return the typed function `name` of a generated source."""
+    return warp_function(defined(name, source, {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}))
 
 
 def _python_function(function: Any) -> FunctionType:
@@ -159,7 +154,7 @@ def _hints(python: FunctionType) -> dict[str, Any]:
         raise InvalidDefinition(f"{python.__name__}: its annotations cannot be read: {error}") from error
 
 
-def _spelled(hint: Any) -> str:
+def spelled(hint: Any) -> str:
     """Return a type as users write it."""
     if hint is None:
         return "no annotation"

@@ -15,14 +15,25 @@ import inspect
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from blobtree._typing import Box, Float64Array
-from blobtree.custom.definition import CustomNode, Limits, custom_parameters, register, registered
-from blobtree.custom.source import CustomSource, custom_source, generated, kind_name, node_class
+from blobtree.custom.definition import (
+    CustomNode,
+    Limits,
+    bound_call,
+    claimed_bound,
+    claimed_function,
+    custom_parameters,
+    defined_kind,
+    point_function,
+    tape_readings,
+    texel_lines,
+)
+from blobtree.custom.source import CustomSource, generated, kind_name
 from blobtree.custom.warp_checks import WarpClaims, check_warp
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import SpaceWarp
@@ -124,68 +135,29 @@ def define_warp(
     >>> Sway(Point((0, 0, 0), radius=1.0), 0.3).values
     {'width': 0.3}
     """
-    source = custom_source(forward, returns=wp.vec3)
-    first, *names = list(source.parameters) or [""]
-    if source.parameters.get(first) is not wp.vec3:
-        raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
+    source, names = point_function(forward, wp.vec3)
     parameters = custom_parameters(source, names, limits, CustomWarp)
     kind = kind_name(source, name)
+    at_point = {"q": wp.vec3, "g": wp.vec3}
     claims = WarpClaims(
-        _stretch(source, parameters, stretch),
+        claimed_bound(source, parameters, stretch, "stretch", ("q", "reach"), positive=True),
         _box(source, parameters, box),
-        None if pullback is None else _pullback(source, parameters, pullback),
+        None
+        if pullback is None
+        else claimed_function(source, parameters, pullback, "pullback", at_point, wp.vec3),
         positive_number("extent", extent),
     )
     digest = source.digest_with(kind, parameters, claims.digest, _box_text(box))
-    known = registered(kind)
-    if known is not None and issubclass(known, CustomWarp) and known.digest == digest:
-        return known
-    check_warp(source, parameters, claims)
-    node: type[CustomWarp] = node_class(
-        kind,
-        source,
-        [(parameter.name, Annotated[Any, parameter]) for parameter in parameters],
+    node: type[CustomWarp] = defined_kind(
         CustomWarp,
-        {
-            "__doc__": source.python.__doc__ or f"A node under the warp {kind!r}.",
-            "kind": kind,
-            "digest": digest,
-            "parameters": parameters,
-            "warp": _row(kind, digest, source, parameters, claims),
-        },
+        source,
+        kind,
+        digest,
+        parameters,
+        check=lambda: check_warp(source, parameters, claims),
+        row=lambda: {"warp": _row(kind, digest, source, parameters, claims)},
     )
-    register(node)
     return node
-
-
-def _types(source: CustomSource, parameters: tuple[Parameter, ...]) -> list[Any]:
-    return [source.parameters[parameter.name] for parameter in parameters]
-
-
-def _stretch(source: CustomSource, parameters: tuple[Parameter, ...], claim: Any) -> float | CustomSource:
-    """Return the claimed bound as a number or a function."""
-    if isinstance(claim, int | float | np.number) and not isinstance(claim, bool):
-        if not 0.0 < claim < np.inf:
-            raise source.refusal(f"stretch: expected a number above 0 or a typed function, got {claim!r}")
-        return float(claim)
-    bound = custom_source(claim, returns=wp.float32)
-    types, expected = list(bound.parameters.values()), _types(source, parameters)
-    if types == expected or (
-        types[2:] == expected and types[:2] in ([wp.vec3, wp.float32], [wp.vec3, float])
-    ):
-        return bound
-    wanted = ", ".join(["q: wp.vec3", "reach: wp.float32", *(item.name for item in parameters)])
-    got = ", ".join(bound.parameters)
-    raise source.refusal(f"stretch: expected a function of ({wanted}), got one of ({got})")
-
-
-def _pullback(source: CustomSource, parameters: tuple[Parameter, ...], function: Any) -> CustomSource:
-    claim = custom_source(function, returns=wp.vec3)
-    if list(claim.parameters.values()) != [wp.vec3, wp.vec3, *_types(source, parameters)]:
-        wanted = ", ".join(["q: wp.vec3", "g: wp.vec3", *(item.name for item in parameters)])
-        got = ", ".join(claim.parameters)
-        raise source.refusal(f"pullback: expected a function of ({wanted}), got one of ({got})")
-    return claim
 
 
 def _box(
@@ -232,13 +204,8 @@ def _row(
     kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], claims: WarpClaims
 ) -> SpaceWarp:
     """Return the row of the table, with functions generated around the user's."""
-    readings, place = [], FIRST_NUMBER
-    for item in parameters:
-        numbers = [f"t{k // 4}[{k % 4}]" for k in range(place, place + item.size)]
-        place += item.size
-        whole = f"int({numbers[0]})" if item.whole else numbers[0]
-        readings.append(f"wp.vec{item.size}({', '.join(numbers)})" if item.size > 1 else whole)
-    texels = "".join(f"    t{i} = tape[at + {i}]\n" for i in range(-(-place // 4) if parameters else 0))
+    readings, count = tape_readings(parameters, FIRST_NUMBER)
+    texels = texel_lines(count if parameters else 0)
 
     def made(part: str, template: str, functions: list[wp.Function], **parts: str) -> wp.Function:
         name = f"custom_{kind}_{part}_{digest}"
@@ -253,13 +220,8 @@ def _row(
     else:
         function = claims.pullback.function
         pullback = made("pullback", _GIVEN, [function], call=f"{function.key}(q, g{rest})")
-    if isinstance(claims.stretch, float):
-        stretch = made("stretch", _STRETCH, [], call=repr(claims.stretch))
-    else:
-        bound = claims.stretch.function
-        leading = ["q", "reach"] if len(claims.stretch.parameters) > len(parameters) else []
-        call = f"{bound.key}({', '.join([*leading, *readings])})"
-        stretch = made("stretch", _STRETCH, [bound], call=call)
+    call, called = bound_call(claims.stretch, ("q", "reach"), readings)
+    stretch = made("stretch", _STRETCH, list(called.values()), call=call)
     return SpaceWarp(kind, forward, pullback, stretch, claims.box, digest=digest)
 
 

@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from blobtree._typing import Box, Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, TRIALS, result_of, trial_value
+from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, Trial, shown, trials
 from blobtree.custom.source import CustomSource
 from blobtree.nodes.parameters import Parameter
-from blobtree.transpile.python import Precision, vector
 
 POINTS = 30
 """Points per set of parameters."""
@@ -41,78 +39,32 @@ class WarpClaims:
         return stretch, self.pullback and self.pullback.digest
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """A warp with one set of values of its parameters."""
-
-    source: CustomSource
-    values: dict[str, Any]
-
-    def call(
-        self, function: CustomSource, leading: tuple[Any, ...], size: int, precision: Precision = np.float64
-    ) -> Float64Array:
-        """Return the result of a function, whose own parameters follow the leading arguments."""
-        arguments = [_typed(value, precision) for value in (*leading, *self.values.values())]
-        plain = function.reference(precision)
-        return result_of(
-            function,
-            lambda *given: np.atleast_1d(plain(*given)),
-            arguments,
-            lambda: f"{_shown(leading[0]) if leading else ''} {self.values or ''}".strip(),
-            size,
-        )
-
-    def at(self, q: Float64Array, precision: Precision = np.float64) -> Float64Array:
-        """Return T(q)."""
-        return self.call(self.source, (tuple(q),), 3, precision)
-
-    def jacobian(self, q: Float64Array, step: float) -> Float64Array | None:
-        """Return J by differences; None at a kink."""
-        here = self.at(q)
-        right = np.stack([self.at(q + step * axis) - here for axis in np.eye(3)], axis=1) / step
-        left = np.stack([here - self.at(q - step * axis) for axis in np.eye(3)], axis=1) / step
-        middle = 0.5 * (right + left)
-        smooth = np.abs(right - left).max() <= 20.0 * SLOPE_TOLERANCE * (1.0 + np.abs(middle).max())
-        return middle if smooth else None
-
-    def stretch(self, claim: float | CustomSource, q: Float64Array, reach: float) -> float:
-        """Return the claimed bound in a ball."""
-        if isinstance(claim, float):
-            return claim
-        ball = (tuple(q), reach) if len(claim.parameters) > len(self.values) else ()
-        return float(self.call(claim, ball, 1)[0])
-
-
 def check_warp(source: CustomSource, parameters: tuple[Parameter, ...], claims: WarpClaims) -> None:
     """Raise `InvalidDefinition` if samples contradict a claim, or the Jacobian is singular at one."""
     rng = np.random.default_rng(SEED)
-    for number in range(TRIALS if parameters else 2):
-        values = {item.name: trial_value(item, rng, number) for item in parameters}
-        trial = _Trial(source, values)
-        spread = claims.extent * rng.choice([0.1, 0.4, 1.0], (POINTS, 1))
-        points = rng.uniform(-1.0, 1.0, (POINTS, 3)) * spread
+    for trial, points in trials(source, parameters, 3, claims.extent, POINTS, rng):
         _try_single_precision(trial, points)
-        jacobians = [trial.jacobian(q, STEP * claims.extent) for q in points]
+        jacobians = [_jacobian(trial, q, STEP * claims.extent) for q in points]
         smooth = [(q, j) for q, j in zip(points, jacobians, strict=True) if j is not None]
         _try_determinants(trial, smooth)
         if claims.pullback is not None:
             _try_pullback(trial, smooth, claims.pullback, rng)
         _try_stretch(trial, points, smooth, claims, rng)
-        numbers = tuple(float(x) for item in parameters for x in item.components(values[item.name]))
+        numbers = tuple(float(x) for item in parameters for x in item.components(trial.values[item.name]))
         _try_box(trial, claims, numbers, rng)
 
 
-def _try_single_precision(trial: _Trial, points: Float64Array) -> None:
+def _try_single_precision(trial: Trial, points: Float64Array) -> None:
     for q in points:
         double, single = trial.at(q), trial.at(q, np.float32)
         if np.abs(single - double).max() > SINGLE_TOLERANCE * (1.0 + np.abs(double).max()):
             raise trial.source.refusal(
-                f"for q = {_shown(q)} it returns {_shown(single)} in single precision, {_shown(double)} in "
+                f"for q = {shown(q)} it returns {shown(single)} in single precision, {shown(double)} in "
                 "double; avoid differences of large numbers and divisions by small ones"
             )
 
 
-def _try_determinants(trial: _Trial, smooth: list[tuple[Float64Array, Float64Array]]) -> None:
+def _try_determinants(trial: Trial, smooth: list[tuple[Float64Array, Float64Array]]) -> None:
     """Check that the Jacobian is invertible, with determinants of one sign."""
     signs = set()
     for q, jacobian in smooth:
@@ -120,13 +72,13 @@ def _try_determinants(trial: _Trial, smooth: list[tuple[Float64Array, Float64Arr
         signs.add(determinant > 0.0)
         if abs(determinant) <= SINGULAR * float(np.linalg.norm(jacobian, 2)) ** 3 or len(signs) > 1:
             raise trial.source.refusal(
-                f"its Jacobian is singular at or near q = {_shown(q)} (determinant {determinant:.3g}), so "
+                f"its Jacobian is singular at or near q = {shown(q)} (determinant {determinant:.3g}), so "
                 f"that it flattens or folds space, with {trial.values}; limit its parameters"
             )
 
 
 def _try_pullback(
-    trial: _Trial,
+    trial: Trial,
     smooth: list[tuple[Float64Array, Float64Array]],
     pullback: CustomSource,
     rng: np.random.Generator,
@@ -136,13 +88,13 @@ def _try_pullback(
         expected, seen = jacobian.T @ g, trial.call(pullback, (tuple(q), tuple(g)), 3)
         if np.abs(seen - expected).max() > 20.0 * SLOPE_TOLERANCE * (1.0 + np.abs(expected).max()):
             raise trial.source.refusal(
-                f"pullback: for q = {_shown(q)} and g = {_shown(g)} it returns {_shown(seen)}, but the "
-                f"transposed Jacobian times g is {_shown(expected)} by differences, with {trial.values}"
+                f"pullback: for q = {shown(q)} and g = {shown(g)} it returns {shown(seen)}, but the "
+                f"transposed Jacobian times g is {shown(expected)} by differences, with {trial.values}"
             )
 
 
 def _try_stretch(
-    trial: _Trial,
+    trial: Trial,
     points: Float64Array,
     smooth: list[tuple[Float64Array, Float64Array]],
     claims: WarpClaims,
@@ -150,25 +102,25 @@ def _try_stretch(
 ) -> None:
     """Check the claimed bound at points, and between the centres of balls and points in them."""
     for q, jacobian in smooth:
-        norm, bound = float(np.linalg.norm(jacobian, 2)), trial.stretch(claims.stretch, q, 0.0)
+        norm, bound = float(np.linalg.norm(jacobian, 2)), trial.bound(claims.stretch, q, 0.0)
         if norm > bound * (1.0 + SLOPE_TOLERANCE):
             raise trial.source.refusal(
-                f"stretch: the norm of its Jacobian at q = {_shown(q)} is {norm:.6g}, more than "
+                f"stretch: the norm of its Jacobian at q = {shown(q)} is {norm:.6g}, more than "
                 f"{bound:.6g}, with {trial.values}"
             )
     for q, other in zip(points, rng.permutation(points), strict=True):
         apart = float(np.linalg.norm(other - q))
         moved, bound = float(np.linalg.norm(trial.at(other) - trial.at(q))), 0.0
         if apart > 0.0:
-            bound = trial.stretch(claims.stretch, q, apart)
+            bound = trial.bound(claims.stretch, q, apart)
         if moved > bound * apart * (1.0 + SLOPE_TOLERANCE) + SLOPE_TOLERANCE:
             raise trial.source.refusal(
-                f"stretch: {_shown(q)} and {_shown(other)} are {apart:.6g} apart, their images {moved:.6g}, "
+                f"stretch: {shown(q)} and {shown(other)} are {apart:.6g} apart, their images {moved:.6g}, "
                 f"more than {bound:.6g} times as much, with {trial.values}; it may jump between them"
             )
 
 
-def _try_box(trial: _Trial, claims: WarpClaims, numbers: tuple[float, ...], rng: np.random.Generator) -> None:
+def _try_box(trial: Trial, claims: WarpClaims, numbers: tuple[float, ...], rng: np.random.Generator) -> None:
     """Check that no point outside the claimed box comes from the inner box."""
     for q in rng.uniform(-1.0, 1.0, (POINTS, 3)) * claims.extent:
         image = trial.at(q)
@@ -177,16 +129,16 @@ def _try_box(trial: _Trial, claims: WarpClaims, numbers: tuple[float, ...], rng:
         slack = 1e-6 * claims.extent
         if (q < lower - slack).any() or (q > upper + slack).any():
             raise trial.source.refusal(
-                f"box: {_shown(q)} comes from {_shown(image)}, but the box {_shown(lower)} to "
-                f"{_shown(upper)} around that does not hold it, with {trial.values}"
+                f"box: {shown(q)} comes from {shown(image)}, but the box {shown(lower)} to "
+                f"{shown(upper)} around that does not hold it, with {trial.values}"
             )
 
 
-def _typed(value: Any, precision: Precision) -> Any:
-    if isinstance(value, tuple):
-        return vector(*value, precision=precision)
-    return precision(value) if isinstance(value, float) else value
-
-
-def _shown(numbers: Any) -> str:
-    return "(" + ", ".join(f"{number:.6g}" for number in np.ravel(numbers).tolist()) + ")"
+def _jacobian(trial: Trial, q: Float64Array, step: float) -> Float64Array | None:
+    """Return the Jacobian by differences; None at a kink."""
+    here = trial.at(q)
+    right = np.stack([trial.at(q + step * axis) - here for axis in np.eye(3)], axis=1) / step
+    left = np.stack([here - trial.at(q - step * axis) for axis in np.eye(3)], axis=1) / step
+    middle = 0.5 * (right + left)
+    smooth = np.abs(right - left).max() <= 20.0 * SLOPE_TOLERANCE * (1.0 + np.abs(middle).max())
+    return middle if smooth else None

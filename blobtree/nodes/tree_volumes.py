@@ -9,6 +9,7 @@ from blobtree.nodes.primitives import DEFAULT_COLOR
 from blobtree.nodes.samples import MAX_NUMBERS
 from blobtree.nodes.tree import Node
 from blobtree.nodes.volumes import WIDTH_CELLS, Volume, from_sdf
+from blobtree.sampling.mesh_distances import grid_points
 from blobtree.sampling.tree_distances import to_sdf
 from blobtree.tape.model import checked_tree
 from blobtree.validation import positive_number
@@ -59,8 +60,7 @@ def sample(tree: Node, *, spacing: float, width: float | None = None, color: Any
             f"spacing: expected at most {MAX_NUMBERS:,} grid points, got {total:,.0f}; take a larger one"
         )
     counts = cells.astype(np.int64)
-    axes = [corner[axis] + step * np.arange(counts[axis]) for axis in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = grid_points(corner, step, counts)
     size = tree.support[1] - tree.support[0]
     distances = to_sdf(tree, points, resolution=max(int(np.ceil(float(size.max()) / step)), 1))
     return from_sdf(

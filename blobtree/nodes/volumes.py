@@ -16,7 +16,7 @@ from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.parameters import Color, Parameter, Quantity
 from blobtree.nodes.primitives import DEFAULT_COLOR, Falling
 from blobtree.nodes.samples import MAX_NUMBERS, Samples
-from blobtree.sampling.mesh_distances import mesh_distances, triangles_of
+from blobtree.sampling.mesh_distances import grid_points, mesh_distances, triangles_of
 from blobtree.validation import Vector, finite_vector, positive_number
 
 STEEPEST = 2.0
@@ -243,8 +243,7 @@ def _sampled(
     counts = np.maximum(np.ceil(size / step - 1e-6).astype(np.int64) + 1, 2)
     if counts.prod() > MAX_NUMBERS:
         raise InvalidNode(f"spacing: expected at most {MAX_NUMBERS:,} grid points, got {counts.prod():,}")
-    axes = [lower[axis] + step * np.arange(counts[axis]) for axis in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = grid_points(np.array(lower), step, counts)
     try:
         values = np.asarray(function(points), np.float64)
     except Exception as error:  # the function is the user's own

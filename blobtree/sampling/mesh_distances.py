@@ -142,7 +142,7 @@ def mesh_distances(
     meter = DistanceMeter(triangles, solid=solid)
     reach = 2.0 * float(np.linalg.norm(step * np.asarray(counts)))
     nodes = [-(-int(count - 1) // COARSE) + 1 for count in counts]
-    coarse = meter.measure(_grid(corner, COARSE * step, nodes), reach).reshape(nodes)
+    coarse = meter.measure(grid_points(corner, COARSE * step, nodes), reach).reshape(nodes)
     nearest = [
         np.minimum((np.arange(count) + COARSE // 2) // COARSE, node - 1)
         for count, node in zip(counts, nodes, strict=True)
@@ -150,13 +150,13 @@ def mesh_distances(
     estimate = coarse[np.ix_(*nearest)].ravel()
     distances = np.clip(estimate, -farthest, farthest)
     near = np.abs(estimate) - COARSE * step * np.sqrt(3.0) <= farthest
-    fine = meter.measure(_grid(corner, step, counts)[near], reach)
+    fine = meter.measure(grid_points(corner, step, counts)[near], reach)
     distances[near] = np.clip(fine, -farthest, farthest)
     result: Float32Array = distances.reshape(counts).astype(np.float32)
     return result
 
 
-def _grid(corner: Float64Array, step: float, counts: Any) -> Float64Array:
+def grid_points(corner: Float64Array, step: float, counts: Any) -> Float64Array:
     """Return the points (n, 3) of a grid, the last axis fastest."""
     axes = [corner[axis] + step * np.arange(counts[axis]) for axis in range(3)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
