@@ -30,9 +30,8 @@ from blobtree.formulas.falloff import WYVILL, Falloff
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.tree import Node
-from blobtree.nodes.values import OPTIONAL, fields_of, left_out
+from blobtree.nodes.values import OPTIONAL, fields_of, left_out, operand_names
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
 from blobtree.validation import Vector, shown
@@ -116,11 +115,10 @@ class OldCustomOperatorRecord(CustomOperatorRecord, frozen=True, tag="own operat
 def _record_type(kind: type[Node]) -> type[NodeRecord]:
     """Return the record of a built-in class of nodes."""
     hints = get_type_hints(kind)
-    names = [field.name for field in fields_of(kind)]
-    references = tuple(name for name in names if name not in parameters_of(kind))
+    references = operand_names(kind)
     types: list[Any] = [
         (name, (int if hints[name] is Node else tuple[int, ...]) if name in references else hints[name])
-        for name in names
+        for name in (field.name for field in fields_of(kind))
     ]
     for place, field in enumerate(fields_of(kind)):
         if isinstance(field.default, Attributes):

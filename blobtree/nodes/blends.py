@@ -310,11 +310,6 @@ class Shell(Macro):
     child: Node
     thickness: Annotated[float, Parameter(Quantity.LENGTH, "distance between both surfaces")]
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The child alone."""
-        return (self.child,)
-
     @Lazy
     def expanded(self) -> Node:
         """Return the child without its smaller copy."""
@@ -337,11 +332,6 @@ class SymmetricDifference(Macro):
 
     first: Node
     second: Node
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """Both nodes."""
-        return (self.first, self.second)
 
     @Lazy
     def expanded(self) -> Node:
@@ -372,11 +362,6 @@ class LocalBlend(Macro):
     first: Node
     second: Node
     region: Node
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """Both nodes and the region."""
-        return (self.first, self.second, self.region)
 
     @Lazy
     def expanded(self) -> Node:

@@ -99,11 +99,6 @@ class Press(Combination):
         super().__post_init__()
         _check_shape(self.width, self.height)
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The solid and the obstacle."""
-        return (self.solid, self.obstacle)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bulge(Press):
@@ -154,11 +149,6 @@ class RatedUnion(Combination):
             hint="take a union, or leave one out",
         ),
     ]
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """Both obstacles."""
-        return (self.first, self.second)
 
 
 @dataclass(frozen=True)

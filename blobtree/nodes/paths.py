@@ -2,7 +2,7 @@
 
 import reprlib
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Node, Transform
+from blobtree.nodes.values import operands_of
 from blobtree.tape.model import checked_tree
 from blobtree.validation import finite_vector
 
@@ -98,14 +99,11 @@ def with_node(tree: Node, path: Path, node: Node) -> Node:
 def _with_child(parent: Node, step: int, child: Node) -> Node:
     """Return `parent` with `child` in place of its child number `step`."""
     first = 0
-    for field in fields(parent):  # type: ignore[arg-type]  # every node is a dataclass
-        value = getattr(parent, field.name)
-        operands = value if isinstance(value, tuple) else (value,)
-        if not operands or not isinstance(operands[0], Node):
-            continue
+    for name, operands in operands_of(parent).items():
         if step < first + len(operands):
             replaced = (*operands[: step - first], child, *operands[step - first + 1 :])
-            return replace(parent, **{field.name: replaced if isinstance(value, tuple) else child})  # type: ignore[type-var]  # every node is a dataclass
+            several = isinstance(getattr(parent, name), tuple)
+            return replace(parent, **{name: replaced if several else child})  # type: ignore[type-var]  # every node is a dataclass
         first += len(operands)
     raise InvalidNode(f"a {type(parent).__name__} has no child {step}")
 

@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import product
-from typing import Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar, Self, cast
 
 import numpy as np
 
@@ -124,6 +124,11 @@ class Leaf(LeafKeywords, Node):
 
     color: Color
 
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """No nodes."""
+        return ()
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.profile != PLAIN:
@@ -226,6 +231,33 @@ class Primitive(Profile, Leaf, ProgramPrimitive):
         head = np.pad(head, ((0, 0), (0, INFLUENCE_SLOT - head.shape[1])))
         tail = np.pad(tail, ((0, 0), (0, -tail.shape[1] % 4)))
         return np.concatenate([head, influences[:, :1], tail], axis=1).reshape(count, -1, 4)
+
+
+class JoinedPrimitive(Primitive):
+    """A primitive that may be a piece of a longer one, which goes on at its joints (`JOINT_YIELD`)."""
+
+    joint_texels: ClassVar[tuple[int, ...]]
+    """Texels of the parameters whose last number tells of a joint."""
+    joints: tuple[float, ...] = ()
+    """These numbers; none if no other piece goes on. They are no parameters of the node."""
+
+    @classmethod
+    def packed(
+        cls,
+        primitives: Sequence[ProgramPrimitive],
+        influences: Float64Array,
+        matrices: Float64Array | None,
+    ) -> Float64Array:
+        """Return the parameters (n, ·, 4) on the tape of n primitives, with their joints."""
+        texels = super().packed(primitives, influences, matrices)
+        none = (0.0,) * len(cls.joint_texels)
+        texels[:, cls.joint_texels, 3] = [cast(Self, primitive).joints or none for primitive in primitives]
+        return texels
+
+    def joined(self, joints: Sequence[float]) -> Self:
+        """Return this new primitive once it has these joints."""
+        object.__setattr__(self, "joints", tuple(joints))
+        return self
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -31,6 +31,7 @@ from blobtree.nodes.numeric_parameters import NumericParameter
 from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradient_of
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
 from blobtree.nodes.values import (
+    children_of,
     equal,
     fields_of,
     from_records,
@@ -124,7 +125,7 @@ class Node(ImplicitModel):
     @property
     def children(self) -> tuple["Node", ...]:
         """The operands of this node, from left to right; empty for a primitive."""
-        return ()
+        return children_of(self)
 
     # -- values -------------------------------------------------------------------------------------
 
@@ -1043,11 +1044,6 @@ class ManyOperands(Node):
             object.__setattr__(self, name, value)
         self.__post_init__()
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The operands, from left to right."""
-        return self.operands
-
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class AssociativeCombination(ManyOperands, Combination):
@@ -1158,22 +1154,12 @@ class Difference(Combination):
     solid: Node
     tool: Node
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The solid and the tool."""
-        return (self.solid, self.tool)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Placed(Node):
     """A node with one `child`, which it moves, grows or deforms."""
 
     child: Node
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The only child."""
-        return (self.child,)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,8 +4,11 @@ The methods that dataclasses generate recurse once per level, so they fail some 
 functions walk the tree with a list. A shared subtree is compared, hashed and pickled once.
 """
 
+from collections.abc import Callable
 from dataclasses import Field, fields
-from typing import Any
+from itertools import chain
+from operator import attrgetter
+from typing import Annotated, Any, get_origin, get_type_hints
 
 from blobtree.tape.program import ProgramNode, postorder
 
@@ -35,10 +38,50 @@ def left_out(field: "Field[Any]", value: Any) -> bool:
     return OPTIONAL in field.metadata and bool(value == field.default)
 
 
+_OPERANDS: dict[type, tuple[str, ...]] = {}
+
+
+def operand_names(kind: type) -> tuple[str, ...]:
+    """Return the names of a class's fields that hold operands: those that declare no parameter."""
+    if kind not in _OPERANDS:
+        hints = get_type_hints(kind, include_extras=True)
+        names = (field.name for field in fields_of(kind))
+        _OPERANDS[kind] = tuple(name for name in names if get_origin(hints[name]) is not Annotated)
+    return _OPERANDS[kind]
+
+
+def operands_of(node: ProgramNode) -> dict[str, tuple[Any, ...]]:
+    """Return the operands of `node` by the names of their fields."""
+    values = {name: getattr(node, name) for name in operand_names(type(node))}
+    return {name: value if isinstance(value, tuple) else (value,) for name, value in values.items()}
+
+
+_CHILDREN: dict[type, Callable[[Any], tuple[Any, ...]]] = {}
+
+
+def children_of(node: ProgramNode) -> tuple[Any, ...]:
+    """Return the operands of `node`, from left to right."""
+    kind = type(node)
+    if kind not in _CHILDREN:
+        _CHILDREN[kind] = _children_reader(kind)
+    return _CHILDREN[kind](node)
+
+
+def _children_reader(kind: type) -> Callable[[Any], tuple[Any, ...]]:
+    names, hints = operand_names(kind), get_type_hints(kind)
+    several = [get_origin(hints[name]) is tuple for name in names]
+    if several == [True] or (len(names) > 1 and not any(several)):
+        return attrgetter(*names)
+    if several == [False]:
+        (name,) = names
+        return lambda node: (getattr(node, name),)
+    return lambda node: tuple(chain.from_iterable(operands_of(node).values()))
+
+
 def parameter_values(node: ProgramNode) -> dict[str, Any]:
     """Return the fields of `node` that hold no other nodes, in order."""
-    children = set(map(id, node.children))
-    return {name: value for name, value in _fields(node).items() if not _holds_nodes(value, children)}
+    operands = operand_names(type(node))
+    return {name: value for name, value in _fields(node).items() if name not in operands}
 
 
 def equal(first: ProgramNode, second: ProgramNode) -> bool:
@@ -90,16 +133,11 @@ def to_records(root: ProgramNode) -> list[Record]:
     indices = {id(node): place for place, node in enumerate(order)}
     records: list[Record] = []
     for node in order:
-        values = parameter_values(node)
         references: References = {}
-        for name, value in _fields(node).items():
-            if name not in values:
-                references[name] = (
-                    tuple(indices[id(item)] for item in value)
-                    if isinstance(value, tuple)
-                    else indices[id(value)]
-                )
-        records.append((type(node), values, references))
+        for name, operands in operands_of(node).items():
+            places = tuple(indices[id(operand)] for operand in operands)
+            references[name] = places if isinstance(getattr(node, name), tuple) else places[0]
+        records.append((type(node), parameter_values(node), references))
     return records
 
 
@@ -123,10 +161,6 @@ def _shown_fields(node: ProgramNode) -> dict[str, Any]:
     """Return the fields of a node that texts show."""
     values = _fields(node)
     return {f.name: values[f.name] for f in fields_of(type(node)) if not left_out(f, values[f.name])}
-
-
-def _holds_nodes(value: Any, children: set[int]) -> bool:
-    return id(value) in children or (isinstance(value, tuple) and any(id(item) in children for item in value))
 
 
 def _tokens(node: ProgramNode) -> list[ProgramNode | str]:
