@@ -2,13 +2,14 @@
 
 import warp as wp
 
-from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
+from blobtree.formulas.skeletons import JOINT_YIELD, Skeleton, min_influence_of_one
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def closest_on_rectangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
+def closest_on_rectangle(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (centre, influence); tape[at + 1 and + 2] = (unit vector along a side, half its length)."""
     center = tape[at]
     first = tape[at + 1]
@@ -46,12 +47,13 @@ def is_beside(w: wp.vec3, edge: wp.vec3, outward: wp.vec3) -> wp.bool:
 
 
 @wp.func
-def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """tape[at] = (corner a, influence); tape[at + 1] = (b − a, 0); tape[at + 2] = (c − a, 0).
+def closest_on_triangle(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """tape[at] = (corner a, influence); tape[at + 1] = (b − a, joint ab); tape[at + 2] = (c − a, joint ac).
 
-    tape[at + 3] = (unit normal, 0), which float32 could not compute for slivers. A point outside has the
-    closest one inside an edge if it is beside this edge, which signs tell: distances to that point and to a
-    corner near it differ by less than float32 shows.
+    tape[at + 3] = (unit normal, joint bc); float32 could not compute the normal of slivers. A joint is 1 if
+    another triangle goes on behind the edge, else 0. A point outside has the closest one inside an edge if it
+    is beside this edge, which signs tell: distances to that point and to a corner near it differ by less than
+    float32 shows.
     """
     corner = tape[at]
     to_b = tape[at + 1]
@@ -67,20 +69,32 @@ def closest_on_triangle(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32)
     beyond_bc = wp.cross(bc, n)
     outside = wp.dot(w, beyond_ab) > 0.0 or wp.dot(w, beyond_ac) > 0.0 or wp.dot(w - ab, beyond_bc) > 0.0
     c = w - n * wp.dot(w, n)
+    joint = float(0.0)
     if outside:
         if is_beside(w, ab, beyond_ab):
             c = foot_on_edge(w, ab)
+            joint = to_b[3]
         elif is_beside(w, ac, beyond_ac):
             c = foot_on_edge(w, ac)
+            joint = to_c[3]
         elif is_beside(w - ab, bc, beyond_bc):
             c = ab + foot_on_edge(w - ab, bc)
+            joint = upright[3]
         else:
             c = closer(w, foot_on_edge(w, ab), foot_on_edge(w, ac))
             c = closer(w, c, ab + foot_on_edge(w - ab, bc))
-    return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], corner[3])
+            joint = wp.max(wp.max(to_b[3], to_c[3]), upright[3])
+    influence = corner[3] * (1.0 - JOINT_YIELD * joint)
+    return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], influence)
+
+
+@wp.func
+def min_influence_of_triangle(tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the influence radius at joints."""
+    return tape[at][3] * (1.0 - JOINT_YIELD)
 
 
 RECTANGLE = Skeleton("rectangle", closest_on_rectangle, min_influence_of_one, parameters=3, convex=True)
-TRIANGLE = Skeleton("triangle", closest_on_triangle, min_influence_of_one, parameters=4, convex=True)
+TRIANGLE = Skeleton("triangle", closest_on_triangle, min_influence_of_triangle, parameters=4, convex=True)
 
 FLAT_SKELETONS = (RECTANGLE, TRIANGLE)

@@ -38,9 +38,12 @@ from blobtree.tape.evaluators import (
     gradient_combine,
     gradient_leaf,
     gradient_pullback_affine,
+    profiled_gradient_leaf,
+    profiled_value_leaf,
     to_local,
     value_leaf,
 )
+from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -170,9 +173,7 @@ def make_branch(value: wp.float32, label: wp.int32, f: wp.vec4) -> Branch:
 
 
 @wp.func
-def branch_combine(
-    operator: wp.int32, a: Branch, b: Branch, parameter: wp.float32, tape: wp.array(dtype=wp.vec4)
-) -> Branch:
+def branch_combine(operator: wp.int32, a: Branch, b: Branch, parameter: wp.float32, tape: Texels) -> Branch:
     """Return the operator's result at q, with the choice that the operator makes at the reference."""
     side = side_of(operator, a[0], b[0])
     value = partials(operator, a[0], b[0], parameter, tape)[0]
@@ -187,9 +188,7 @@ def branch_combine(
 
 
 @wp.func
-def branch_leaf(
-    q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> Branch:
+def branch_leaf(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: wp.int32) -> Branch:
     """Return the branch of a primitive, which is smooth."""
     f = gradient_leaf(q, closest(kind, q, tape, at), wp.vec4(), wp.vec3(), 0.0, 0.0)
     value = value_leaf(r, closest(kind, r, tape, at), wp.vec4(), wp.vec3(), 0.0, 0.0)
@@ -197,16 +196,31 @@ def branch_leaf(
 
 
 @wp.func
-def direct_branch(
-    q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: wp.array(dtype=wp.vec4), at: wp.int32
-) -> Branch:
-    """Return the branch of a direct field, which is smooth."""
-    f = direct_value_gradient(kind, q, tape, at)
-    return make_branch(direct_value_gradient(kind, r, tape, at)[0], 0, f)
+def stretched_branch(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: wp.int32) -> Branch:
+    """Return the branch of a primitive with a map, and maybe a profile, at tape[at]."""
+    profile = tape[at + 3]
+    point = to_local(q, tape, at)
+    reference = to_local(r, tape, at)
+    if profile[2] == 0.0:
+        plain = branch_leaf(point, reference, kind, tape, at + PREFIX)
+        return make_branch(plain[0], 0, gradient_pullback_affine(field_of(plain), tape, at))
+    c = closest(kind, point, tape, at + PREFIX)
+    f = profiled_gradient_leaf(point, c, wp.vec4(), wp.vec3(), 0.0, 0.0, profile)
+    c = closest(kind, reference, tape, at + PREFIX)
+    value = profiled_value_leaf(reference, c, wp.vec4(), wp.vec3(), 0.0, 0.0, profile)
+    return make_branch(value, 0, gradient_pullback_affine(f, tape, at))
 
 
 @wp.func
-def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> Branch:
+def direct_branch(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: wp.int32) -> Branch:
+    """Return the branch of a direct field with a map at tape[at], which is smooth."""
+    f = direct_value_gradient(kind, to_local(q, tape, at), tape, at + PREFIX)
+    value = direct_value_gradient(kind, to_local(r, tape, at), tape, at + PREFIX)[0]
+    return make_branch(value, 0, gradient_pullback_affine(f, tape, at))
+
+
+@wp.func
+def branch_at(q: wp.vec3, r: wp.vec3, tape: Texels, span: wp.vec2i) -> Branch:
     """Return the branch active at r, evaluated at q: the loop of `interpreter` over two points at once."""
     accumulator = Branch()
     registers = _Branches()
@@ -225,21 +239,13 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.ve
         if code >= FIELD:
             kind = code - FIELD
             for _i in range(count):
-                leaf = direct_branch(
-                    to_local(point, tape, at), to_local(reference, tape, at), kind, tape, at + PREFIX
-                )
-                f = gradient_pullback_affine(field_of(leaf), tape, at)
-                leaf = make_branch(leaf[0], 0, f)
+                leaf = direct_branch(point, reference, kind, tape, at)
                 accumulator = branch_combine(operator, accumulator, leaf, parameter, tape)
                 at += PREFIX + direct_stride(kind)
         elif code >= STRETCHED:
             kind = code - STRETCHED
             for _i in range(count):
-                leaf = branch_leaf(
-                    to_local(point, tape, at), to_local(reference, tape, at), kind, tape, at + PREFIX
-                )
-                f = gradient_pullback_affine(field_of(leaf), tape, at)
-                leaf = make_branch(leaf[0], 0, f)
+                leaf = stretched_branch(point, reference, kind, tape, at)
                 accumulator = branch_combine(operator, accumulator, leaf, parameter, tape)
                 at += PREFIX + stride(kind)
         elif code >= 0:
@@ -272,7 +278,7 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: wp.array(dtype=wp.vec4), span: wp.ve
 
 
 @wp.func
-def has_choice(tape: wp.array(dtype=wp.vec4), span: wp.vec2i) -> wp.bool:
+def has_choice(tape: Texels, span: wp.vec2i) -> wp.bool:
     """Return True if a tape has an operator with kinks."""
     at = span[0]
     kinked = bool(False)

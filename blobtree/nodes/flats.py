@@ -1,7 +1,8 @@
 """Primitives around flat skeletons: rectangles, triangles and polygons, with rounded edges."""
 
+from collections import Counter
 from dataclasses import KW_ONLY, dataclass
-from itertools import product
+from itertools import combinations, product
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +12,7 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.flat_skeletons import RECTANGLE, TRIANGLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Pieces, Primitive, beside
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, JoinedPrimitive, Pieces, Primitive, beside
 from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
 
@@ -87,7 +88,7 @@ def _sides(columns: Columns) -> tuple[Float64Array, Float64Array]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Triangle(Primitive):
+class Triangle(JoinedPrimitive):
     """A flat triangle with a rounded edge: everything within `radius` of the triangle.
 
     Raises
@@ -105,6 +106,7 @@ class Triangle(Primitive):
 
     file_tag = "triangle"
     skeleton = TRIANGLE
+    joint_texels = (1, 2, 3)
 
     a: Annotated[Vector, Parameter(Quantity.POINT, "first corner")]
     b: Annotated[Vector, Parameter(Quantity.POINT, "second corner")]
@@ -179,8 +181,13 @@ class Polygon(Pieces):
     def expanded(self) -> Node:
         """Return the union of ears."""
         ears = _ears(_in_plane(np.array(self.points)))
-        corners = [[self.points[place] for place in ear] for ear in ears]
-        return self.united(Triangle(*ear, radius=self.radius, **self.shared) for ear in corners)
+        edges = Counter(frozenset(pair) for ear in ears for pair in combinations(ear, 2))
+        return self.united(
+            Triangle(*(self.points[place] for place in ear), radius=self.radius, **self.shared).joined(
+                [float(edges[frozenset(pair)] > 1) for pair in combinations(ear, 2)]
+            )
+            for ear in ears
+        )
 
 
 def _in_plane(points: Float64Array) -> Float64Array:

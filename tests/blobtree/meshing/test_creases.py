@@ -1,5 +1,6 @@
 """Vertices on creases and corners of CSG, against the exact curves and points."""
 
+from dataclasses import replace
 from functools import reduce
 from operator import and_
 from typing import Any
@@ -58,6 +59,13 @@ def widest_gap(points: Float64Array) -> float:
 def test_two_balls_meet_in_a_circle(pair: Node, resolution: int) -> None:
     mesh, points, cell = sharp(pair, resolution)
     assert count_of(mesh, 0) == 0
+    assert RING.distances(points).max() <= NEAR * cell
+    assert widest_gap(points) * RING.radius <= 2.5 * cell
+
+
+def test_profiles_of_primitives_leave_creases_in_place() -> None:
+    """The radii, and so the circle, stay the same."""
+    _, points, cell = sharp(replace(A, width=0.3) | replace(B, falloff="gaussian", width=1.5), 24)
     assert RING.distances(points).max() <= NEAR * cell
     assert widest_gap(points) * RING.radius <= 2.5 * cell
 
