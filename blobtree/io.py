@@ -14,8 +14,9 @@ to equal trees.
 """
 
 import os
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_hints
 
 import msgspec
 
@@ -26,7 +27,7 @@ from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
 from blobtree.errors import ImplicitDecalsError, InvalidFile
 from blobtree.files import write_atomically
-from blobtree.formulas.falloff import WYVILL, Falloff
+from blobtree.formulas.falloff import Falloff
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
@@ -65,55 +66,15 @@ class CustomRecord(NodeRecord, frozen=True):
         return _custom_node(self.node_kind, values)
 
 
-class CustomSkeletonRecord(CustomRecord, frozen=True, tag="custom_skeleton"):
-    """A primitive around a custom skeleton."""
+class CustomSkeletonRecord(CustomRecord, frozen=True):
+    """A primitive around a custom skeleton, whose class declares these in each definition."""
 
-    node_kind = CustomPrimitive
     radius: float
     color: Vector
-    attributes: dict[str, AttributeValue] = {}
-    falloff: str = WYVILL.name
-    width: float | None = None
-    weight: float = 1.0
 
 
-class CustomFieldRecord(CustomRecord, frozen=True, tag="custom_field"):
-    """A field in a box by a custom function."""
-
-    node_kind = CustomField
-    center: Vector
-    size: Vector
-    fade: float
-    color: Vector
-    attributes: dict[str, AttributeValue] = {}
-
-
-class CustomOperatorRecord(CustomRecord, frozen=True, tag="custom_operator"):
-    """A combination by a custom operator."""
-
-    node_kind = CustomCombination
-    references = ("operands",)
-    operands: tuple[int, ...]
-
-
-class CustomWarpRecord(CustomRecord, frozen=True, tag="custom_warp"):
-    """A node under a custom warp."""
-
-    node_kind = CustomWarp
-    references = ("child",)
-    child: int
-
-
-class OldCustomSkeletonRecord(CustomSkeletonRecord, frozen=True, tag="own skeleton"):
-    """The same as older files write it."""
-
-
-class OldCustomOperatorRecord(CustomOperatorRecord, frozen=True, tag="own operator"):
-    """The same as older files write it."""
-
-
-def _record_type(kind: type[Node]) -> type[NodeRecord]:
-    """Return the record of a built-in class of nodes."""
+def _record_type(kind: type[Node], tag: str, base: type[NodeRecord] = NodeRecord) -> type[NodeRecord]:
+    """Return the record of a class of nodes, or of the custom kinds that derive from one."""
     hints = get_type_hints(kind)
     references = operand_names(kind)
     types: list[Any] = [
@@ -130,31 +91,35 @@ def _record_type(kind: type[Node]) -> type[NodeRecord]:
     record: Any = msgspec.defstruct(
         f"{kind.__name__}Record",
         types,
-        bases=(NodeRecord,),
+        bases=(base,),
         namespace={"node_kind": kind, "references": references},
-        tag=kind.file_tag,
+        tag=tag,
         frozen=True,
         module=__name__,
     )
     return cast("type[NodeRecord]", record)
 
 
-RECORD_OF_KIND = {kind: _record_type(kind) for kind in NODE_KINDS.values()}
+RECORD_OF_KIND = {kind: _record_type(kind, tag) for tag, kind in NODE_KINDS.items()}
 """Records of the built-in classes of nodes."""
+
+CUSTOM_RECORDS: dict[Any, list[type[NodeRecord]]] = {
+    CustomPrimitive: [
+        _record_type(CustomPrimitive, tag, CustomSkeletonRecord)
+        for tag in ("custom_skeleton", "own skeleton")
+    ],
+    CustomField: [_record_type(CustomField, "custom_field", CustomRecord)],
+    CustomCombination: [
+        _record_type(CustomCombination, tag, CustomRecord) for tag in ("custom_operator", "own operator")
+    ],
+    CustomWarp: [_record_type(CustomWarp, "custom_warp", CustomRecord)],
+}
+"""Records of custom nodes by the bases of their classes: those of today, then those of older files."""
 
 if TYPE_CHECKING:
     AnyRecord = NodeRecord
 else:
-    AnyRecord = (
-        CustomSkeletonRecord
-        | CustomFieldRecord
-        | CustomOperatorRecord
-        | CustomWarpRecord
-        | OldCustomSkeletonRecord
-        | OldCustomOperatorRecord
-    )
-    for _record in RECORD_OF_KIND.values():
-        AnyRecord |= _record
+    AnyRecord = Union[(*RECORD_OF_KIND.values(), *chain.from_iterable(CUSTOM_RECORDS.values()))]
 
 
 class TreeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -333,17 +298,8 @@ def _checked_path(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
 
 def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
     """Return the record of `node`, whose operands are replaced by their indices."""
-    record_type: type[NodeRecord]
-    if isinstance(node, CustomPrimitive):
-        record_type = CustomSkeletonRecord
-    elif isinstance(node, CustomField):
-        record_type = CustomFieldRecord
-    elif isinstance(node, CustomCombination):
-        record_type = CustomOperatorRecord
-    elif isinstance(node, CustomWarp):
-        record_type = CustomWarpRecord
-    else:
-        record_type = RECORD_OF_KIND[type(node)]
+    bases = (base for base in CUSTOM_RECORDS if isinstance(node, base))
+    record_type = RECORD_OF_KIND.get(type(node)) or CUSTOM_RECORDS[next(bases)][0]
     defaults = {field.name for field in fields_of(type(node)) if left_out(field, getattr(node, field.name))}
     values = {name: getattr(node, name) for name in record_type.__struct_fields__ if name not in defaults}
     values |= {name: dict(value) for name, value in values.items() if isinstance(value, Attributes)}

@@ -323,24 +323,22 @@ def _directed_row(kind: str, digest: str, source: CustomSource, claims: Claims) 
     """Return the row of an operator that reads gradients."""
     shape, envelope, function = _SHAPES[claims.like], claims.steepest, source.function
     assert isinstance(envelope, CustomSource)
-    extra = _slots(len(source.parameters) - 4)["extra"]
-    names = {part: f"custom_{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
-    text = _DIRECTED_PARTIALS.format(
-        name=names["partials"], absent=shape.absent, function=function.key, extra=extra
-    )
-    partials = generated(names["partials"], text, {function.key: function})
-    text = _DIRECTED_SLOPE.format(name=names["slope"], alone=shape.alone)
-    slope = generated(names["slope"], text, {"UNBOUNDED": UNBOUNDED})
     low, high = shape.corners
-    text = _DIRECTED_RANGE.format(
-        name=names["range"], envelope=envelope.function.key, low=low, high=high, extra=extra
-    )
-    scope = {envelope.function.key: envelope.function, "widened_range": widened_range}
+    texts = {"absent": shape.absent, "alone": shape.alone, "low": low, "high": high}
+    texts |= {"function": function.key, "envelope": envelope.function.key}
+    texts |= _slots(len(source.parameters) - 4)
+    scope: dict[str, Any] = {function.key: function, envelope.function.key: envelope.function}
+    scope |= {"UNBOUNDED": UNBOUNDED, "widened_range": widened_range}
+
+    def made(part: str, template: str) -> wp.Function:
+        name = f"custom_{kind}_{part}_{digest}"
+        return generated(name, template.format(name=name, **texts), scope)
+
     return Operator(
         kind,
-        partials,
-        slope,
-        generated(names["range"], text, scope),
+        made("partials", _DIRECTED_PARTIALS),
+        made("slope", _DIRECTED_SLOPE),
+        made("range", _DIRECTED_RANGE),
         cast("wp.Function", shape.choice),
         commutes=False,
         starts_from_zero=claims.like == "blend",
@@ -363,31 +361,29 @@ def _slots(count: int) -> dict[str, str]:
 
 def _row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operator:
     """Return the row of the table, with functions generated around the user's."""
-    shape, bound = _SHAPES[claims.like], claims.steepest
-    slots = _slots(len(source.parameters) - 2)
-    names = {part: f"custom_{kind}_{part}_{digest}" for part in ("partials", "slope", "range")}
+    shape, bound, function = _SHAPES[claims.like], claims.steepest, source.function
+    texts = _slots(len(source.parameters) - 2) | {"absent": shape.absent, "function": function.key}
+    scope: dict[str, Any] = {function.key: function, "widened_range": widened_range}
     if isinstance(bound, float):
-        steepest = f"wp.vec2({bound!r}, {bound!r})"
-        scope: dict[str, Any] = {}
+        texts["steepest"] = f"wp.vec2({bound!r}, {bound!r})"
     else:
-        steepest = f"{bound.function.key}(max_a, max_b{slots['extra']})"
-        scope = {bound.function.key: bound.function}
-    function = source.function
-    text = _PARTIALS.format(name=names["partials"], absent=shape.absent, function=function.key, **slots)
-    partials = generated(names["partials"], text, {function.key: function})
-    text = _SLOPE.format(name=names["slope"], steepest=steepest, **slots)
-    slope = generated(names["slope"], text, scope)
-    if claims.monotone:
-        between = monotone_range(partials, falls_with_b=claims.like == "difference")
-    else:
-        text = _RANGE.format(name=names["range"], partials=names["partials"], steepest=steepest, **slots)
-        scope = {**scope, names["partials"]: partials, "widened_range": widened_range}
-        between = generated(names["range"], text, scope)
+        texts["steepest"] = f"{bound.function.key}(max_a, max_b{texts['extra']})"
+        scope[bound.function.key] = bound.function
+
+    def made(part: str, template: str) -> wp.Function:
+        name = f"custom_{kind}_{part}_{digest}"
+        return generated(name, template.format(name=name, **texts), scope)
+
+    partials = made("partials", _PARTIALS)
+    texts["partials"] = partials.key
+    scope[partials.key] = partials
     return Operator(
         kind,
         partials,
-        slope,
-        between,
+        made("slope", _SLOPE),
+        monotone_range(partials, falls_with_b=claims.like == "difference")
+        if claims.monotone
+        else made("range", _RANGE),
         cast("wp.Function", shape.choice),
         commutes=claims.order_free,
         starts_from_zero=claims.like == "blend",

@@ -22,7 +22,7 @@ from blobtree.formulas.convolution import (
 from blobtree.lazy import Lazy
 from blobtree.nodes.curves import Arc, checked_radii
 from blobtree.nodes.fields import FieldPrimitive
-from blobtree.nodes.flats import triangle_texels
+from blobtree.nodes.flats import check_corners, triangle_texels
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius, parameters_of
 from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
 from blobtree.nodes.tree import Macro, Node, Sum
@@ -210,15 +210,7 @@ class ConvolutionTriangle(ConvolutionPrimitive):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        corners = np.array([self.a, self.b, self.c])
-        sides = np.roll(corners, 1, axis=0) - corners
-        scale = np.linalg.norm(sides, axis=1).max()
-        area = np.linalg.norm(np.cross(sides[0] / scale, sides[1] / scale)) if scale > 0.0 else 0.0
-        if area < FLATTEST_TRIANGLE:
-            raise InvalidNode(
-                f"triangle: expected three corners that span a plane, got {self.a}, {self.b}, {self.c}, "
-                "which lie on a line or are equal; use a ConvolutionSegment"
-            )
+        check_corners(self.a, self.b, self.c, FLATTEST_TRIANGLE, "a ConvolutionSegment")
 
     @classmethod
     def kernel_radii(cls, columns: Columns) -> Float64Array:

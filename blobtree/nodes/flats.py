@@ -117,19 +117,24 @@ class Triangle(JoinedPrimitive):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        corners = np.array([self.a, self.b, self.c])
-        edges = corners - np.roll(corners, 1, axis=0)
-        longest = np.abs(edges).max()
-        if not longest or np.linalg.norm(np.cross(*(edges[:2] / longest))) < SMALLEST_SINE:
-            raise InvalidNode(
-                f"triangle: expected three corners that span a plane, got {self.a}, {self.b}, {self.c}, "
-                "which lie on a line or are equal; use a Segment"
-            )
+        check_corners(self.a, self.b, self.c, SMALLEST_SINE, "a Segment")
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
         """Return the first corner and the influence radius; the edges from it; the unit normal."""
         return triangle_texels(columns, influences[:, 0])
+
+
+def check_corners(a: Vector, b: Vector, c: Vector, flattest: float, instead: str) -> None:
+    """Raise `InvalidNode` for a triangle whose height is below `flattest` of its longest side."""
+    corners = np.array([a, b, c])
+    edges = corners - np.roll(corners, 1, axis=0)
+    longest = np.linalg.norm(edges, axis=1).max()
+    if not longest or np.linalg.norm(np.cross(*(edges[:2] / longest))) < flattest:
+        raise InvalidNode(
+            f"triangle: expected three corners that span a plane, got {a}, {b}, {c}, which lie on a line or "
+            f"are equal; use {instead}"
+        )
 
 
 def triangle_texels(columns: Columns, numbers: Float64Array) -> Float64Array:

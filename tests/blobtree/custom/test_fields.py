@@ -1,6 +1,7 @@
 """Custom direct fields: values, gradients, bounds, meshes, files, and what a definition is refused for."""
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,7 @@ def test_a_custom_field_blends_is_meshed_and_traced(node: Node) -> None:
 
 @EACH
 def test_files_and_pickles_name_the_kind(node: CustomField) -> None:
+    node = replace(node, weight=-0.5, attributes={"age": 3.0})
     assert from_json(to_json(node)) == node == pickle.loads(pickle.dumps(node))
     assert eval(repr(node), {"Lump": Lump, "Waves": Waves}) == node
     with pytest.raises(InvalidFile, match=r"calls .* define_field"):

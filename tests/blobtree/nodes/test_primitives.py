@@ -205,7 +205,8 @@ def test_gradients_are_exact_where_the_closest_point_leaves_a_corner_or_a_joint(
     ]
     ends += [(curved, np.array(p.start), np.subtract(p.control, p.start)) for p in pieces[1:]]
     pipe = Polyline(curved.points, radius=0.4)
-    ends += [(pipe, np.array(pipe.points[i]), np.subtract(*pipe.points[i : i + 2])) for i in (1, 2)]
+    bends = np.array(pipe.points)
+    ends += [(pipe, bends[i], bends[i + 1] - bends[i]) for i in (1, 2)]
     dart = Polygon(((0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)), radius=0.4)
     ears: Any = dart.expanded.children
     ends += [(dart, 0.4 * np.array(e.a) + 0.6 * np.array(e.b), np.subtract(e.c, e.a)) for e in ears]
