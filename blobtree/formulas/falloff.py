@@ -27,11 +27,6 @@ STEEPEST_SLOPE = 6.0 * STEEPEST_DISTANCE * (1.0 - STEEPEST_DISTANCE**2) ** 2
 """max |g'| = 1.7173, the Lipschitz constant of g."""
 
 
-def inverse_falloff(field: float) -> float:
-    """Return the normalised distance d with g(d) = `field`, for 0 ≤ field ≤ 1 (eq. 3): √(1 − F^⅓)."""
-    return math.sqrt(max(0.0, 1.0 - field ** (1.0 / 3.0)))
-
-
 @wp.func
 def falloff(squared_distance: wp.float32) -> wp.float32:
     """Return g as a function of d², which needs no square root."""

@@ -14,7 +14,6 @@ from blobtree.formulas.falloff import (
     falloff_slope_bound,
     falloff_steepest,
     falloff_steepness,
-    inverse_falloff,
 )
 from tests.blobtree.transpile.warp_functions import call
 
@@ -36,13 +35,6 @@ def test_rim_is_where_the_falloff_is_half() -> None:
     assert ISO == 0.5
     assert pytest.approx(0.454202, abs=1e-6) == RIM
     assert pytest.approx(ISO, abs=1e-15) == (1.0 - RIM**2) ** 3
-    assert inverse_falloff(ISO) == pytest.approx(RIM, abs=1e-15)
-
-
-def test_inverse_falloff_undoes_the_falloff() -> None:
-    for d in np.linspace(0.0, 1.0, 1001):
-        assert inverse_falloff(float((1.0 - d * d) ** 3)) == pytest.approx(d, abs=1e-7)
-    assert (inverse_falloff(0.0), inverse_falloff(1.0)) == (1.0, 0.0)
 
 
 def test_falloff_is_one_at_the_skeleton_and_zero_beyond_its_reach() -> None:
