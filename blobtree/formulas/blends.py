@@ -492,13 +492,23 @@ def deepest_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     return KEEP_BOTH
 
 
+superelliptic_range = monotone_range(superelliptic_partials)
+r_union_range = monotone_range(r_union_partials)
+r_intersection_range = monotone_range(r_intersection_partials)
+r_difference_range = monotone_range(r_difference_partials, falls_with_b=True)
+smooth_intersection_range = monotone_range(smooth_intersection_partials)
+clean_union_range = monotone_range(clean_union_partials)
+controllable_range = monotone_range(controllable_partials)
+masked_range = monotone_range(masked_partials)
+
+
 # -- the table ------------------------------------------------------------------------------------------
 
 SUPERELLIPTIC = Operator(
     "superelliptic",
     superelliptic_partials,
     superelliptic_slope,
-    monotone_range(superelliptic_partials),
+    superelliptic_range,
     superelliptic_choice,
     monotone=True,
 )
@@ -506,7 +516,7 @@ R_UNION = Operator(
     "r_union",
     r_union_partials,
     r_union_slope,
-    monotone_range(r_union_partials),
+    r_union_range,
     blend_choice,
     commutes=False,
     monotone=True,
@@ -515,7 +525,7 @@ R_INTERSECTION = Operator(
     "r_intersection",
     r_intersection_partials,
     r_intersection_slope,
-    monotone_range(r_intersection_partials),
+    r_intersection_range,
     intersection_like_choice,
     commutes=False,
     starts_from_zero=False,
@@ -526,7 +536,7 @@ R_DIFFERENCE = Operator(
     "r_difference",
     r_difference_partials,
     r_difference_slope,
-    monotone_range(r_difference_partials, falls_with_b=True),
+    r_difference_range,
     difference_like_choice,
     commutes=False,
     starts_from_zero=False,
@@ -536,7 +546,7 @@ SMOOTH_INTERSECTION = Operator(
     "smooth_intersection",
     smooth_intersection_partials,
     smooth_intersection_slope,
-    monotone_range(smooth_intersection_partials),
+    smooth_intersection_range,
     smooth_intersection_choice,
     commutes=False,
     starts_from_zero=False,
@@ -557,7 +567,7 @@ CLEAN_UNION = Operator(
     "clean_union",
     clean_union_partials,
     clean_union_slope,
-    monotone_range(clean_union_partials),
+    clean_union_range,
     clean_union_choice,
     commutes=False,
     monotone=True,
@@ -566,7 +576,7 @@ CONTROLLABLE = Operator(
     "controllable",
     controllable_partials,
     controllable_slope,
-    monotone_range(controllable_partials),
+    controllable_range,
     controllable_choice,
     commutes=False,
     monotone=True,
@@ -575,7 +585,7 @@ MASKED = Operator(
     "masked",
     masked_partials,
     masked_slope,
-    monotone_range(masked_partials),
+    masked_range,
     masked_choice,
     commutes=False,
     starts_from_zero=False,

@@ -269,7 +269,7 @@ def monotone_range(partials: wp.Function, *, falls_with_b: bool = False) -> wp.F
     names = ["a", "b", "parameter", "tape"][: parameter_count(partials)]
     types = {"a": wp.vec2, "b": wp.vec2, "parameter": wp.float32, "tape": Texels}
     low, high = ("a[0], b[1]", "a[1], b[0]") if falls_with_b else ("a[0], b[0]", "a[1], b[1]")
-    key, rest = f"{partials.key}_range", ", ".join(["", *names[2:]])
+    key, rest = f"{partials.key.removesuffix('_partials')}_range", ", ".join(["", *names[2:]])
     text = (
         f"def {key}({', '.join(names)}):\n"
         f"    return widened_range(partials({low}{rest})[0], partials({high}{rest})[0])\n"

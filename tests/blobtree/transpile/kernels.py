@@ -2,6 +2,7 @@
 
 # mypy: disable-error-code="call-overload"
 
+from types import FunctionType
 from typing import Any
 
 import warp as wp
@@ -68,14 +69,18 @@ def reciprocal(x: wp.float32) -> wp.float32:
     return 1.0 / (x + zero)
 
 
-def choose_row(
+def of_two_rows(prototype: FunctionType) -> Any:
+    """Write the body of a choice between a sum and a union."""
+    choice = RowChoice(prototype, "operators", "partials")
+    return choice.over((operators.SUM, operators.UNION), prototype.__module__)
+
+
+@of_two_rows
+def chosen(
     code: wp.int32, a: wp.float32, b: wp.float32, parameter: wp.float32, unused: wp.float32
 ) -> wp.vec3:
     """What a row's operator makes of two numbers."""
-
-
-CHOICE = RowChoice(choose_row, "operators", "partials")
-chosen: Any = CHOICE.over((operators.SUM, operators.UNION), __name__)
+    raise NotImplementedError
 
 
 @wp.kernel
