@@ -65,7 +65,19 @@ LONG_FILES = (
     "blobtree/tracing/test_trace.py",
     "blobtree/transpile/test_derivative.py",
     "decals/editing/test_fuzz.py",
-    "decals/surfaces/test_vtk_process.py",
+    "decals/rendering/test_decals.py",
+    "decals/scenes/test_origin.py",
+    "decals/rendering/test_filter.py",
+    "test_packaging.py",
+    "decals/scattering/test_boundary.py",
+    "decals/rendering/test_tree.py",
+    "decals/scattering/test_density.py",
+    "decals/scattering/test_deform.py",
+    "decals/window/test_shapes.py",
+    "decals/images/test_images.py",
+    "decals/scattering/test_relaxation.py",
+    "decals/window/test_host_plotter.py",
+    "decals/vtk/test_lifetime.py",
 )
 """Files of several seconds begin first, so that no worker ends long before another."""
 
