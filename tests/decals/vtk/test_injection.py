@@ -377,7 +377,12 @@ def test_removing_decals_that_are_not_there_is_an_error(plotter: Factory) -> Non
     for wrong in (bare, mesh, None):
         with pytest.raises(InvalidScene, match="expected an actor with decals of this subplot, got"):
             pl.decals.remove(wrong)
+    with pytest.raises(InvalidScene, match="mapping: expected 'corrected' or 'chord'"):
+        pl.decals.mapping = "walked"
     pl.subplot(0, 1)
+    pl.decals.mapping = "walked"
+    with pytest.raises(InvalidScene, match="mapping: expected 'corrected' or 'chord'"):
+        pl.decals.apply(bare)
     with pytest.raises(InvalidScene, match="in the active subplot"):
         pl.decals.remove(actor)
     pl.subplot(0, 0)
