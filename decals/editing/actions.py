@@ -242,7 +242,7 @@ class Actions:
     def next_mapping(self, _cursor: Cursor) -> None:
         """Draw with the next image mapping."""
         modes = self.state.modes
-        modes.mapping = ImageMapping((modes.mapping + 1) % len(ImageMapping))
+        modes.mapping = ImageMapping((modes.mapping - 1) % len(ImageMapping))
         self.state.message = f"image mapping: {modes.mapping.name.lower()}"
 
     @action("help", "h", "F1", summary="show this help, its next page, or hide it", group=Group.SCENE)

@@ -134,5 +134,7 @@ def test_modes_by_name() -> None:
     np.testing.assert_array_equal(
         line, outline(document, 1, contact=Contact.RADIAL, mapping=ImageMapping.CHORD)
     )
-    with pytest.raises(InvalidEdit, match="mapping: expected one of 'chord', 'corrected', got 'flat'"):
+    with pytest.raises(
+        InvalidEdit, match="mapping: expected one of 'chord', 'corrected', 'walked', got 'flat'"
+    ):
         outline(document, 1, mapping="flat")

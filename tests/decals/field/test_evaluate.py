@@ -218,7 +218,7 @@ def test_refuses(points: NDArray[Any], normals: NDArray[Any], says: str) -> None
         (
             {"mapping": 5},
             InvalidScene,
-            "mapping: expected one of 'chord', 'corrected', got 5",
+            "mapping: expected one of 'chord', 'corrected', 'walked', got 5",
         ),
         ({"stiffness": 0.5}, InvalidScene, "stiffness: expected a number from 1 to 64, got 0.5"),
         ({"stiffness": "hard"}, InvalidScene, "stiffness: expected a number from 1 to 64, got 'hard'"),
