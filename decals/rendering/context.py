@@ -34,8 +34,8 @@ from decals.shaders import Source, compose
 MIN_VERSION = 330
 """Version of OpenGL that is enough for everything but compute shaders; macOS ends at 410."""
 
-MAX_PROGRAMS = 32
-"""Programs that are kept without being used; without a graphics card, one takes some megabytes."""
+MAX_PROGRAMS = 16
+"""Programs that are kept whether they are used or not; without a graphics card, one takes 8 MB."""
 
 MAX_ANISOTROPY = 8.0
 """Greatest ratio of a pixel's footprint in an image at which the image is not blurred."""
