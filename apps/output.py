@@ -21,7 +21,7 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     if path.is_dir():
         raise InvalidInput(f"expected a file to write, {str(path)!r} is a folder; add a file name")
     if path.suffix.lower() not in suffixes:
-        known = ", ".join(suffixes)
+        known = " or ".join(suffixes)
         raise InvalidInput(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
     _check_writable(path.parent)
 
