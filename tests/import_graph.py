@@ -1,7 +1,7 @@
 """The graph of imports between the project's own modules, and its cycles."""
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -23,17 +23,20 @@ def modules() -> dict[str, Path]:
     return names
 
 
-def imported_names(module: str, path: Path) -> Iterator[str]:
-    """Yield the full name of each import in a file: inside functions and for type checking too."""
+@cache
+def imported_names(module: str, path: Path) -> list[str]:
+    """Return the full name of each import in a file: inside functions and for type checking too."""
+    names: list[str] = []
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package.split(".")
             prefix = [".".join(base[: len(base) + 1 - node.level])] if node.level else []
             source = ".".join([*prefix, *([node.module] if node.module else [])])
-            yield from (f"{source}.{alias.name}" for alias in node.names)
+            names += [f"{source}.{alias.name}" for alias in node.names]
+    return names
 
 
 def module_graph() -> Graph:

@@ -40,7 +40,7 @@ def files(folder: str) -> list[Path]:
 def imports(path: Path) -> list[str]:
     """Return the absolute imports of a file by their full names."""
     (name,) = (name for name, other in modules().items() if other == path)
-    return list(imported_names(name, path))
+    return imported_names(name, path)
 
 
 def within(name: str, package: str) -> bool:
