@@ -85,17 +85,33 @@ def test_threads_do_not_change_the_bytes() -> None:
     assert first.positions.tobytes() == again.positions.tobytes()
 
 
-@settings(max_examples=8, deadline=None)
-@given(
+RANDOM_SURFACES = given(
     number=st.integers(0, 10_000),
     count=st.integers(0, 60),
     fixed=st.integers(0, 3),
     parts=st.integers(1, 3),
     flat=st.booleans(),
 )
+
+
+@settings(max_examples=4, deadline=None)
+@RANDOM_SURFACES
 def test_random_surfaces_keep_the_invariants(
     number: int, count: int, fixed: int, parts: int, flat: bool
 ) -> None:
+    check_random_surfaces(number, count, fixed, parts, flat)
+
+
+@pytest.mark.slow
+@settings(max_examples=30, deadline=None)
+@RANDOM_SURFACES
+def test_many_random_surfaces_keep_the_invariants(
+    number: int, count: int, fixed: int, parts: int, flat: bool
+) -> None:
+    check_random_surfaces(number, count, fixed, parts, flat)
+
+
+def check_random_surfaces(number: int, count: int, fixed: int, parts: int, flat: bool) -> None:
     rng = np.random.default_rng(number)
     surfaces = []
     for _ in range(parts):

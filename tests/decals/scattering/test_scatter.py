@@ -230,9 +230,23 @@ def test_invalid_arguments_raise(options: dict[str, Any], message: str) -> None:
         scatter(plane(), **options)
 
 
-@settings(max_examples=6, deadline=None)
-@given(st.integers(0, 10_000), st.integers(0, 40), st.integers(1, 6))
+RANDOM_TRIANGLES = given(number=st.integers(0, 10_000), count=st.integers(0, 40), triangles=st.integers(1, 6))
+
+
+@settings(max_examples=3, deadline=None)
+@RANDOM_TRIANGLES
 def test_random_triangles_get_the_exact_count(number: int, count: int, triangles: int) -> None:
+    check_random_triangles(number, count, triangles)
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None)
+@RANDOM_TRIANGLES
+def test_many_random_triangles_get_the_exact_count(number: int, count: int, triangles: int) -> None:
+    check_random_triangles(number, count, triangles)
+
+
+def check_random_triangles(number: int, count: int, triangles: int) -> None:
     rng = np.random.default_rng(number)
     soup = MeshSurface(rng.normal(size=(3 * triangles, 3)), np.arange(3 * triangles).reshape(-1, 3))
     decals = scatter(soup, count=count, seed=number)
