@@ -8,6 +8,7 @@ oracles of the tests. Other parts:
     --only index [--device cuda:0]   building the index of 100,000 and 1,000,000 decals; needs no graphics
     --only million                   rendering 1,000,000 decals
     --only faults [--seed 2]         stretched, folded, oversized and missing decals on six models
+    --only pixels [--seed 2]         pixels of these models on which no image shows, at 3600 x 2700
     --only contact                   folds, stretch, continuity and time of all contact modes
     --only filter                    one filtered sample a pixel against many
     --only walk                      walked image mapping against exact log maps, and its cost
@@ -101,6 +102,17 @@ def measure_faults(seed: int, *, quick: bool) -> Figures:
     return figures
 
 
+def measure_pixels(seed: int, *, quick: bool) -> Figures:
+    """Count pixels of covered models without an image, and print the figures."""
+    from tests.bench import decal_pixels
+
+    figures = decal_pixels.measure(seed, quick=quick)
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
+    for name, value in figures.items():
+        print(f"{name:28} {value:12.4g}  {decal_pixels.TARGETS.get(name, '')}".rstrip())
+    return figures
+
+
 def measure_contact(*, quick: bool) -> Figures:
     """Compare the contact modes, and print the figures."""
     from tests.bench import contact_modes
@@ -168,17 +180,19 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
     parser.add_argument(
         "--only",
-        choices=["index", "million", "faults", "contact", "filter", "walk", "octree", "methods"],
+        choices=["index", "million", "faults", "pixels", "contact", "filter", "walk", "octree", "methods"],
         help="measure one part",
     )
     parser.add_argument("--peers", action="store_true", help="measure other methods")
-    parser.add_argument("--seed", type=int, default=1, help="seed of --only faults")
+    parser.add_argument("--seed", type=int, default=1, help="seed of --only faults and --only pixels")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
     if options.only == "million":
         figures = measure_million(quick=options.quick)
     elif options.only == "faults":
         figures = measure_faults(options.seed, quick=options.quick)
+    elif options.only == "pixels":
+        figures = measure_pixels(options.seed, quick=options.quick)
     elif options.only == "contact":
         figures = measure_contact(quick=options.quick)
     elif options.only == "filter":
