@@ -69,15 +69,23 @@ ARC_REACH = 2.0
 SPARE = 0.015
 """Share of its radius by which a decal grows beyond a bare point."""
 
-SEARCHES = ((0.5, 0.8), (0.3, 0.9), (0.3, 0.94), (0.2, 0.96), (0.1, 0.97), (0.05, 0.98))
-"""Rounds that look for bare points: spread of random points in mean distances of the samples, and distance of
-the points around which they lie from their owners, in the owners' radii. The last round is repeated."""
+SEARCHES = (
+    (0.5, 0.86, 4),
+    (0.3, 0.92, 4),
+    (0.3, 0.95, 8),
+    (0.2, 0.96, 16),
+    (0.1, 0.97, 16),
+    (0.05, 0.98, 16),
+)
+"""Rounds that look for bare points: spread of random points in mean distances of the samples, distance of the
+points around which they lie from their owners, in the owners' radii, and number of random points around each.
+The last round is repeated."""
+
+CUBE = 1.0
+"""Side of the cubes of which one point each is searched around, in mean distances of the samples."""
 
 MAX_SEARCHES, CLEAN_SEARCHES = 24, 3
 """Largest number of rounds, and rounds without a bare point after which they end."""
-
-TRIALS_PER_RISK = 16
-"""Random points around each such point in each round."""
 
 EVEN_RADIUS_RATIO = 1.495
 """Ratio of a radius to the median at even density, beyond which other decals grow first."""
@@ -497,9 +505,9 @@ def _close_gaps(
     """Grow radii, up to limits, until searches find no bare point; return the points nearest to bare."""
     clean = 0
     for turn in range(MAX_SEARCHES):
-        spread, share = SEARCHES[min(turn, len(SEARCHES) - 1)]
-        owned = owned.risky(radii, share, sample_distance)
-        trials = _random_points_around(owned.points, TRIALS_PER_RISK, spread * sample_distance, rng)
+        spread, share, count = SEARCHES[min(turn, len(SEARCHES) - 1)]
+        owned = owned.risky(radii, share, CUBE * sample_distance)
+        trials = _random_points_around(owned.points, count, spread * sample_distance, rng)
         owned = owned.joined(find(trials))
         clean = 0 if _cover(radii, owned, limits, speck) else clean + 1
         if turn >= len(SEARCHES) and clean >= CLEAN_SEARCHES:
