@@ -106,7 +106,7 @@ def worst(got: Any, want: Any, rows: Any) -> Any:
     return np.maximum(uv, np.abs(got.field - want.field))[rows]
 
 
-@pytest.mark.parametrize("mapping", ImageMapping)
+@pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED])
 @pytest.mark.parametrize("make", SETS)
 def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:
     decals, points, normals = make(np.random.default_rng(SETS.index(make)))
