@@ -399,7 +399,7 @@ async def lab(picture: str | None = None) -> None:
             for attempt in attempts:
                 for name, value in attempt.settings:
                     sliders = lab_page.lab.values()["lab_sliders"]
-                    label = next(s["label"] for s in sliders if s["label"].startswith(name))
+                    label = next(s["name"] for s in sliders if s["name"].startswith(name))
                     if isinstance(value, str):
                         await choose(browser, label, value)
                         continue
