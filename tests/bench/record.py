@@ -19,6 +19,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering import context as context_module
 from decals.rendering.context import Context
@@ -38,14 +39,7 @@ TARGETS = ("g_position", "g_normal", "g_color", "g_paint")
 """Textures that the passes themselves write."""
 
 
-def record(
-    scene: Scene,
-    size: tuple[int, int],
-    path: Path,
-    *,
-    contact: Contact = Contact.PRODUCT,
-    filtered: bool = False,
-) -> None:
+def record(scene: Scene, path: Path, options: RenderOptions) -> None:
     """Record a picture of a scene of meshes: one sample per pixel, one tile."""
     arrays: Arrays = {}
     passes: dict[str, dict[str, Any]] = {}
@@ -60,9 +54,9 @@ def record(
             _recording_calls(arrays, passes.setdefault(backend, {})),
         ):
             context.part_samples = None  # the whole picture in one call, as with a graphics card
-            renderer.render(scene, RenderOptions(size=size, samples=1, contact=contact, filtered=filtered))
+            renderer.render(scene, options)
     texts = {name: compose(name).text for name in ("mesh.vert", "mesh.frag", "screen.vert")}
-    settings = {"size": size, "texts": texts, "passes": passes, "layered": scene.decals.layered}
+    settings = {"size": options.size, "texts": texts, "passes": passes, "layered": scene.decals.layered}
     np.savez_compressed(path, settings=np.array(json.dumps(settings)), **arrays)  # type: ignore[arg-type]
 
 
@@ -165,6 +159,9 @@ def main() -> None:
         "--scattered", action="store_true", help="distribute decals by `scatter` instead of `even_decals`"
     )
     parser.add_argument("--contact", choices=[mode.name.lower() for mode in Contact], default="product")
+    parser.add_argument(
+        "--mapping", choices=[mode.name.lower() for mode in ImageMapping], default="corrected"
+    )
     parser.add_argument("--filtered", action="store_true", help="average the decals over each pixel")
     parser.add_argument("--layered", action="store_true", help="random interactions in three layers")
     parser.add_argument("--size", default="1600x1200")
@@ -175,7 +172,14 @@ def main() -> None:
     scene = bench_scene(options.model, options.decals, size, scattered=options.scattered)
     if options.layered:
         scene = scene.replace(decals=in_layers(scene.decals))
-    record(scene, size, options.path, contact=Contact[options.contact.upper()], filtered=options.filtered)
+    drawing = RenderOptions(
+        size=size,
+        samples=1,
+        contact=Contact[options.contact.upper()],
+        mapping=ImageMapping[options.mapping.upper()],
+        filtered=options.filtered,
+    )
+    record(scene, options.path, drawing)
 
 
 if __name__ == "__main__":

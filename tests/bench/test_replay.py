@@ -12,6 +12,7 @@ from decals import Contact, DecalImage, MeshObject, Scene
 from decals.apps.commands.bench import even_decals
 from decals.errors import NoGraphics
 from decals.rendering.context import Context
+from decals.rendering.options import RenderOptions
 from tests.bench import record, replay, tracing
 from tests.bench.scenes import in_layers
 from tests.decals.rendering.pictures import view_of
@@ -41,7 +42,9 @@ def ring_scene(*, layered: bool) -> Scene:
 
 def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context) -> None:
     path = tmp_path / "ring.npz"
-    record.record(ring_scene(layered=False), (64, 48), path)
+    record.record(
+        ring_scene(layered=False), path, RenderOptions(size=(64, 48), samples=1, contact=Contact.PRODUCT)
+    )
     figures = replay.measure(gl, path, 1)
     assert 0.1 < figures["covered"] < 0.9
     assert figures["decals_fragment"] >= 0.0
@@ -51,7 +54,9 @@ def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context)
 
 def test_replaced_decals_cover_the_same_part_of_the_picture(tmp_path: Path, gl: moderngl.Context) -> None:
     path = tmp_path / "ring.npz"
-    record.record(ring_scene(layered=True), (64, 48), path, contact=Contact.RADIAL)
+    record.record(
+        ring_scene(layered=True), path, RenderOptions(size=(64, 48), samples=1, contact=Contact.RADIAL)
+    )
     figures = replay.measure(gl, path, 1, counts=[50, 5000])
     assert 0 < figures["mb_50"] < figures["mb_5000"] / 20
     assert figures["painted_50"] == pytest.approx(1 - np.exp(-replay.COVERAGE), abs=0.1)
