@@ -31,12 +31,21 @@ SPACING = 1.1 / 10.0
 RELAY = 3
 """Texels of a relay: (point, x of the other walk), (gradient of x, y of the other walk), (gradient of y,
 state)."""
-GRID = RELAY * SIDE * SIDE
+RELAYS = RELAY * SIDE * SIDE
+"""Texels of the relays of a grid."""
+BLOCK = 3
+"""Relays along a side of a block."""
+BLOCKS_ALONG = SIDE // BLOCK
+BLOCKS = BLOCKS_ALONG * BLOCKS_ALONG
+"""Blocks of a grid. A texel behind the relays holds the ball around those of a block: middle and radius."""
+GRID = RELAYS + BLOCKS
 """Texels of a grid."""
 LOST, SINGLE, DOUBLE = 0.0, 1.0, 2.0
 """States of a relay: its walk ended at a border; no other walk leads to its point; another one does."""
 STEPS = 4
-"""Steps from relay to relay."""
+"""Steps from relay to relay, at most."""
+FROM_GUESS, FROM_NEAREST, FROM_OTHER = 0, 1, 2
+"""Where walks of a pixel begin: in the corrected mapping, at a near relay, where another walk leads."""
 TURN = 0.005
 """Smallest difference of normals, 1 − cosine, that counts against a relay."""
 DOUBT = 0.15
@@ -90,11 +99,17 @@ def from_relay(
 def walk_from(start: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
     """Return where a walk from relay to relay ends, for a point at w from the centre."""
     at = start
+    last = wp.int32(-1)
     for _step in range(STEPS):
         relay = relay_number(at)
+        number = SIDE * relay[1] + relay[0]
+        if number == last:
+            break
+        last = number
         seen = from_relay(relay[0], relay[1], first, w, n_q, index)
-        if seen[3] >= 0.0:
-            at = wp.vec2(seen[0], seen[1])
+        if seen[3] < 0.0:
+            break
+        at = wp.vec2(seen[0], seen[1])
     return at
 
 
@@ -131,20 +146,40 @@ def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index
 
 @wp.func
 def nearest_relay(first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
-    """Return the place of the relay nearest to a point at w, among those whose normal agrees best."""
+    """Return the place of the relay nearest to a point at w, among those whose normal agrees best.
+
+    Blocks whose balls are farther than the best relay are left out. The block in the nearest ball is first.
+    """
+    begin = wp.int32(0)
+    least = wp.float32(1.0e30)
+    for block in range(BLOCKS):
+        ball = index.walks[first + RELAYS + block]
+        farthest = wp.length(w - xyz(ball)) + ball[3]
+        if farthest < least:
+            least = farthest
+            begin = block
     found = wp.vec2(0.0, 0.0)
     least = wp.float32(1.0e30)
-    for row in range(SIDE):
-        for column in range(SIDE):
-            texel = first + RELAY * (SIDE * row + column)
-            last = index.walks[texel + 2]
-            if last[3] != LOST:
-                normal = wp.normalize(wp.cross(xyz(index.walks[texel + 1]), xyz(last)))
+    for turn in range(BLOCKS):
+        block = (begin + turn) % BLOCKS
+        ball = index.walks[first + RELAYS + block]
+        gap = wp.max(wp.length(w - xyz(ball)) - ball[3], 0.0)
+        if gap * gap < least:
+            row = BLOCK * int((float(block) + 0.5) / float(BLOCKS_ALONG))
+            column = BLOCK * (block % BLOCKS_ALONG)
+            for k in range(BLOCK * BLOCK):
+                up = int((float(k) + 0.5) / float(BLOCK))
+                right = k - BLOCK * up
+                texel = first + RELAY * (SIDE * (row + up) + column + right)
                 offset = w - xyz(index.walks[texel])
-                distance = wp.dot(offset, offset) + AGREEMENT * (1.0 - wp.dot(normal, n_q))
+                distance = wp.dot(offset, offset)
                 if distance < least:
-                    least = distance
-                    found = relay_place(column, row)
+                    last = index.walks[texel + 2]
+                    normal = wp.normalize(wp.cross(xyz(index.walks[texel + 1]), xyz(last)))
+                    distance += AGREEMENT * (1.0 - wp.dot(normal, n_q))
+                    if distance < least and last[3] != LOST:
+                        least = distance
+                        found = relay_place(column + right, row + up)
     return found
 
 
@@ -165,20 +200,32 @@ def walked_place(owner: wp.int32, w: wp.vec3, n_q: wp.vec3, guess: wp.vec2, inde
     if head[0] < 0.0:
         return wp.vec3(guess[0], guess[1], 0.0)
     first = int(head[1]) + GRID * int(head[0])
-    at = walk_from(guess, first, w, n_q, index)
-    found = between_relays(at, first, w, n_q, index)
-    if nearness(found[2]) < 1.0 or found[3] > OTHER_FACE:
-        nearest = walk_from(nearest_relay(first, w, n_q, index), first, w, n_q, index)
-        second = between_relays(nearest, first, w, n_q, index)
-        if second[2] + SPACING * second[3] < found[2] + SPACING * found[3]:
-            at = nearest
-            found = second
-    relay = relay_number(at)
-    texel = first + RELAY * (SIDE * relay[1] + relay[0])
-    if index.walks[texel + 2][3] == DOUBLE:
-        other = wp.vec2(index.walks[texel][3], index.walks[texel + 1][3])
-        second = between_relays(walk_from(other, first, w, n_q, index), first, w, n_q, index)
-        shorter = wp.length(wp.vec2(second[0], second[1])) < wp.length(wp.vec2(found[0], found[1]))
-        if shorter and nearness(second[2]) == 1.0 and second[3] < found[3] + TURN:
-            found = second
+    start = guess
+    at = guess
+    found = wp.vec4(guess[0], guess[1], FAR * SPACING, 1.0)
+    begun = wp.int32(FROM_GUESS)
+    for _walk in range(3):  # one loop: calls are inlined, and three of them would take many registers
+        end = walk_from(start, first, w, n_q, index)
+        seen = between_relays(end, first, w, n_q, index)
+        better = begun == FROM_GUESS
+        if begun == FROM_NEAREST:
+            better = seen[2] + SPACING * seen[3] < found[2] + SPACING * found[3]
+        if begun == FROM_OTHER:
+            shorter = wp.length(wp.vec2(seen[0], seen[1])) < wp.length(wp.vec2(found[0], found[1]))
+            better = shorter and nearness(seen[2]) == 1.0 and seen[3] < found[3] + TURN
+        if better:
+            at = end
+            found = seen
+        if begun == FROM_OTHER:
+            break
+        if begun == FROM_GUESS and (nearness(found[2]) < 1.0 or found[3] > OTHER_FACE):
+            begun = FROM_NEAREST
+            start = nearest_relay(first, w, n_q, index)
+        else:
+            relay = relay_number(at)
+            texel = first + RELAY * (SIDE * relay[1] + relay[0])
+            if index.walks[texel + 2][3] != DOUBLE:
+                break
+            begun = FROM_OTHER
+            start = wp.vec2(index.walks[texel][3], index.walks[texel + 1][3])
     return wp.vec3(found[0], found[1], nearness(found[2]))

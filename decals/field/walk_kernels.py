@@ -12,7 +12,7 @@ digits of float32.
 import warp as wp
 
 from decals.field.mapping import tangent_coordinates, unroll
-from decals.field.walk import DOUBLE, GRID, LOST, RELAY, SIDE, SINGLE, SPACING, relay_place
+from decals.field.walk import DOUBLE, LOST, RELAY, RELAYS, SIDE, SINGLE, SPACING, relay_place
 from decals.record import xyz
 
 wp.set_module_options({"enable_backward": False})
@@ -219,7 +219,7 @@ def join_relays(texels: wp.array(dtype=wp.vec4)):
     last = texels[RELAY * i + 2]
     if last[3] == LOST:
         return
-    grid = GRID * (i // (SIDE * SIDE))
+    grid = RELAYS * (i // (SIDE * SIDE))
     number = i % (SIDE * SIDE)
     own = relay_place(number % SIDE, number // SIDE)
     end = xyz(texels[RELAY * i])

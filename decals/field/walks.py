@@ -10,7 +10,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.kernels import loaded
 from decals.field.mapping import ImageMapping
-from decals.field.walk import GRID, SIDE
+from decals.field.walk import BLOCK, BLOCKS, BLOCKS_ALONG, GRID, LOST, RELAY, RELAYS, SIDE
 from decals.field.walk_kernels import (
     WalkedMesh,
     WalkStart,
@@ -145,23 +145,28 @@ def _walk(rows: Float32Array, meshes: Sequence[MeshSurface]) -> tuple[Int32Array
     numbers, grids = [np.zeros(0, np.int64)], [np.zeros((0, GRID, 4), np.float32)]
     for number, mesh in enumerate(meshes):
         own = np.flatnonzero(mesh_of == number)
-        for first in range(0, len(own), BLOCK):
-            part = own[first : first + BLOCK]
+        for first in range(0, len(own), AT_ONCE):
+            part = own[first : first + AT_ONCE]
             needed, made = _grids(rows[part], mesh)
             numbers.append(part[needed])
             grids.append(made)
     return np.concatenate(numbers).astype(np.int32), np.concatenate(grids)
 
 
-BLOCK = 256
-"""Decals whose grids are made at once; 441 relays of each take 21 KB."""
+NOWHERE = 1e6
+"""Coordinate of balls without relays, in visible radii."""
+ROUNDING = 1e-5
+"""Excess of the radius of balls, for rounding."""
+
+AT_ONCE = 256
+"""Decals whose grids are made at once; 441 relays of each take 22 KB."""
 
 
 def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Array]:
     """Return True for the decals that need relays, and the grids of these."""
     starts: Any = wp.array(_starts(rows, mesh), dtype=WalkStart, device="cpu")
     relays = len(rows) * SIDE * SIDE
-    placed: Any = wp.zeros(len(rows) * GRID, dtype=wp.vec4, device="cpu")
+    placed: Any = wp.zeros(len(rows) * RELAYS, dtype=wp.vec4, device="cpu")
     texels: Any = wp.zeros_like(placed)
     wp.launch(loaded(place_relays, "cpu"), relays, [starts, _walked(mesh)], [placed], device="cpu")
     wp.launch(loaded(smooth_relays, "cpu"), relays, [placed], [texels], device="cpu")
@@ -171,10 +176,26 @@ def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Arr
     ]
     wp.launch(loaded(compare_relays, "cpu"), relays, [*frames, texels], [errors], device="cpu")
     needed = errors.numpy().reshape(len(rows), -1).max(axis=1) > TOLERANCE
-    grids = texels.numpy().reshape(len(rows), GRID, 4)[needed]
+    grids = texels.numpy().reshape(len(rows), RELAYS, 4)[needed]
     joined: Any = wp.array(grids.reshape(-1, 4), dtype=wp.vec4, device="cpu")
     wp.launch(loaded(join_relays, "cpu"), len(grids) * SIDE * SIDE, [joined], device="cpu")
-    return needed, joined.numpy().reshape(-1, GRID, 4)
+    grids = joined.numpy().reshape(-1, RELAYS, 4)
+    return needed, np.concatenate([grids, _balls(grids)], axis=1)
+
+
+def _balls(grids: Float32Array) -> Float32Array:
+    """Return the balls around the blocks of relays, ``float32[g, BLOCKS, 4]``; empty ones are far away."""
+    along = BLOCKS_ALONG, BLOCK
+    blocks = grids.reshape(-1, *along, *along, RELAY, 4).transpose(0, 1, 3, 2, 4, 5, 6)
+    blocks = blocks.reshape(-1, BLOCKS, BLOCK * BLOCK, RELAY, 4)
+    lost = blocks[..., 2, 3:] == LOST
+    points = blocks[..., 0, :3]
+    low, high = np.where(lost, np.inf, points).min(axis=2), np.where(lost, -np.inf, points).max(axis=2)
+    middle = np.where(low <= high, 0.5 * low + 0.5 * high, NOWHERE)
+    reach = np.linalg.norm(np.where(lost, middle[:, :, None], points) - middle[:, :, None], axis=3).max(
+        axis=2
+    )
+    return np.concatenate([middle, (1.0 + ROUNDING) * reach[..., None]], axis=2).astype(np.float32)
 
 
 def _walked(mesh: MeshSurface) -> Any:

@@ -10,7 +10,7 @@ from blobtree import HalfSpace, Intersection, Point
 from decals.errors import InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
-from decals.field.walk import GRID
+from decals.field.walk import GRID, LOST, RELAY, RELAYS, SIDE
 from decals.field.walks import Walks
 from decals.index.editor import DecalEditor
 from decals.model import Decals
@@ -179,6 +179,11 @@ def test_walks_on_hostile_meshes() -> None:
     )
     walks = Walks.over(decals, [surface])
     assert np.isfinite(walks.texels).all()
+    grids = walks.texels[len(walks) :].reshape(-1, GRID, 4)
+    for row, column in np.ndindex(SIDE, SIDE):  # the ball of a block holds its relays
+        first, ball = RELAY * (SIDE * row + column), grids[:, RELAYS + 7 * (row // 3) + column // 3]
+        away = np.linalg.norm(grids[:, first, :3] - ball[:, :3], axis=1)
+        assert ((away <= ball[:, 3]) | (grids[:, first + 2, 3] == LOST)).all()
     points, normals = surface.project(rng.uniform(-1, 1, (2000, 3)))
     seen = evaluate(decals, points, normals, mapping="walked", walks=walks, device="cpu")
     assert np.isfinite(seen.uv).all()
