@@ -251,6 +251,11 @@ def _vtk_matrix(matrix: Float64Array) -> vtkMatrix4x4:
     return result
 
 
+NOT_WALKED = (
+    "mapping: expected 'corrected' or 'chord' with decals applied to actors, got 'walked', "
+    "which walks over the objects of the scene; add the mesh with plotter.decals.add_mesh instead"
+)
+
 INJECTED_TEXTURES = 6
 """Texture units of an injected shader: images, records, limits, and the three arrays of the index."""
 
@@ -279,19 +284,21 @@ class InjectedDecals:
         self, actor: Any, *, follow: bool, crease_angle: float, labels: tuple[str, ...] | None = None
     ) -> None:
         """Show the decals on an actor."""
-        self.check_mapping(self._subplot.mapping, applied=True)
+        if self._subplot.mapping is ImageMapping.WALKED:
+            raise InvalidScene(NOT_WALKED)
         self._release(self._of(actor))
         self._injections.append(
             Injection(self._subplot, actor, follow=follow, labels=labels, crease_angle=crease_angle)
         )
 
-    def check_mapping(self, mapping: ImageMapping, *, applied: bool = False) -> None:
-        """Raise InvalidScene for a mapping that actors cannot be drawn in, if there are or will be any."""
-        if mapping is ImageMapping.WALKED and (applied or self._injections):
-            raise InvalidScene(
-                "mapping: expected 'corrected' or 'chord' with decals applied to actors, got 'walked', "
-                "which walks over the objects of the scene; add the mesh with plotter.decals.add_mesh instead"
-            )
+    def refuse(self, mapping: ImageMapping) -> bool:
+        """Return True if there are actors that cannot be drawn in a mapping."""
+        return mapping is ImageMapping.WALKED and bool(self._injections)
+
+    def check_mapping(self, mapping: ImageMapping) -> None:
+        """Raise InvalidScene if there are actors that cannot be drawn in a mapping."""
+        if self.refuse(mapping):
+            raise InvalidScene(NOT_WALKED)
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor.

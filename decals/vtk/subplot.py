@@ -35,7 +35,7 @@ from decals.validation import finite_number, member, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
-from decals.vtk.injection import InjectedDecals
+from decals.vtk.injection import NOT_WALKED, InjectedDecals
 from decals.vtk.proxy_actor import ProxyActor, box_around
 from decals.vtk.window_title import WindowTitle
 
@@ -208,6 +208,7 @@ class SubplotRenderer(KnownAttributes):
         if scene is not None:
             check_scene(scene)
         self._drop_cleared_scene()
+        self.applied.check_mapping(self._drawing_of(scene).mapping)
         self._scene, self._failed = scene, None
         if scene is None:
             self._proxy_actor.remove()
@@ -281,8 +282,12 @@ class SubplotRenderer(KnownAttributes):
 
         A document that is edited takes over these modes, and can change them.
         """
-        drawing = drawing_of(self._scene)
-        return drawing if hasattr(self._scene, "draw_as") else replace(drawing, **self._settings)
+        return self._drawing_of(self._scene)
+
+    def _drawing_of(self, scene: SceneLike | None) -> Drawing:
+        """Return how a scene would be drawn."""
+        drawing = drawing_of(scene)
+        return drawing if hasattr(scene, "draw_as") else replace(drawing, **self._settings)
 
     def _draw_with(self, name: str, value: Any) -> None:
         """Set a mode, also of an edited document, which saves it."""
@@ -522,6 +527,8 @@ class SubplotRenderer(KnownAttributes):
         picking = getattr(getattr(self.plotter, "picking", None), "_picker_in_use", False)
         if picking and self._enclosed:
             messages = [*messages, PICKERS]
+        if self.applied.refuse(self.mapping):  # an edited document has changed its own
+            messages = [*messages, NOT_WALKED]
         for message in messages:
             if message not in self._warned:
                 self._warned.add(message)

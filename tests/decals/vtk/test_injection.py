@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from decals.editing.document import Document
 from decals.errors import InvalidScene
+from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import Buffers
-from decals.rendering.options import RenderOptions
+from decals.rendering.options import Drawing, RenderOptions
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
@@ -445,3 +447,18 @@ def test_other_mappers_are_refused(plotter: Factory, kind: str) -> None:
     }
     with pytest.raises(InvalidScene, match="vtkPolyDataMapper"):
         pl.decals.apply(add[kind]())
+
+
+def test_actors_refuse_scenes_with_walked_images(plotter: Factory) -> None:
+    """An edited document can change its mapping later, which brings a warning."""
+    mesh = torus()
+    pl, _ = subplot_with(plotter, mesh, decals_over(mesh))
+    shown = pl.decals.scene
+    with pytest.raises(InvalidScene, match="mapping: expected 'corrected' or 'chord'"):
+        pl.decals.add_scene(shown.replace(drawing=Drawing(mapping=ImageMapping.WALKED)))
+    assert pl.decals.scene is shown
+    document = Document.from_scene(shown)
+    pl.decals.subplot.scene = document
+    document.draw_as(Drawing(mapping=ImageMapping.WALKED))
+    with pytest.warns(UserWarning, match="mapping: expected 'corrected' or 'chord'"):
+        shot(pl)
