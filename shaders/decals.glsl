@@ -36,8 +36,7 @@ vec3 posed_direction(vec3 along, vec3 n) {
 #ifdef MATERIALS
 // Sums over the decals of a pixel with materials, each by the part of it that is seen: of normals and 1, of roughness,
 // metalness and 1, and of emission and occlusion.
-uniform sampler2DArray decal_normals;    // alpha times x, y, roughness, metalness
-uniform sampler2DArray decal_emissions;  // alpha times emission, occlusion
+uniform sampler2DArray decal_materials;  // image i: 2i alpha times x, y, roughness, metalness; 2i + 1 emission, occlusion
 float material_left;                     // part of the pixel that upper decals leave
 vec4 material_normals;
 vec2 material_values;
@@ -85,7 +84,7 @@ DecalHit decal_at(vec3 q, vec3 n) {
 #ifdef MATERIALS
 // Add the maps of a decal's image at a place with derivatives: part of the pixel, normal there, frame of the decal.
 void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3 n, vec3 n_p, vec3 u) {
-    vec4 maps = textureGrad(decal_normals, place, dx, dy);
+    vec4 maps = textureGrad(decal_materials, vec3(place.xy, 2.0 * place.z), dx, dy);
     if (maps.z <= 0.0 || alpha <= 0.0) {
         return;  // no material
     }
@@ -106,7 +105,7 @@ void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3
     float part = material_left * opacity;
     material_normals += part * alpha * vec4(normalize(normal), 1.0);
     material_values += part * maps.zw;
-    material_glow += part * textureGrad(decal_emissions, place, dx, dy);
+    material_glow += part * textureGrad(decal_materials, vec3(place.xy, 2.0 * place.z + 1.0), dx, dy);
 }
 #endif
 

@@ -26,7 +26,7 @@ from decals.record import Contact, balls_nested, has_cells
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
-from decals.rendering.materials import MaterialArrays, Relief
+from decals.rendering.materials import MaterialArray, Relief
 from decals.rendering.pixel_pass import (
     PixelPass,
     Program,
@@ -83,7 +83,7 @@ class DecalPass:
         filtered: bool = False,
         rest: RestBuffer | None = None,
         masks: DataTexture | None = None,
-        materials: MaterialArrays | None = None,
+        materials: MaterialArray | None = None,
         relief: Relief | None = None,
         lights: Lighting | None = None,
         walks: DataTexture | None = None,
@@ -125,16 +125,19 @@ class DecalPass:
             set_uniform(program, "decal_mapping", int(mapping))
             set_uniform(program, "decal_stiffness", stiffness)
             decals.use(program, unit + 1)
-            others: dict[str, Any] = {} if materials is None else dict(materials.textures)
-            for name, data in (("object_masks", masks), ("decal_walks", walks)):
-                if data is not None:
-                    others[name] = data.texture
             if relief is not None:
-                others["decal_reliefs"] = relief.texture
                 relief.use(program, lights)
-            for number, (name, other) in enumerate(others.items(), unit + 1 + decals.texture_count):
-                other.use(number)
-                set_uniform(program, name, number)
+            unit += 1 + decals.texture_count
+            for name, data in (
+                ("decal_materials", materials),
+                ("decal_reliefs", relief),
+                ("object_masks", masks),
+                ("decal_walks", walks),
+            ):
+                if data is not None:
+                    data.texture.use(unit)
+                    set_uniform(program, name, unit)
+                    unit += 1
         painting.run(rectangle.rows(part))
 
     def read_decal(self, tile: Tile) -> Float32Array:

@@ -1,4 +1,4 @@
-"""Maps and heights of materials on the GPU, beside the images of decals: layer i belongs to image i."""
+"""Maps and heights of materials on the GPU, beside the images of decals."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,37 +14,28 @@ from decals.rendering.options import ImageLike, SceneLike
 from decals.rendering.pixel_pass import Program, set_uniform
 
 
-class MaterialArrays:
-    """Maps of the materials among images; layers of other images are zero.
+class MaterialArray:
+    """Maps of the materials among images, two layers for each; those of other images are zero.
 
     Texels are multiplied by the alpha of the base colour, so that filtering ignores transparent ones. They
-    are (x and y of the normal, roughness, metalness), and (emission in linear light, occlusion).
-
-    Attributes
-    ----------
-    textures : dict
-        The two arrays by the names of their samplers.
+    are (x and y of the normal, roughness, metalness), and (emission in linear light, occlusion). One array
+    for both keeps the decal pass within the 16 texture units that every driver has.
     """
 
     def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
-        self.textures = {
-            name: context.gl.texture_array((shape[1], shape[0], len(images)), 4, dtype="f2")
-            for name in ("decal_normals", "decal_emissions")
-        }
-        for layer, image in enumerate(images):
-            for texture, texels in zip(self.textures.values(), _texels(image, shape), strict=True):
-                region = (0, 0, layer, shape[1], shape[0], 1)
-                texture.write(texels[::-1].astype(np.float16).tobytes(), viewport=region)
-        for texture in self.textures.values():
-            texture.repeat_x = texture.repeat_y = False
-            texture.build_mipmaps()
-            texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-            texture.anisotropy = context.anisotropy
+        self.texture = context.gl.texture_array((shape[1], shape[0], 2 * len(images)), 4, dtype="f2")
+        layers = (texels for image in images for texels in _texels(image, shape))
+        for layer, texels in enumerate(layers):
+            region = (0, 0, layer, shape[1], shape[0], 1)
+            self.texture.write(texels[::-1].astype(np.float16).tobytes(), viewport=region)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.texture.build_mipmaps()
+        self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self.texture.anisotropy = context.anisotropy
 
     def release(self) -> None:
         """Release the memory."""
-        for texture in self.textures.values():
-            texture.release()
+        self.texture.release()
 
 
 STEPS_PER_RADIUS = 16

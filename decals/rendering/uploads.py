@@ -25,7 +25,7 @@ from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.materials import (
     RELIEF_LOOKUPS,
-    MaterialArrays,
+    MaterialArray,
     Relief,
     ReliefArray,
     has_materials,
@@ -531,7 +531,7 @@ class UploadedScene:
     decals: DecalData | None
     images: ImageArray | None
     masks: DataTexture | None = None
-    materials: MaterialArrays | None = None
+    materials: MaterialArray | None = None
     relief: Relief | None = None
     walks: DataTexture | None = None
 
@@ -555,7 +555,7 @@ class Uploads:
         self._drawables: GpuCache[Drawable] = GpuCache()
         self._decals: GpuCache[DecalData] = GpuCache()
         self._images: GpuCache[ImageArray] = GpuCache()
-        self._materials: GpuCache[MaterialArrays] = GpuCache()
+        self._materials: GpuCache[MaterialArray] = GpuCache()
         self._reliefs: GpuCache[ReliefArray] = GpuCache()
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
         self._walks: tuple[tuple[int, ...], tuple[object, ...], Walks, DataTexture] | None = None
@@ -594,13 +594,13 @@ class Uploads:
             self._walks[3].release()
         self._walks = None
 
-    def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArrays | None:
+    def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArray | None:
         """Return the maps of a scene's images; None without any."""
         if images is None or not has_materials(scene):
             return None
         shape = images.height, images.width
         return self._materials.get(
-            lambda: MaterialArrays(self.context, scene.images, shape), images, *scene.images
+            lambda: MaterialArray(self.context, scene.images, shape), images, *scene.images
         )
 
     def _relief_of(self, scene: SceneLike, images: ImageArray | None) -> Relief | None:

@@ -1,5 +1,6 @@
 """The decal pass at every pixel: against float64 brute force, against Warp, and the colours that it makes."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -15,10 +16,12 @@ from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import viewpoint as tile
 from decals.rendering.context import Context
+from decals.rendering.decal_pass import decal_library, decal_program
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject
+from decals.shaders import compose
 from decals.surfaces.mesh import MeshSurface
 from tests.decals.rendering.pictures import (
     SIZE,
@@ -112,6 +115,18 @@ def test_every_pixel_of_walked_images(renderer: Renderer, layered: bool) -> None
         assert (errors > 0.02).mean() < 0.003
         plain = evaluate(editor, *points, device="cpu")
         assert (np.abs(plain.uv - buffers.uv[seen])[same].max(axis=1) > 0.02).mean() > 0.1
+
+
+@pytest.mark.parametrize("other", ["posed", "relief"])
+def test_no_scene_needs_more_textures_than_every_driver_has(context: Context, other: str) -> None:
+    library = decal_library(Contact.ELASTIC, layered=True, limited=True, nested=True, walked=True)
+    variant = {"limited": True, "materials": True, other: True}
+    names = set(decal_program(context, library, **variant))
+    slots = {"decals": "//@ include decals.glsl", "functions": library, "relief": "//@ include relief.glsl"}
+    text = compose("decal_pass.glsl", slots=slots, version=None).text
+    samplers = names & set(re.findall(r"uniform i?sampler\w+ (\w+);", text))
+    assert {"decal_walks", "decal_materials", "object_masks"} < samplers
+    assert len(samplers) <= 16
 
 
 @pytest.mark.parametrize("contact", list(Contact))
