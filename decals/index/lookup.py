@@ -24,6 +24,9 @@ ABOVE_ALL = 1 << 23
 NESTING_SLACK = 1.0e-5
 """Relative enlargement of the larger of two decals that may be nested, above the rounding of all devices."""
 
+MAX_TESTED = 1000
+"""Most candidates in a cell that are tested for nesting; the time of more would grow with their square."""
+
 MIX_X = wp.constant(wp.uint32(0x1B873593))
 MIX_Y = wp.constant(wp.uint32(0x27D4EB2F))
 MIX_Z = wp.constant(wp.uint32(0x165667B1))
@@ -223,14 +226,19 @@ def are_nested_contact(decal: wp.int32, other: wp.int32, decals: wp.array(dtype=
 
 @wp.kernel
 def find_nested(index: IndexedDecals, found: wp.array(dtype=wp.int32)):
-    """Write 1 if two contact decals are nested.
+    """Write 1 if two contact decals are nested, or if a decal has more than MAX_TESTED candidates.
 
     By `balls_nested`, with radii a ≤ b, the distance of their centres is at most b/√(1 − MIN_KEPT_RADIUS²) =
     1.023 b. The larger one reaches 1.266 b, so the index lists it at the centre of the smaller one.
     """
     i = wp.tid()
+    if found[0] != 0:
+        return
     for level in range(index.level_count):
         span = cell_range(xyz(index.records[RECORD * i]), level, index)
+        if span[1] - span[0] > MAX_TESTED:
+            found[0] = 1
+            return
         for j in range(span[0], span[1]):
             if are_nested_contact(i, index.ids[j], index.records):
                 found[0] = 1

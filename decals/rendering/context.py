@@ -215,7 +215,7 @@ class Context:
         if program is None:
             program = compiled()
         self._programs[key] = program  # the last one now
-        if len(self._programs) > MAX_PROGRAMS:
+        while len(self._programs) > MAX_PROGRAMS:
             oldest: Any = self._programs.pop(next(iter(self._programs)))
             weakref.finalize(oldest, self._unused.append, oldest.mglo).atexit = False
         kept: Compiled = program

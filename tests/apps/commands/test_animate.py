@@ -156,7 +156,7 @@ def test_the_command_turns_and_poses(vtk_display: None, folder: Path, capsys: Ca
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["-o", "a.avi"], ".gif, .mp4"),
+        (["-o", "a.avi"], ".gif or .mp4"),
         (["-o", "nowhere/a"], "could not make the output folder"),
         (["-o", "a", "--frames", "0"], "--frames"),
         (["-o", "a", "--poses", "none.py"], "--poses: expected a Python file"),

@@ -30,7 +30,7 @@ def test_a_save_writes_what_was_there_when_it_was_asked_for(
     assert begun.wait(LONG)
     session.do(ScaleDecals([1], 3.0))
     assert session.modified
-    assert "save" in actions.state.background.progress
+    assert "saving" in actions.state.background.progress
     assert not path.exists()
     go.set()
     finish(actions)
@@ -73,7 +73,7 @@ def test_saving_and_a_long_edit_go_on_together(tmp_path: Path, monkeypatch: pyte
     press(actions, "save")
     assert begun.wait(LONG)
     actions.state.background.edit("scale", step_of(ScaleDecals(np.arange(60), 2.0)))
-    assert "save" in actions.state.background.progress
+    assert "saving" in actions.state.background.progress
     assert "scale" in actions.state.background.progress
     go.set()
     finish(actions)
