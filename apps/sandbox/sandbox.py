@@ -343,16 +343,31 @@ class Sandbox:
             self._window.actions.perform(action, lambda: self._window.tools.at(width / 2, height / 2))
 
     def go_to(self, entry: int) -> None:
-        """Undo or redo until so many entries of the history are done."""
-        with self._reported():
-            session = self._window.session
-            total = len(session.labels) + len(session.undone_labels)
-            entry = whole_number("history", entry, 0, total, InvalidEdit)
-            self._window.background.require_idle(computing=False)
-            while len(session.labels) > entry:
+        """End a drag, then undo or redo until so many entries of the history are done."""
+        session = self._window.session
+
+        def step() -> None:
+            while len(session.labels) > number:
                 session.undo()
-            while len(session.labels) < entry:
-                session.redo()
+            while len(session.labels) < number and session.redo() is not None:
+                pass
+
+        with self._reported():
+            total = len(session.labels) + len(session.undone_labels)
+            number = whole_number("history", entry, 0, total, InvalidEdit)
+            self._when_idle(step)
+
+    def _when_idle(self, step: Callable[[], None]) -> None:
+        """End a drag and take a step once its edits are adopted; `InvalidEdit` while another edit runs."""
+        background = self._window.background
+
+        def followed() -> None:
+            background.require_idle(computing=False)
+            step()
+
+        if self._window.session.stroke_open:
+            self._window.actions.trees.end_drag()
+        background.when_followed(followed)
 
     # -- files ------------------------------------------------------------------------------------------
 
@@ -375,13 +390,17 @@ class Sandbox:
         self.in_lesson = False
         if self._before_lesson is None:
             return
-        (entry, camera), self._before_lesson = self._before_lesson, None
-        with self._reported():
-            self._window.background.require_idle(computing=False)
+        entry, camera = self._before_lesson
+
+        def step() -> None:
+            self._before_lesson = None
             session = self._window.session
             while session.labels and session.next_undo is not entry:
                 session.undo()
             self.display.restore_camera(camera)
+
+        with self._reported():
+            self._when_idle(step)
 
     def new_model(self) -> None:
         """Begin an empty scene."""

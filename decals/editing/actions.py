@@ -189,25 +189,33 @@ class Actions:
     @action("undo", "Ctrl+z", summary="undo", group=Group.SCENE)
     def undo(self, _cursor: Cursor) -> None:
         """Undo the last entry."""
-        self._step_through_history(self.state.session.next_undo, "undo", _undo)
+        self._step_through_history(lambda: self.state.session.next_undo, "undo", _undo)
 
     @action("redo", "Ctrl+y", "Ctrl+Shift+z", summary="redo", group=Group.SCENE)
     def redo(self, _cursor: Cursor) -> None:
         """Redo the entry that was undone last."""
-        self._step_through_history(self.state.session.next_redo, "redo", _redo)
+        self._step_through_history(lambda: self.state.session.next_redo, "redo", _redo)
 
     def _step_through_history(
-        self, entry: UndoEntry | None, name: str, step: Callable[[EditSession, UndoEntry], str]
+        self,
+        next_entry: Callable[[], UndoEntry | None],
+        name: str,
+        step: Callable[[EditSession, UndoEntry], str],
     ) -> None:
-        """Undo or redo an entry, in the background if it changes many decals."""
+        """Undo or redo an entry after the steps of a drag, in the background if it changes many decals."""
         state = self.state
-        state.background.require_idle(computing=False)
-        if entry is None:
-            state.message = f"nothing to {name}"
-        elif are_many(entry.edit.after.numbers):
-            state.background.edit(name, lambda session: step(session, entry))
-        else:
-            state.message = step(state.session, entry)
+
+        def followed() -> None:
+            state.background.require_idle(computing=False)
+            entry = next_entry()
+            if entry is None:
+                state.message = f"nothing to {name}"
+            elif are_many(entry.edit.after.numbers):
+                state.background.edit(name, lambda session: step(session, entry))
+            else:
+                state.message = step(state.session, entry)
+
+        state.background.when_followed(followed)
 
     @action(
         "next_contact",

@@ -326,13 +326,21 @@ class BackgroundJobs:
             self.edit(label, step)
 
     def when_followed(self, call: Callable[[], None]) -> None:
-        """Call a function once all steps of `edit_latest` are adopted; calls keep their order."""
-        self._when_idle.append(call)
-        self._call_waiting()
+        """Call a function once all steps of `edit_latest` are adopted; calls keep their order.
+
+        If it is called later, its errors become the message.
+        """
+        if not self._when_idle and not self._following:
+            call()
+        else:
+            self._when_idle.append(call)
 
     def _call_waiting(self) -> None:
         while self._when_idle and not self._following:
-            self._when_idle.pop(0)()
+            try:
+                self._when_idle.pop(0)()
+            except ImplicitDecalsError as error:
+                self._show(str(error))
 
     def require_idle(self, *, computing: bool = True) -> None:
         """Refuse a new edit while another one runs.

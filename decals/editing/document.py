@@ -133,6 +133,11 @@ class Edit:
         parts = vars(self.parts_after).values()
         return not len(self.after.numbers) and all(part is None for part in parts)
 
+    @property
+    def objects(self) -> tuple[SceneObject, ...]:
+        """Objects before the edit, then those after it; none if they stay."""
+        return *(self.parts_before.objects or ()), *(self.parts_after.objects or ())
+
     def then(self, later: "Edit") -> "Edit":
         """Return one edit that does this one and then a later one."""
         return Edit(

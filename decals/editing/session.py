@@ -12,11 +12,15 @@ from decals.editing.visibility import check_locks
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.files import save_scene
+from decals.scenes.objects import forget_surface
 from decals.scenes.scene import Scene
 from decals.validation import describe, instance
 
 MAX_REPLAYED_DECALS = 500
 """A session repeats a fork's edits of at most so many decals; otherwise it adopts the fork's index."""
+
+MAX_SURFACES = 8
+"""Entries whose objects keep their surfaces, before the present state and after it; others compute them again."""
 
 
 class Command(Protocol):
@@ -142,7 +146,7 @@ class EditSession:
         history = self._history
         history.undone.clear()
         if history.stroke is None:
-            history.done.append(UndoEntry(command.label, edit))
+            self._append(history.done, UndoEntry(command.label, edit))
         else:
             history.stroke = UndoEntry(history.stroke.label, history.stroke.edit.then(edit))
         self._notify(edit)
@@ -154,7 +158,7 @@ class EditSession:
         if not self._history.done:
             return None
         entry = self._history.done.pop()
-        self._history.undone.append(entry)
+        self._append(self._history.undone, entry)
         self._revert(entry.edit)
         return entry.label
 
@@ -164,10 +168,19 @@ class EditSession:
         if not self._history.undone:
             return None
         entry = self._history.undone.pop()
-        self._history.done.append(entry)
+        self._append(self._history.done, entry)
         self._apply(entry.edit.after, entry.edit.parts_after)
         self._notify(entry.edit)
         return entry.label
+
+    def _append(self, entries: list[UndoEntry], entry: UndoEntry) -> None:
+        """Append an entry; objects that only farther ones have forget their surfaces."""
+        entries.append(entry)
+        if len(entries) > MAX_SURFACES:
+            near = {item for kept in entries[-MAX_SURFACES:] for item in kept.edit.objects}
+            far = entries[-MAX_SURFACES - 1].edit.objects
+            for item in set(far) - near - {*self.document.objects}:
+                forget_surface(item)
 
     def _revert(self, edit: Edit) -> None:
         self._apply(edit.before, edit.parts_before)
@@ -216,7 +229,7 @@ class EditSession:
         stroke, self._history.stroke = self._history.stroke, None
         self._revision += stroke is not None
         if stroke is not None and not stroke.edit.empty:
-            self._history.done.append(stroke)
+            self._append(self._history.done, stroke)
 
     def revert_stroke(self) -> None:
         """Restore the state at the beginning of the open stroke, and keep the stroke open."""

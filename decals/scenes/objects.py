@@ -244,6 +244,13 @@ class TreeObject(Immutable):
 SceneObject = MeshObject | TreeObject
 
 
+def forget_surface(item: SceneObject) -> None:
+    """Drop what was computed for a tree's surface, some megabytes; it is computed again when needed."""
+    if isinstance(item, TreeObject):
+        for name in ("surface", "_shown_part"):
+            vars(item).pop(name, None)
+
+
 def _labels(item: SceneObject) -> dict[str, Any]:
     """Return the checked labels of an object, and whether it takes only decals that name it."""
     return {

@@ -238,6 +238,12 @@ def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWind
     assert sandbox.values()["done"] == ["set radius"]
     sandbox.perform("undo")
     assert digest(window.document) == before
+    for last in (False, True):  # the history ends a drag, and waits for the check of the surface
+        sandbox.set_value("radius", 0.8, last)
+        sandbox.go_to(0)
+        finish(window)
+        assert digest(window.document) == before
+        assert sandbox.values()["undone"] == ["set radius"]
 
 
 def test_the_ends_of_a_slider_stay_while_it_moves(window: EditWindow) -> None:

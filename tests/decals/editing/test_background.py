@@ -147,6 +147,22 @@ def test_one_edit_at_a_time_and_who_comes_next_is_told() -> None:
     assert actions.state.background.progress == ""
 
 
+def test_an_undo_waits_for_the_steps_of_a_drag() -> None:
+    actions = threaded()
+    session, first = actions.state.session, digest(actions.state.session.document)
+    held = Held(ScaleDecals(np.arange(60), 2.0))
+    actions.state.begin_stroke("drag")
+    actions.state.background.edit_latest("scale", held)
+    assert held.begun.wait(LONG)
+    actions.state.end_stroke()
+    press(actions, "undo")
+    assert actions.state.message != BUSY
+    held.go.set()
+    finish(actions)
+    assert digest(session.document) == first
+    assert (session.labels, session.undone_labels) == ((), ("drag",))
+
+
 def test_escape_drops_what_goes_on() -> None:
     actions = threaded()
     first = digest(actions.state.session.document)

@@ -6,10 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.editing import AddDecals, DeleteDecals, EditSession, MoveDecals, ScaleDecals, SetValues
+from blobtree.nodes.surgery import dominant_primitive
+from decals.editing import (
+    AddDecals,
+    DeleteDecals,
+    EditSession,
+    MoveDecals,
+    PaintPrimitive,
+    ScaleDecals,
+    SetValues,
+)
 from decals.errors import InvalidDecals, InvalidEdit, InvalidScene
 from decals.scenes.files import load_scene
-from tests.decals.editing.scenes import digest, one, scene
+from tests.decals.editing.scenes import digest, one, scene, tree_of
 
 
 @pytest.fixture
@@ -35,6 +44,24 @@ def test_a_drag_is_one_entry(session: EditSession) -> None:
     assert session.redo() == "drag"
     assert digest(session.document) == last
     assert session.redo() is None
+
+
+def test_objects_of_far_entries_forget_their_surfaces(
+    session: EditSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.editing.session.MAX_SURFACES", 2)
+    first, objects = digest(session.document), []
+    path = dominant_primitive(tree_of(session.document), np.zeros(3, np.float32))
+    for blue in (0.2, 0.4, 0.6, 0.8):
+        session.do(PaintPrimitive(0, path, (0.0, 0.0, blue)))
+        objects.append(session.document.objects)
+        assert session.document.objects[0].surface.area > 1.0
+    assert ["surface" in vars(tree) for tree, _ in objects] == [False, True, True, True]
+    assert all("surface" in vars(mesh) for _, mesh in objects)
+    while session.undo():
+        assert session.document.objects[0].surface.area > 1.0
+    assert digest(session.document) == first
+    assert ["surface" in vars(tree) for tree, _ in objects] == [True, True, False, False]
 
 
 def test_a_cancelled_stroke_leaves_no_trace(session: EditSession) -> None:
