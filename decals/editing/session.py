@@ -20,7 +20,7 @@ MAX_REPLAYED_DECALS = 500
 """A session repeats a fork's edits of at most so many decals; otherwise it adopts the fork's index."""
 
 MAX_SURFACES = 8
-"""Entries whose objects keep their surfaces, before the present state and after it; others compute them again."""
+"""Entries before the present state, and after it, whose objects keep surfaces; others compute them again."""
 
 
 class Command(Protocol):

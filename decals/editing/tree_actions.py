@@ -76,7 +76,7 @@ class TreeActions:
     def __init__(self, state: ActionState) -> None:
         self._state = state
         self._color_index = 0
-        self._handle_drag: HandleDrag | None = None
+        self._handle_drag: tuple[HandleDrag, tuple[int, Path]] | None = None
 
     # -- the selected primitive -------------------------------------------------------------------------
 
@@ -173,15 +173,15 @@ class TreeActions:
 
     def begin_handle_drag(self, name: str, ray: Ray, length: float) -> None:
         """Begin to drag a handle of the selected node, with the pointer at a ray."""
-        handles = self.handles(length)
-        if name not in [handle.name for handle in handles]:
+        handles, selected = self.handles(length), self._state.primitive
+        if selected is None or name not in [handle.name for handle in handles]:
             known = ", ".join(handle.name for handle in handles) or "none"
             raise InvalidEdit(f"handle: expected one of the selected node, {known}, got {describe(name)}")
-        self._handle_drag = HandleDrag(handles, name, ray, length)
+        self._handle_drag = HandleDrag(handles, name, ray, length), selected
         self._state.begin_stroke(name)
 
     def drag_handle(self, ray: Ray, *, snap: bool = False) -> None:
-        """Drag the handle to the pointer's ray.
+        """Drag the handle to the pointer's ray, while its node is selected and has it.
 
         Parameters
         ----------
@@ -190,8 +190,11 @@ class TreeActions:
         snap
             If True, moves, turns and scales go in round steps.
         """
-        drag, selected = self._handle_drag, self._state.primitive
-        if drag is None or selected is None or not self._state.session.stroke_open:
+        if self._handle_drag is None or not self._state.session.stroke_open:
+            return
+        drag, selected = self._handle_drag
+        names = [handle.name for handle in self.handles(drag.length)]
+        if selected != self._state.primitive or drag.name not in names:
             return
         step = (self._state.snap or snap_distance(drag.length)) if snap else self._state.snap
         command: MovePrimitive | TransformPrimitive | SetParameter | None = None

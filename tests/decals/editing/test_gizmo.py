@@ -115,6 +115,9 @@ def test_a_drag_follows_the_pointer_is_one_entry_and_is_undone(name: str) -> Non
     session.undo()
     assert digest(session.document) == state
     actions.trees.drag_handle((eye, target - eye))  # the drag has ended
+    actions.trees.begin_handle_drag(name, (eye, place - eye), 0.5)
+    actions.trees.select_node(0, (0,))
+    actions.trees.drag_handle((eye, target - eye))  # another node, a point without ends, is selected now
     assert digest(session.document) == state
 
 
