@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.console import Console
 
 from decals.errors import InvalidInput
+from decals.validation import make_folder
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 
@@ -31,7 +32,7 @@ def check_animation(path: Path, suffixes: tuple[str, ...]) -> None:
     if path.suffix and not path.is_dir():
         check_output(path, suffixes)
     else:
-        make_folder(path)
+        make_folder(path, InvalidInput)
         _check_writable(path)
 
 
@@ -48,19 +49,3 @@ def _check_writable(folder: Path) -> None:
 def print_path(path: Path) -> None:
     """Say on stdout which file was written."""
     Console().print(str(path), soft_wrap=True, highlight=False, markup=False)
-
-
-def make_folder(folder: Path) -> None:
-    """Create a folder if it does not exist.
-
-    Raises
-    ------
-    InvalidInput
-        If its parent is missing or read-only, or a file has its name.
-    """
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise InvalidInput(
-            f"could not make the output folder {str(folder)!r} ({error.strerror}); choose another"
-        ) from error

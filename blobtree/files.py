@@ -20,7 +20,7 @@ from pathlib import Path
 PREFIX = ".implicit-decals-"
 """Start of the name of a temporary file; the machine, the process and a random part follow."""
 
-NAME = re.compile(re.escape(PREFIX) + r"(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{12}(\.\w+)?")
+NAME = re.compile(re.escape(PREFIX) + r"(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{12}(\.\w+)*")
 
 MAX_AGE = 86_400.0
 """Seconds after which a temporary file of another machine counts as left behind."""
@@ -30,6 +30,7 @@ MAX_AGE = 86_400.0
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path with the suffix of ``path``; on success, move its file to ``path``.
 
+    The suffix is in lower case, as VTK's writers add their own to any other.
     The file gets the permissions, and where allowed the owner, of the file that it replaces. If ``path`` is a
     symbolic link, its target is replaced. On an error the temporary file is removed.
 
@@ -45,7 +46,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         _check_target(target)
         _remove_abandoned(target.parent)
         process = f"{_machine()}-{os.getpid()}-{uuid.uuid4().hex[:12]}"
-        temporary = target.with_name(f"{PREFIX}{process}{target.suffix}")
+        temporary = target.with_name(f"{PREFIX}{process}{target.suffix.lower()}")
         yield temporary
         _finish(temporary, target)
     except OSError as error:
@@ -59,8 +60,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise OSError(errno.EINVAL, f"not a possible path ({error})", name) from error
     finally:
         if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
+            _remove_all_of(temporary)
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
@@ -112,6 +112,15 @@ def _remove_abandoned(folder: Path) -> None:
                 known = match["machine"] == _machine() and os.name == "posix"
                 old = time.time() - entry.stat().st_mtime > MAX_AGE
                 if old or (known and not _is_running(int(match["process"]))):
+                    Path(entry.path).unlink()
+
+
+def _remove_all_of(temporary: Path) -> None:
+    """Remove a temporary file, and those of a writer that added a suffix to its name."""
+    with suppress(OSError):
+        for entry in os.scandir(temporary.parent):
+            if entry.name.startswith(temporary.name):
+                with suppress(OSError):
                     Path(entry.path).unlink()
 
 

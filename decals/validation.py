@@ -1,12 +1,14 @@
 """Checks of arguments: each returns the checked value, or raises an error that says what was expected."""
 
 import math
+import os
+import tempfile
 from collections.abc import Callable, Collection
 from enum import Enum, IntEnum
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
 from blobtree.colors import color_rgb, is_named
 from blobtree.validation import is_whole, real
-from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, MissingPackage
+from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, InvalidScene, MissingPackage
 
 T = TypeVar("T")
 E = TypeVar("E", bound=Enum)
@@ -190,6 +192,45 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def as_path(path: object) -> Path:
+    """Return the path of a file; InvalidScene for values of other types."""
+    try:
+        return Path(cast("str | os.PathLike[str]", path))
+    except TypeError:
+        raise InvalidScene(f"path: expected the path of a file, got {describe(path)}; give a text") from None
+
+
+def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Path:
+    """Return the path of a file with one of these suffixes that can be written, or raise InvalidScene."""
+    known = " or ".join(suffixes)
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidScene(f"path: expected the path of a {known} file, got {describe(path)}")
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise InvalidScene(f"path: expected a file that ends in {known}, got {str(path)!r}; rename it")
+    if path.is_dir():
+        raise InvalidScene(f"path: expected a file, {str(path)!r} is a folder; add a file name")
+    folder = path.parent
+    if not folder.is_dir():
+        raise InvalidScene(f"path: the folder {str(folder)!r} does not exist; create it first")
+    try:
+        tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof
+    except OSError as error:
+        raise InvalidScene(
+            f"path: the folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
+        ) from error
+    return path
+
+
+def make_folder(folder: Path, error: type[ImplicitDecalsError]) -> None:
+    """Create a folder for output if it does not exist; raise an error if that fails or it is a file."""
+    try:
+        folder.mkdir(exist_ok=True)
+    except (OSError, ValueError) as cause:
+        reason = "it is a file" if isinstance(cause, FileExistsError) else getattr(cause, "strerror", cause)
+        raise error(f"could not make the output folder {str(folder)!r} ({reason}); choose another") from cause
 
 
 def optional_package(name: str, extra: str) -> ModuleType:

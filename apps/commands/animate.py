@@ -21,7 +21,12 @@ from decals.apps.commands.options import (
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
-from decals.apps.models.loading import import_definitions, import_module_or_file, load_models
+from decals.apps.models.loading import (
+    call_imported,
+    import_definitions,
+    import_module_or_file,
+    load_models,
+)
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_animation, print_path
 from decals.apps.views import UPRIGHT, frame, parse_view
@@ -65,8 +70,9 @@ def animate(
     model
         Models as for render, or one saved scene.
     output
-        A folder for pictures frame_0001.png and so on; or a video that ends in .gif or .mp4. For .mp4 the
-        package imageio-ffmpeg is needed.
+        A folder for pictures frame_0001.png and so on, in which those of an earlier run are replaced, and
+        later ones removed; or a video that ends in .gif or .mp4. For .mp4 the package imageio-ffmpeg is
+        needed.
     frames
         Number of frames. Default: 120, or the number of meshes.
     rate
@@ -139,7 +145,7 @@ def _pose_function(module: str) -> Poses:
     function: Poses | None = getattr(import_module_or_file("--poses", module), "pose", None)
     if not callable(function):
         raise InvalidInput(f"--poses {module}: expected a function pose(t), found none; define one")
-    return function
+    return lambda t: call_imported("--poses", module, function, t)
 
 
 def _mesh_function(scene: Scene, files: Sequence[str]) -> Poses:

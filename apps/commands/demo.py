@@ -20,10 +20,11 @@ from decals.apps.commands.options import MAX_SAMPLES, TILE, Whole, check_count, 
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.gallery import spanning
 from decals.apps.models.shapes import creature, egg
-from decals.apps.output import check_output, make_folder, print_path
-from decals.errors import NoGraphics
+from decals.apps.output import check_output, print_path
+from decals.errors import InvalidInput, NoGraphics
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
+from decals.validation import make_folder
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 
@@ -79,7 +80,7 @@ def demo(
     """
     pixels = parse_size(size)
     check_count("--samples", samples, 1, MAX_SAMPLES)
-    make_folder(output)
+    make_folder(output, InvalidInput)
     for name in PICTURES:
         check_output(output / name, (".png",))
     with progress_bars() as progress, Renderer(max_tile=TILE) as renderer:

@@ -10,8 +10,9 @@ from rich.table import Table
 
 from decals.apps import gallery as examples
 from decals.apps.commands.options import Whole, check_count
-from decals.apps.output import PICTURE_SUFFIXES, check_output, make_folder, print_path
+from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
 from decals.errors import InvalidInput
+from decals.validation import make_folder
 
 FOLDER = Path("gallery")
 """Default folder of the pictures of all examples."""
@@ -46,7 +47,7 @@ def gallery(
         raise InvalidInput(f"expected --all or the name of an example, got both; leave out {name!r} or --all")
     if all_:
         folder = output or FOLDER
-        make_folder(folder)
+        make_folder(folder, InvalidInput)
         _draw({each: folder / f"{each}.png" for each in examples.EXAMPLES}, side)
     elif name is not None:
         _draw({name: output or Path(f"{name}.png")}, side)

@@ -4,10 +4,11 @@ import importlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
@@ -101,7 +102,19 @@ def import_module_or_file(option: str, module: str) -> ModuleType:
     try:
         return _import(module)
     except (Exception, SystemExit) as error:
-        raise InvalidInput(f"{option} {module}: {_location(error)}{type(error).__name__}: {error}") from error
+        frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.name == "<module>"]
+        raise _failed(f"{option} {module}", frames, error) from error
+
+
+def call_imported(option: str, module: str, function: Callable[..., Any], *arguments: object) -> Any:
+    """Return what a function of the module that an option names returns; its errors are InvalidInput."""
+    try:
+        return function(*arguments)
+    except (Exception, SystemExit) as error:
+        inner = traceback.extract_tb(error.__traceback__)[1:]
+        frames = [frame for frame in inner if frame.filename == inner[0].filename]
+        call = f"{getattr(function, '__name__', 'function')}({', '.join(map(repr, arguments))})"
+        raise _failed(f"{option} {module}, {call}", frames, error) from error
 
 
 def _import(module: str) -> ModuleType:
@@ -129,8 +142,8 @@ def _add_search_path(folder: Path) -> None:
         sys.path.append(str(folder))
 
 
-def _location(error: BaseException) -> str:
-    """Return "file:line: " of the failed statement, or "" if the message names it or no statement ran."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.name == "<module>"]
+def _failed(what: str, frames: Sequence[traceback.FrameSummary], error: BaseException) -> InvalidInput:
+    """Return the error of a user's code that failed, with "file:line: " unless its message has it."""
     known = not frames or frames[-1].filename in str(error)
-    return "" if known else f"{frames[-1].filename}:{frames[-1].lineno}: "
+    place = "" if known else f"{frames[-1].filename}:{frames[-1].lineno}: "
+    return InvalidInput(f"{what}: {place}{type(error).__name__}: {error}")

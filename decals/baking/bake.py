@@ -1,9 +1,7 @@
 """`bake`: a scene as a GLB file whose texture or vertex colours show the decals."""
 
 import os
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -30,7 +28,7 @@ from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
 from decals.surfaces.convert import Model
-from decals.validation import describe, optional_package, whole_number
+from decals.validation import checked_path, optional_package, whole_number
 
 SUFFIX = ".glb"
 
@@ -229,25 +227,3 @@ def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[
         return known, Decals.empty(), [], Drawing()
     pixels = [image.pixels for image in known.images]
     return known.objects, known.decals, pixels, drawing_of(known)
-
-
-def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Path:
-    """Return the path of a file with one of these suffixes that can be written, or raise InvalidScene."""
-    known = " or ".join(suffixes)
-    if not isinstance(path, str | os.PathLike):
-        raise InvalidScene(f"path: expected the path of a {known} file, got {describe(path)}")
-    path = Path(path)
-    if path.suffix.lower() not in suffixes:
-        raise InvalidScene(f"path: expected a file that ends in {known}, got {str(path)!r}; rename it")
-    if path.is_dir():
-        raise InvalidScene(f"path: expected a file, {str(path)!r} is a folder; add a file name")
-    folder = path.parent
-    if not folder.is_dir():
-        raise InvalidScene(f"path: the folder {str(folder)!r} does not exist; create it first")
-    try:
-        tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof
-    except OSError as error:
-        raise InvalidScene(
-            f"path: the folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
-        ) from error
-    return path

@@ -12,7 +12,7 @@ from blobtree.meshing.polygonize import polygonize
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
 from blobtree.validation import truth
-from decals.baking.bake import SUFFIX, SurfaceColors, bake, checked_path
+from decals.baking.bake import SUFFIX, SurfaceColors, bake
 from decals.baking.meshes import bake_mesh
 from decals.errors import InvalidMesh, InvalidScene
 from decals.field.evaluate import evaluate
@@ -31,7 +31,7 @@ from decals.surfaces.normals import split_at_creases
 from decals.surfaces.subdivide import means, subdivided
 from decals.surfaces.surface import unit_rows
 from decals.surfaces.topology import welded
-from decals.validation import real_number
+from decals.validation import checked_path, real_number
 
 if TYPE_CHECKING:
     import pyvista as pv

@@ -14,8 +14,8 @@ from decals.editing.commands import ReplaceScene
 from decals.editing.session import EditSession
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.scenes.camera import Camera
-from decals.scenes.files import as_path
 from decals.scenes.scene import Scene
+from decals.validation import as_path
 
 AUTOSAVE_SECONDS = 5.0
 """Time between two writes of the recovery file while a scene changes, and that after which a stroke ends."""

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from io import BytesIO
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.progressive import Targets
 from decals.rendering.viewpoint import Tile
+from decals.validation import as_path
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,7 +71,7 @@ class Picture:
         Raises
         ------
         InvalidScene
-            If the suffix is unknown or the file cannot be written.
+            If the path is no path, its suffix is unknown, or the file cannot be written.
 
         Examples
         --------
@@ -79,7 +79,7 @@ class Picture:
         >>> picture = decals.render(blobtree.Point((0, 0, 0), radius=1), size=(32, 24), samples=1)
         >>> picture.save(pathlib.Path(tempfile.mkdtemp()) / "ball.jpg")
         """
-        path = Path(path)
+        path = as_path(path)
         file_format = Image.registered_extensions().get(path.suffix.lower())
         if file_format not in Image.SAVE:
             raise InvalidScene(

@@ -1,6 +1,7 @@
 """Animations: one picture after another, as files in a folder or as a video."""
 
 import os
+import re
 from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,13 +20,24 @@ from decals.rendering.picture import Picture, on_white
 from decals.rendering.renderer import Renderer
 from decals.scenes.pose import PosedScene
 from decals.scenes.scene import Scene
-from decals.validation import describe, finite_number, optional_package, real_number, whole_number
+from decals.validation import (
+    checked_path,
+    describe,
+    finite_number,
+    make_folder,
+    optional_package,
+    real_number,
+    whole_number,
+)
 
 MAX_FRAMES = 100_000
 """Largest number of frames that a turntable has."""
 
 VIDEO_SUFFIXES = (".gif", ".mp4")
 """Suffixes of the files that `animate` writes; without a suffix it writes a folder."""
+
+_FRAME = re.compile(r"frame_([0-9]{4}|[1-9][0-9]{4,})\.png")
+"""Names that `animate` gives to pictures in a folder."""
 
 _RATE = "a number of frames per second from 0.1 to 240"
 
@@ -99,7 +111,8 @@ def animate(
     path : str or path
         A folder for pictures ``frame_0001.png``, ``frame_0002.png`` and so on, made if it does not exist; or
         a video that ends in ".gif" or ".mp4", in which transparent pixels are white. An .mp4 file needs the
-        package imageio-ffmpeg.
+        package imageio-ffmpeg. Once all pictures are written, those of a longer animation that was in the
+        folder are removed.
     size : (int, int)
         Width and height in pixels, even for .mp4 files.
     rate : float
@@ -122,7 +135,7 @@ def animate(
     Raises
     ------
     InvalidScene
-        There is no frame, one is of another kind, or an argument is out of range.
+        There is no frame, one is of another kind, an argument is out of range, or the path cannot be used.
     MissingPackage
         imageio-ffmpeg is not installed.
     NoGraphics
@@ -173,16 +186,18 @@ def animate(
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
-    """Return where to write, and make the folder of pictures."""
+    """Return where to write; the folder of a video is checked."""
     try:
         target = Path(path)
     except TypeError:
         raise InvalidScene(f"path: expected a folder or a file, got {describe(path)}") from None
-    if target.suffix and target.suffix.lower() not in VIDEO_SUFFIXES and not target.is_dir():
+    if not target.suffix or target.is_dir():
+        return target
+    if target.suffix.lower() not in VIDEO_SUFFIXES:
         raise InvalidScene(
             f"path: expected a folder, or a file that ends in .gif or .mp4, got {str(target)!r}; rename it"
         )
-    return target
+    return checked_path(target, VIDEO_SUFFIXES)
 
 
 @contextmanager
@@ -207,8 +222,24 @@ def _sink(target: Path, size: Size, rate: float) -> Iterator[_Sink]:
                 finally:
                     stream.close()
         case _:
-            target.mkdir(exist_ok=True)
-            yield lambda pixels, number: Picture(pixels).save(target / f"frame_{number:04d}.png")
+            make_folder(target, InvalidScene)
+            count = 0
+
+            def write(pixels: UInt8Array, number: int) -> None:
+                nonlocal count
+                Picture(pixels).save(target / f"frame_{number:04d}.png")
+                count = number
+
+            yield write
+            _remove_later_frames(target, count)
+
+
+def _remove_later_frames(folder: Path, count: int) -> None:
+    """Remove the pictures of a longer animation from a folder that got ``count`` new ones."""
+    for file in list(folder.iterdir()):
+        match = _FRAME.fullmatch(file.name)
+        if match is not None and int(match[1]) > count and file.is_file():
+            file.unlink()
 
 
 def _opaque(pixels: UInt8Array) -> Image.Image:

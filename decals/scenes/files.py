@@ -29,7 +29,7 @@ Numbers are the shortest decimals that give the same float32 again. Paths are re
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import msgspec
 from msgspec import Raw, Struct
@@ -62,7 +62,7 @@ from decals.scenes.records import (
     relative,
 )
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, instance, is_file
+from decals.validation import as_path, instance, is_file
 
 PART = 500
 """Decals that are described at a time."""
@@ -195,14 +195,6 @@ def load_scene(
         return from_json(text, folder=path.parent, samples=samples, trust=trust)
     except InvalidScene as error:
         raise InvalidScene(f"{str(path)!r}: {error}") from error
-
-
-def as_path(path: object) -> Path:
-    """Return the path of a file; InvalidScene for values of other types."""
-    try:
-        return Path(cast("str | os.PathLike[str]", path))
-    except TypeError:
-        raise InvalidScene(f"path: expected the path of a file, got {describe(path)}; give a text") from None
 
 
 def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> bytes:

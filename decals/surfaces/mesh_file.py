@@ -82,6 +82,8 @@ def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> Me
     """
     import pyvista as pv
 
+    if isinstance(dataset, pv.MultiBlock) and _is_empty(dataset):
+        raise InvalidMesh(f"{name!r} has no block with faces; give a surface mesh")
     _check_cells(dataset, name)
     surface = (
         dataset if isinstance(dataset, pv.PolyData) else dataset.extract_surface(algorithm="dataset_surface")
@@ -122,6 +124,15 @@ def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> Me
 
     surface = pv.PolyData.from_irregular_faces(vertices, areal)
     return vertices, surface.triangulate().regular_faces.astype(np.int32)
+
+
+def _is_empty(dataset: Any) -> bool:
+    """Return True if neither a dataset nor any of its blocks has cells."""
+    import pyvista as pv
+
+    if isinstance(dataset, pv.MultiBlock):
+        return all(_is_empty(block) for block in dataset)
+    return getattr(dataset, "n_cells", 0) == 0
 
 
 def _check_cells(dataset: Any, name: str) -> None:

@@ -92,6 +92,22 @@ def test_videos(vtk_display: None, folder: Path, monkeypatch: pytest.MonkeyPatch
     np.testing.assert_array_equal(sent[solid], expected[solid][:, :3])
 
 
+def test_frames_of_a_longer_animation_are_removed(vtk_display: None, folder: Path) -> None:
+    kept = [
+        "frame_0001.png",
+        "frame_0002.png",
+        "frame_003.png",
+        "frame_00003.png",
+        "frame_0004.jpg",
+        "my_frame_0004.png",
+    ]
+    (folder / "turn").mkdir()
+    for name in [*kept[1:], "frame_0003.png", "frame_10000.png"]:
+        (folder / "turn" / name).write_bytes(b"")
+    decals.animate(decals.turntable(scene(), 2), "turn", size=SIZE)
+    assert sorted(file.name for file in (folder / "turn").iterdir()) == sorted(kept)
+
+
 def test_cancelled_work_leaves_whole_pictures_only(vtk_display: None, folder: Path) -> None:
     calls = iter([False, False, False, True])
     with pytest.raises(Cancelled):
@@ -108,6 +124,12 @@ def test_cancelled_work_leaves_whole_pictures_only(vtk_display: None, folder: Pa
         ({"path": "turn.avi"}, r"\.gif or \.mp4, got 'turn.avi'"),
         ({"path": "turn.mp4", "size": (33, 24)}, "even width and height"),
         ({"path": 3}, "expected a folder or a file"),
+        ({"path": "nowhere/turn"}, "could not make the output folder"),
+        ({"path": "nowhere/turn.gif"}, "folder 'nowhere' does not exist"),
+        ({"path": "file"}, "'file' .it is a file.; choose another"),
+        ({"path": "file/turn"}, "Not a directory"),
+        ({"path": "file/turn.gif"}, "folder 'file' does not exist"),
+        ({"path": "turn\0"}, "null"),
         ({"rate": 0}, "frames per second"),
         ({"count": 0}, "count"),
         ({"samples": 0}, "samples"),
@@ -115,10 +137,11 @@ def test_cancelled_work_leaves_whole_pictures_only(vtk_display: None, folder: Pa
     ],
 )
 def test_invalid_animations(folder: Path, wrong: dict[str, Any], message: str) -> None:
+    (folder / "file").write_bytes(b"")
     given: dict[str, Any] = {"frames": [scene()], "path": "turn", **wrong}
     with pytest.raises(InvalidScene, match=message):
         decals.animate(**given)
-    assert not list(folder.iterdir())
+    assert [entry.name for entry in folder.iterdir()] == ["file"]
 
 
 @pytest.mark.parametrize("wrong", [{"scene": 3}, {"count": 0}, {"turns": "x"}])
@@ -143,6 +166,12 @@ def test_the_command_turns_and_poses(vtk_display: None, folder: Path, capsys: Ca
     assert run(["animate", "scene.json", *SMALL, "--frames", "4", "--poses", "walk.py", "-o", "walk"]) == 0
     moved = decals.render(decals.pose(one, {"body": np.add(vertices, (0.5, 0, 0))}), size=SIZE)
     np.testing.assert_array_equal(picture(folder / "walk/frame_0003.png"), np.asarray(moved))
+
+    (folder / "fall.py").write_text("def pose(t):\n    return {'body': t}['x']\n")
+    assert run(["animate", "scene.json", *SMALL, "--frames", "4", "--poses", "fall.py", "-o", "walk"]) == 2
+    line = " ".join(capsys.readouterr().err.split())
+    assert "--poses fall.py, pose(0.0): " in line
+    assert "fall.py:2: KeyError: 'x'" in line
 
     faces = np.column_stack([np.full(4, 3), one.objects[0].faces])  # type: ignore[union-attr]
     for name, shift in (("a.ply", 0.0), ("b.ply", 0.5)):

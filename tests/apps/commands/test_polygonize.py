@@ -14,14 +14,14 @@ from decals.apps.cli import run
 Capture = pytest.CaptureFixture[str]
 
 
-@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "vtp"])
+@pytest.mark.parametrize("suffix", ["ply", "PLY", "obj", "OBJ", "stl", "STL", "vtp"])
 def test_polygonize(folder: Path, suffix: str) -> None:
     blobtree.save(Point((1, 2, 3), radius=0.5, color=(1.0, 0.5, 0.0)), folder / "ball.json")
     assert run(["polygonize", "ball.json", "--resolution", "32", "-o", f"ball.{suffix}"]) == 0
     mesh = pv.read(folder / f"ball.{suffix}")
     assert np.allclose(np.linalg.norm(mesh.points - [1, 2, 3], axis=1), 0.5, atol=1e-3)
     assert mesh.triangulate().volume == pytest.approx(4 / 3 * np.pi * 0.125, rel=0.02)
-    if suffix in ("ply", "vtp"):
+    if suffix.lower() in ("ply", "vtp"):
         assert np.asarray(mesh["RGB"])[0].tolist() == [255, 128, 0]
     assert sorted(path.name for path in folder.iterdir()) == sorted(["ball.json", f"ball.{suffix}"])
 

@@ -2,6 +2,7 @@
 
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,12 @@ def test_other_formats_lie_on_white(tmp_path: Path, suffix: str) -> None:
 def test_other_paths_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(InvalidScene, match="picture"):
         picture().save(tmp_path / name)
+
+
+@pytest.mark.parametrize("wrong", [None, BytesIO(), b"a.png"], ids=["none", "stream", "bytes"])
+def test_values_that_are_no_paths_are_refused(wrong: Any) -> None:
+    with pytest.raises(InvalidScene, match="path: expected the path of a file, got"):
+        picture().save(wrong)
 
 
 def test_notebooks_get_a_png() -> None:

@@ -103,7 +103,8 @@ HOSTILE = [
     square(vertices=[[0, 0]]),
     square(vertices=[[0, 0, np.nan]] * 4), square(vertices="x"), square(vertices=[[0, 0, 0]] * 4),
     square(faces=[[0, 1, 2], [0, "x", 3]]), pv.PolyData(), pv.PolyData(np.array(CORNERS, np.float32)),
-    pv.Line(), (CORNERS, TRIANGLES, 3), np.zeros((3, 3)),
+    pv.Line(), (CORNERS, TRIANGLES, 3), np.zeros((3, 3)), pv.MultiBlock(),
+    pv.MultiBlock([None]), pv.MultiBlock([pv.MultiBlock([pv.PolyData()])]),
 ]  # fmt: skip
 
 
