@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import blobtree
 from blobtree import InvalidNode, Node, from_json, to_json
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
-from blobtree.nodes.primitives import Falling, Leaf
+from blobtree.nodes.primitives import Falling, Leaf, Pieces
 from blobtree.nodes.values import OPTIONAL, fields_of
 from blobtree.tape.model import bounds_along, gradients_at
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around, random_leaf, random_profile, triple
@@ -26,6 +26,8 @@ Rng = np.random.Generator
 Operand = Callable[[Rng], Node]
 
 EXACT = 1e-4
+JOINTED = 2e-4
+"""For shapes of several pieces, which yield to each other at joints; steep profiles enlarge that."""
 """Largest relative error of values and gradients, absolute below 1."""
 
 AWAY = 2e-3
@@ -207,7 +209,7 @@ def _fields(node: Node, points: Any, what: str) -> Iterator[str]:
     expected = oracle.gradient(node, points[smooth])
     length = np.maximum(1.0, np.linalg.norm(expected, axis=1))
     error = np.linalg.norm(seen[smooth, 1:] - expected, axis=1) / length
-    if error.max(initial=0.0) > EXACT:
+    if error.max(initial=0.0) > (JOINTED if isinstance(node, Pieces) else EXACT):
         yield f"{what}: gradient differs from float64 by {error.max():.3g}"
 
 

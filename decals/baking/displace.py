@@ -18,6 +18,7 @@ from decals.errors import InvalidMesh, InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.walks import Walks, walks_for
 from decals.images.load import encode_srgb
 from decals.index.index import DecalIndex
 from decals.model import Decals
@@ -124,7 +125,7 @@ def displace(
     stiffness : float, optional
         Stiffness of elastic contact, from 1.
     mapping : ImageMapping or str, optional
-        Image mapping: ``"corrected"`` or ``"chord"``.
+        Image mapping: ``"corrected"``, ``"chord"`` or ``"walked"``.
     resolution : int, optional
         Cells along the longest side of a tree's support, before triangles are divided. Default 64.
     creases : bool
@@ -178,6 +179,7 @@ def displace(
     need = _Edges(rows, edge_length)
     objects: list[SceneObject | PosedMesh] = []
     index = DecalIndex.of(known.decals)
+    walks = walks_for(modes.mapping, known.decals, known.objects)
     with reporting(progress, cancel) as report:
         for number, item in enumerate(known.objects):
             report("dividing triangles", number / len(known.objects))
@@ -189,7 +191,7 @@ def displace(
             heights = np.concatenate(
                 [np.zeros(0, np.float32)]
                 + [
-                    _heights(known, modes, index, item, rest.vertices[at], normals[at], report)
+                    _heights(known, modes, index, walks, item, rest.vertices[at], normals[at], report)
                     for at in (slice(k, k + BLOCK) for k in range(0, len(normals), BLOCK))
                 ]
             )
@@ -206,6 +208,7 @@ def _heights(
     scene: Scene,
     modes: Drawing,
     index: DecalIndex,
+    walks: Walks | None,
     item: SceneObject,
     points: Float32Array,
     normals: Float32Array,
@@ -220,6 +223,7 @@ def _heights(
         contact=modes.contact,
         stiffness=modes.stiffness,
         index=index,
+        walks=walks,
         images=scene.images,
         on=item,
     ).height

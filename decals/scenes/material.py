@@ -131,7 +131,9 @@ class DecalMaterial(DecalImage):
         object.__setattr__(self, "relief", self._checked_relief())
 
     @classmethod
-    def load(cls, source: Any, *, folder: Path | None = None, name: str = "") -> "DecalMaterial":
+    def load(
+        cls, source: Any, *, folder: Path | None = None, name: str = "", relief: float = 0.0
+    ) -> "DecalMaterial":
         """Return the material of a folder of maps, which are found by the endings of their names.
 
         Of a file ``steel_Roughness.png`` the ending, in any case, is ``roughness``. MAP_NAMES lists all.
@@ -144,6 +146,8 @@ class DecalMaterial(DecalImage):
             Folder of relative paths. Default: the working directory.
         name : str
             Name of the material. Default: that of the folder.
+        relief : float
+            Height of the value 1 of the height map, in radii of each decal. 0 draws no relief.
 
         Raises
         ------
@@ -180,7 +184,7 @@ class DecalMaterial(DecalImage):
                 f"let the name of one end with {endings}"
             )
         images: dict[str, Any] = {**maps}
-        return cls(name or path.name or str(path), **images)
+        return cls(name or path.name or str(path), relief=relief, **images)
 
     def surface_texels(self) -> tuple[Float32Array, Float32Array]:
         """Return what shaders read: x, y, roughness, metalness; and emission in linear light, occlusion.

@@ -53,6 +53,25 @@ def test_vertices_move_by_the_heights_of_the_decals(hilly: Scene, moved: Displac
         assert np.abs(across).max() < (6e-3 if ball else 1e-6)
 
 
+def test_heights_follow_the_walked_mapping(hilly: Scene) -> None:
+    moved = decals.displace(hilly, edge_length=0.2, mapping="walked")
+    walks = decals.field.Walks.over(hilly.decals, hilly.objects)
+    (cube,) = (item for item in moved.objects if item.name != "ball")
+    assert isinstance(cube, PosedMesh)
+    steps = cube.vertices.astype(float) - cube.rest.vertices
+    normals = np.round((cube.rest.vertices - [1.5, 0, 0]) / 0.6 * 0.501)
+    inner = np.abs(normals).sum(axis=1) == 1
+    points = hilly.decals, cube.rest.vertices[inner], normals[inner]
+    walked, corrected = (
+        decals.evaluate(*points, images=hilly.images, on=cube.rest, mapping=mapping, walks=walks).height
+        for mapping in ("walked", "corrected")
+    )
+    assert walked is not None
+    assert corrected is not None
+    np.testing.assert_allclose(np.einsum("ij,ij->i", steps[inner], normals[inner]), walked, atol=1e-6)
+    assert np.abs(walked - corrected).max() > 0.01
+
+
 def test_a_closed_object_stays_closed_and_edges_are_short(hilly: Scene, moved: DisplacedScene) -> None:
     for item in moved.objects:
         assert isinstance(item, PosedMesh)

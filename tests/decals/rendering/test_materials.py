@@ -231,6 +231,7 @@ def test_folders_of_maps_are_found_by_their_names(tmp_path: Path) -> None:
     assert material.emission[0, 0].tolist() == [1, 2, 3]
     assert material.height is not None
     assert material.height[0, 0] == np.float32(0.2)
+    assert (material.relief, DecalMaterial.load(tmp_path, relief=0.3).relief) == (0.0, 0.3)
     picture_file(tmp_path / "other_rough.png", 3)
     with pytest.raises(InvalidImage, match="expected one file for the map 'roughness', got"):
         DecalMaterial.load(tmp_path)
