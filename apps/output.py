@@ -5,8 +5,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from blobtree.files import make_folder
 from decals.errors import InvalidInput
-from decals.validation import make_folder
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 

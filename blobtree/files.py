@@ -17,6 +17,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from blobtree.errors import ImplicitDecalsError
+
 PREFIX = ".implicit-decals-"
 """Start of the name of a temporary file; the machine, the process and a random part follow."""
 
@@ -132,3 +134,12 @@ def _is_running(process: int) -> bool:
     except PermissionError:  # another user's
         return True
     return True
+
+
+def make_folder(folder: Path, error: type[ImplicitDecalsError]) -> None:
+    """Create a folder for output if it does not exist; raise an error if that fails or it is a file."""
+    try:
+        folder.mkdir(exist_ok=True)
+    except (OSError, ValueError) as cause:
+        reason = "it is a file" if isinstance(cause, FileExistsError) else getattr(cause, "strerror", cause)
+        raise error(f"could not make the output folder {str(folder)!r} ({reason}); choose another") from cause

@@ -224,15 +224,6 @@ def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Pat
     return path
 
 
-def make_folder(folder: Path, error: type[ImplicitDecalsError]) -> None:
-    """Create a folder for output if it does not exist; raise an error if that fails or it is a file."""
-    try:
-        folder.mkdir(exist_ok=True)
-    except (OSError, ValueError) as cause:
-        reason = "it is a file" if isinstance(cause, FileExistsError) else getattr(cause, "strerror", cause)
-        raise error(f"could not make the output folder {str(folder)!r} ({reason}); choose another") from cause
-
-
 def optional_package(name: str, extra: str) -> ModuleType:
     """Return a package of an extra of this project; raise MissingPackage if it is not installed."""
     try:

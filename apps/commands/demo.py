@@ -13,6 +13,7 @@ from rich.console import Console
 
 from blobtree import Progress
 from blobtree._typing import Float32Array, Int32Array
+from blobtree.files import make_folder
 from blobtree.graphics import require_screen
 from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
 from decals.apps.commands.activation import command_lines
@@ -24,7 +25,6 @@ from decals.apps.output import check_output, print_path
 from decals.errors import InvalidInput, NoGraphics
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions
-from decals.validation import make_folder
 
 PICTURES = ("hero.png", "contact.png", "span.png")
 

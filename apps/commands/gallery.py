@@ -8,11 +8,11 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
+from blobtree.files import make_folder
 from decals.apps import gallery as examples
 from decals.apps.commands.options import Whole, check_count
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
 from decals.errors import InvalidInput
-from decals.validation import make_folder
 
 FOLDER = Path("gallery")
 """Default folder of the pictures of all examples."""

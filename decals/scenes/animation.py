@@ -12,7 +12,7 @@ from typing import Protocol
 from PIL import Image
 
 from blobtree._typing import UInt8Array
-from blobtree.files import replacing
+from blobtree.files import make_folder, replacing
 from blobtree.progress import Cancel, Progress, reporting
 from decals.errors import InvalidScene
 from decals.rendering.options import Size, check_scene, drawing_of
@@ -24,7 +24,6 @@ from decals.validation import (
     checked_path,
     describe,
     finite_number,
-    make_folder,
     optional_package,
     real_number,
     whole_number,
