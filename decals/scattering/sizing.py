@@ -265,18 +265,24 @@ def covering_radii(
             trials = _random_points_around(owned.points, TRIALS_PER_PEAK, spread * sample_distance, rng)
             owned = owned.joined(find(trials))
             _grow(radii, owned, limits)
-        report("measuring radii", (len(TRIAL_SPREADS) + 2) / (len(TRIAL_SPREADS) + 3))
-    stages = [(limits, -CLEARANCE)]
-    if even:
-        largest = EVEN_RADIUS_RATIO * float(np.median(radii))
-        radii, stages = (
-            np.minimum(radii, largest),
-            [(np.minimum(limits, largest), -CLEARANCE), (limits, SPECK)],
-        )
-    radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
-    owned = owned.joined(first)
-    for limits, speck in stages:
-        owned = _close_gaps(radii, owned, (1.0 + RADIUS_MARGIN) * limits, speck, find, sample_distance, rng)
+
+        def search(trials: OrientedPoints) -> _OwnedPoints:
+            report("measuring radii", (len(TRIAL_SPREADS) + 2) / (len(TRIAL_SPREADS) + 3))
+            return find(trials)
+
+        stages = [(limits, -CLEARANCE)]
+        if even:
+            largest = EVEN_RADIUS_RATIO * float(np.median(radii))
+            radii, stages = (
+                np.minimum(radii, largest),
+                [(np.minimum(limits, largest), -CLEARANCE), (limits, SPECK)],
+            )
+        radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
+        owned = owned.joined(first)
+        for limits, speck in stages:
+            owned = _close_gaps(
+                radii, owned, (1.0 + RADIUS_MARGIN) * limits, speck, search, sample_distance, rng
+            )
     return radii
 
 
