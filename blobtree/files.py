@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all; every writer of the project goes through `replacing`.
+"""Output files and folders. Files are written whole or not at all: every writer goes through `replacing`.
 
 A writer fills a temporary file in the folder of its target, which then takes the target's place. A crash, a
 kill or a full disk leaves the old file. The next save into the folder removes what a killed process left.

@@ -307,7 +307,8 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
 
     They are those of `cell_owner` and `elastic_contact`. One traversal of the index finds the candidates,
     and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
-    one is the owner, unless it is nested with another holder above it that faces the surface well.
+    one is the owner, unless it is nested with another holder above it that faces the surface well. Only sets
+    with nested decals (`IndexedDecals.nested`) are searched for such a holder.
     """
     closest = wp.int32(NO_OWNER)
     least = wp.float32(0.0)
