@@ -7,7 +7,9 @@ const int ELASTIC = 3;
 const bool PARTED = decal_nested && decal_contact == ELASTIC;  // small decals part the images of larger ones
 const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
-const int SAMPLES = 16;        // parts of pixels with more
+const int SIDE_PARTS = 4;      // parts of each side of pixels with more
+const float MAX_SIDE = 0.15;   // of a pixel or a part of one, in visible radii
+const vec3 EVERYWHERE = vec3(1.0, 0.0, 0.0);  // line with the whole pixel on its inner side
 const float MAX_TAPS = 8.0;    // look-ups of an image along one side of a pixel
 const float SPACING = 0.67;   // of look-ups, relative to the shorter side
 const float SHARPNESS = 0.6;   // texels of a look-up relative to the distance between look-ups
@@ -19,22 +21,22 @@ struct Place {
     vec3 arc;  // length along the surface from the centre, and its changes, in visible radii
 };
 
-// Part of the pixel inside the rim of a decal: share, centre.
-vec3 inside_rim(vec3 arc, vec3 right, vec3 up) {
+// The rim of a decal as a line through the pixel.
+vec3 rim_line(vec3 arc, vec3 right, vec3 up) {
     float bend = dot(right, right) + dot(up, up) - dot(arc.yz, arc.yz);  // a circle's distance from its tangent
-    return positive_part(1.0 - arc.x - max(bend, 0.0) / (24.0 * max(arc.x, 0.25)), -arc.yz);
+    return pixel_line(1.0 - arc.x - max(bend, 0.0) / (24.0 * max(arc.x, 0.25)), -arc.yz);
 }
 
 // The same for the chord, of a decal by its ball.
-vec3 inside_ball(vec3 q, vec3 right, vec3 up, vec4 ball) {
+vec3 ball_line(vec3 q, vec3 right, vec3 up, vec4 ball) {
     vec3 w = (q - ball.xyz) / (RIM * ball.w);
     float chord = max(length(w), 1e-6);
     float scale = 1.0 / (RIM * ball.w);
-    return inside_rim(vec3(chord, vec2(dot(w, right), dot(w, up)) * (scale / chord)), scale * right, scale * up);
+    return rim_line(vec3(chord, vec2(dot(w, right), dot(w, up)) * (scale / chord)), scale * right, scale * up);
 }
 
-// Part of the pixel on a decal's side of its contact line with another one.
-vec3 beside_line(vec3 q, vec3 right, vec3 up, vec4 ball, vec4 other) {
+// The contact line of a decal with another one.
+vec3 contact_line(vec3 q, vec3 right, vec3 up, vec4 ball, vec4 other) {
     vec3 a = q - ball.xyz, b = q - other.xyz;
     float value;
     vec3 slope;
@@ -45,11 +47,7 @@ vec3 beside_line(vec3 q, vec3 right, vec3 up, vec4 ball, vec4 other) {
         value = dot(b, b) / (other.w * other.w) - dot(a, a) / (ball.w * ball.w);
         slope = 2.0 * (b / (other.w * other.w) - a / (ball.w * ball.w));
     }
-    return positive_part(value, vec2(dot(slope, right), dot(slope, up)));
-}
-
-vec3 lesser(vec3 part, vec3 other) {
-    return other.x < part.x ? other : part;
+    return pixel_line(value, vec2(dot(slope, right), dot(slope, up)));
 }
 
 // Elastic contact: z² of a neighbour, and its changes.
@@ -118,7 +116,7 @@ vec4 image_average(int decal, Place place, vec3 q, vec3 n) {
     if (u.w >= 0.0) {
         vec2 texels = vec2(textureSize(decal_images, 0).xy);
         vec2 sides = vec2(length(texels * place.uv_right), length(texels * place.uv_up));
-        float cell = SPACING * clamp(min(sides.x, sides.y), 1.0, max(sides.x, sides.y) * 2.0 / MAX_TAPS);
+        float cell = SPACING * max(min(sides.x, sides.y), 1.0);
         vec2 taps = clamp(floor(sides / cell + 0.7), 1.0, MAX_TAPS);
         vec2 right = place.uv_right / taps.x, up = place.uv_up / taps.y;
         float texel = SHARPNESS * max(sides.x / taps.x, sides.y / taps.y);
@@ -138,15 +136,20 @@ vec4 image_average(int decal, Place place, vec3 q, vec3 n) {
     return fade * tint.w * color * vec4(tint.rgb, 1.0);
 }
 
-// Distance after contact of a decal across a contact line; with one neighbour, for others are farther.
-vec3 contact_with(int decal, int other, vec3 q, vec3 n, vec3 right, vec3 up) {
+// Distance after contact of a decal across a contact line; with the nearest two neighbours, for others are farther.
+vec3 contact_with(int decal, ivec2 others, vec3 q, vec3 n, vec3 right, vec3 up) {
     vec4 ball = decal_texel(4 * decal);
     float per_radius = 1.0 / (RIM * ball.w);
     vec3 w = per_radius * (q - ball.xyz);
-    if (decal_contact == ELASTIC) {
-        return other < 0 ? vec3(0.0) : push_steps(w, per_radius * right, per_radius * up, ball, decal_texel(4 * other));
+    if (decal_contact != ELASTIC) {
+        return vec3(others.x < 0 ? min(length(w), 1.0) : 1.0, 0.0, 0.0);
     }
-    return vec3(other < 0 ? min(length(w), 1.0) : 1.0, 0.0, 0.0);
+    vec3 squares = vec3(0.0);
+    for (int i = 0; i < 2 && others.x >= 0; i++) {
+        squares += push_steps(w, per_radius * right, per_radius * up, ball, decal_texel(4 * others.x));
+        others = ivec2(others.y, -1);
+    }
+    return squares;
 }
 
 // Premultiplied colour of the decals of one layer that share the pixel, with their owner at q. `boundaries` counts the
@@ -160,9 +163,9 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     vec3 squares = vec3(0.0);
     Bumps bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
     ivec2 beside = ivec2(-1);
-    vec2 owner_shares = vec2(1.0);  // of the pixel, on the owner's side of the contact lines with `beside`
-    int above = -1, below = -1, nested_count = 0;
-    float above_share = 0.0;
+    vec3 first_line = EVERYWHERE, second_line = EVERYWHERE;  // contact lines with `beside`
+    int above = -1, below = -1, nested_count = 0, lower_rims = 0;
+    vec3 above_line = -0.5 * EVERYWHERE;
     float half_pixel = 0.5 * (length(right) + length(up));
     boundaries = 0;
     for (int level = 0; level < index_level_count; level++) {
@@ -178,7 +181,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             bool outside = power(offset, RIM * other_ball.w) > 0.0;
             int other_rank = decal_layered ? rank_of(other, decal_records) : 0;
             bool together = pushes && other_rank == rank;
-            bool nested = together && has_cells(decal_contact)
+            bool nested = decal_nested && together
                 && balls_nested(other_ball.xyz - ball.xyz, RIM * ball.w, RIM * other_ball.w);
             if (!together || nested) {
                 bool higher = nested ? is_above(other, owner, decal_records) && lies_on_top(n, other, decal_records)
@@ -187,11 +190,12 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                 if (PARTED && nested) {
                     add_bump(bumps, q, n, right, up, ball, other_ball, other);
                 }
+                vec3 line = ball_line(q, right, up, other_ball);
+                lower_rims += !higher && abs(line.x) < 0.5 ? 1 : 0;
                 if (higher && outside) {
-                    float share = inside_ball(q, right, up, other_ball).x;
-                    boundaries += share > 0.0 ? 1 : 0;
-                    above = share > above_share ? other : above;
-                    above_share = max(share, above_share);
+                    boundaries += line.x > -0.5 ? 1 : 0;
+                    above = line.x > above_line.x ? other : above;
+                    above_line = line.x > above_line.x ? line : above_line;
                 } else if (nested && !outside) {
                     boundaries += higher ? 1 : 0;  // other decals cut it
                     below = higher ? below : other;
@@ -201,13 +205,14 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             if (decal_contact == ELASTIC) {
                 squares += push_steps(w, per_radius * right, per_radius * up, ball, other_ball);
             }
-            float share = beside_line(q, right, up, ball, other_ball).x;
-            boundaries += share < 1.0 ? 1 : 0;
-            if (share < owner_shares.x) {
-                owner_shares = vec2(share, owner_shares.x);
+            vec3 line = contact_line(q, right, up, ball, other_ball);
+            boundaries += line.x < 0.5 ? (half_pixel > MAX_SIDE * RIM * other_ball.w ? MANY : 1) : 0;
+            if (line.x < min(first_line.x, 0.5)) {
+                second_line = first_line;
+                first_line = line;
                 beside = ivec2(other, beside.x);
-            } else if (share < owner_shares.y) {
-                owner_shares.y = share;
+            } else if (line.x < min(second_line.x, 0.5)) {
+                second_line = line;
                 beside.y = other;
             }
         }
@@ -218,22 +223,27 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     // The owner, those beside it or the one below, and the one above in turn; in one loop, because some drivers run
     // code once even where no pixel needs it.
     vec3 owner_part = vec3(1.0, 0.0, 0.0);
-    float bare = 0.0, sum = 0.0;
     vec4 color = vec4(0.0);
     ivec2 others = beside;
     for (int decal = owner; decal >= 0;) {
         bool first = decal == owner, across = decal == beside.x || decal == beside.y;
         vec4 own_ball = decal_texel(4 * decal);
-        vec3 part = inside_ball(q, right, up, own_ball);
-        if (across) {
-            part = lesser(part, beside_line(q, right, up, own_ball, ball));
-            int third = decal == beside.x ? beside.y : beside.x;
-            if (third >= 0) {
-                part = lesser(part, beside_line(q, right, up, own_ball, decal_texel(4 * third)));
+        vec3 part = vec3(1.0, 0.0, 0.0);
+        ivec2 neighbours = ivec2(-1);
+        if (!first) {
+            vec3 line = EVERYWHERE, other_line = EVERYWHERE;
+            if (across) {
+                int third = decal == beside.x ? beside.y : beside.x;
+                neighbours = ivec2(owner, third);
+                line = contact_line(q, right, up, own_ball, ball);
+                if (third >= 0) {
+                    other_line = contact_line(q, right, up, own_ball, decal_texel(4 * third));
+                }
             }
+            part = inner_part(ball_line(q, right, up, own_ball), line, other_line);
         }
         vec3 at = first ? q : q + part.y * right + part.z * up;
-        vec3 contact = first ? squares : contact_with(decal, across ? owner : -1, at, n, right, up);
+        vec3 contact = first ? squares : contact_with(decal, neighbours, at, n, right, up);
         Place place = place_of(decal, at, n, right, up, contact);
         if (PARTED) {
             if (!first) {
@@ -247,20 +257,18 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             }
         }
         if (first) {
-            part = inside_rim(place.arc, per_radius * right, per_radius * up);
-            bare = 1.0 - part.x;
-            boundaries += bare > 0.0 ? 1 : 0;
-            if (beside.x >= 0) {
-                part = lesser(part, beside_line(q, right, up, ball, decal_texel(4 * beside.x)));
+            vec3 rim = rim_line(place.arc, per_radius * right, per_radius * up);
+            boundaries += rim.x < 0.5 ? (lower_rims > 0 ? MANY : 1) : 0;
+            if (boundaries > 0) {
+                part = inner_part(rim, first_line, second_line);
             }
             place.uv += part.y * place.uv_right + part.z * place.uv_up;
             owner_part = part;
             if (below >= 0) {  // the owner lies on it
                 others = ivec2(part.x < 1.0 ? below : -1, -1);
             }
-        } else if (decal != above) {
-            bare = min(bare, 1.0 - part.x);
-            part.x = across ? part.x : min(part.x, 1.0 - owner_part.x);
+        } else if (decal != above && !across) {
+            part.x = min(part.x, 1.0 - owner_part.x);
         }
         vec4 own_color = part.x * image_average(decal, place, at, n);
         if (decal == above) {
@@ -268,13 +276,9 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             break;
         }
         color += own_color;
-        sum += part.x;
         decal = others.x;
         others = ivec2(others.y, -1);
-        if (decal < 0) {
-            color /= max(sum + bare, 1e-6);
-            decal = above;
-        }
+        decal = decal < 0 ? above : decal;
     }
     boundaries += boundaries > 0 && nested_count > 0 && nested_count + boundaries > 2 ? MANY : 0;
     return color;
@@ -283,56 +287,63 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
 // The decal with the largest part of a pixel whose centre no decal covers, or -1.
 int nearest_rim(vec3 q, vec3 n, vec3 right, vec3 up) {
     int nearest = -1;
-    float largest = 0.0;
+    float largest = -0.5;
     for (int level = 0; level < index_level_count; level++) {
         ivec2 span = cell_range(q, level);
         for (int j = span.x; j < span.y; j++) {
             int decal = texelFetch(index_ids, ivec2(j & 4095, j >> 12), 0).x;
             vec4 ball = decal_texel(4 * decal);
-            float share = inside_ball(q, right, up, ball).x;
-            if (share > largest && acts(q - ball.xyz, n, decal)) {
+            float inside = ball_line(q, right, up, ball).x;
+            if (inside > largest && acts(q - ball.xyz, n, decal)) {
                 nearest = decal;
-                largest = share;
+                largest = inside;
             }
         }
     }
     return nearest;
 }
 
-// Premultiplied linear colour of all decals over each other, averaged over a pixel. In pixels with many boundaries it is
-// the mean of SAMPLES parts, each in another row and column.
+// Premultiplied linear colour of all decals over each other, averaged over a pixel. Pixels with many boundaries, or with
+// sides that are long beside their owner, are the mean of several parts.
 vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
     vec4 sum = vec4(0.0);
-    int count = 1;
-    vec3 point = q;
-    for (int i = 0; i < count; i++) {
+    ivec2 parts = ivec2(1);
+    for (int i = 0; i < parts.x * parts.y; i++) {
+        vec2 at = (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
+        vec3 point = q + at.x * right + at.y * up;
+        vec3 part_right = right / float(parts.x), part_up = up / float(parts.y);
         int owner = decal_single_layer ? int(single_layer_at(point, n, decal_contact).x)
                                        : owner_at(point, n, decal_contact);
-        if (owner < 0 && count == 1) {
-            owner = nearest_rim(point, n, right, up);
+        if (owner < 0) {
+            owner = nearest_rim(point, n, part_right, part_up);
+        }
+        bool whole = parts == ivec2(1);
+        if (whole && owner >= 0) {
+            float longest = MAX_SIDE * RIM * decal_texel(4 * owner).w;
+            parts = ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
+            if (parts != ivec2(1)) {
+                i = -1;
+                continue;
+            }
         }
         vec4 color = vec4(0.0);
         int most = 0;
         while (owner >= 0 && color.a < OPAQUE) {
             int boundaries;
-            color += (1.0 - color.a) * layer_average(owner, point, n, right, up, boundaries);
-            most = max(most, boundaries);
+            color += (1.0 - color.a) * layer_average(owner, point, n, part_right, part_up, boundaries);
+            most = most > 0 && boundaries > 0 ? MANY : most + boundaries;  // of layers over each other
             if (!decal_layered) {
                 break;
             }
             owner = owner_below(point, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
                 decal_contact);
         }
-        if (i == 0 && most > MAX_BOUNDARIES) {
-            count = 1 + SAMPLES;
-            right /= sqrt(float(SAMPLES));
-            up /= sqrt(float(SAMPLES));
-        } else {
-            sum += color;
+        if (whole && most > MAX_BOUNDARIES) {
+            parts = ivec2(SIDE_PARTS);
+            i = -1;
+            continue;
         }
-        int mirrored = ((i & 1) << 3) | ((i & 2) << 1) | ((i & 4) >> 1) | (i >> 3);
-        vec2 at = (vec2(float(i), float(mirrored)) + 0.5) / float(SAMPLES) - 0.5;
-        point = q + sqrt(float(SAMPLES)) * (at.x * right + at.y * up);
+        sum += color;
     }
-    return count > 1 ? sum / float(SAMPLES) : sum;
+    return sum / float(parts.x * parts.y);
 }

@@ -2,8 +2,8 @@
 
 A pixel is a parallelogram on the surface's tangent plane, with the steps to the next pixels as its sides. A
 rim or contact line is the zero of a field that is positive on the owner's side. Inside a pixel it is nearly a
-straight line: the field's value at the centre and its change along both sides decide the share of the pixel
-on the positive side, and where that part lies.
+straight line, which the field's value at the centre and its change along both sides give. The part of the
+pixel on the positive side of up to three such lines is a polygon; its area and centre are exact.
 
 The footprint is the change of image coordinates along both sides, for a fixed owner. Differences between
 pixels would cross the edges between owners.
@@ -21,60 +21,92 @@ from decals.field.mapping import ImageMapping, image_distance, tangent_coordinat
 
 wp.set_module_options({"enable_backward": False})
 
-MIN_SIDE = 0.02
-"""Smallest change along the shorter side, relative to the longer one; it bounds cancellation."""
-
-MIN_CHANGE = 1.0e-30
-MIN_LENGTH = 1.0e-6
 MIN_SHARE = 1.0e-4
 """Smallest share of a pixel whose centre is computed."""
 
-
-@wp.func
-def cube_above(x: wp.float32) -> wp.float32:
-    """Return max(x, 0)³."""
-    y = wp.max(x, 0.0)
-    return y * y * y
+MIN_CHANGE = 1.0e-30
+MIN_LENGTH = 1.0e-6
 
 
 @wp.func
-def square_above(x: wp.float32) -> wp.float32:
-    """Return max(x, 0)²."""
-    y = wp.max(x, 0.0)
-    return y * y
+def pixel_line(value: wp.float32, along: wp.vec2) -> wp.vec3:
+    """Return the border of a linear field for `inner_part`, given its value at the centre and its changes.
 
-
-@wp.func
-def positive_part(value: wp.float32, along: wp.vec2) -> wp.vec3:
-    """Return the part of a pixel in which a linear field is positive: its share, and its centre.
-
-    The field is `value` at the pixel's centre and changes by `along` from side to side. Over the pixel it is
-    distributed as the sum of two uniform variables. The share is the integral of that density above 0, the
-    mean the integral of the share over the share. The centre, in sides of the pixel, lies on the gradient.
+    The first number is at least 0.5 where the field is positive in the whole pixel, and at most −0.5 where it
+    is nowhere.
     """
-    longer = wp.max(wp.abs(along[0]), wp.abs(along[1]))
-    if longer < MIN_CHANGE:
+    change = wp.max(wp.abs(along[0]) + wp.abs(along[1]), MIN_CHANGE)
+    return wp.vec3(value / change, along[0] / change, along[1] / change)
+
+
+@wp.func
+def clip_span(span: wp.vec2, value: wp.float32, change: wp.float32) -> wp.vec2:
+    """Return the part of an interval of t where value + change·t > 0; it may end before it begins."""
+    if wp.abs(change) < MIN_CHANGE:
         if value > 0.0:
-            return wp.vec3(1.0, 0.0, 0.0)
+            return span
+        return wp.vec2(0.0, 0.0)
+    t = -value / change
+    if change > 0.0:
+        return wp.vec2(wp.max(span[0], t), span[1])
+    return wp.vec2(span[0], wp.min(span[1], t))
+
+
+@wp.func
+def edge_part(
+    start: wp.vec2, step: wp.vec2, distance: wp.float32, span: wp.vec2, a: wp.vec3, b: wp.vec3
+) -> wp.vec3:
+    """Return the integrals of 1, x and y over the triangle from the pixel's centre to a part of an edge.
+
+    The edge is start + t·step for t in `span`, as far as it lies inside two lines; `distance` is that of the
+    centre from it, positive inside.
+    """
+    first = clip_span(span, a[0] + a[1] * start[0] + a[2] * start[1], a[1] * step[0] + a[2] * step[1])
+    both = clip_span(first, b[0] + b[1] * start[0] + b[2] * start[1], b[1] * step[0] + b[2] * step[1])
+    area = 0.5 * distance * wp.max(both[1] - both[0], 0.0)
+    centre = (2.0 / 3.0) * (start + 0.5 * (both[0] + both[1]) * step)
+    return wp.vec3(area, area * centre[0], area * centre[1])
+
+
+@wp.func
+def side_part(start: wp.vec2, step: wp.vec2, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+    """Return `edge_part` of one side of the pixel, inside three lines."""
+    span = clip_span(
+        wp.vec2(-0.5, 0.5), c[0] + c[1] * start[0] + c[2] * start[1], c[1] * step[0] + c[2] * step[1]
+    )
+    return edge_part(start, step, 0.5, span, a, b)
+
+
+@wp.func
+def line_part(line: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec3:
+    """Return `edge_part` of a line inside the pixel and two other lines."""
+    square = line[1] * line[1] + line[2] * line[2]
+    if wp.abs(line[0]) >= 0.5 or square < 0.25:
         return wp.vec3(0.0, 0.0, 0.0)
-    side = wp.max(wp.min(wp.abs(along[0]), wp.abs(along[1])) / longer, MIN_SIDE)
-    outer = 0.5 * (1.0 + side)
-    inner = 0.5 * (1.0 - side)
-    d = value / longer
-    if d >= outer:
-        return wp.vec3(1.0, 0.0, 0.0)
-    if d <= -outer:
+    length = wp.sqrt(square)
+    start = wp.vec2(-line[0] * line[1] / square, -line[0] * line[2] / square)
+    step = wp.vec2(-line[2] / length, line[1] / length)
+    span = clip_span(wp.vec2(-2.0, 2.0), 0.5 + start[0], step[0])
+    span = clip_span(span, 0.5 - start[0], -step[0])
+    span = clip_span(span, 0.5 + start[1], step[1])
+    span = clip_span(span, 0.5 - start[1], -step[1])
+    return edge_part(start, step, line[0] / length, span, a, b)
+
+
+@wp.func
+def inner_part(a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+    """Return the part of a pixel inside three lines of `pixel_line`: its share, and its centre, in sides.
+
+    By the divergence theorem, the integrals over the polygon are sums over its edges, without their order.
+    """
+    sides = side_part(wp.vec2(0.5, 0.0), wp.vec2(0.0, 1.0), a, b, c)
+    sides += side_part(wp.vec2(-0.5, 0.0), wp.vec2(0.0, 1.0), a, b, c)
+    sides += side_part(wp.vec2(0.0, 0.5), wp.vec2(1.0, 0.0), a, b, c)
+    sides += side_part(wp.vec2(0.0, -0.5), wp.vec2(1.0, 0.0), a, b, c)
+    whole = sides + line_part(a, b, c) + line_part(b, a, c) + line_part(c, a, b)
+    if whole[0] < MIN_SHARE:
         return wp.vec3(0.0, 0.0, 0.0)
-    share = (
-        square_above(d + outer) - square_above(d + inner) - square_above(d - inner) + square_above(d - outer)
-    ) / (2.0 * side)
-    if share < MIN_SHARE:
-        return wp.vec3(0.0, 0.0, 0.0)
-    moment = (
-        cube_above(d + outer) - cube_above(d + inner) - cube_above(d - inner) + cube_above(d - outer)
-    ) / (6.0 * side)
-    shift = (moment / share - d) * longer / wp.dot(along, along)
-    return wp.vec3(share, shift * along[0], shift * along[1])
+    return wp.vec3(wp.min(whole[0], 1.0), whole[1] / whole[0], whole[2] / whole[0])
 
 
 @wp.func

@@ -15,7 +15,8 @@ from decals.field.ownership import contact_at, owner_at, owner_below, single_lay
 from decals.field.pixel_filter import (
     contact_distance,
     image_steps,
-    positive_part,
+    inner_part,
+    pixel_line,
     push_square_step,
     pushed_distance_step,
 )
@@ -210,7 +211,8 @@ FILTER_FUNCTIONS = (
     is_above,
     lies_on_top,
     has_cells,
-    positive_part,
+    pixel_line,
+    inner_part,
     push_square_step,
     pushed_distance_step,
     image_steps,

@@ -71,25 +71,27 @@ def display(linear: Floats) -> Floats:
     return result
 
 
-def share_above(value: float, along: tuple[float, float]) -> tuple[float, float]:
-    """Share of a unit square in which value + along·(x, y) > 0, and its mean there; exact, by clipping."""
-    corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
-    levels = [value + along[0] * x + along[1] * y for x, y in corners]
-    kept: list[tuple[float, float]] = []
-    for k in range(4):
-        (p, a), (q, b) = (corners[k], levels[k]), (corners[k - 3], levels[k - 3])
-        if a > 0:
-            kept.append(p)
-        if (a > 0) != (b > 0):
-            t = a / (a - b)
-            kept.append((p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])))
-    if len(kept) < 3:
-        return 0.0, 0.0
-    points = np.array(kept)
-    following = np.roll(points, -1, axis=0)
-    crosses = points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]
+def share_inside(lines: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
+    """Area and centre of the part of a unit square in which all value + a·x + b·y > 0; exact, by clipping."""
+    points = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+    for value, a, b in lines:
+        levels = [value + a * x + b * y for x, y in points]
+        kept: list[tuple[float, float]] = []
+        for k in range(len(points)):
+            p, q, here, before = points[k], points[k - 1], levels[k], levels[k - 1]
+            if (here > 0) != (before > 0):
+                t = here / (here - before)
+                kept.append((p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])))
+            if here > 0:
+                kept.append(p)
+        points = kept
+    if len(points) < 3:
+        return 0.0, 0.0, 0.0
+    corners = np.array(points)
+    following = np.roll(corners, -1, axis=0)
+    crosses = corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]
     area = 0.5 * crosses.sum()
     if area < 1e-12:
-        return 0.0, 0.0
-    centre = ((points + following) * crosses[:, None]).sum(axis=0) / (6 * area)
-    return float(area), float(value + centre @ along)
+        return 0.0, 0.0, 0.0
+    centre = ((corners + following) * crosses[:, None]).sum(axis=0) / (6 * area)
+    return float(area), float(centre[0]), float(centre[1])

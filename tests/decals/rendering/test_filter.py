@@ -1,10 +1,11 @@
 """Filtered pictures, with one sample a pixel, against the mean of many points of each pixel."""
 
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from blobtree.transpile.python import plain_python, vector
@@ -14,7 +15,7 @@ from decals.rendering.renderer import Renderer
 from decals.rendering.uploads import filled_corners
 from tests.blobtree.transpile.warp_functions import python_function
 from tests.decals.rendering.flat_views import FLAT, expected_picture, flat_view, peak_ratio, waves
-from tests.oracles.pixels import share_above
+from tests.oracles.pixels import share_inside
 
 SIZE = (64, 48)
 
@@ -36,28 +37,41 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
 @pytest.mark.parametrize(
     ("angle", "kind", "contact", "least"),
     [
-        (0, "waves", "elastic", 43),
-        (80, "waves", "elastic", 33),  # decals of three pixels' height
-        (45, "waves", "product", 37),  # footprints without contact
-        (45, "waves", "radial", 41),
-        (45, "layers", "elastic", 41),
-        (60, "plain", "elastic", 39),
+        (0, "waves", "elastic", 44),
+        (80, "waves", "elastic", 46),  # decals of three pixels' height
+        (45, "waves", "product", 42),  # footprints without contact
+        (45, "waves", "radial", 43),
+        (45, "layers", "elastic", 44),
+        (45, "plain", "product", 50),
+        (85, "plain", "elastic", 50),
     ],
 )
 def test_one_sample_a_pixel_is_near_the_mean(
     drawer: Renderer, angle: float, kind: str, contact: str, least: float
 ) -> None:
-    assert peak_ratio(difference(drawer, angle, kind, contact)) > least
+    apart = difference(drawer, angle, kind, contact)
+    assert peak_ratio(apart) > least
+    if kind == "plain":  # rims and contact lines; 1 is the noise of 64 points
+        assert apart.max() <= 9.1
 
 
-@given(st.floats(-2, 2), st.tuples(*[st.floats(-1, 1)] * 2).filter(lambda a: max(map(abs, a)) > 1e-3))
-def test_shares_of_a_pixel_are_exact(value: float, along: tuple[float, float]) -> None:
-    part = plain_python(python_function(pixel_filter.positive_part))(value, vector(*along))
-    share, mean = share_above(value, along)
-    assert part[0] == pytest.approx(share, abs=3e-3)
-    if 0.01 < share < 1.0:
-        scale = abs(along[0]) + abs(along[1])
-        assert value + part[1] * along[0] + part[2] * along[1] == pytest.approx(mean, abs=0.01 * scale)
+SLOPES = st.tuples(*[st.floats(-1, 1)] * 2).filter(lambda a: max(map(abs, a)) > 1e-3)
+
+
+@given(st.lists(st.tuples(st.floats(-1, 1), SLOPES), min_size=1, max_size=3))
+def test_parts_of_a_pixel_inside_lines_are_exact(lines: list[tuple[float, tuple[float, float]]]) -> None:
+    directions = [np.array(along) / np.hypot(*along) for _, along in lines]
+    # two lines that coincide are counted twice
+    assume(all(abs(a[0] * b[1] - a[1] * b[0]) > 1e-4 for a, b in combinations(directions, 2)))
+    pixel_line, inner_part = (
+        plain_python(python_function(f)) for f in (pixel_filter.pixel_line, pixel_filter.inner_part)
+    )
+    drawn = [pixel_line(value, vector(*along)) for value, along in lines]
+    part = inner_part(*drawn, *[vector(1.0, 0.0, 0.0)] * (3 - len(lines)))
+    share, x, y = share_inside([(value, *along) for value, along in lines])
+    assert part[0] == pytest.approx(share, abs=2e-4)
+    if share > 0.01:
+        assert (part[1], part[2]) == pytest.approx((x, y), abs=2e-3)
 
 
 def test_images_do_not_show_what_lies_outside_their_disc() -> None:
