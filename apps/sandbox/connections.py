@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from aiohttp import web
+from aiohttp import WSCloseCode, web
 from wslink.websocket import LinkProtocol
 
 MOUSE = "viewport.mouse.interaction"
@@ -33,6 +33,9 @@ OURS = frozenset({TRIGGER, UPDATE, LIFECYCLE})
 OF_SERVER = "driving", "trame__template"
 """First parts of the names of values that no browser may change."""
 
+
+MAX_MESSAGE_BYTES = 250_000_000
+"""Longest message: the server reserves as much as its first part announces."""
 
 PICTURES, HEAD_BYTES = b"viewport.image.push.subscription", 256
 """Name that messages with pictures have among their first bytes."""
@@ -96,6 +99,21 @@ async def _compressed(
     return response
 
 
+def _closing(handler: Any, receive: Callable[..., Awaitable[None]]) -> Callable[..., Awaitable[None]]:
+    """Return a receiver of messages that ends connections whose bytes are no message."""
+
+    async def received(binary: bool, message: Any, client: str) -> None:
+        chunks = handler.unchunkers[client]
+        chunks.max_message_size = min(chunks.max_message_size, MAX_MESSAGE_BYTES)
+        try:
+            assert binary
+            await receive(binary, message, client)
+        except Exception:  # unpacking raises anything; errors of calls have been answered
+            await handler.connections[client].close(code=WSCloseCode.INVALID_TEXT)
+
+    return received
+
+
 class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
     """Checks the messages of all browsers of a server before its functions are called.
 
@@ -136,6 +154,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         bound.config["ws_compress"] = False
         bound.app.middlewares.append(_compressed)
         for handler in bound._ws_handlers:
+            handler.onMessage = _closing(handler, handler.onMessage)
             for name, (part, call) in handler.functionMap.items():
                 handler.functionMap[name] = part, self._checked(name, call)
 

@@ -193,6 +193,14 @@ def test_malformed_messages_are_refused_without_an_exception(
         assert {key: page._server.state[key] for key in templates} == templates
         assert digest(window.document) == before
         await browser.close()
+        announced = (3_000_000_000).to_bytes(4, "little")  # the whole message, of which the rest never comes
+        for data in (b"", b"x", bytes(12), b"x" * 40, bytes(8) + announced + b"x", "text"):
+            browser = await connect()
+            await (
+                browser.socket.send_str(data) if isinstance(data, str) else browser.socket.send_bytes(data)
+            )
+            await asyncio.wait_for(asyncio.shield(browser._listens), 10)  # the server ends the connection
+            await browser.close()
 
     serve(check)
     assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
