@@ -5,6 +5,9 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Annotated
 
+import numpy as np
+
+from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.blends import (
     CLEAN_UNION,
@@ -314,6 +317,33 @@ class Shell(Macro):
     def expanded(self) -> Node:
         """Return the child without its smaller copy."""
         return self.child - self.child.offset(-self.thickness)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mirror(Macro):
+    """Sum of `child` and its mirror image beyond the plane through the origin across an axis.
+
+    Examples
+    --------
+    >>> from blobtree import Mirror, Point
+    >>> Mirror(Point((1, 0, 0), radius=0.5))([[1, 0, 0], [-1, 0, 0]]).tolist()
+    [1.0, 1.0]
+    """
+
+    file_tag = "mirror"
+
+    child: Node
+    axis: Annotated[str, Parameter(Quantity.CHOICE, "axis across the plane", choices=("x", "y", "z"))] = "x"
+
+    @property
+    def reflection(self) -> Float64Array:
+        """The map to the mirror image, float64[4, 4]."""
+        return np.diag([-1.0 if name == self.axis else 1.0 for name in "xyzw"])
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return the sum."""
+        return self.child + self.child.transform(self.reflection)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

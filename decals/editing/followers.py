@@ -7,7 +7,8 @@ import numpy as np
 from blobtree import ISO, Node
 from blobtree._typing import Float32Array, Float64Array, IndexArray, Int64Array
 from blobtree.lazy import Lazy
-from blobtree.nodes.paths import Path, inside_support, moved, node_at, node_in_world, with_node, world_matrix
+from blobtree.nodes.paths import Path, inside_support, moved, node_at, node_in_world, with_node
+from blobtree.nodes.places import Place, images
 from decals.editing.document import Document, ForkFamily
 from decals.editing.queries import SurfacePoints, nearest_points
 from decals.scenes.objects import SceneObject, TreeObject
@@ -61,13 +62,9 @@ def followers(
     )
     rows = anchor.on_object(near) if len(near) else near
     positions = decals.positions[rows].astype(np.float64)
-    if offset.ndim == 2:
-        offset = positions @ (offset[:3, :3] - np.eye(3)).T + offset[:3, 3]
-    weights = anchor.weights[rows] if offset.any() else np.zeros(len(rows))
-    targets = positions + weights[:, None] * offset
-    moves = (weights * np.linalg.norm(offset, axis=-1) > 0) | (
-        np.abs(item.tree(targets) - ISO) > FIELD_TOLERANCE
-    )
+    shift = _displacements(anchor, rows, positions, offset)
+    targets = positions + shift
+    moves = shift.any(axis=1) | (np.abs(item.tree(targets) - ISO) > FIELD_TOLERANCE)
     if not moves.any():  # nothing to compute, or to compile
         none = np.zeros((0, 3), np.float32)
         return numbers[:0], SurfacePoints(none, none, np.zeros(0, np.int32))
@@ -77,6 +74,27 @@ def followers(
     positions_after, normals_after = projected
     objects_after = np.full(int(moves.sum()), number, np.int32)
     return numbers[rows[moves]], SurfacePoints(positions_after, normals_after, objects_after)
+
+
+def _displacements(
+    anchor: "DragAnchor", rows: IndexArray, positions: Float64Array, offset: Float64Array
+) -> Float64Array:
+    """Return how far decals follow the node, or the mirror image of it that they lie on."""
+    if not offset.any():
+        return np.zeros((len(rows), 3))
+    matrix = offset
+    if offset.ndim == 1:
+        matrix = np.eye(4)
+        matrix[:3, 3] = offset
+    weights = anchor.weights[:, rows]
+    nearest = weights.argmax(axis=0)
+    result = np.zeros((len(rows), 3))
+    for number, image in enumerate(anchor.images):
+        change = image @ matrix @ np.linalg.inv(image) - np.eye(4)
+        chosen = nearest == number
+        moved_by = positions[chosen] @ change[:3, :3].T + change[:3, 3]
+        result[chosen] = weights[number, chosen, None] * moved_by
+    return result
 
 
 class DragAnchor:
@@ -99,13 +117,23 @@ class DragAnchor:
         return result
 
     @Lazy
+    def images(self) -> list[Float64Array]:
+        """Return the maps from the node in the world to itself and to its mirror images."""
+        return images(self._tree, self._key[2])
+
+    @Lazy
     def weights(self) -> Float64Array:
-        """Part of the node's displacement that each decal follows; 0 outside the node's support."""
+        """Part of the displacement of each image that each decal follows, shape (images, n).
+
+        It is 0 outside the support of the node and its images.
+        """
         _, _, path = self._key
         shifted = [node_in_world(tree, path) for pair in _shifted_trees(self._tree, path)[1] for tree in pair]
         near = inside_support(self._positions, *shifted)
-        weights = np.zeros(len(near))
-        weights[near] = following_weights(self._tree, path, self._positions[near].astype(np.float64))
+        weights = np.zeros((len(self.images), len(near)))
+        points = self._positions[near].astype(np.float64)
+        turns = np.stack([image[:3, :3] for image in self.images])
+        weights[:, near] = following_weights(self._tree, path, points, turns)
         return weights
 
 
@@ -120,19 +148,33 @@ def _drag_anchor(document: Document, key: DragKey, tree: Node, positions: Float3
     return anchor
 
 
-def following_weights(tree: Node, path: Path, points: Float64Array) -> Float64Array:
-    """Return the part of a node's displacement that the surface follows at each point, from 0 to 1.
+def following_weights(tree: Node, path: Path, points: Float64Array, turns: Float64Array) -> Float64Array:
+    """Return the part of an image's displacement that the surface follows at each point, from 0 to 1.
 
     With f the field and t the position of the node, the surface moves along its normal n by −(∂f/∂t)/|∇f|. A
-    rigid motion would move it by n. The weight is the component of the first along the second.
+    rigid motion would move it by n. The weight is the component of the first along the second. The image of
+    the node under the linear map C moves by C t, so that C n takes the place of n.
+
+    Parameters
+    ----------
+    tree, path
+        The tree, and the path of the node.
+    points
+        Points of the surface, shape (n, 3).
+    turns
+        The linear maps from the node to its images, shape (k, 3, 3).
+
+    Returns
+    -------
+    float64, shape (k, n)
     """
     if not len(points):
-        return np.zeros(0)
+        return np.zeros((len(turns), 0))
     step, pairs = _shifted_trees(tree, path)
     change = np.stack([ahead(points) - behind(points) for ahead, behind in pairs], axis=1) / (2.0 * step)
     slope = tree.gradient(points).astype(np.float64)
     squared = np.einsum("ni,ni->n", slope, slope)
-    ratios = -np.einsum("ni,ni->n", change, slope) / np.where(squared > 0, squared, 1.0)
+    ratios = -np.einsum("ni,kji,nj->kn", change, turns, slope) / np.where(squared > 0, squared, 1.0)
     weights: Float64Array = np.clip(ratios, 0.0, 1.0)
     return weights
 
@@ -141,10 +183,10 @@ def _shifted_trees(tree: Node, path: Path) -> tuple[float, list[tuple[Node, Node
     """Return a small step, and for each world axis the trees with the node moved ahead and back by it."""
     low, high = node_in_world(tree, path).support
     step = DIFFERENCE_STEP * float((high - low).min())
-    inverse = np.linalg.inv(world_matrix(tree, path))
+    place = Place(tree, path)
 
     def with_moved(offset: Float64Array) -> Node:
         return with_node(tree, path, moved(node_at(tree, path), offset))
 
-    offsets = [inverse @ axis for axis in step * np.eye(3)]
+    offsets = [place.moved(axis) for axis in step * np.eye(3)]
     return step, [(with_moved(offset), with_moved(-offset)) for offset in offsets]

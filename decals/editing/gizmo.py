@@ -12,7 +12,8 @@ from blobtree import Node
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.parameters import Quantity, parameters_of
-from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_path, world_transform
+from blobtree.nodes.paths import Path, node_at, primitive_path
+from blobtree.nodes.places import Place
 
 AXES = "x", "y", "z"
 TURN_PLACE, SCALE_PLACE = 0.75, 1.2
@@ -50,7 +51,7 @@ class Handle:
 
 
 def handles_of(tree: Node, path: Path, length: float) -> list[Handle]:
-    """Return the handles of the node at a path, the middle first; none for a node below a warp.
+    """Return the handles of the node at a path, the middle first; none for one that its warps do not show.
 
     Parameters
     ----------
@@ -62,18 +63,16 @@ def handles_of(tree: Node, path: Path, length: float) -> list[Handle]:
         Length of the gizmo's axes, in model units.
     """
     try:
-        world_transform(tree, path)
-        low, high = node_in_world(tree, path).support
+        middle = Place(tree, path).middle
+        points = control_points(tree, path)
     except InvalidNode:
         return []
-    middle = (low + high).astype(np.float64) / 2.0
     handles = [Handle("move", middle)]
     for axis, name in enumerate(AXES):
         across = np.ones(3) - np.eye(3)[axis]
         handles.append(Handle(f"move {name}", middle + length * np.eye(3)[axis]))
         handles.append(Handle(f"turn {name}", middle + TURN_PLACE * length * across / math.sqrt(2.0)))
     handles.append(Handle("scale", middle + SCALE_PLACE * length / math.sqrt(3.0)))
-    points = control_points(tree, path)
     alone = len(points) == 1 and np.allclose(points[0].position, middle, atol=1e-3 * length)
     return handles if alone else handles + points
 
@@ -84,13 +83,12 @@ def control_points(tree: Node, path: Path) -> list[Handle]:
         path = primitive_path(tree, path)
     except InvalidNode:
         return []
-    node, world = node_at(tree, path), world_transform(tree, path)
+    node, place = node_at(tree, path), Place(tree, path)
     handles = []
     for name, parameter in parameters_of(type(node)).items():
         if parameter.quantity in (Quantity.POINT, Quantity.POINTS):
             rows = np.atleast_2d(np.asarray(getattr(node, name), np.float64))
-            positions = rows @ world[:3, :3].T + world[:3, 3]
-            handles += [Handle(f"{name} {row}", position) for row, position in enumerate(positions)]
+            handles += [Handle(f"{name} {row}", place.world(point)) for row, point in enumerate(rows)]
     return handles
 
 
@@ -98,8 +96,7 @@ def moved_point(tree: Node, path: Path, handle: str, target: ArrayLike) -> tuple
     """Return path, parameter and value that put a control point at a point of the world, shape (3,)."""
     path = primitive_path(tree, path)
     name, row = handle.rsplit(" ", 1)
-    node, world = node_at(tree, path), world_transform(tree, path)
-    place = tuple(np.linalg.solve(world[:3, :3], np.asarray(target) - world[:3, 3]).tolist())
+    node, place = node_at(tree, path), tuple(Place(tree, path).local(target).tolist())
     value = getattr(node, name)
     if parameters_of(type(node))[name].quantity is Quantity.POINT:
         return path, name, place

@@ -11,6 +11,7 @@ from blobtree import Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
+from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, world_space_path
 from decals.editing.action_state import ActionState, Cursor, require_pick
 from decals.editing.background import Step
@@ -131,8 +132,7 @@ class TreeActions:
 
     def _middle(self, number: int, path: Path) -> Float32Array:
         """Return the middle of a primitive's box, which moves with the primitive."""
-        low, high = node_in_world(self._tree(number), path).support
-        return np.asarray((low + high) / 2)
+        return Place(self._tree(number), path).middle.astype(np.float32)
 
     @property
     def handle_position(self) -> Float32Array:

@@ -19,9 +19,8 @@ from blobtree.nodes.paths import (
     resized,
     square_matrix,
     with_node,
-    world_matrix,
-    world_transform,
 )
+from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join
 from blobtree.validation import affine_matrix, truth
 from decals.editing.document import Document, Edit
@@ -133,8 +132,7 @@ class MovePrimitive(PrimitiveCommand):
         """Return the edit."""
         tree = self.tree(document)
         offset = finite_vector("offset", self.offset, InvalidEdit)
-        local_offset = np.linalg.solve(world_matrix(tree, self.path), offset)
-        node = moved(node_at(tree, self.path), local_offset)
+        node = moved(node_at(tree, self.path), Place(tree, self.path).moved(offset))
         return self.compute_exchange(document, node, offset, quick=self.quick)
 
 
@@ -173,8 +171,8 @@ class TransformPrimitive(PrimitiveCommand):
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         tree = self.tree(document)
-        matrix, world = square_matrix(affine_matrix(self.matrix)), world_transform(tree, self.path)
-        node = mapped(node_at(tree, self.path), np.linalg.solve(world, matrix @ world))
+        matrix = square_matrix(affine_matrix(self.matrix))
+        node = mapped(node_at(tree, self.path), Place(tree, self.path).mapped(matrix))
         return self.compute_exchange(document, node, matrix, quick=self.quick)
 
 

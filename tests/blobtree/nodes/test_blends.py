@@ -16,12 +16,14 @@ from blobtree import (
     InvalidNode,
     LocalBlend,
     Masked,
+    Mirror,
     Node,
     Point,
     RDifference,
     Ricci,
     RIntersection,
     RUnion,
+    Segment,
     Shell,
     SmoothDifference,
     SmoothIntersection,
@@ -48,6 +50,7 @@ NODES: list[Node] = [
     ControllableBlend(A, B, left_angle=0.0, right_angle=30.0),
     Masked(A, B),
     Shell(A, 0.2),
+    Mirror(A, "z"),
     SymmetricDifference(A, B),
     LocalBlend(A, B, C),
     BlendGraph((A, B, C), names=("a", "b", "c"), pairs=PAIRS),
@@ -189,6 +192,16 @@ def test_a_local_blend_is_a_sum_inside_its_region_and_a_union_where_that_ends() 
     assert inside.sum() > 20
     np.testing.assert_allclose(local(points[inside]), (A + B)(points[inside]), atol=1e-6)
     np.testing.assert_allclose(local(points[outside]), (A | B)(points[outside]), atol=1e-6)
+
+
+def test_a_mirror_adds_the_image_and_a_node_below_it_changes_both() -> None:
+    limb = Segment((0.2, 0.4, 0), (1, 1, 0.5), radius=0.3)
+    points = np.random.default_rng(8).uniform(-2, 2, (200, 3)).astype(np.float32)
+    for axis, name in enumerate("xyz"):
+        image = points * (1 - 2 * np.eye(3, dtype=np.float32)[axis])
+        np.testing.assert_allclose(Mirror(limb, name)(points), limb(points) + limb(image), atol=1e-6)
+    with pytest.raises(InvalidNode, match="axis"):
+        Mirror(limb, "w")
 
 
 def test_a_shell_is_hollow() -> None:

@@ -89,7 +89,12 @@ def test_handles_stand_at_ends_and_control_points_also_below_maps() -> None:
     assert [handle.name for handle in control_points(curve, ())] == ["points 0", "points 1", "points 2"]
     _, name, value = moved_point(curve, (), "points 1", (1, 3, 0))
     assert (name, value) == ("points", ((0, 0, 0), (1, 3, 0), (2, 0, 0)))
-    assert handles_of(Twist(TREE, degrees=20.0), (0,), 1.0) == []
+    twisted = Twist(Segment((1, 0, 0), (1, 0, 1), radius=0.2), degrees=90.0)
+    ends = control_points(twisted, (0,))
+    np.testing.assert_allclose([end.position for end in ends], [(1, 0, 0), (0, 1, 1)], atol=1e-8)
+    _, name, value = moved_point(twisted, (0,), "end 0", (0, 2, 1))
+    assert name == "end"
+    np.testing.assert_allclose(value, (2, 0, 1), atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["move", "move z", "turn y", "scale", "end 0"])

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Cone, InvalidNode, Point, Ricci, Segment
+from blobtree import ISO, Cone, InvalidNode, Mirror, Point, Ricci, Segment
 from blobtree.nodes.paths import node_in_world, primitive_at
+from blobtree.nodes.places import Place
 from decals.editing import (
     EditSession,
     MovePrimitive,
@@ -15,6 +16,7 @@ from decals.editing import (
     ReplaceNode,
     ResizePrimitive,
     SetParameter,
+    TransformPrimitive,
 )
 from decals.editing.actions import Actions
 from decals.editing.followers import DragAnchor, following_weights
@@ -27,6 +29,7 @@ from tests.blobtree.custom_kinds import Bar
 from tests.decals.editing.scenes import digest, tree_of
 
 A, B = Point((0, 0, 0), radius=1.0), Segment((1, 0, 0), (2, 0, 0), radius=0.5)
+STILL = np.eye(3)[None]
 C = Cone((0, 0, 2), (0, 0, 3), radius=0.4, end_radius=0.2)
 NESTED = (A + B.translate((0.5, 0, 0)).scale(2)) - (C.rotate((0, 0, 1), 90) | A)
 
@@ -130,10 +133,10 @@ def test_following_is_whole_on_a_primitive_alone_and_shared_in_a_blend() -> None
     tree = A + Point((1.2, 0, 0), radius=1.0)
     low, high = tree.support
     points = scatter([TreeObject("t", tree).surface], count=100).positions.astype(np.float64)
-    first, second = following_weights(tree, (0,), points), following_weights(tree, (1,), points)
+    first, second = (following_weights(tree, (step,), points, STILL)[0] for step in (0, 1))
     np.testing.assert_allclose(first + second, 1.0, atol=0.02)
     mirror = points * (-1, 1, 1) + (1.2, 0, 0)
-    np.testing.assert_allclose(following_weights(tree, (1,), mirror), first, atol=0.02)
+    np.testing.assert_allclose(following_weights(tree, (1,), mirror, STILL)[0], first, atol=0.02)
     far = np.abs(points[:, 0] - low[0]) > (high - low)[0] * 0.7
     assert first[far].max() < 0.15
 
@@ -141,8 +144,8 @@ def test_following_is_whole_on_a_primitive_alone_and_shared_in_a_blend() -> None
 def test_decals_in_a_hole_follow_the_tool() -> None:
     tree = A - Point((0, 0, 1.1), radius=0.5)
     points = TreeObject("t", tree).surface.project([[0, 0, 0.6]])[0].astype(np.float64)
-    np.testing.assert_allclose(following_weights(tree, (1,), points), 1.0, atol=0.02)
-    np.testing.assert_allclose(following_weights(tree, (0,), points), 0.0, atol=0.02)
+    np.testing.assert_allclose(following_weights(tree, (1,), points, STILL)[0], 1.0, atol=0.02)
+    np.testing.assert_allclose(following_weights(tree, (0,), points, STILL)[0], 0.0, atol=0.02)
 
 
 @pytest.mark.parametrize("way", [(0.02, 0.03, -0.02), (0.4, 0.3, -0.2)])
@@ -166,7 +169,8 @@ def test_beyond_its_reach_a_node_carries_nothing_along(tree: Any, path: Any) -> 
     item, other = TreeObject("tree", tree), TreeObject("other", Point((1.5, 0.2, 0.4), radius=0.9))
     positions = scatter([item.surface, other.surface], count=300).positions
     start = DragAnchor(((item, other), 0, path), tree, positions)
-    np.testing.assert_array_equal(start.weights, following_weights(tree, path, positions.astype(np.float64)))
+    whole = following_weights(tree, path, positions.astype(np.float64), STILL)
+    np.testing.assert_array_equal(start.weights, whole)
     assert 0 < (start.weights > 0).sum() < len(positions)
 
 
@@ -250,10 +254,43 @@ def _under_a_sum(document: Any) -> Any:
     return change.after, change.parts_after
 
 
-def test_below_a_twist_nothing_moves_alone() -> None:
-    session = session_of((A + B).twist(30))
-    with pytest.raises(InvalidNode, match="below a Twist"):
-        session.do(MovePrimitive(0, (0, 0), (0, 0, 1)))
+def test_below_a_twist_a_node_moves_as_the_world_shows_it_and_decals_follow() -> None:
+    ball = Point((0, 0, 1.5), radius=0.6)
+    session = session_of((B + ball.translate((1.5, 0, 0))).twist(60))
+    first, path, offset = digest(session.document), (0, 1), np.array((0.2, 0.5, 0.3))
+    middle, before = Place(tree_of(session.document), path).middle, session.document.decals.decals.positions
+    np.testing.assert_allclose(middle, (0.0, 1.5, 1.5), atol=1e-6)
+    session.do(MovePrimitive(0, path, offset))
+    tree, after = tree_of(session.document), session.document.decals.decals.positions
+    np.testing.assert_allclose(Place(tree, path).middle, middle + offset, atol=1e-6)
+    np.testing.assert_allclose(tree((middle + offset)[None]), 1.0, atol=1e-5)
+    far = before[:, 2] > 1.9  # on the ball alone
+    np.testing.assert_allclose((after - before)[far].mean(axis=0), offset, atol=0.1)
+    assert np.abs(tree(after) - ISO).max() < 1e-4
+    session.undo()
+    assert digest(session.document) == first
+
+
+def test_decals_follow_the_mirror_image_of_a_node_too() -> None:
+    limb = Segment((0.8, 0.3, 0), (2, 0.3, 0), radius=0.3)
+    session = session_of(Mirror(A + limb, axis="x").rotate((0, 0, 1), 90))
+    before, path = session.document.decals.decals.positions, (0, 0, 1)
+    session.do(MovePrimitive(0, path, (0, 0.4, 0.2)))
+    moved, tree = session.document.decals.decals.positions - before, tree_of(session.document)
+    for side in (1, -1):  # y of the limb's free end
+        end = side * before[:, 1] > 1.9
+        np.testing.assert_allclose(moved[end], [(0, side * 0.4, 0.2)] * int(end.sum()), atol=0.01)
+        assert end.sum() > 1
+    assert np.abs(tree(session.document.decals.decals.positions) - ISO).max() < 1e-4
+    turn = np.diag([1.0, 1.0, -1.0, 1.0])[:, [0, 2, 1, 3]]
+    before = session.document.decals.decals.positions
+    session.do(TransformPrimitive(0, path, turn))
+    moved = session.document.decals.decals.positions - before
+    for side in (1, -1):
+        end = side * before[:, 1] > 2.3
+        turned = np.diag([1, side, 1, 1]) @ turn @ np.diag([1, side, 1, 1])
+        misses = np.linalg.norm((moved - before @ (turned - np.eye(4))[:3, :3].T)[end], axis=1)
+        assert misses.min() < 0.02
 
 
 def test_a_parameter_of_any_node_is_set_and_decals_stay_on_the_surface() -> None:
