@@ -196,17 +196,23 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
 _held: list[Any] = []
 
 
-def hold_display() -> None:
+def hold_display() -> bool:
     """Keep VTK from ending the display of contexts that are made from now on.
 
     Nothing happens where VTK's OpenGL was not imported, or does not go through EGL. Contexts made before VTK
     was imported are not saved by it.
+
+    Returns
+    -------
+    bool
+        True if VTK's display is kept.
     """
     vtk: Any = sys.modules.get("vtkmodules.vtkRenderingOpenGL2")
     if _held or not hasattr(vtk, "vtkEGLRenderWindow"):
-        return
+        return bool(_held)
     window = vtk.vtkEGLRenderWindow()
     window.SetSize(1, 1)
     window.OffScreenRenderingOn()
     window.Render()
     _held.append(window)
+    return True

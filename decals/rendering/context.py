@@ -13,7 +13,7 @@ import moderngl
 
 from blobtree.graphics import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.errors import NoGraphics
-from decals.rendering.current_context import kept_current
+from decals.rendering.current_context import is_current, kept_current
 from decals.rendering.pixel_pass import (
     COMPUTE_VERSION,
     Compiled,
@@ -59,6 +59,9 @@ class _Entered(threading.local):
 
 
 _entered = _Entered()
+
+_idle: list["Context"] = []
+"""The context that the last renderer left to the next one, with its programs; none or one."""
 
 
 def _is_software(gl: moderngl.Context) -> bool:
@@ -120,6 +123,7 @@ class Context:
         mark_drawing()
         self.gl = gl
         self._owned = owned
+        self._display_held = False
         self._programs: dict[tuple[str, ...], Program] = {}
         self._unused: list[Any] = []
         self.requested_backend = backend_named(gl, backend) if backend else None
@@ -141,11 +145,45 @@ class Context:
         """
         require_gl()
         with kept_current():
-            hold_display()
+            held = hold_display()
             gl = _newest_context()
-            context = cls(gl, owned=True, backend=backend)
-            with context.current():  # a new context is current: give the thread back to the one before
-                return context
+            try:
+                context = cls(gl, owned=True, backend=backend)
+            finally:
+                gl.__exit__(None, None, None)  # type: ignore[no-untyped-call]  # a new context is current
+            context._display_held = held
+            return context
+
+    @classmethod
+    def reused(cls) -> "Context":
+        """Return the standalone context that was left idle, or make one; errors are those of `standalone`.
+
+        Its programs need not be compiled again.
+        """
+        require_gl()
+        try:
+            context = _idle.pop()
+        except IndexError:
+            return cls.standalone()
+        return context if context._is_alive() else cls.standalone()
+
+    def _is_alive(self) -> bool:
+        """Return False if the display may have been ended since the context was made, by VTK or by others."""
+        if hold_display() != self._display_held:
+            return False
+        with self.current():
+            return is_current()
+
+    def leave(self) -> None:
+        """Keep this standalone context for `reused`; release it if another one is kept."""
+        if _idle or is_forked():
+            self.release()
+            return
+        with self.current():
+            self.clear_spare_textures()
+            self._release_programs()
+        self.__dict__.pop("backend", None)  # the environment may name another one next time
+        _idle.append(self)
 
     @property
     def name(self) -> str:
@@ -209,8 +247,7 @@ class Context:
 
     def _kept(self, key: tuple[str, ...], compiled: Callable[[], Compiled]) -> Compiled:
         """Return a program, compiled if it is not among those that were wanted last."""
-        while self._unused:
-            self._unused.pop().release()
+        self._release_programs()
         program: Any = self._programs.pop(key, None)
         if program is None:
             program = compiled()
@@ -251,6 +288,11 @@ class Context:
             texture.release()
         self._spare_textures.clear()
 
+    def _release_programs(self) -> None:
+        """Release the programs that are not used any more."""
+        while self._unused:
+            self._unused.pop().release()
+
     def release(self) -> None:
         """Release the programs, and the context if it is owned. Calling twice is harmless.
 
@@ -260,10 +302,10 @@ class Context:
             return
         with self.current():
             self.clear_spare_textures()
-            for program in (*self._programs.values(), *self._unused):
+            self._release_programs()
+            for program in self._programs.values():
                 program.release()
         self._programs.clear()
-        self._unused.clear()
         if self._owned:
             with kept_current():
                 self.gl.release()

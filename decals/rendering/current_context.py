@@ -28,6 +28,11 @@ def kept_current() -> Iterator[None]:
             restore()
 
 
+def is_current() -> bool:
+    """Return False if this thread has no current context of EGL, as after the end of its display."""
+    return not _library("libEGL.so.1") or _egl_context() is not None
+
+
 @cache
 def _library(name: str) -> Any:
     """Return a system library whose functions take and return pointers; None for a missing library."""

@@ -76,7 +76,8 @@ class Renderer:
     Parameters
     ----------
     context : Context, optional
-        Where to draw. Default: a standalone context that the renderer owns.
+        Where to draw. Default: a standalone context. The next renderer takes it over after `release`,
+        with its compiled programs.
     max_tile : int
         Pictures with more samples along a side are drawn in tiles.
 
@@ -102,7 +103,8 @@ class Renderer:
             instance("context", context, Context, InvalidScene, "Context.standalone makes one")
         whole_number("max_tile", max_tile, 1, MAX_TILE, InvalidScene)
         self._owned = context is None
-        self.context = context or Context.standalone()
+        self._released = False
+        self.context = context or Context.reused()
         self._max_tile = min(max_tile, self.context.max_texture_size - 2 * TILE_MARGIN)
         self._uploads = Uploads(self.context)
         self._targets = TargetPool(self.context)
@@ -351,14 +353,15 @@ class Renderer:
 
     def release(self) -> None:
         """Release everything. Calling twice is harmless. A forked child releases nothing of its parent."""
-        if is_forked():
+        if self._released or is_forked():
             return
+        self._released = True
         with self.context.current():
             self._targets.release()
             self._uploads.release()
             self._camera.release()
         if self._owned:
-            self.context.release()
+            self.context.leave()
 
     def __enter__(self) -> Self:
         return self

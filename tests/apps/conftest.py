@@ -1,5 +1,7 @@
 """One renderer for what is measured and drawn."""
 
+from collections.abc import Iterator
+
 import pytest
 
 from decals.errors import NoGraphics
@@ -7,8 +9,10 @@ from decals.rendering import Renderer
 
 
 @pytest.fixture(scope="module")
-def renderer(vtk_display: None) -> Renderer:
+def renderer(vtk_display: None) -> Iterator[Renderer]:
     try:
-        return Renderer()
+        renderer = Renderer()
     except NoGraphics as error:
         pytest.skip(str(error))
+    with renderer:
+        yield renderer

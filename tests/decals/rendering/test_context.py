@@ -2,15 +2,22 @@
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import moderngl
+import numpy as np
 import pytest
 
 from decals.errors import NoGraphics
+from decals.model import Decals
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.context import Context
+from decals.rendering.pixel_pass import BACKEND_VARIABLE
 from decals.shaders import CompileError, Source, compose
+from tests.decals.rendering.pictures import view_of
+from tests.decals.shapes import torus
 
 
 def usable(context: Context) -> bool:
@@ -116,6 +123,83 @@ def test_an_attached_context_is_left_alone(context: Context) -> None:
         assert usable(attached)
     attached.release()
     assert usable(context)
+
+
+@pytest.fixture
+def no_idle(vtk_display: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No context is idle at the beginning, and none that the test leaves is used after it."""
+    monkeypatch.setattr("decals.rendering.context._idle", [])
+
+
+def drawn(renderer: Renderer) -> np.ndarray:
+    shape = torus(rows=12, columns=6)
+    return renderer.render(view_of(Decals.empty(), shape), RenderOptions(size=(16, 12), samples=1))
+
+
+@pytest.mark.usefixtures("no_idle")
+def test_a_renderer_takes_over_the_context_of_the_one_before() -> None:
+    """With its programs, on any thread, and after a second release by the first one."""
+    with Renderer() as first:
+        picture, programs = drawn(first), dict(first.context._programs)
+    first.release()
+    with ThreadPoolExecutor(1) as thread:
+        second = thread.submit(Renderer).result()
+        assert second.context is first.context
+        first.release()
+        np.testing.assert_array_equal(thread.submit(drawn, second).result(), picture)
+        assert second.context._programs == programs
+        thread.submit(second.release).result()
+
+
+@pytest.mark.usefixtures("no_idle")
+def test_renderers_at_the_same_time_have_contexts_of_their_own() -> None:
+    with Renderer() as first, Renderer() as second:
+        assert first.context is not second.context
+    with Renderer() as third, Renderer() as fourth:
+        assert third.context is second.context
+        assert fourth.context not in (first.context, second.context)
+        np.testing.assert_array_equal(drawn(third), drawn(fourth))
+
+
+@pytest.mark.usefixtures("no_idle")
+def test_a_context_is_not_used_again_if_vtk_was_imported_after_it_was_made() -> None:
+    with Renderer() as first:
+        pass
+    first.context._display_held = not first.context._display_held
+    with Renderer() as second:
+        assert second.context is not first.context
+
+
+@pytest.mark.usefixtures("no_idle")
+def test_the_environment_names_the_backend_of_a_context_that_is_used_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("fragment", "compute"):
+        monkeypatch.setenv(BACKEND_VARIABLE, name)
+        with Renderer() as renderer:
+            assert renderer.backend == name
+
+
+LOST = """
+import ctypes
+
+from decals.rendering import Renderer
+
+egl = ctypes.CDLL("libEGL.so.1")
+egl.eglGetCurrentDisplay.restype = ctypes.c_void_p
+with Renderer() as first, first.context.current():
+    display = egl.eglGetCurrentDisplay()
+egl.eglTerminate(ctypes.c_void_p(display))
+with Renderer() as second, second.context.current():
+    print(second.context is first.context, second.context.gl.buffer(b"abcd").read())
+"""
+"""A program that ends the display of EGL between two renderers."""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="contexts are made by EGL on Linux alone")
+def test_a_context_is_not_used_again_after_the_end_of_its_display() -> None:
+    done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "False b'abcd'", done.stderr
 
 
 CALLER = """

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -21,20 +20,6 @@ from tests.decals.shapes import torus
 
 NO_COMPUTE = {"MESA_GL_VERSION_OVERRIDE": "4.1", "MESA_GLSL_VERSION_OVERRIDE": "410"}
 """Mesa then offers what macOS does."""
-
-
-@pytest.fixture(scope="module")
-def compute(standalone_context: Context) -> Iterator[Renderer]:
-    if standalone_context.gl.version_code < COMPUTE_VERSION:
-        pytest.skip(f"no compute shaders in {standalone_context.name}")
-    with Context.standalone(backend="compute") as made, Renderer(made) as drawing:
-        yield drawing
-
-
-@pytest.fixture(scope="module")
-def fragment() -> Iterator[Renderer]:
-    with Context.standalone(backend="fragment") as made, Renderer(made) as drawing:
-        yield drawing
 
 
 @pytest.mark.parametrize("count", [0, 1, 400])

@@ -11,7 +11,6 @@ from blobtree import Node, Point, Segment
 from decals import Camera, Decals, MeshObject, Scene, TreeObject
 from decals.errors import InvalidScene
 from decals.rendering import Buffers, Renderer, RenderOptions
-from decals.rendering.pixel_pass import BACKEND_VARIABLE
 from decals.scenes.pose import PosedScene
 from tests.decals.shapes import torus
 
@@ -43,12 +42,9 @@ def buffers(renderer: Renderer, scene: Scene | PosedScene, camera: Camera | None
     return renderer.buffers(scene, OPTIONS, viewpoint=camera)
 
 
-@pytest.fixture(scope="module", params=["fragment", "compute"])
-def renderer(vtk_display: None, request: pytest.FixtureRequest) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(BACKEND_VARIABLE, request.param)
-        with Renderer() as one:
-            yield one
+@pytest.fixture
+def renderer(drawer: Renderer) -> Renderer:
+    return drawer
 
 
 def ring() -> MeshObject:

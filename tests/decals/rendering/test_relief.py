@@ -1,7 +1,5 @@
 """Relief in pictures: parallax, normals and shadows against float64 and against moved triangles."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,6 @@ from decals import Camera, DecalMaterial, Decals, Scene
 from decals.index import DecalEditor
 from decals.rendering import Buffers, Light, Lighting, Renderer, RenderOptions
 from decals.rendering.materials import has_relief
-from decals.rendering.pixel_pass import BACKEND_VARIABLE
 from tests.decals.relief import expected_heights
 from tests.decals.rendering.test_edited import EditedScene
 from tests.decals.rendering.test_posed import sheet
@@ -26,14 +23,8 @@ Array = NDArray[Any]
 
 
 @pytest.fixture(scope="module")
-def renderers(vtk_display: None) -> Iterator[dict[str, Renderer]]:
-    with pytest.MonkeyPatch.context() as patch, ExitStack() as opened:
-        made = {}
-        for backend in ("fragment", "compute"):
-            patch.setenv(BACKEND_VARIABLE, backend)
-            made[backend] = opened.enter_context(Renderer())
-            assert made[backend].backend == backend
-        yield made
+def renderers(fragment: Renderer, compute: Renderer) -> dict[str, Renderer]:
+    return {"fragment": fragment, "compute": compute}
 
 
 def waves(seed: int, *, relief: float) -> DecalMaterial:

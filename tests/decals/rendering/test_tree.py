@@ -1,15 +1,11 @@
 """Trees in the G-buffer through both entry points: the same pixels, and true depth among all objects."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from blobtree import Node, Point, Segment
-from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.picture import Buffers
-from decals.rendering.pixel_pass import COMPUTE_VERSION
 from decals.rendering.renderer import Renderer
 from decals.rendering.tree import covered_rectangle
 from decals.rendering.viewpoint import PictureView, Projection, Viewpoint, tiles
@@ -24,20 +20,6 @@ BALL = Point((0, 0, 0), radius=0.5, color=(0.9, 0.2, 0.1))
 CUT = (
     Segment((-0.6, 0, 0), (0.6, 0, 0), radius=0.4, color=(0.1, 0.4, 0.9)) - Point((0, 0.4, 0), radius=0.4)
 ).twist(60)
-
-
-@pytest.fixture(scope="module")
-def compute(standalone_context: Context) -> Iterator[Renderer]:
-    if standalone_context.gl.version_code < COMPUTE_VERSION:
-        pytest.skip(f"no compute shaders in {standalone_context.name}")
-    with Context.standalone(backend="compute") as made, Renderer(made) as drawing:
-        yield drawing
-
-
-@pytest.fixture(scope="module")
-def fragment() -> Iterator[Renderer]:
-    with Context.standalone(backend="fragment") as made, Renderer(made) as drawing:
-        yield drawing
 
 
 def objects() -> list[TreeObject | MeshObject]:
