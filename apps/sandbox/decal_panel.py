@@ -11,7 +11,7 @@ import numpy as np
 from blobtree.colors import color_rgb
 from decals.apps.sandbox.controls import STEPS, Control, hex_color, number_of
 from decals.editing.action_state import ActionState
-from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius
+from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius, positive_number
 from decals.editing.commands import SetValues
 from decals.editing.document import Document
 from decals.errors import InvalidEdit
@@ -174,9 +174,9 @@ def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
         return
     if not isinstance(name, str) or name not in ("radius", "decal_radius", "density"):
         raise InvalidEdit(f"brush: expected 'radius' or such, got {describe(name)}")
-    number = number_of(name, raw)
-    if number <= 0.0 or (name == "density" and number > 1.0):
-        raise InvalidEdit(f"{name}: expected a number above 0{' and at most 1' * (name == 'density')}")
+    number = positive_number(name, number_of(name, raw))
+    if name == "density" and number > 1.0:
+        raise InvalidEdit(f"density: expected at most 1, got {number:g}")
     setattr(brush, name, number)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int64Array
+from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER
 from decals.editing.commands import DeleteDecals
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
@@ -87,10 +88,10 @@ def decals_within(document: Document, point: ArrayLike, radius: float) -> Int64A
 
 
 def positive_number(name: str, value: float) -> float:
-    """Return a number above 0, or raise `InvalidEdit`."""
+    """Return a number above 0 of a usable size, or raise `InvalidEdit`."""
     number = finite_number(name, value, InvalidEdit)
-    if number <= 0.0:
-        raise InvalidEdit(f"{name}: expected a number above 0, got {number:g}")
+    if not SMALLEST_NUMBER <= number <= LARGEST_NUMBER:
+        raise InvalidEdit(f"{name}: expected a number above 0, at most {LARGEST_NUMBER:g}, got {number:g}")
     return number
 
 

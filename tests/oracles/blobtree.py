@@ -37,6 +37,7 @@ from blobtree import (
     LimitedTwist,
     LocalBlend,
     Masked,
+    Mirror,
     Node,
     Noise,
     NoiseWarp,
@@ -220,7 +221,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
             values = parameter_values(node)
             fields = [evaluate(x, q) for x in node.operands]
             return reduce(lambda a, b: _blended(a, b, node, **values), fields)
-        case ConvolutionStroke():
+        case ConvolutionStroke() | Mirror():
             return signed(written_out(node), q)
         case Macro():
             return evaluate(written_out(node), q)
@@ -323,6 +324,9 @@ def written_out(node: Node) -> Node:
     match node:
         case Shell(child=child, thickness=thickness):
             return Difference(child, grown(child, -thickness))
+        case Mirror(child=child, axis=axis):
+            signs = [-1.0 if name == axis else 1.0 for name in "xyz"]
+            return Sum(child, Transform(child, tuple((*row, 0.0) for row in np.diag(signs).tolist())))
         case SymmetricDifference(first=a, second=b):
             return Union(Difference(a, b), Difference(b, a))
         case ConvolutionStroke(points=points, radii=radii, color=color):

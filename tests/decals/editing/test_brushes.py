@@ -58,6 +58,7 @@ def test_the_push_brush_moves_by_the_kernel_and_leaves_the_rest() -> None:
     ("command", "message"),
     [
         (BrushDecals(TOP, UP, 0.0, 0.1), "radius"),
+        (BrushDecals(TOP, UP, 1e308, 0.1), "radius"),
         (BrushDecals(TOP, UP, 1.0, -1.0), "decal radius"),
         (BrushDecals(TOP, UP, 1.0, 0.1, density=2.0), "density"),
         (BrushDecals(TOP, UP, 1.0, 0.1, images=(9,)), "image"),
