@@ -1,4 +1,4 @@
-"""Skeletons along curves: circular arcs, and polynomial curves up to cubics or with a varying radius.
+"""Skeletons along curves: pieces of polylines, circular arcs, and polynomial curves up to cubics.
 
 `formulas.skeletons` states what a skeleton is. For a curve c(t) with the influence s(t), 0 ≤ t ≤ 1, the
 closest point minimises |q − c(t)| / s(t). Its derivative has the sign of a polynomial N of degree 5 at most,
@@ -23,6 +23,34 @@ POLISH_STEPS = 3
 
 POLISH_LIMIT = 4e-3
 """Longest step of `polished`: beside a centre of curvature, a root in float32 is that far off."""
+
+
+@wp.func
+def joined_influence(
+    influence: wp.float32, joints: wp.float32, at_start: wp.bool, at_end: wp.bool
+) -> wp.float32:
+    """Return the influence at a closest point, which yields at joints: 1 start, 2 end, 3 both, 0 none."""
+    if (at_start and (joints == 1.0 or joints == 3.0)) or (at_end and joints >= 2.0):
+        return influence * (1.0 - JOINT_YIELD)
+    return influence
+
+
+@wp.func
+def closest_on_joined_segment(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """tape[at] = (start, influence); tape[at + 1] = (end − start, joints), as in `joined_influence`."""
+    start = tape[at]
+    axis = tape[at + 1]
+    a = wp.vec3(start[0], start[1], start[2])
+    ab = wp.vec3(axis[0], axis[1], axis[2])
+    t = wp.clamp(wp.dot(q - a, ab) / wp.max(wp.dot(ab, ab), 1.0e-37), 0.0, 1.0)
+    c = a + ab * t
+    return wp.vec4(c[0], c[1], c[2], joined_influence(start[3], axis[3], t == 0.0, t == 1.0))
+
+
+@wp.func
+def min_influence_of_joined_segment(tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the influence radius at joints."""
+    return tape[at][3] * (1.0 - JOINT_YIELD)
 
 
 @wp.func
@@ -195,7 +223,7 @@ def polished(t: wp.float32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float3
 def closest_on_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at + k] = coefficient of tᵏ in (c(t), s(t)), k from 0 to 3; s is constant if that of t³ is not 0.
 
-    s has no term in t³. In its place stand the ends at which another curve goes on: 1 start, 2 end, 3 both.
+    s has no term in t³. In its place stand the joints, as in `joined_influence`.
     With c − q = w + b t + a t² + g t³ and s = 1 + s₁ t + s₂ t² in units of s(0), to which N is proportional,
     N = ½ (|c − q|²)' s − |c − q|² s'.
     """
@@ -243,9 +271,7 @@ def closest_on_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
         low = high
     best = polished(best, q, tape, at)
     c = curve_point(best, tape, at)
-    joints = tape[at + 3][3]
-    if (best == 0.0 and (joints == 1.0 or joints == 3.0)) or (best == 1.0 and joints >= 2.0):
-        c[3] = c[3] * (1.0 - JOINT_YIELD)
+    c[3] = joined_influence(c[3], tape[at + 3][3], best == 0.0, best == 1.0)
     return c
 
 
@@ -257,7 +283,14 @@ def min_influence_of_curve(tape: Texels, at: wp.int32) -> wp.float32:
     return wp.min(start, wp.min(start + 0.5 * first, start + first + tape[at + 2][3]))
 
 
+JOINED_SEGMENT = Skeleton(
+    "joined_segment",
+    closest_on_joined_segment,
+    min_influence_of_joined_segment,
+    parameters=2,
+    convex=True,
+)
 ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, parameters=3)
 CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, parameters=4)
 
-CURVE_SKELETONS = (ARC, CURVE)
+CURVE_SKELETONS = (JOINED_SEGMENT, ARC, CURVE)

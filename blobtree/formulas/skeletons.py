@@ -17,7 +17,7 @@ from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
-JOINT_YIELD = 4e-6
+JOINT_YIELD = 3e-6
 """Part of the influence by which a skeleton is weaker at a joint than the one that goes on there.
 
 The joint is not the closest point where the next skeleton has a closer one, but float32 may not show it in

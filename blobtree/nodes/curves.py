@@ -1,14 +1,16 @@
 """Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii."""
 
+from collections import Counter
+from collections.abc import Hashable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Annotated
 
 import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
-from blobtree.formulas.curve_skeletons import ARC, CURVE
+from blobtree.formulas.curve_skeletons import ARC, CURVE, JOINED_SEGMENT
 from blobtree.formulas.skeletons import CIRCLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius
@@ -249,11 +251,24 @@ class TaperedBezier(JoinedPrimitive):
         return np.stack(powers, axis=1)
 
 
+class JoinedSegment(JoinedPrimitive, Segment):
+    """A piece of a polyline."""
+
+    skeleton = JOINED_SEGMENT
+    joint_texels = (1,)
+
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start and influence radius; the axis."""
+        axes = columns["end"] - columns["start"]
+        return np.stack(
+            [beside(columns["start"], influences[:, 0]), beside(axes, np.zeros(len(axes)))], axis=1
+        )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Polyline(Pieces):
     """A tube around straight lines from point to point: the union of segments.
-
-    Within 1e-3 radii of the planes across the lines at a joint, gradients are exact to 1e-3 only.
 
     Raises
     ------
@@ -286,7 +301,10 @@ class Polyline(Pieces):
     def expanded(self) -> Node:
         """Return the union of segments between different neighbours."""
         ends = [pair for pair in pairwise(self.points) if pair[0] != pair[1]]
-        return self.united(Segment(*pair, radius=self.radius, **self.shared) for pair in ends)
+        return self.united(
+            JoinedSegment(*pair, radius=self.radius, **self.shared).joined(joints)
+            for pair, joints in zip(ends, _joints(ends), strict=True)
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -344,17 +362,22 @@ class Stroke(Pieces):
         """Return the union of the parabolas."""
         balls = np.column_stack([self.points, self.radii])
         pieces = _b_spline(balls) if self.spline == "b_spline" else _catmull_rom(balls)
-        last = len(pieces) - 1
-        joints = [(place > 0) + 2 * (place < last) for place in range(len(pieces))]
+        joints = _joints([(tuple(start), tuple(end)) for start, _, end in pieces.tolist()])
         return self.united(map(self._piece, joints, pieces.tolist()))
 
-    def _piece(self, joints: int, controls: list[list[float]]) -> TaperedBezier:
+    def _piece(self, joints: tuple[float], controls: list[list[float]]) -> TaperedBezier:
         start, control, end = controls
         a, b, c = (tuple(ball[:3]) for ball in controls)
         radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
         piece = TaperedBezier(a, b, c, **radii, **self.shared)  # type: ignore[arg-type]  # lists of four
         object.__setattr__(piece, "to_width_radius", self.radii[0] - start[3])
-        return piece.joined((joints,))
+        return piece.joined(joints)
+
+
+def _joints(ends: Sequence[tuple[Hashable, Hashable]]) -> list[tuple[float]]:
+    """Return the joints of pieces between two ends each: 1 start, 2 end, 3 both, 0 none."""
+    shared = Counter(chain.from_iterable(ends))
+    return [((shared[start] > 1) + 2.0 * (shared[end] > 1),) for start, end in ends]
 
 
 def checked_radii(points: tuple[Vector, ...], radii: tuple[float, ...]) -> tuple[float, ...]:

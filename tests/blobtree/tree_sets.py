@@ -84,7 +84,7 @@ _SETS = {
     "built_in": _batches(BUILT_IN_TREES, 1e-5, 2e-4),
     "solids": _batches(SOLID_TREES, 2e-5, 3e-4),
     "fields": _batches(FIELD_TREES, 2e-5, 3e-4, ordinary=10),  # of which one in three points has a colour
-    "shapes": _batches(SHAPE_TREES, 2e-5, 3e-4, 1e-3),  # beside the joints of polylines
+    "shapes": _batches(SHAPE_TREES, 2e-5, 3e-4),
     "blends": _batches(BLEND_TREES, 2e-5, ANY_ORDER),
     "contacts": _batches(CONTACT_TREES, 2e-5, 3e-4),
     "deformed": _batches(DEFORMED_TREES, 2e-5, 3e-4),

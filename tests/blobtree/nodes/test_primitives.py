@@ -220,7 +220,7 @@ def test_gradients_are_exact_where_the_closest_point_leaves_a_corner_or_a_joint(
         points = points[np.abs(smooth).max(axis=1) < 1e-5]
         assert len(points) > 50
         expected = oracle.gradient(node, points, 1e-7)
-        np.testing.assert_allclose(node.gradient(points), expected, atol=2e-3 if node is pipe else 2e-5)
+        np.testing.assert_allclose(node.gradient(points), expected, atol=2e-5)
 
 
 def test_bounds_are_tight() -> None:

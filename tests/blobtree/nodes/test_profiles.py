@@ -117,7 +117,8 @@ def test_an_isolated_primitive_shows_its_radius_and_ends_at_its_width(kind: str,
     outward = np.array([sign, 0.0 if sign else 1.0, 0.0])
     for width in (None, 0.1, 1.0):
         node = make(falloff=name, width=width)
-        assert float(node(surface)) == pytest.approx(ISO, abs=10 * JOINT_YIELD if kind == "polygon" else 2e-6)
+        error = 10 * JOINT_YIELD if kind in ("polygon", "polyline") else 2e-6
+        assert float(node(surface)) == pytest.approx(ISO, abs=error)
         end = 0.4 * (1.0 / exact.rim(name) - 1.0) if width is None else width
         inside, outside = np.array(surface) + np.multiply.outer([0.98 * end, 1.001 * end], outward)
         assert float(node(inside)) > 0.0
