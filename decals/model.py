@@ -14,7 +14,7 @@ from blobtree.formulas.falloff import RIM
 from blobtree.immutable import Immutable
 from blobtree.validation import items
 from decals.errors import InvalidDecals, InvalidRow
-from decals.images.load import decode_srgb
+from decals.images.texels import decode_srgb
 from decals.receivers import codes_of, receiver_array
 from decals.validation import (
     bool_array,

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import BoolArray, Float64Array, Int32Array, UInt8Array
+from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.colors import color_rgb, is_named
 from blobtree.validation import is_whole, real
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, InvalidScene, MissingPackage
@@ -167,13 +167,28 @@ def called(name: str, function: Callable[..., T], *arguments: Any, error: type[I
         ) from reason
 
 
-def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = InvalidImage) -> UInt8Array:
-    """Return pixels that are ``uint8[h, w, 4]`` with h, w > 0, or raise an error."""
+MAX_LIGHT = 65504.0
+"""Brightest light of an image: the largest half float, which graphics cards store."""
+
+
+def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = InvalidImage) -> NDArray[Any]:
+    """Return pixels that are ``uint8``, ``uint16`` or ``float32[h, w, 4]`` with h, w > 0, or raise an error.
+
+    Floats are linear light from 0 to `MAX_LIGHT`, with alpha up to 1.
+    """
+    expected = f"{name}: expected uint8, uint16 or float32 pixels [h, w, 4]"
     if not isinstance(pixels, np.ndarray):
-        raise error(f"{name}: expected uint8 pixels [h, w, 4], got {describe(pixels)}; use load_image")
-    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
-        got = f"{pixels.dtype}{list(pixels.shape)}"
-        raise error(f"{name}: expected uint8 pixels [h, w, 4], got {got}; use load_image")
+        raise error(f"{expected}, got {describe(pixels)}; use load_image")
+    kinds = np.uint8, np.uint16, np.float32
+    if pixels.dtype not in kinds or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
+        raise error(f"{expected}, got {pixels.dtype}{list(pixels.shape)}; use load_image")
+    if pixels.dtype == np.float32:
+        low, high, alpha = (float(of) for of in (pixels.min(), pixels.max(), pixels[..., 3].max()))
+        if not (low >= 0.0 and high <= MAX_LIGHT and alpha <= 1.0):
+            raise error(
+                f"{name}: expected linear light from 0 to {MAX_LIGHT:g} with alpha up to 1, got {low:g} to "
+                f"{high:g} with alpha up to {alpha:g}; clip it"
+            )
     return pixels
 
 

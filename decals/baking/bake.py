@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Float64Array, UInt8Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidResolution
 from blobtree.files import write_atomically
 from blobtree.progress import Cancel, Progress, reporting
@@ -19,7 +19,7 @@ from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.field.walks import walks_for
-from decals.images.load import decode_srgb
+from decals.images.texels import Pixels, decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
@@ -27,6 +27,7 @@ from decals.rendering.options import Drawing, SceneLike, drawing_of
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
+from decals.scenes.scene import DecalImage
 from decals.surfaces.convert import Model
 from decals.validation import checked_path, optional_package, whole_number
 
@@ -160,7 +161,7 @@ class SurfaceColors:
         The same as the scene has them, which decides which decals lie on them.
     decals : Decals or DecalEditor
         The decals on them.
-    images : sequence of uint8[h, w, 4]
+    images : sequence of Pixels
         Images of the decals.
     contact, mapping, stiffness
         See `bake`.
@@ -171,12 +172,13 @@ class SurfaceColors:
         meshes: Sequence[BakeMesh],
         objects: Sequence[object],
         decals: Decals | DecalEditor,
-        images: Sequence[UInt8Array],
+        images: Sequence[Pixels],
         contact: AnyContact,
         mapping: ImageMapping,
         stiffness: float,
     ) -> None:
-        self._meshes, self._objects, self._decals, self._images = meshes, objects, decals, images
+        self._meshes, self._objects, self._decals = meshes, objects, decals
+        self._images = [DecalImage(f"image {i}", pixels) for i, pixels in enumerate(images)]
         self._contact, self._mapping, self._stiffness = contact, mapping, stiffness
         self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
         self._walks = walks_for(mapping, decals, objects)
@@ -220,7 +222,7 @@ def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Pr
     return nodes
 
 
-def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[UInt8Array], Drawing]:
+def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[Pixels], Drawing]:
     """Return objects, decals, images and drawing of a scene, of models or of the file of either."""
     known = scene_or_objects(scene)
     if isinstance(known, list):

@@ -19,7 +19,7 @@ from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.field.walks import Walks, walks_for
-from decals.images.load import encode_srgb
+from decals.images.texels import encode_srgb
 from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.rendering.options import Drawing

@@ -8,7 +8,7 @@ from blobtree._typing import Float32Array, Float64Array, Int64Array, UInt8Array
 from blobtree.progress import Progress
 from decals.baking.atlas import Unwrapped
 from decals.baking.meshes import BakeMesh
-from decals.images.load import encode_srgb
+from decals.images.texels import encode_srgb
 from decals.surfaces.mesh import MeshSurface
 
 BLOCK_SAMPLES = 1 << 19

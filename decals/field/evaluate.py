@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
 from blobtree.kernels import loaded
 from blobtree.validation import real, truth
@@ -18,7 +18,8 @@ from decals.field.law import AnyContact, ContactLaw, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.field.sampling_kernels import color_points, sample_points
 from decals.field.walks import Walks
-from decals.images.load import AnyImage, decode_srgb, each_image, image_pixels
+from decals.images.load import AnyImage, each_image, image_pixels
+from decals.images.texels import Pixels, linear_premultiplied, unit_levels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
@@ -296,8 +297,8 @@ def _neighbors(
     return Neighbors(offsets, known[found[order]].astype(np.int32), fields[order], pushes[order])
 
 
-def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array]:
-    """Lay out sRGB images of any sizes in one array of texels.
+def texel_arrays(images: Sequence[Pixels]) -> tuple[Int32Array, Float32Array]:
+    """Lay out images of any sizes in one array of texels.
 
     Returns
     -------
@@ -306,14 +307,7 @@ def texel_arrays(images: Sequence[UInt8Array]) -> tuple[Int32Array, Float32Array
     texels : float32[t, 4]
         Premultiplied linear colours, row after row, the upper row first.
     """
-    levels = np.arange(256, dtype=np.float32) / np.float32(255)
-    linear = decode_srgb(levels.astype(np.float64)).astype(np.float32)
-    return _laid_out(
-        [
-            np.dstack([linear[image[..., :3]] * levels[image[..., 3:]], levels[image[..., 3]]])
-            for image in images
-        ]
-    )
+    return _laid_out([linear_premultiplied(image) for image in images])
 
 
 def _laid_out(layers: Sequence[Float32Array]) -> tuple[Int32Array, Float32Array]:
@@ -327,7 +321,7 @@ def _laid_out(layers: Sequence[Float32Array]) -> tuple[Int32Array, Float32Array]
 def _heights(
     decals: Decals | DecalEditor,
     reliefs: Sequence[Float32Array | None],
-    pixels: Sequence[UInt8Array],
+    pixels: Sequence[Pixels],
     inputs: list[Any],
     contact: AnyContact,
     device: Any,
@@ -336,7 +330,7 @@ def _heights(
     layers = []
     for relief, image in zip(reliefs, pixels, strict=True):
         layer = np.zeros(image.shape, np.float32)
-        layer[..., 3] = image[..., 3] / np.float32(255)
+        layer[..., 3] = unit_levels(image[..., 3])
         if relief is not None:
             layer[..., 0] = relief
         layers.append(layer)

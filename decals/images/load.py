@@ -14,13 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
-from blobtree._typing import FloatArray, UInt8Array
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
+from decals.images.radiance import decode_radiance, is_radiance
+from decals.images.texels import Pixels
 from decals.validation import describe, is_file, require_rgba
 
-MAX_IMAGE_EDGE = 8192
-"""Longest edge of a decal image that is read from a file, in pixels."""
+MAX_IMAGE_EDGE = 16384
+"""Longest edge of a decal image that is read, in pixels: the limit of usual graphics cards."""
+
+MAX_IMAGE_AREA = 1 << 26
+"""Most pixels of a decal image that is read."""
 
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM", "TGA", "JPEG2000", "AVIF")
 """Formats that are read, by their names in Pillow. Others, such as EPS, would start programs or are rare."""
@@ -30,8 +34,8 @@ class HasPixels(Protocol):
     """An image of a scene, such as `decals.DecalImage`."""
 
     @property
-    def pixels(self) -> UInt8Array:
-        """Straight RGBA, ``uint8[h, w, 4]``."""
+    def pixels(self) -> Pixels:
+        """Straight RGBA, ``[h, w, 4]``."""
         ...
 
 
@@ -49,11 +53,17 @@ AnyImage: TypeAlias = str | os.PathLike[str] | Image.Image | NDArray[Any] | HasP
 DEFAULT_IMAGE = "scale"
 """Image of decals for which no image is given."""
 
+PNG_DEPTH = 24
+"""Place of the bits of a channel in a PNG file."""
+
+MAX_FILE_BYTES = 1 << 29
+"""Most bytes of a Radiance file that are read."""
+
 _DAMAGED = "it is damaged or of another kind, so export it again"
 _ADVICE = "give a picture such as PNG or JPEG, or one of: " + ", ".join(BUILTIN_IMAGES)
 
 
-def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint8]:
+def load_image(reference: str, *, folder: Path | None = None) -> Pixels:
     """Return the pixels of a generated image or of a picture file.
 
     Parameters
@@ -65,8 +75,8 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
 
     Returns
     -------
-    uint8[h, w, 4]
-        sRGB with straight alpha, row 0 at the top.
+    uint8, uint16 or float32[h, w, 4]
+        Straight alpha, row 0 at the top. Integers hold sRGB; floats, of Radiance files, linear light.
 
     Raises
     ------
@@ -92,14 +102,15 @@ def load_image(reference: str, *, folder: Path | None = None) -> NDArray[np.uint
     return read_image((folder or Path()) / reference)
 
 
-def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = None) -> UInt8Array:
+def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = None) -> Pixels:
     """Return the pixels of an image of any kind.
 
     Parameters
     ----------
     image : str, path, PIL.Image.Image, numpy.ndarray, pyvista.Texture or DecalImage
         The name of a generated image; the path of a picture; or pixels, row 0 at the top. Arrays are grey
-        ``[h, w]``, RGB ``[h, w, 3]`` or RGBA ``[h, w, 4]``, of bytes or of floats from 0 to 1.
+        ``[h, w]``, RGB ``[h, w, 3]`` or RGBA ``[h, w, 4]``, of bytes, of 16 bits or of sRGB floats from 0 to
+        1. The pixels of a `DecalImage` may also be linear light of any brightness.
     name : str
         Name of the image in messages.
     folder : Path, optional
@@ -107,8 +118,8 @@ def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = 
 
     Returns
     -------
-    uint8[h, w, 4]
-        sRGB with straight alpha, row 0 at the top.
+    uint8, uint16 or float32[h, w, 4]
+        Straight alpha, row 0 at the top. Integers hold sRGB; floats, of Radiance files, linear light.
 
     Raises
     ------
@@ -133,28 +144,43 @@ def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = 
     return _array_pixels(cast(HasArray, image).to_array() if hasattr(image, "to_array") else image, name)
 
 
-EMBEDDED = "data:image/png;base64,"
-"""How a reference begins that holds the picture itself."""
+EMBEDDED = {
+    "uint8": "data:image/png;base64,",
+    "uint16": "data:image/png;bytes-of=uint16;base64,",
+    "float32": "data:image/png;bytes-of=float32;base64,",
+}
+"""How references begin that hold the picture itself, by the type of its pixels.
+
+The bytes of wider pixels, in little-endian order, are those of a wider picture.
+"""
 
 
 def is_embedded(reference: str) -> bool:
     """Return True if a reference holds the picture itself, as `embedded_image` writes it."""
-    return reference.startswith(EMBEDDED)
+    return reference.startswith(tuple(EMBEDDED.values()))
 
 
-def embedded_image(pixels: UInt8Array) -> str:
-    """Return ``uint8[h, w, 4]`` as a text that `load_image` reads."""
+def embedded_image(pixels: Pixels) -> str:
+    """Return pixels as a text that `load_image` reads."""
     buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG")
-    return EMBEDDED + base64.b64encode(buffer.getvalue()).decode("ascii")
+    rows = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder("<"))
+    Image.fromarray(rows.view(np.uint8).reshape(len(rows), -1, 4)).save(buffer, "PNG")
+    return EMBEDDED[pixels.dtype.name] + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
-def _embedded_pixels(reference: str) -> UInt8Array:
+def _embedded_pixels(reference: str) -> Pixels:
+    kind, start = next(item for item in EMBEDDED.items() if reference.startswith(item[1]))
+    width = np.dtype(kind).itemsize
     try:
-        data = base64.b64decode(reference.removeprefix(EMBEDDED), validate=True)
+        data = base64.b64decode(reference.removeprefix(start), validate=True)
+        rows = _read_picture(io.BytesIO(data), "an image within the file", max_edge=width * MAX_IMAGE_EDGE)
+        if width == 1:
+            return rows
+        wide = np.ascontiguousarray(rows).reshape(len(rows), -1).view(np.dtype(kind).newbyteorder("<"))
+        pixels: Pixels = wide.reshape(len(rows), -1, 4).astype(kind)
     except ValueError as error:
         raise InvalidImage("could not read an image within the file (no base64); save it again") from error
-    return _read_picture(io.BytesIO(data), "an image within the file")
+    return require_rgba("an image within the file", pixels)
 
 
 def each_image(images: Any) -> list[Any]:
@@ -174,7 +200,7 @@ def each_image(images: Any) -> list[Any]:
     return list(images)
 
 
-def _array_pixels(image: Any, name: str) -> UInt8Array:
+def _array_pixels(image: Any, name: str) -> Pixels:
     try:
         array = np.asarray(image)
     except (TypeError, ValueError):  # rows of different lengths
@@ -192,27 +218,30 @@ def _array_pixels(image: Any, name: str) -> UInt8Array:
     levels = _levels(planes, name)
     if levels.shape[2] == 4:
         return levels
-    colors = np.broadcast_to(levels, (*levels.shape[:2], 3))
-    return np.dstack([colors, np.full(levels.shape[:2], 255, np.uint8)])
+    return _opaque(np.broadcast_to(levels, (*levels.shape[:2], 3)))
 
 
-def _levels(values: NDArray[Any], name: str) -> UInt8Array:
-    """Return channels as bytes."""
-    if values.dtype == np.uint8:
-        return values
-    if values.dtype == np.uint16:
-        return np.rint(values / 257.0).astype(np.uint8)
+def _opaque(colors: NDArray[Any]) -> Pixels:
+    """Return the colours ``[h, w, 3]`` of an image without alpha as RGBA."""
+    alpha = np.full(colors.shape[:2], np.iinfo(colors.dtype).max, colors.dtype)
+    return np.dstack([colors, alpha])
+
+
+def _levels(values: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return channels as integers."""
+    if values.dtype in (np.uint8, np.uint16):
+        return values.astype(values.dtype.newbyteorder("="), copy=False)
     if values.dtype.kind != "f" or not ((values >= 0.0) & (values <= 1.0)).all():
         raise InvalidImage(
             f"{name}: expected bytes, or floats from 0 to 1, got {values.dtype} from {values.min()} to "
-            f"{values.max()}; scale it first"
+            f"{values.max()}; scale it, or give decals.DecalImage linear light, float32[h, w, 4]"
         )
     return np.rint(values * 255.0).astype(np.uint8)
 
 
-def _picture_pixels(picture: Image.Image, name: str) -> UInt8Array:
+def _picture_pixels(picture: Image.Image, name: str, max_edge: int = MAX_IMAGE_EDGE) -> Pixels:
     """Return the pixels of an open picture, upright."""
-    _check_size(picture, name)
+    _check_size(picture, name, max_edge)
     try:
         picture.load()
         return _to_rgba(ImageOps.exif_transpose(picture))
@@ -226,18 +255,18 @@ def _has_invalid_color(reference: str, folder: Path | None) -> bool:
     return bool(mark) and name in BUILTIN_IMAGES and not is_file((folder or Path()) / reference)
 
 
-def read_image(path: Path) -> NDArray[np.uint8]:
+def read_image(path: Path) -> Pixels:
     """Return the pixels of a picture file of any mode: grey, palette, 16 bit, with or without alpha.
 
     Parameters
     ----------
     path : Path
-        A PNG, JPEG, WebP, TIFF, BMP, GIF, PPM, TGA, JPEG 2000 or AVIF file.
+        A PNG, JPEG, WebP, TIFF, BMP, GIF, PPM, TGA, JPEG 2000, AVIF or Radiance (``.hdr``) file.
 
     Returns
     -------
-    uint8[h, w, 4]
-        sRGB with straight alpha, row 0 at the top.
+    uint8, uint16 or float32[h, w, 4]
+        Straight alpha, row 0 at the top. Integers hold sRGB; floats, of Radiance files, linear light.
 
     Raises
     ------
@@ -259,10 +288,37 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     """
     if not is_file(path):
         raise InvalidImage(f"expected an image, found no file {str(path)!r}; {_ADVICE}")
-    return _read_picture(path, str(path))
+    try:
+        with path.open("rb") as file:
+            start = file.read(PNG_DEPTH + 1)
+            if is_radiance(start):
+                return decode_radiance(start + file.read(MAX_FILE_BYTES), str(path), MAX_IMAGE_EDGE)
+    except OSError as error:
+        raise InvalidImage(f"could not read the image {str(path)!r} ({error.strerror})") from error
+    pixels = _read_picture(path, str(path))
+    wide = start.startswith(b"\x89PNG") and start[PNG_DEPTH:] == b"\x10" and pixels.dtype == np.uint8
+    return _wide_colors(path, pixels) if wide else pixels
 
 
-def _read_picture(file: Path | io.BytesIO, name: str) -> UInt8Array:
+def _wide_colors(path: Path, narrow: Pixels) -> Pixels:
+    """Return the 16-bit colours of a PNG file, of which Pillow reads 8 bits."""
+    import pyvista as pv
+    from vtkmodules.vtkIOImage import vtkPNGReader
+
+    reader = vtkPNGReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    image = reader.GetOutput()
+    height, width = narrow.shape[:2]
+    if image.GetDimensions() != (width, height, 1) or image.GetScalarSize() != 2:  # turned by its tags
+        return narrow
+    scalars: Any = pv.convert_array(image.GetPointData().GetScalars())
+    values = scalars.reshape(height, width, -1)[::-1]
+    colors = np.broadcast_to(values[..., :-1], (height, width, 3)) if values.shape[2] in (2, 4) else values
+    return np.dstack([colors, values[..., -1]]) if values.shape[2] in (2, 4) else _opaque(colors)
+
+
+def _read_picture(file: Path | io.BytesIO, name: str, max_edge: int = MAX_IMAGE_EDGE) -> Pixels:
     """Return the pixels of a picture file; messages call it by a name."""
     try:
         # Pillow warns of odd tags, and of sizes, for which MAX_IMAGE_EDGE is the limit.
@@ -271,7 +327,7 @@ def _read_picture(file: Path | io.BytesIO, name: str) -> UInt8Array:
             _without_log(),
             Image.open(file, formats=PICTURE_FORMATS) as picture,
         ):
-            return _picture_pixels(picture, name)
+            return _picture_pixels(picture, name, max_edge)
     except UnidentifiedImageError as error:
         raise InvalidImage(f"expected an image, {name!r} is not a picture; {_ADVICE}") from error
     except Image.DecompressionBombError as error:
@@ -297,23 +353,26 @@ def _without_log() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _check_size(picture: Image.Image, name: str) -> None:
+def _check_size(picture: Image.Image, name: str, max_edge: int) -> None:
     width, height = picture.size
-    if not (0 < width <= MAX_IMAGE_EDGE and 0 < height <= MAX_IMAGE_EDGE):
+    if not (0 < width <= max_edge and 0 < height <= max_edge and width * height <= MAX_IMAGE_AREA):
         raise InvalidImage(
-            f"expected an image of 1 to {MAX_IMAGE_EDGE} pixels a side, "
+            f"expected an image of 1 to {max_edge} pixels a side and {MAX_IMAGE_AREA:,} together, "
             f"{name!r} has {width} x {height}: scale it first"
         )
 
 
-def _to_rgba(picture: Image.Image) -> NDArray[np.uint8]:
+def _to_rgba(picture: Image.Image) -> Pixels:
+    if picture.mode.startswith("I;16"):
+        grey = np.asarray(picture).astype(np.uint16)
+        return _opaque(np.dstack([grey, grey, grey]))
     if picture.mode.startswith(("I", "F")):
         return _wide_grey(np.asarray(picture, dtype=np.float64), picture.mode)
     return np.asarray(picture.convert("RGBA"), dtype=np.uint8)
 
 
 def _wide_grey(values: NDArray[np.float64], mode: str) -> NDArray[np.uint8]:
-    """Return 16- or 32-bit grey as 8-bit RGBA; the conversion of Pillow would clip it to white."""
+    """Return 32-bit grey as 8-bit RGBA; the conversion of Pillow would clip it to white."""
     if mode == "F":
         finite = np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0)
         grey = finite * 255.0 if finite.max(initial=0.0) <= 1.0 else finite
@@ -321,14 +380,3 @@ def _wide_grey(values: NDArray[np.float64], mode: str) -> NDArray[np.uint8]:
         grey = values / 257.0
     level = np.rint(np.clip(grey, 0.0, 255.0)).astype(np.uint8)
     return np.dstack([level, level, level, np.full_like(level, 255)])
-
-
-def decode_srgb(colors: FloatArray) -> FloatArray:
-    """Decode sRGB colours from 0 to 1 to linear light, in the precision of ``colors``."""
-    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
-
-
-def encode_srgb(colors: FloatArray) -> FloatArray:
-    """Encode linear light, clamped to [0, 1], as sRGB colours, in the precision of ``colors``."""
-    light = np.clip(colors, 0.0, 1.0)
-    return np.where(light <= 0.0031308, light * 12.92, 1.055 * light ** (1 / 2.4) - 0.055)

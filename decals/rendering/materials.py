@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import moderngl
 import numpy as np
-from PIL import Image
 
 from blobtree._typing import Float32Array, Float64Array
+from decals.images.texels import resized_texels, unit_levels
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.lights import Lighting
@@ -52,12 +52,12 @@ class ReliefArray:
         self.texture = context.gl.texture_array((shape[1], shape[0], len(images)), 2, dtype="f4")
         for layer, image in enumerate(images):
             texels = np.zeros((*image.pixels.shape[:2], 2), np.float32)
-            texels[..., 1] = image.pixels[..., 3] / np.float32(255)
+            texels[..., 1] = unit_levels(image.pixels[..., 3])
             heights = _relief_texels(image)
             if heights is not None:
                 texels[..., 0] = heights
             region = (0, 0, layer, shape[1], shape[0], 1)
-            self.texture.write(_resized(texels, shape)[::-1].tobytes(), viewport=region)
+            self.texture.write(resized_texels(texels, shape)[::-1].tobytes(), viewport=region)
         self.texture.repeat_x = self.texture.repeat_y = False
         self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
 
@@ -134,19 +134,6 @@ def _texels(image: ImageLike, shape: tuple[int, int]) -> Iterator[Float32Array]:
         for _ in range(2):
             yield np.zeros((*shape, 4), np.float32)
         return
-    alpha = image.pixels[..., 3:] / np.float32(255)
+    alpha = unit_levels(image.pixels[..., 3:])
     for texels in image.surface_texels():
-        yield _resized(texels * alpha, shape)
-
-
-def _resized(texels: Float32Array, shape: tuple[int, int]) -> Float32Array:
-    """Return texels in another shape; the filter has no overshoot, so no value leaves its range."""
-    if texels.shape[:2] == shape:
-        return texels
-    channels = [
-        np.asarray(
-            Image.fromarray(np.ascontiguousarray(channel)).resize(shape[::-1], Image.Resampling.BILINEAR)
-        )
-        for channel in np.moveaxis(texels, -1, 0)
-    ]
-    return np.stack(channels, axis=-1)
+        yield resized_texels(texels * alpha, shape)

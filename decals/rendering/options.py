@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
-from blobtree._typing import UInt8Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
+from decals.images.texels import Pixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.receivers import takes_named_only
@@ -221,7 +221,7 @@ class ImageLike(Protocol):
     """An image of a scene: straight RGBA, row 0 at the top."""
 
     @property
-    def pixels(self) -> UInt8Array: ...  # noqa: D102
+    def pixels(self) -> Pixels: ...  # noqa: D102
 
 
 class SceneLike(Protocol):

@@ -16,7 +16,7 @@ from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS
 from decals.errors import InvalidScene, TooMuchData
 from decals.field.mapping import ImageMapping
 from decals.field.walks import Walks
-from decals.images.load import decode_srgb
+from decals.images.texels import Pixels, linear_premultiplied, resized_texels
 from decals.index.editor import LIMITS, RECORDS, DecalEditor
 from decals.index.index import DecalIndex, has_nested
 from decals.model import Decals
@@ -41,12 +41,14 @@ MAX_IMAGE_BYTES = 1 << 29
 """Memory of all images without mip levels, at most; for more, all become smaller."""
 _TEXEL_BYTES = 8  # four half floats
 
+Texels = TypeVar("Texels", UInt8Array, Float32Array)
+
 
 class ImageArray:
     """Images for one shader: layer ``i`` is image ``i``, its first row at v = 1.
 
-    Images are sRGB. They are converted to linear light with premultiplied alpha in half floats, so filtering
-    and compositing are sums. All layers have one width and one height, with mip levels. An empty list gives
+    Images are converted to linear light with premultiplied alpha in half floats, so filtering and
+    compositing are sums. All layers have one width and one height, with mip levels. An empty list gives
     one transparent layer.
 
     Attributes
@@ -59,10 +61,10 @@ class ImageArray:
     Raises
     ------
     InvalidImage
-        If an array is not ``uint8[h, w, 4]``.
+        If an array is no image, see `decals.images.texels.Pixels`.
     """
 
-    def __init__(self, context: Context, images: Sequence[UInt8Array]) -> None:
+    def __init__(self, context: Context, images: Sequence[Pixels]) -> None:
         for number, image in enumerate(images):
             require_rgba(f"image {number}", image)
         shapes = [(image.shape[0], image.shape[1]) for image in images]
@@ -71,7 +73,7 @@ class ImageArray:
         self.texture = context.gl.texture_array((self.width, self.height, layers), 4, dtype="f2")
         empty = np.zeros((1, 1, 4), np.uint8)
         for layer, image in enumerate(images or [empty]):
-            texels = linear_premultiplied(filled_corners(resized(image, (self.height, self.width)))[::-1])
+            texels = _texels(image, (self.height, self.width))[::-1]
             region = (0, 0, layer, self.width, self.height, 1)
             self.texture.write(texels.astype(np.float16).tobytes(), viewport=region)
         self.texture.repeat_x = self.texture.repeat_y = False
@@ -104,12 +106,11 @@ def common_shape(shapes: Sequence[tuple[int, int]], *, limit: int) -> tuple[int,
     return height, width
 
 
-def linear_premultiplied(image: UInt8Array) -> Float32Array:
-    """Return an sRGB image in linear light, colours multiplied by alpha."""
-    levels = np.arange(256, dtype=np.float32) / 255
-    decoded = decode_srgb(levels)
-    alpha = levels[image[..., 3:]]
-    return np.concatenate([decoded[image[..., :3]] * alpha, alpha], axis=-1)
+def _texels(image: Pixels, shape: tuple[int, int]) -> Float32Array:
+    """Return an image in linear light and another shape, with colours around its disc."""
+    if image.dtype == np.uint8:
+        return linear_premultiplied(filled_corners(resized(image.astype(np.uint8, copy=False), shape)))
+    return resized_texels(filled_corners(linear_premultiplied(image)), shape)
 
 
 def resized(image: UInt8Array, shape: tuple[int, int]) -> UInt8Array:
@@ -124,7 +125,7 @@ DISC_MARGIN = 1.5
 """Texels around the disc of an image that bilinear look-ups inside it may read."""
 
 
-def filled_corners(image: UInt8Array) -> UInt8Array:
+def filled_corners(image: Texels) -> Texels:
     """Return an image whose texels outside its disc continue its rim outward.
 
     Decals show the disc alone, but mip levels average texels on both sides of its rim.

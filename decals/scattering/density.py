@@ -10,6 +10,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.validation import point_array
 from decals.errors import InvalidImage, InvalidScattering
 from decals.images.load import AnyImage, image_pixels
+from decals.images.texels import as_bytes
 from decals.scattering.image_projections import Projection
 from decals.surfaces.mesh import MeshSurface
 from decals.validation import describe, function_values, instance, real_array, real_number
@@ -184,7 +185,9 @@ class PaintedImage:
 
     def __init__(self, image: AnyImage | ArrayLike, projection: Projection, *, repeat: bool = False) -> None:
         ready = isinstance(image, np.ndarray | list)  # these may be finer than bytes
-        self.grey = _grey_values(cast(ArrayLike, image) if ready else image_pixels(cast(AnyImage, image)))
+        self.grey = _grey_values(
+            cast(ArrayLike, image) if ready else as_bytes(image_pixels(cast(AnyImage, image)))
+        )
         if not callable(projection):
             raise InvalidScattering(
                 f"projection: expected one such as Planar.over(surface), or a function of points, "

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, UInt8Array
 from decals.errors import InvalidImage
-from decals.images.load import AnyImage, decode_srgb, image_pixels
+from decals.images.load import AnyImage, image_pixels
+from decals.images.texels import Pixels, as_bytes, decode_srgb, unit_levels, without_excess
 from decals.scenes.scene import DecalImage
 from decals.validation import describe, is_file, real_number
 
@@ -54,7 +54,7 @@ class DecalMaterial(DecalImage):
     source : str
         Name of the material.
     pixels : image
-        Base colour and alpha, sRGB; stored as uint8[h, w, 4].
+        Base colour and alpha, sRGB; stored as uint8 or uint16[h, w, 4].
     normal : image, optional
         Normals in tangent space, x to the right, y up (OpenGL's, as in glTF); stored as uint8[h, w, 3].
         By default flat.
@@ -84,7 +84,7 @@ class DecalMaterial(DecalImage):
     (np.uint8(76), [128, 128, 255])
     """
 
-    pixels: NDArray[np.uint8] = field(repr=False)
+    pixels: Pixels = field(repr=False)
     normal: UInt8Array = field(default=UNSET, repr=False)
     roughness: UInt8Array = field(default=UNSET, repr=False)
     metallic: UInt8Array = field(default=UNSET, repr=False)
@@ -109,7 +109,7 @@ class DecalMaterial(DecalImage):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        pixels = image_pixels(self.pixels, name=f"material {self.source!r}, base colour")
+        pixels = without_excess(image_pixels(self.pixels, name=f"material {self.source!r}, base colour"))
         object.__setattr__(self, "pixels", pixels)
         super().__post_init__()
         shape = pixels.shape[:2]
@@ -213,7 +213,7 @@ class DecalMaterial(DecalImage):
         texel = 2.0 / min(rows, columns)
         part = np.clip((inner - texel) / max(RIM_TAPER, 3.0 * texel), 0.0, 1.0)
         taper = part * part * (3.0 - 2.0 * part)
-        alpha = self.pixels[..., 3] / 255.0
+        alpha = unit_levels(self.pixels[..., 3])
         raised: Float32Array = (self.relief * taper * alpha * self.height).astype(np.float32)
         return raised
 
@@ -243,7 +243,7 @@ class DecalMaterial(DecalImage):
             raise InvalidImage(
                 f"{self._name(name)}: expected an image with three channels, got {list(array.shape)}"
             )
-        return image_pixels(given, name=self._name(name))[..., :3]
+        return as_bytes(image_pixels(given, name=self._name(name)))[..., :3]
 
     def _levels(self, name: str, default: float) -> UInt8Array:
         """Return a map of one channel; a number stands for all texels."""
@@ -255,7 +255,7 @@ class DecalMaterial(DecalImage):
                     f"{self._name(name)}: expected a number from 0 to 1, got {describe(value)}"
                 )
             return np.full(self.pixels.shape[:2], round(255 * float(value)), np.uint8)
-        return image_pixels(value, name=self._name(name))[..., 0]
+        return as_bytes(image_pixels(value, name=self._name(name)))[..., 0]
 
 
 def _heights(name: str, given: Any) -> Float32Array | None:
@@ -264,7 +264,7 @@ def _heights(name: str, given: Any) -> Float32Array | None:
         return None
     array = given if isinstance(given, np.ndarray) else None
     if array is None or array.dtype.kind != "f" or array.ndim != 2:
-        return (image_pixels(given, name=name)[..., 0] / 255.0).astype(np.float32)
+        return unit_levels(image_pixels(given, name=name)[..., 0])
     heights = array.astype(np.float32)
     if not np.isfinite(heights).all():
         row, column = np.argwhere(~np.isfinite(heights))[0].tolist()

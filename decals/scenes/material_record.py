@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from blobtree._typing import UInt8Array
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.load import embedded_image, image_pixels, is_embedded
+from decals.images.texels import Pixels
 from decals.scenes.material import MAP_NAMES, DecalMaterial
 
 PICTURES = tuple(name for name in MAP_NAMES if name != "height")
@@ -66,7 +66,7 @@ def sources_of(image: str | MaterialRecord) -> list[str]:
     return [source for source in given if source is not None and not is_embedded(source)]
 
 
-def _rgba(levels: UInt8Array) -> UInt8Array:
+def _rgba(levels: Pixels) -> Pixels:
     """Return a map of one, three or four channels as a picture."""
     if levels.ndim == 3 and levels.shape[2] == 4:
         return levels

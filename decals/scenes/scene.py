@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import decals
 from blobtree.progress import Progress
 from decals import rendering
 from decals.errors import ImplicitDecalsError, InvalidScene, NoGraphics
 from decals.images.load import AnyImage, each_image, image_pixels
+from decals.images.texels import Pixels
 from decals.model import LAYER_LIMIT, Decals
 from decals.receivers import check_receivers
 from decals.scenes.camera import Camera
@@ -35,13 +35,14 @@ class DecalImage:
     ----------
     source : str
         The name of a generated image (``"scale"``, ``"tile#b0413e"``) or the path of a picture.
-    pixels : uint8[h, w, 4]
-        Straight RGBA, row 0 at the top; the decal's rim is the ellipse that touches the four edges.
+    pixels : uint8, uint16 or float32[h, w, 4]
+        Straight RGBA, row 0 at the top. Integers hold sRGB; floats hold linear light of any brightness. The
+        decal's rim is the ellipse that touches the four edges.
 
     Raises
     ------
     InvalidScene
-        If the source is no text or the pixels are not uint8[h, w, 4].
+        If the source is no text or the pixels are others.
 
     Examples
     --------
@@ -54,7 +55,7 @@ class DecalImage:
     """
 
     source: str
-    pixels: NDArray[np.uint8] = field(repr=False)
+    pixels: Pixels = field(repr=False)
 
     def __post_init__(self) -> None:
         instance("an image's source", self.source, str, InvalidScene, "give a name or a path")

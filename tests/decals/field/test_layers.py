@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from decals.errors import InvalidImage
 from decals.field.evaluate import evaluate
-from decals.images.load import decode_srgb
+from decals.images.texels import decode_srgb
 from decals.model import Decals, Interaction
 from decals.record import Contact
 from tests.oracles.contact import RIM

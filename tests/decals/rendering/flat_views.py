@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.images.load import decode_srgb
+from decals.images.texels import decode_srgb
 from decals.model import Decals
 from decals.rendering.lights import Lighting
 from decals.scenes.camera import Camera

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from decals.field.mapping import ImageMapping
-from decals.images.load import decode_srgb
+from decals.images.texels import decode_srgb
 from decals.model import Decals
 from decals.record import DEFAULT_CONTACT, Contact
 from decals.rendering.options import SceneLike

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from decals.errors import InvalidImage, TooMuchData
+from decals.images.texels import linear_premultiplied
 from decals.rendering.context import Context
 from decals.rendering.uploads import (
     ROW_TEXELS,
     DataTexture,
     ImageArray,
     common_shape,
-    linear_premultiplied,
     resized,
 )
 from decals.shaders import Source, compose
@@ -90,6 +90,16 @@ def test_images_become_linear_and_premultiplied() -> None:
     np.testing.assert_allclose(linear[0], expected, atol=1e-6)
 
 
+def test_bright_images_keep_their_light(context: Context) -> None:
+    bright = np.full((4, 4, 4), 1.0, np.float32)
+    bright[..., 0] = 30.0
+    array = ImageArray(context, [bright, np.full((8, 8, 4), 65535, np.uint16)])
+    texels = np.frombuffer(array.texture.read(), np.float16).reshape(2, 8, 8, 4)
+    assert (texels[0] == [30, 1, 1, 1]).all()
+    assert (texels[1] == 1).all()
+    array.release()
+
+
 def test_image_layers_rows_and_mip_levels(context: Context) -> None:
     images = [np.full((8, 8, 4), 255, np.uint8), np.zeros((8, 8, 4), np.uint8)]
     images[1][:4] = 255  # upper half
@@ -121,10 +131,10 @@ def test_no_images(context: Context) -> None:
 
 
 @pytest.mark.parametrize(
-    "bad", [np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4, 4), np.float32), np.zeros((0, 4, 4), np.uint8)]
+    "bad", [np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4, 4)), np.zeros((0, 4, 4), np.uint8)]
 )
 def test_bad_images(context: Context, bad: Any) -> None:
-    with pytest.raises(InvalidImage, match="image 0: expected uint8 pixels"):
+    with pytest.raises(InvalidImage, match="image 0: expected uint8, uint16 or float32 pixels"):
         ImageArray(context, [bad])
 
 

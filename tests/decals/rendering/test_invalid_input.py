@@ -72,7 +72,7 @@ def test_a_picture_after_a_refused_one_is_as_before(renderer: Renderer) -> None:
     view = view_of(scattered(shape, 30, 2, radii=(0.1, 0.4)), shape)
     before = renderer.render(view, RenderOptions(size=SIZE))
     bad = View(view.objects, view.camera, view.decals, (Picture(np.zeros((4, 4, 3), np.uint8)),))
-    with pytest.raises(ValueError, match="image 0: expected uint8 pixels"):
+    with pytest.raises(ValueError, match="image 0: expected uint8, uint16 or float32 pixels"):
         renderer.render(bad, RenderOptions(size=SIZE))
     np.testing.assert_array_equal(renderer.render(view, RenderOptions(size=SIZE)), before)
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from decals.errors import InvalidImage, InvalidScene
-from decals.images.load import decode_srgb, encode_srgb
+from decals.images.texels import decode_srgb, encode_srgb
 from decals.model import Decals
 from decals.rendering.lights import Light, Lighting
 from decals.rendering.options import RenderOptions
