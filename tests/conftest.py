@@ -83,10 +83,38 @@ LONG_FILES = (
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files that take longest in front."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the slow cases, and put the files that take longest in front."""
+    cases = [item for item in items if isinstance(item, pytest.Function) and hasattr(item, "callspec")]
+    for item in cases:
+        if is_slow_case(item):
+            item.add_marker(pytest.mark.slow)
+    if not any("::" in argument for argument in config.args):
+        check_named_cases(cases)
     order = {f"tests/{name}": place for place, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: order.get(item.nodeid.partition("::")[0], len(order)))
+
+
+def is_slow_case(item: pytest.Function) -> bool:
+    """Return True if a mark of the test makes this case slow."""
+    slow = {name for mark in item.iter_markers("slow_cases") for name in mark.args}
+    ordinary = {name for mark in item.iter_markers("ordinary_cases") for name in mark.args}
+    return item.callspec.id in slow or (bool(ordinary) and item.callspec.id not in ordinary)
+
+
+def check_named_cases(items: list[pytest.Function]) -> None:
+    """Raise UsageError if one of these marks names a case that its test does not have."""
+    found: dict[str, set[str]] = {}
+    named: dict[str, set[str]] = {}
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        found.setdefault(test, set()).add(item.callspec.id)
+        marks = (*item.iter_markers("slow_cases"), *item.iter_markers("ordinary_cases"))
+        named.setdefault(test, set()).update(name for mark in marks for name in mark.args)
+    if wrong := [
+        f"{test}: {sorted(named[test] - found[test])}" for test in named if named[test] - found[test]
+    ]:
+        raise pytest.UsageError(f"marks name cases that there are not: {wrong}")
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -15,7 +15,6 @@ from PIL import Image
 from decals.apps import gallery
 from decals.apps.gallery import sphere
 from decals.apps.gallery.helpers import draw, main
-from decals.errors import NoGraphics
 from decals.rendering import Renderer
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -28,24 +27,21 @@ SCATTERED = ("particles", "deforming", "posing", "painted", "models", "dragon")
 """Examples that depend on scattering: better scattering changes their pictures."""
 
 
-@pytest.fixture(scope="module")
-def renderer(vtk_display: None) -> Renderer:
-    try:
-        renderer = Renderer()
-    except NoGraphics as error:
-        pytest.skip(str(error))
+@pytest.fixture
+def golden_renderer(renderer: Renderer) -> Renderer:
     if "llvmpipe" not in renderer.context.name:
         pytest.skip(f"golden images are drawn by llvmpipe, not by {renderer.context.name}")
     return renderer
 
 
+@pytest.mark.slow_cases("custom_nodes", "deforming", "painted", "particles", "pressed_solids", "relief")
 @pytest.mark.parametrize("name", gallery.EXAMPLES)
-def test_an_example_draws_its_golden_image(renderer: Renderer, name: str) -> None:
+def test_an_example_draws_its_golden_image(golden_renderer: Renderer, name: str) -> None:
     if name in gallery.DOWNLOADED and "PYVISTA_DATA" not in os.environ:
         pytest.skip("its meshes would be downloaded; set PYVISTA_DATA to a folder that has them")
     module = import_module(f"{gallery.__name__}.{name}")
     assert module.__doc__
-    drawn = draw(renderer, module.panels(), side=SIDE, samples=2)[..., :3]
+    drawn = draw(golden_renderer, module.panels(), side=SIDE, samples=2)[..., :3]
     if name in SCATTERED:
         assert drawn.std() > 20
         return

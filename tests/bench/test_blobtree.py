@@ -1,5 +1,7 @@
 """The benchmark's own functions, small: what they claim to measure is what they run."""
 
+import pytest
+
 from blobtree import Sum
 from tests.bench.blobtree import blobs, cells_of, cost_of_quality, median_time, mixed, remeshing, surface_of
 
@@ -11,6 +13,7 @@ def test_edits_touch_a_part_and_are_timed_against_a_fresh_mesh() -> None:
     assert figures["remesh_over_fresh"] > 0.0
 
 
+@pytest.mark.slow
 def test_the_cost_of_quality_is_a_ratio_of_times() -> None:
     assert 0.1 < cost_of_quality(resolution=32)["quality_cost"] < 10.0
 

@@ -1,12 +1,14 @@
 """The benchmark of decals, with small samples."""
 
 import numpy as np
+import pytest
 
 from decals.record import Contact
 from tests.bench import contact_modes, decal_index, decals
 from tests.bench import decal_figures as bench
 
 
+@pytest.mark.slow
 def test_errors_and_folds() -> None:
     figures = bench.contact(2100) | bench.folds(2000) | bench.mapping(200)
     assert 0 < figures["contact_error_rh"] < 2e-5
@@ -14,6 +16,7 @@ def test_errors_and_folds() -> None:
     assert figures["map_sphere"] < 1e-4 < figures["map_torus"] < figures["map_torus_chord"]
 
 
+@pytest.mark.slow
 def test_contact_modes_differ_in_folds_and_stretch() -> None:
     modes = Contact.PRODUCT, Contact.ELASTIC
     folds = [contact_modes.folds(contact, 4000) for contact in modes]
@@ -31,6 +34,7 @@ def test_missing_figures_are_reported() -> None:
     assert "slope_most" in text
 
 
+@pytest.mark.slow
 def test_the_decals_of_the_index_leave_no_gap() -> None:
     """Each point of the sphere lies within the rims of one to three decals."""
     decals = decal_index.spiral_decals(2000)

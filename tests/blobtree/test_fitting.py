@@ -54,17 +54,17 @@ def test_parameters_come_back_from_field_values() -> None:
     assert found.values.shape == (len(found.parameters),) == (len(numeric_parameters(MODEL)),)
 
 
-def test_parameters_come_back_from_the_surface() -> None:
+@pytest.mark.parametrize("with_normals", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_parameters_come_back_from_the_surface(with_normals: bool) -> None:
     points, normals = surface_samples(MODEL, 400)
     start = with_numeric_values(
         perturbed(MODEL, np.random.default_rng(3), amount=0.4), numeric_parameters(MODEL)[:1], [2.0]
     )
-    for given in (None, normals):
-        found = fit(start, points, normals=given, fixed=["exponent"])
-        assert np.abs(found.residuals).max() < 1e-5
-        if given is not None:
-            assert found.normal_residuals is not None
-            assert np.abs(found.normal_residuals).max() < 1e-3
+    found = fit(start, points, normals=normals if with_normals else None, fixed=["exponent"])
+    assert np.abs(found.residuals).max() < 1e-5
+    if with_normals:
+        assert found.normal_residuals is not None
+        assert np.abs(found.normal_residuals).max() < 1e-3
 
 
 def test_random_trees_come_back() -> None:

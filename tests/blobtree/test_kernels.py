@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -34,19 +35,40 @@ def _double(values: wp.array(dtype=wp.float32)):  # type: ignore[no-untyped-def,
     values[i] = 2.0 * values[i]
 
 
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty kernel cache, no parsed headers, and no shipped kernels."""
+@contextmanager
+def _cache_in(folder: Path) -> Iterator[Path]:
+    """Within a ``with`` block, an empty kernel cache, no parsed headers, and no shipped kernels."""
     start_warp()
     headers: dict[int, Any] = {}
-    monkeypatch.setattr(wp._src.context.runtime, "_pch_dirs", headers)
-    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "cache"))
-    monkeypatch.setattr(kernels, "SHIPPED", tmp_path / "shipped")
-    _forget()
-    yield tmp_path / "cache"
-    _forget()
-    for folder in headers.values():
-        folder.cleanup()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(wp._src.context.runtime, "_pch_dirs", headers)
+        patch.setattr(wp.config, "kernel_cache_dir", str(folder / "cache"))
+        patch.setattr(kernels, "SHIPPED", folder / "shipped")
+        _forget()
+        yield folder / "cache"
+        _forget()
+    for used in headers.values():
+        used.cleanup()
+
+
+@pytest.fixture
+def empty_cache(tmp_path: Path) -> Iterator[Path]:
+    with _cache_in(tmp_path) as folder:
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def parsed_headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with _cache_in(tmp_path_factory.mktemp("headers")) as folder:
+        kernels._parse_headers()
+        return folder / HEADERS
+
+
+@pytest.fixture
+def cache(empty_cache: Path, parsed_headers: Path) -> Path:
+    """A kernel cache that holds parsed headers alone."""
+    shutil.copytree(parsed_headers, empty_cache / HEADERS)
+    return empty_cache
 
 
 def _forget() -> None:
@@ -151,16 +173,16 @@ def test_shipped_kernels_of_another_version_of_warp_are_left(cache: Path) -> Non
     assert kernels._state.compiled == before + 1
 
 
-def test_a_cache_that_cannot_be_written_is_named(cache: Path) -> None:
-    cache.write_text("a file, where a folder should be")
+def test_a_cache_that_cannot_be_written_is_named(empty_cache: Path) -> None:
+    empty_cache.write_text("a file, where a folder should be")
     with pytest.raises(UnusableCache, match="set the environment variable WARP_CACHE_PATH") as raised:
         _doubled()
-    assert repr(str(cache)) in str(raised.value)
+    assert repr(str(empty_cache)) in str(raised.value)
 
 
-def test_headers_are_parsed_once_per_machine(cache: Path) -> None:
+def test_headers_are_parsed_once_per_machine(empty_cache: Path) -> None:
     _doubled()
-    (kept,) = (cache / HEADERS).glob("*/*.pch")
+    (kept,) = (empty_cache / HEADERS).glob("*/*.pch")
     parsed = kept.stat().st_mtime_ns
 
     def compile_in_thread() -> None:
@@ -173,15 +195,15 @@ def test_headers_are_parsed_once_per_machine(cache: Path) -> None:
     assert kept.stat().st_mtime_ns == parsed
 
 
-def test_files_of_kernels_that_compile_together_share_parsed_headers(cache: Path) -> None:
+def test_files_of_kernels_that_compile_together_share_parsed_headers(empty_cache: Path) -> None:
     """Headers parsed with other options, such as another size of blocks, would be parsed again."""
     with ThreadPoolExecutor(1) as thread:
         thread.submit(kernels._parse_headers).result()
-    (kept,) = (cache / HEADERS).glob("*/*.pch")
+    (kept,) = (empty_cache / HEADERS).glob("*/*.pch")
     parsed = kept.stat().st_mtime_ns
     with ThreadPoolExecutor(1) as thread:
         assert thread.submit(_doubled).result() == [2.0, 5.0]
-    assert [file.stat().st_mtime_ns for file in (cache / HEADERS).glob("*/*.pch")] == [parsed]
+    assert [file.stat().st_mtime_ns for file in (empty_cache / HEADERS).glob("*/*.pch")] == [parsed]
     with ThreadPoolExecutor(1) as thread:
         thread.submit(kernels._parse_headers).result()
     assert kept.stat().st_mtime_ns == parsed
@@ -205,15 +227,15 @@ def test_damaged_headers_are_replaced(cache: Path, capfd: pytest.CaptureFixture[
 
 
 def test_each_installation_of_warp_has_its_own_headers(
-    cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Headers parsed for another folder do not compile, with thousands of lines of errors."""
     kernels._parse_headers()
-    (kept,) = (cache / HEADERS).iterdir()
+    (kept,) = (empty_cache / HEADERS).iterdir()
     monkeypatch.setattr(wp, "__file__", str(tmp_path / "warp" / "__init__.py"))
     with kernels._kept_headers():
         pass
-    (other,) = {*(cache / HEADERS).iterdir()} - {kept}
+    (other,) = {*(empty_cache / HEADERS).iterdir()} - {kept}
     assert {file.suffix for folder in (kept, other) for file in folder.iterdir()} == {".pch", CHECKSUM}
 
 

@@ -84,12 +84,12 @@ _SETS = {
     "built_in": _batches(BUILT_IN_TREES, 1e-5, 2e-4),
     "solids": _batches(SOLID_TREES, 2e-5, 3e-4),
     "fields": _batches(FIELD_TREES, 2e-5, 3e-4, ordinary=10),  # of which one in three points has a colour
-    "shapes": _batches(SHAPE_TREES, 2e-5, 3e-4),
+    "shapes": _batches(SHAPE_TREES, 2e-5, 3e-4, ordinary=3),
     "blends": _batches(BLEND_TREES, 2e-5, ANY_ORDER),
     "contacts": _batches(CONTACT_TREES, 2e-5, 3e-4),
     "deformed": _batches(DEFORMED_TREES, 2e-5, 3e-4),
-    "profiled": _batches(PROFILED_TREES, 2e-5, 3e-4),
-    "signed": _batches(SIGNED_TREES, 2e-5, ANY_COLOR, 1e-3),
+    "profiled": _batches(PROFILED_TREES, 2e-5, 3e-4, ordinary=3),
+    "signed": _batches(SIGNED_TREES, 2e-5, ANY_COLOR, 1e-3, ordinary=3),
     "custom": _batches(CUSTOM_TREES, 2e-5, 3e-4),
 }
 EVERY_BATCH = pytest.mark.parametrize(

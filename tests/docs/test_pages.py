@@ -208,6 +208,18 @@ def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("small_pictures")
+@pytest.mark.slow_cases(
+    "baking",
+    "contact",
+    "custom-nodes",
+    "decals",
+    "many-runs",
+    "modelling",
+    "pyvista",
+    "rendering",
+    "scattering",
+    "tour",
+)
 @pytest.mark.parametrize("page", [page for page in PAGES if code(page)], ids=lambda page: page.stem)
 def test_the_python_of_a_page_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -15,6 +15,7 @@ from decals.apps.cli import app, run
 from decals.apps.commands import activation
 from decals.apps.commands import demo as demo_module
 from decals.apps.commands.activation import command_lines, find_shell
+from decals.apps.gallery import spanning
 from decals.errors import NoGraphics
 from decals.rendering import Renderer
 
@@ -157,6 +158,7 @@ def ended_demo(
 ) -> Callable[[], list[str]]:
     """Run a small demo; gives its last lines."""
     monkeypatch.setattr(demo_module, "COUNT", 60)
+    monkeypatch.setattr(demo_module, "nest_scene", lambda progress: spanning.scene(fov=27.0))
 
     def lines() -> list[str]:
         assert run(["demo", "--size", "40x30", "--samples", "1"]) == 0

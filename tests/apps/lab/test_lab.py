@@ -53,6 +53,7 @@ def number_of(lab: Lab, label: str) -> int:
     return next(int(s["number"]) for s in lab.values()["lab_sliders"] if s["name"].startswith(label))
 
 
+@pytest.mark.slow_cases("5")
 @pytest.mark.parametrize("number", range(6))
 def test_wrong_and_right_answers_are_told_apart(lab: Lab, number: int) -> None:
     lab.start(number)

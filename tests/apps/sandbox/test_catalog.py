@@ -21,6 +21,7 @@ def test_every_built_in_class_is_offered_once() -> None:
     assert {kind.__name__ for kind in NODE_KINDS.values()} - left_out <= set(names)
 
 
+@pytest.mark.slow_cases("GradientBlend")
 @pytest.mark.parametrize("name", KINDS)
 def test_a_new_node_has_a_surface(name: str) -> None:
     count = catalog.operand_count(catalog.kinds()[name])

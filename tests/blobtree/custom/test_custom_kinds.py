@@ -29,6 +29,7 @@ def test_the_random_trees_hold_every_custom_kind_and_maps_among_them() -> None:
     assert sum(tree.tape.stretched for tree in CUSTOM_TREES) > 30
 
 
+@pytest.mark.slow_cases("0-custom", "0-shapes")
 @pytest.mark.parametrize(
     "kinds", [CUSTOM, SOLIDS, SHAPES, BLENDED], ids=["custom", "solids", "shapes", "blends"]
 )
@@ -75,6 +76,7 @@ def assert_on_torus(vertices: NDArray[np.float32]) -> None:
     np.testing.assert_allclose(np.hypot(np.hypot(x, y) - 1.0, z), 0.2, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_every_way_to_a_mesh_knows_custom_kinds() -> None:
     half = 0.02
     mesh = polygonize(UNIT_RING, chord_error=half * 0.2)

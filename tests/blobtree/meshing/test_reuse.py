@@ -34,6 +34,7 @@ def small_blobs(count: int = 300) -> list[Point]:
     return [Point((x, y, z), radius=0.04, color=(x, y, z)) for x, y, z in places]
 
 
+@pytest.mark.slow_cases("1")
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4))])
 def test_random_edits_match_a_new_mesh(seed: int) -> None:
     rng = np.random.default_rng(seed)

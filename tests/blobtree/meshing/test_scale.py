@@ -79,6 +79,7 @@ def deep(tip: Node, depth: int) -> Node:
     return tree
 
 
+@pytest.mark.slow
 def test_a_tree_ten_thousand_levels_deep() -> None:
     tree = deep(BALL, 10_000)
     polygonizer = Polygonizer(tree, resolution=24)

@@ -148,6 +148,7 @@ def random_texels(kind: int, rng: np.random.Generator) -> tuple[list[Any], float
     return rows, start, q
 
 
+@pytest.mark.ordinary_cases("0")
 @pytest.mark.parametrize("kind", range(3))
 def test_bounds_over_balls_hold_and_are_tight(kind: int) -> None:
     rng = np.random.default_rng(kind)

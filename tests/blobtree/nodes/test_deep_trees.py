@@ -6,6 +6,7 @@ from functools import reduce
 from operator import add
 
 import numpy as np
+import pytest
 
 from blobtree import Node, Point, Ricci, Sum, Union
 from blobtree.formulas.skeletons import POINT
@@ -62,6 +63,7 @@ def test_a_subtree_that_is_used_twice_at_every_level() -> None:
     np.testing.assert_allclose(tree([(3.0, 0, 0), (6.0, 1.0, 0), (-1.0, 0, 0)]), [1.0, 0.5, 0.5], atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_points_take_seconds() -> None:
     rng = np.random.default_rng(0)
     started = time.process_time()

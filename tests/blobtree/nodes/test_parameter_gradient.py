@@ -50,6 +50,7 @@ TREES: dict[str, Sequence[Node]] = {
 }
 
 
+@pytest.mark.slow_cases("shapes", "custom", "solids")
 @pytest.mark.parametrize("kind", TREES)
 def test_derivatives_match_differences(kind: str) -> None:
     rng = np.random.default_rng(4)

@@ -75,6 +75,7 @@ def test_a_deep_tree_is_written(make: Callable[[float], Node]) -> None:
     assert sum(line.split()[0] == f"[{DEPTH}]" for line in lines) == expected
 
 
+@pytest.mark.slow_cases("differences")
 @DEEP
 def test_a_deep_tree_is_pickled_and_copied(make: Callable[[float], Node]) -> None:
     tree = make(0.4375)

@@ -76,6 +76,7 @@ def test_texels_have_the_colours_of_the_surface_below_them(baked: Path, name: st
     assert want.std(axis=0).min() > 0.02
 
 
+@pytest.mark.slow_cases("cube-color1")
 @pytest.mark.parametrize(("name", "color"), [("ball", BALL), ("cube", CUBE)])
 def test_points_of_the_surface_find_their_colours_through_texture_coordinates(
     tmp_path: Path, name: str, color: Any

@@ -87,6 +87,7 @@ def tried(session: Any, command: Any) -> None:
         session.do(command)
 
 
+@pytest.mark.slow_cases("3-40-0")
 @pytest.mark.parametrize(
     ("seed", "count", "few"),
     [(3, 40, 0), (5, 40, 500), *(pytest.param(4, 1_000, few, marks=pytest.mark.slow) for few in (0, 500))],

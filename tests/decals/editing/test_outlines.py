@@ -63,6 +63,7 @@ def gaps(points: Any, line: Any) -> Any:
     return np.linalg.norm(points[:, None] - feet, axis=2).min(axis=1)
 
 
+@pytest.mark.ordinary_cases("0-0", "1-1", "2-2", "3-0")
 @pytest.mark.parametrize("mapping", ImageMapping)
 @pytest.mark.parametrize("contact", Contact)
 def test_an_outline_is_the_edge_of_what_the_picture_shows(

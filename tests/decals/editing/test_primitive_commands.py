@@ -49,6 +49,7 @@ def scene_of(tree: Any, count: int) -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_skeletons_of_ones_own_move_again_and_again_by_the_same_path() -> None:
     session = session_of(A + Bar(0.5, radius=0.4).translate((0.8, 0, 0)) + Bar(1.0, radius=0.3))
     first = digest(session.document)
@@ -160,6 +161,7 @@ def test_a_quick_move_is_the_same_move_without_a_surface(way: Any) -> None:
     assert np.abs(tree(decals.positions) - ISO).max() < 1e-4
 
 
+@pytest.mark.ordinary_cases("path0-tree0", "path1-tree1")
 @pytest.mark.parametrize(
     "tree", [A + B, Ricci((A, B.scale(1.2)), exponent=3), A - Point((0, 0, 1.2), radius=0.6)]
 )

@@ -74,6 +74,7 @@ def test_every_small_angle_on_the_sphere(angle: Any) -> None:
     assert np.abs(mapped(np.sin(angle) * u + (np.cos(angle) - 1) * n_p, n_p, n_q) - angle * u).max() < 3e-7
 
 
+@pytest.mark.slow_cases("torus-0.02")
 @pytest.mark.parametrize(("name", "chord"), [("torus", 0.02), ("ellipsoid", 0.02)])
 def test_what_is_drawn_on_curved_surfaces(name: str, chord: Any) -> None:
     corrected, projected = (

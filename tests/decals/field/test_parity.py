@@ -20,6 +20,7 @@ DOUBT = 1e-9
 """Relative change up to which two float64 oracles may see different owners."""
 
 
+@pytest.mark.ordinary_cases("0-True", "1-False", "2-False", "3-True")
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
 def test_the_two_oracles_agree(contact: Contact, layered: bool) -> None:
@@ -69,6 +70,7 @@ def check(contact: Contact, found: Any, samples: int) -> None:
         assert found[name] <= most, name
 
 
+@pytest.mark.ordinary_cases("100000-0-False", "100000-1-True", "100000-2-True", "100000-3-False")
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
 @pytest.mark.parametrize("samples", [100_000, pytest.param(500_000, marks=pytest.mark.slow)])

@@ -82,6 +82,7 @@ def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
     assert sum(tree.tape.stretched for tree in TREES) > 5
 
 
+@pytest.mark.ordinary_cases("0", "24")
 @pytest.mark.parametrize("start", range(0, len(TREES), 6))
 def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int) -> None:
     assert_same_in_both_languages(context, TREES[start : start + 6], ALL_KINDS, start)
@@ -126,6 +127,7 @@ def test_gradient_blends_are_the_same_in_both_languages(context: Context, name: 
     assert_same_in_both_languages(context, [tree], kinds, 0, bounds_agreement=1e-3, field_agreement=1e-3)
 
 
+@pytest.mark.slow_cases("signed")
 @pytest.mark.parametrize("more", [PROFILED, SIGNED], ids=["profiled", "signed"])
 def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: MoreKinds) -> None:
     trees = random_trees(seed=35, count=6, more=more)
@@ -210,6 +212,7 @@ MODELS = {
 }
 
 
+@pytest.mark.slow_cases("a twist in a twist")
 @pytest.mark.parametrize("name", MODELS)
 def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
     tree, (width, height) = MODELS[name], (160, 120)

@@ -27,6 +27,7 @@ def test_the_names_are_the_six() -> None:
     assert BUILTIN_IMAGES == ("eye", "rivet", "rock", "scale", "spatter", "tile")
 
 
+@pytest.mark.slow_cases("256-rock", "256-spatter", "256-tile", "256-eye", "256-rivet", "256-scale")
 @pytest.mark.parametrize("name", BUILTIN_IMAGES)
 @pytest.mark.parametrize("size", [1, 33, 256])
 def test_any_size_is_rgba_and_repeats(name: str, size: int) -> None:

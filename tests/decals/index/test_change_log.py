@@ -24,6 +24,7 @@ def field(editor: DecalEditor, points: np.ndarray, contact: Contact) -> np.ndarr
     return np.column_stack([found.owner, found.field, found.uv])
 
 
+@pytest.mark.ordinary_cases("0-True", "1-False", "2-True", "3-False")
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", list(Contact))
 def test_what_a_change_cannot_reach_stays_and_not_much_more(contact: Contact, layered: bool) -> None:

@@ -91,14 +91,16 @@ def test_programs_that_were_not_wanted_for_long_are_released(
         return context.program(compose("screen.vert"), Source.named("a", text))
 
     with context.current():
-        _ = context.gl.error  # one of an earlier test
+        frame = context.gl.simple_framebuffer((2, 2), dtype="f4")
+        frame.use()
+        _ = (
+            context.gl.error
+        )  # moderngl binds the framebuffer before again, which an earlier test has released
         used = program(0)
         for number in (1, 2, 3):
             program(number)
         assert len(context._programs) == 2
         assert used.mglo not in context._unused  # still held here
-        frame = context.gl.simple_framebuffer((2, 2), dtype="f4")
-        frame.use()
         context.gl.vertex_array(used, []).render(vertices=3)
         assert context.gl.error == "GL_NO_ERROR"
         held = used.mglo

@@ -77,6 +77,7 @@ def index_without_nested(*arguments: Any) -> Any:
     return index
 
 
+@pytest.mark.slow_cases("800-radii2-0")
 @pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED])
 @pytest.mark.parametrize(("count", "radii"), [(1, (0.5, 0.6)), (40, (0.2, 0.6)), (800, (0.004, 0.4))])
 def test_every_pixel_is_the_oracles(
@@ -205,17 +206,18 @@ def test_pixels_under_many_decals_have_all_their_colours(renderer: Renderer, cou
     np.testing.assert_allclose(seen.astype(int), plain, atol=1)
 
 
-def test_what_lies_over_what_is_the_same_from_every_side(renderer: Renderer) -> None:
+@pytest.mark.ordinary_cases("45", "225")
+@pytest.mark.parametrize("turn", range(0, 360, 45))
+def test_what_lies_over_what_is_the_same_from_every_side(renderer: Renderer, turn: int) -> None:
     """The topmost decal at points seen by two cameras."""
     shape = torus()
     decals = in_layers(scattered(shape, 300, 9, radii=(0.1, 0.4)), 9)
     view = view_of(decals, shape)
-    for turn in range(0, 360, 45):
-        angle = np.radians(turn)
-        direction = (float(np.cos(angle)), float(np.sin(angle)), 0.8)
-        camera = Camera.fitting(shape.vertices, direction=direction, up=(0, 0, 1))
-        buffers = renderer.buffers(View((shape,), camera, decals, view.images), RenderOptions(size=SIZE))
-        compare(view, buffers, ImageMapping.CORRECTED)
+    angle = np.radians(turn)
+    direction = (float(np.cos(angle)), float(np.sin(angle)), 0.8)
+    camera = Camera.fitting(shape.vertices, direction=direction, up=(0, 0, 1))
+    buffers = renderer.buffers(View((shape,), camera, decals, view.images), RenderOptions(size=SIZE))
+    compare(view, buffers, ImageMapping.CORRECTED)
 
 
 @pytest.mark.parametrize(("contact", "count"), [(Contact.PRODUCT, 300), (Contact.ELASTIC, 70)])

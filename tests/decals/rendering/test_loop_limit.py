@@ -36,6 +36,7 @@ def refusal(limit: LoopLimit, editor: DecalEditor) -> str:
     return ""
 
 
+@pytest.mark.ordinary_cases("0", "5")
 @pytest.mark.parametrize("seed", range(6))
 def test_what_edits_pile_up_is_refused_when_it_would_be_at_once(seed: int) -> None:
     rng, refused, steps = np.random.default_rng(seed), 0, 300

@@ -90,6 +90,7 @@ ORDINARY = {
 """Each contact once. What an edit can reach is found in the same way for both kinds of shaders."""
 
 
+@pytest.mark.slow_cases("fragment-kinds0-0", "fragment-kinds3-2")
 @pytest.mark.parametrize(
     ("drawer", "kinds", "contact"),
     [
@@ -165,6 +166,7 @@ def test_what_else_changes_is_drawn_over_the_same_surface(
         assert bits(drawer.draw(edited, options)) == found
 
 
+@pytest.mark.slow_cases("compute")
 def test_pictures_of_an_edited_scene_paint_only_where_it_changed(drawer: Renderer, edited: Edited) -> None:
     """The same for whole pictures that are read back."""
     first = drawer.render(edited, RenderOptions(size=(160, 120)))

@@ -51,6 +51,7 @@ def assert_same(first: Buffers, second: Buffers) -> None:
     assert np.abs(first.color.astype(int) - second.color).max() <= 1
 
 
+@pytest.mark.ordinary_cases("True-direction0", "False-direction1")
 @pytest.mark.parametrize("direction", [(0.3, 0.5, 1.0), (-0.2, 1.0, 0.3)])
 @pytest.mark.parametrize("backwards", [False, True])
 def test_both_entry_points_give_the_same_buffers(
@@ -125,6 +126,7 @@ def test_a_clipping_plane_hides_what_rays_hit_before_it(fragment: Renderer, comp
     assert_same(first, second)
 
 
+@pytest.mark.slow_cases("None")
 @pytest.mark.parametrize("viewpoint", [None, orthographic(2.0)])
 def test_depth_is_whole_where_it_is_asked_for(
     fragment: Renderer, compute: Renderer, viewpoint: Viewpoint | None

@@ -66,6 +66,7 @@ MODELS: dict[str, tuple[Callable[[], MeshSurface], Callable[[Float32Array], Any]
 }
 
 
+@pytest.mark.slow_cases("half ball-900", "disc-900", "square-900")
 @pytest.mark.parametrize("count", [400, 900])
 @pytest.mark.parametrize("name", list(MODELS))
 def test_boundary_particles_have_the_same_area_as_others(name: str, count: int) -> None:

@@ -49,6 +49,7 @@ def test_vertex_density_is_linear_in_faces() -> None:
         vertex_density(ball, [1.0])
 
 
+@pytest.mark.slow_cases("surface0-<lambda>-regions0-0")
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("surface", "density", "regions"),

@@ -46,6 +46,7 @@ def pixels(scene: decals.Scene) -> np.ndarray:
     return np.asarray(scene.render(size=(80, 60), samples=1).pixels)
 
 
+@pytest.mark.slow_cases("place1", "place2")
 @pytest.mark.parametrize("place", PLACES)
 def test_a_far_mesh_looks_as_a_near_one(place: Place) -> None:
     near, far = near_scene("mesh"), decals.cover(mesh(place), count=12, seed=2)
@@ -59,6 +60,7 @@ def test_a_far_mesh_looks_as_a_near_one(place: Place) -> None:
     assert item.surface.raycast([[0, 0, 5]], [[0, 0, -1]])[0] == pytest.approx(4.0, abs=0.05)
 
 
+@pytest.mark.slow_cases("place1", "place2")
 @pytest.mark.parametrize("place", PLACES)
 def test_a_far_tree_is_the_near_one(place: Place) -> None:
     points = np.random.default_rng(1).uniform(-1, 1, (200, 3))

@@ -248,6 +248,7 @@ def test_a_larger_screenshot_is_drawn_larger(plotter: Factory) -> None:
     assert (difference <= 6).mean() > 0.95
 
 
+@pytest.mark.slow_cases("shape2")
 @pytest.mark.parametrize("shape", [pytest.param((1, 2), marks=pytest.mark.slow), (2, 2), (1, 3)])
 def test_a_larger_screenshot_of_subplots_shows_each(plotter: Factory, shape: tuple[int, int]) -> None:
     """VTK draws it in tiles: some hold nothing of a subplot, others a part of it."""

@@ -24,6 +24,7 @@ def plane(pl: Plotter, *, at: float, **options: Any) -> None:
     pl.reset_camera_clipping_range()
 
 
+@pytest.mark.ordinary_cases("<lambda>1", "<lambda>3", "<lambda>6")
 @pytest.mark.parametrize(
     "prepare",
     [

@@ -107,6 +107,7 @@ CASES = [(look, Contact.PRODUCT) for look in LOOKS] + [
 ]
 
 
+@pytest.mark.ordinary_cases("flat-3", "smooth-0", "culled-0", "cell scalars-0")
 @pytest.mark.parametrize(("look", "contact"), CASES)
 def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, contact: Contact) -> None:
     mesh = torus()
@@ -316,6 +317,7 @@ def test_a_mesh_that_changes_keeps_true_normals(plotter: Factory) -> None:
     np.testing.assert_array_equal(shot(pl), shot(again))
 
 
+@pytest.mark.ordinary_cases("before-near", "after-far_away")
 @pytest.mark.parametrize("center", [(0.0, 0.0, 0.0), (500.0, 0.0, 0.0)], ids=["near", "far_away"])
 @pytest.mark.parametrize("first", [True, False], ids=["before", "after"])
 def test_decals_stay_if_another_actor_shows_the_same_mesh(

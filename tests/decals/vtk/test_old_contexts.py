@@ -54,6 +54,7 @@ def in_a_process(folder: Path, *entries: str, **environment: str) -> subprocess.
     )
 
 
+@pytest.mark.slow
 def test_a_context_of_version_3_2_that_can_do_more(plotter: Factory, tmp_path: Path) -> None:
     pl = plotter()
     pl.decals.add_scene(both(), camera=True)

@@ -87,6 +87,7 @@ def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
     assert (with_ball == first).mean() > 0.8
 
 
+@pytest.mark.ordinary_cases("<lambda>1", "<lambda>2", "<lambda>3", "<lambda>8")
 @pytest.mark.parametrize(
     "change",
     [
@@ -133,6 +134,7 @@ def prepared(subplot: SubplotRenderer, samples: int) -> int:
     raise AssertionError("the frame is never done")
 
 
+@pytest.mark.slow_cases("2")
 @pytest.mark.parametrize("samples", [1, 2])
 def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory, samples: int) -> None:
     other, pl = plotter(), plotter()
@@ -199,6 +201,7 @@ def test_an_editors_changes_are_drawn(plotter: Factory) -> None:
     assert pl.bounds.z_max > 4.2
 
 
+@pytest.mark.ordinary_cases("<lambda>1", "<lambda>2")
 @pytest.mark.parametrize(
     "change",
     [
@@ -278,6 +281,7 @@ def test_what_a_stage_cannot_be_set_to_is_said_at_once(plotter: Factory, name: s
     assert getattr(subplot, name) == before
 
 
+@pytest.mark.ordinary_cases("place0", "place4")
 @pytest.mark.parametrize("place", [(float("nan"), 0), (0, float("inf")), ("x", 0), (0, None), ([1], 2)])
 def test_a_place_that_is_none_is_refused(plotter: Factory, place: tuple[float, float]) -> None:
     pl = plotter()

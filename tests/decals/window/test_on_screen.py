@@ -22,6 +22,7 @@ def test_without_a_screen() -> None:
     assert SAYS in run_module(PROGRAM, "off")
 
 
+@pytest.mark.slow
 def test_windows_on_a_virtual_display(display: str) -> None:
     """One process opens three windows. A timer, a request to close and real keys end them."""
     try:

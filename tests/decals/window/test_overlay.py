@@ -50,6 +50,7 @@ def test_a_line_that_fits_is_left_as_it_is(opened: Any) -> None:
     assert window.overlay._status.GetInput() == "h: help"
 
 
+@pytest.mark.slow_cases("size1-1")
 @pytest.mark.parametrize(("size", "pages"), [((400, 300), 2), ((1200, 800), 1)])
 def test_the_help_fits_into_the_window(opened: Any, size: tuple[int, int], pages: int) -> None:
     driver = opened(

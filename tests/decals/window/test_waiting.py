@@ -154,6 +154,7 @@ def test_a_whole_frame_may_be_asked_for_at_once(waiting: Any, opened: Any) -> No
     np.testing.assert_array_equal(pixels(window), whole.shot())
 
 
+@pytest.mark.ordinary_cases("1", "4")
 @pytest.mark.parametrize("ticks", [0, 1, 2, 4])
 def test_a_window_closed_in_between_gives_everything_back(
     waiting: Any, monkeypatch: pytest.MonkeyPatch, ticks: Any

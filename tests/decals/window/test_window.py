@@ -219,6 +219,7 @@ def test_outlines_wait_until_a_drag_has_ended(driver: Driver) -> None:
     assert driver.window.overlay.lines.n_lines == 1
 
 
+@pytest.mark.slow_cases("5000")
 @pytest.mark.parametrize("max_decals", [5_000, 5])
 def test_a_primitive_is_moved_by_its_handle_and_decals_follow(
     driver: Any, max_decals: Any, monkeypatch: pytest.MonkeyPatch
