@@ -2,7 +2,8 @@
 // the object's own colour. DECALS: there are decals; the slot holds decals.glsl. POSED: some objects are posed, and the
 // textures of rest.frag say where their pixels lie in the rest pose. TWO_TARGETS: also write owner, field and uv.
 // LIMITED: decals have receivers or fades. MATERIALS: some images have maps; color.w is then the metalness.
-// RELIEF: some images have heights; the slot relief holds relief.glsl.
+// RELIEF: some images have heights; the slot relief holds relief.glsl. With POSED, the posed objects are trees that
+// offset.glsl has moved.
 // FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl.
 //@ include camera.glsl
 //@ include pixel.glsl
@@ -72,6 +73,11 @@ Pixel pixel_at(ivec2 texel) {
 #ifdef RELIEF
         relief_normal = normal;
         float lit = 1.0;
+#ifdef POSED
+        if (is_posed) {  // offset.glsl moved the surface
+            lit = relief_light_at(position, dot(visible.xyz - position, normal), normal);
+        } else
+#endif
         if (dot(ray_direction(vec2(texel) + 0.5), normal) < 0.0) {  // none on the inside of a surface
             vec4 raised = relief_point(position, normal, ray_direction(vec2(texel) + 0.5));
             position = raised.xyz;

@@ -1,17 +1,7 @@
 // Owner, image coordinates and colour of decals at a surface point. All formulas and loops are those of
 // decals/field/ownership.py; GLSL adds the image look-up.
 //@ include footprint.glsl
-uniform sampler2D decal_records;  // decal i: 4i (position, s), 4i + 1 (normal, rank), (u, image), (tint, opacity)
-uniform sampler2D index_levels;
-uniform isampler2D index_table;
-uniform isampler2D index_ids;
-uniform int index_level_count;
-uniform int index_mask;
-uniform sampler2D decal_limits;  // decal i: cosines between which it fades, depth at which it ends, place of receivers
-uniform sampler2D decal_walks;  // see decals/field/walks.py
-uniform int decal_mapping;
-uniform float decal_stiffness;
-uniform sampler2DArray decal_images;  // linear, premultiplied
+//@ include decal_data.glsl
 
 #ifdef POSED
 // Steps of this pixel in the rest pose, where decals lie; `is_posed` is false on objects without one.

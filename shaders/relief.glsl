@@ -13,17 +13,33 @@ const int SHADOW_STEPS = 16;      // toward the light
 const float SHADOW_EDGE = 0.06;   // of the range: depth below the relief at which a shadow is full
 const float LEAST_SLOPE = 0.08;   // least cosine between the normal and the ray, or the light
 
+#ifdef OFFSET
+uniform sampler2DArray relief_slopes;  // by which heights rise at most from a place of image i, see offset_tree.py
+uniform float relief_steepest;         // of them
+uniform float relief_stretch;          // of images by contact and mapping, at most
+float relief_slope;                    // from the place where a height was looked up last
+#endif
+
 // Height over the surface at q: of all decals over each other, from the topmost down.
 float relief_height(vec3 q, vec3 n) {
     float height = 0.0;
     float left = 1.0;
     DecalHit hit = decal_at(q, n);
+#ifdef OFFSET
+    relief_slope = hit.owner < 0 ? relief_stretch * relief_steepest : 0.0;
+#endif
     while (hit.owner >= 0 && left > 1.0 - OPAQUE) {
         float image = decal_texel(4 * hit.owner + 2).w;
         float shown = decal_texel(4 * hit.owner + 3).w * (decal_limited ? fade_at(q, n, hit.owner) : 1.0);
         vec2 texel = vec2(0.0, 1.0);
         if (image >= 0.0) {
             texel = textureLod(decal_reliefs, vec3(hit.uv, image), 0.0).xy;
+#ifdef OFFSET
+            float rim = RIM * decal_texel(4 * hit.owner).w * max(1.0 - 2.0 * length(hit.uv - 0.5), 0.0);
+            float beyond = relief_range.y / (rim + relief_range.y / relief_steepest + 1e-30);  // to neighbours
+            float within = textureLod(relief_slopes, vec3(hit.uv, image), 0.0).x;
+            relief_slope = max(relief_slope, relief_stretch * max(within, beyond));
+#endif
         }
         if (in_image(hit.uv)) {
             height += left * shown * RIM * decal_texel(4 * hit.owner).w * texel.x;

@@ -1,5 +1,6 @@
 """The decal pass: colours all pixels at once, for any number of decals and objects."""
 
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -43,6 +44,83 @@ from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 BODY = "decal_pass.glsl"
 
 
+@dataclass(frozen=True, eq=False)
+class DecalSource:
+    """The decals that a program evaluates, and how.
+
+    Attributes
+    ----------
+    decals
+        Records and index.
+    mapping, contact, stiffness
+        How images lie on the surface and push each other. The mapping WALKED needs ``walks``.
+    masks
+        Masks of the objects, see `decals.receivers.object_mask`, for decals that are limited.
+    materials, relief, walks
+        Maps and heights of images, and walks of decals, see `Uploads.walks`; None without any.
+    lights
+        Of these the first casts shadows of ``relief``; None for the studio's key.
+    """
+
+    decals: DecalData
+    mapping: ImageMapping
+    contact: AnyContact
+    stiffness: float
+    masks: DataTexture | None = None
+    materials: MaterialArray | None = None
+    relief: Relief | None = None
+    lights: Lighting | None = None
+    walks: DataTexture | None = None
+
+    @property
+    def limited(self) -> bool:
+        """True if decals have receivers or fades."""
+        return self.decals.limited
+
+    @property
+    def law(self) -> ContactLaw | None:
+        """The formulas of a contact of one's own."""
+        return self.contact if isinstance(self.contact, ContactLaw) else None
+
+    def constants(self) -> str:
+        """Return the GLSL constants of ``decals.glsl``."""
+        return decal_constants(self.contact, **self._variant)
+
+    def library(self, *, filtered: bool = False) -> str:
+        """Return the GLSL of all formulas, see `decal_library`."""
+        return decal_library(self.contact, **self._variant, filtered=filtered)
+
+    @property
+    def _variant(self) -> dict[str, bool]:
+        decals = self.decals
+        return {
+            "layered": decals.layered,
+            "limited": decals.limited,
+            "nested": decals.nested,
+            "walked": self.walks is not None,
+        }
+
+    def use(self, program: Program, unit: int) -> int:
+        """Bind all textures to the units from ``unit`` on, and set the uniforms; return the next unit."""
+        set_uniform(program, "decal_mapping", int(self.mapping))
+        set_uniform(program, "decal_stiffness", self.stiffness)
+        self.decals.use(program, unit)
+        if self.relief is not None:
+            self.relief.use(program, self.lights)
+        unit += self.decals.texture_count
+        for name, data in (
+            ("decal_materials", self.materials),
+            ("decal_reliefs", self.relief),
+            ("object_masks", self.masks),
+            ("decal_walks", self.walks),
+        ):
+            if data is not None:
+                data.texture.use(unit)
+                set_uniform(program, name, unit)
+                unit += 1
+        return unit
+
+
 class DecalPass:
     """Reads a G-buffer, writes its colour under decals and, on request, the decal at every pixel.
 
@@ -76,69 +154,35 @@ class DecalPass:
         self,
         rectangle: Rectangle,
         gbuffer: GBuffer,
-        decals: DecalData | None,
+        source: "DecalSource | None",
         images: ImageArray | None,
-        mapping: ImageMapping,
-        contact: AnyContact,
-        stiffness: float,
         filtered: bool = False,
         rest: RestBuffer | None = None,
-        masks: DataTexture | None = None,
-        materials: MaterialArray | None = None,
-        relief: Relief | None = None,
-        lights: Lighting | None = None,
-        walks: DataTexture | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours.
 
-        ``masks`` are those of the objects, see `decals.receivers.object_mask`, for decals that are limited.
-        ``materials`` fill `material_targets` too. The first of the ``lights`` casts shadows of ``relief``.
-        The mapping WALKED needs ``walks``, see `Uploads.walks`.
+        Materials of the decals fill `material_targets` too.
         """
-        limited, library = decals is not None and decals.limited, ""
-        filtered = filtered and materials is None and walks is None  # these are not averaged over pixels
-        if decals is not None:
-            library = decal_library(
-                contact,
-                layered=decals.layered,
-                limited=limited,
-                nested=decals.nested,
-                walked=walks is not None,
-                filtered=filtered,
-            )
-        shining = materials is not None and decals is not None
+        shining = source is not None and source.materials is not None
+        walked = source is not None and source.walks is not None
+        filtered = filtered and not shining and not walked  # these are not averaged over pixels
         variant = {
-            "limited": limited,
+            "limited": source is not None and source.limited,
             "filtered": filtered,
             "materials": shining,
-            "relief": shining and relief is not None,
+            "relief": shining and source is not None and source.relief is not None,
         }
+        library = "" if source is None else source.library(filtered=filtered)
         painting = self._pass(library, posed=rest is not None, **variant)
         program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         textures |= rest.textures if rest is not None else {}
         use_textures(program, textures)
-        if decals is not None and images is not None:
-            unit = len(textures)
-            images.use(unit)
-            set_uniform(program, "decal_images", unit)
-            set_uniform(program, "decal_mapping", int(mapping))
-            set_uniform(program, "decal_stiffness", stiffness)
-            decals.use(program, unit + 1)
-            if relief is not None:
-                relief.use(program, lights)
-            unit += 1 + decals.texture_count
-            for name, data in (
-                ("decal_materials", materials),
-                ("decal_reliefs", relief),
-                ("object_masks", masks),
-                ("decal_walks", walks),
-            ):
-                if data is not None:
-                    data.texture.use(unit)
-                    set_uniform(program, name, unit)
-                    unit += 1
+        if source is not None and images is not None:
+            images.use(len(textures))
+            set_uniform(program, "decal_images", len(textures))
+            source.use(program, len(textures) + 1)
         painting.run(rectangle.rows(part))
 
     def read_decal(self, tile: Tile) -> Float32Array:
@@ -234,7 +278,14 @@ def decal_library(
     filtered: bool = False,
 ) -> str:
     """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
-    constants = (
+    constants = decal_constants(contact, layered=layered, limited=limited, nested=nested, walked=walked)
+    law = contact if isinstance(contact, ContactLaw) else None
+    return constants + _translated_functions(law, filtered)
+
+
+def decal_constants(contact: AnyContact, *, layered: bool, limited: bool, nested: bool, walked: bool) -> str:
+    """Return the GLSL constants of decals, for the slot ``functions``, in one contact mode or law."""
+    return (
         f"const float RIM = {float(RIM)!r};\n"
         f"const int decal_contact = {int(contact)};\n"
         f"const bool decal_nested = {str(nested and contact in (Contact.RADIAL, Contact.ELASTIC)).lower()};\n"
@@ -243,10 +294,14 @@ def decal_library(
         f"const bool decal_layered = {str(layered).lower()};\n"
         f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
     )
-    return constants + _translated_functions(contact if isinstance(contact, ContactLaw) else None, filtered)
 
 
 @cache
 def _translated_functions(law: ContactLaw | None, filtered: bool) -> str:
+    return translate_library(decal_functions(law, filtered=filtered))
+
+
+def decal_functions(law: ContactLaw | None, *, filtered: bool = False) -> tuple[Any, ...]:
+    """Return the typed functions that ``decals.glsl`` or ``filtered_decals.glsl`` calls."""
     functions: tuple[Any, ...] = FILTER_FUNCTIONS if filtered else LIBRARY_FUNCTIONS
-    return translate_library(functions if law is None else map(law.formulas.function, functions))
+    return functions if law is None else tuple(map(law.formulas.function, functions))

@@ -45,25 +45,97 @@ RELIEF_LOOKUPS = 64
 """Most points at which heights are looked up for a pixel, see ``shaders/relief.glsl``."""
 
 
+SLOPE_CELLS = 24
+"""Cells along each side of an image for which a slope is known."""
+
+STRETCH = 2.0
+"""Assumed greatest movement of images by contact and mapping, over that of the surface."""
+
+
+def slope_bounds(texels: Float32Array) -> Float64Array:
+    """Return the slopes of cones that contain all heights of an image.
+
+    A cone stands on any point of a cell, at its height: no height of the image lies above it (cone step
+    mapping, Dummer 2006). Heights and distances are in radii, so the image is two wide.
+
+    Parameters
+    ----------
+    texels
+        Heights, float32[h, w], which are interpolated.
+
+    Returns
+    -------
+    float64[SLOPE_CELLS, SLOPE_CELLS]
+        The first row belongs to the first of the texels.
+    """
+    count = SLOPE_CELLS
+    padded = np.pad(texels.astype(np.float64), 1, mode="edge")
+    down, right = (np.abs(np.diff(padded, axis=axis)) * texels.shape[axis] / 2.0 for axis in (0, 1))
+    steep = np.hypot(
+        np.maximum(down[:-1, 1:-1], down[1:, 1:-1]), np.maximum(right[1:-1, :-1], right[1:-1, 1:])
+    )
+
+    def cells(values: Float64Array, reduce: "np.ufunc") -> Float64Array:
+        """Reduce the texels that interpolation in each cell reads."""
+        for axis in (0, 1):
+            side = values.shape[axis]
+            edges = np.arange(count + 1) * side / count
+            first = np.clip(np.floor(edges[:-1] - 0.5), 0, side - 1).astype(int)
+            last = np.clip(np.ceil(edges[1:] - 0.5), 0, side - 1).astype(int)
+            values = np.stack(
+                [
+                    reduce.reduce(values.take(range(a, b + 1), axis), axis=axis)
+                    for a, b in zip(first, last, strict=True)
+                ],
+                axis=axis,
+            )
+        return values
+
+    near = np.pad(cells(steep, np.maximum), 1, mode="edge")
+    near = np.lib.stride_tricks.sliding_window_view(near, (3, 3)).max(axis=(2, 3))
+    highest = cells(texels.astype(np.float64), np.maximum).reshape(-1)
+    lowest = cells(texels.astype(np.float64), np.minimum).reshape(-1)
+    places = np.indices((count, count)).reshape(2, -1)
+    between = np.maximum(np.abs(places[:, :, None] - places[:, None, :]) - 1, 0) * (2.0 / count)
+    gaps = np.hypot(*between)
+    far = np.where(gaps > 0.0, (highest - lowest[:, None]) / np.where(gaps > 0.0, gaps, 1.0), 0.0)
+    bounds: Float64Array = np.maximum(near, far.max(axis=1).reshape(count, count))
+    return bounds
+
+
 class ReliefArray:
-    """Heights of images on the GPU: layer i holds those of image i."""
+    """Heights of images on the GPU: layer i holds those of image i, and slopes that bound them."""
 
     def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
         self.texture = context.gl.texture_array((shape[1], shape[0], len(images)), 2, dtype="f4")
+        side = SLOPE_CELLS
+        self.slopes = context.gl.texture_array((side, side, len(images)), 1, dtype="f4")
+        self.steepest = 0.0
+        known: dict[int, Float64Array] = {}
         for layer, image in enumerate(images):
             texels = np.zeros((*image.pixels.shape[:2], 2), np.float32)
             texels[..., 1] = unit_levels(image.pixels[..., 3])
             heights = _relief_texels(image)
+            bounds: Float64Array = np.zeros((side, side))
             if heights is not None:
                 texels[..., 0] = heights
+                if id(image) not in known:
+                    known[id(image)] = slope_bounds(heights)
+                bounds = known[id(image)]
+            self.steepest = max(self.steepest, float(bounds.max()))
+            self.slopes.write(
+                bounds[::-1].astype(np.float32).tobytes(), viewport=(0, 0, layer, side, side, 1)
+            )
             region = (0, 0, layer, shape[1], shape[0], 1)
             self.texture.write(resized_texels(texels, shape)[::-1].tobytes(), viewport=region)
-        self.texture.repeat_x = self.texture.repeat_y = False
-        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        for texture, kind in ((self.texture, moderngl.LINEAR), (self.slopes, moderngl.NEAREST)):
+            texture.repeat_x = texture.repeat_y = False
+            texture.filter = (kind, kind)
 
     def release(self) -> None:
         """Release the memory."""
         self.texture.release()
+        self.slopes.release()
 
 
 class Relief:
@@ -78,7 +150,7 @@ class Relief:
     """
 
     def __init__(self, array: ReliefArray, scene: SceneLike) -> None:
-        self.texture = array.texture
+        self.texture, self.slopes, self._steepest = array.texture, array.slopes, array.steepest
         rows = scene.decals.decals if isinstance(scene.decals, DecalEditor) else scene.decals
         ranges: Float64Array = np.zeros(
             (len(scene.images) + 1, 2)
@@ -94,8 +166,15 @@ class Relief:
         )
         self._step = float(rows.radii[raised].min()) / STEPS_PER_RADIUS if raised.any() else 1.0
 
+    @property
+    def reach(self) -> float:
+        """Greatest distance, in model units, by which the surface moves in or out."""
+        return max(self._range[1], -self._range[0])
+
     def use(self, program: Program, lights: Lighting | None) -> None:
-        """Set the uniforms of a program of the decal pass but for the sampler."""
+        """Set the uniforms of a program but for the samplers."""
+        set_uniform(program, "relief_steepest", self._steepest)
+        set_uniform(program, "relief_stretch", STRETCH)
         set_uniform(program, "relief_range", self._range)
         set_uniform(program, "relief_step", self._step)
         set_uniform(program, "relief_light", _first_light(lights))

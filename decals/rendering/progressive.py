@@ -20,15 +20,16 @@ from decals.index.change_log import affected_balls
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.rendering.context import DEPTH, Context
-from decals.rendering.decal_pass import DecalPass
+from decals.rendering.decal_pass import DecalPass, DecalSource
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
 from decals.rendering.materials import has_relief
 from decals.rendering.mesh import PosedMeshDrawable
+from decals.rendering.offset_tree import OffsetTreeDrawable
 from decals.rendering.options import RenderOptions, SceneLike, Size
 from decals.rendering.pixel_pass import GROUP
 from decals.rendering.rest_buffer import RestBuffer
-from decals.rendering.uploads import Drawable, UploadedScene
+from decals.rendering.uploads import UploadedScene
 from decals.rendering.viewpoint import Bounds, Part, PictureView, Rectangle, Step, Tile, Viewpoint
 
 Regions = tuple[Rectangle, ...]
@@ -161,6 +162,8 @@ class TargetState:
         Mapping, contact mode, stiffness and lights.
     relief
         True if rays are followed over the surface, so that an edit may change pixels far from it.
+    moved
+        True if heights of decals move objects.
     """
 
     objects: tuple[object, ...]
@@ -171,6 +174,7 @@ class TargetState:
     version: int
     options: RenderOptions
     relief: bool
+    moved: bool
 
     @classmethod
     def of(cls, scene: SceneLike, bounds: Bounds, tile: Tile, options: RenderOptions, *, depth: bool) -> Self:
@@ -195,6 +199,7 @@ class TargetState:
             decal_version(scene),
             options,
             relief,
+            relief and any(hasattr(item, "tree") for item in scene.objects),
         )
 
     def dirty(self, previous: TargetState | None, tile: Tile) -> DirtyRegions:
@@ -202,12 +207,19 @@ class TargetState:
         # Light reads the surface around the inner rectangle, but neither paint nor light there.
         paint: Regions = (_inner_groups(tile),)
         whole = paint
-        if previous is None or self.view != previous.view or not same_objects(self.objects, previous.objects):
+        same_surface = previous is not None and same_objects(self.objects, previous.objects)
+        if previous is not None and (self.moved or previous.moved):  # decals move trees
+            same_surface = same_surface and self._same_decals(previous) and self.version == previous.version
+        if previous is None or self.view != previous.view or not same_surface:
             return DirtyRegions((Rectangle(0, 0, tile.width, tile.height),), whole, whole)
-        if self.formulas == previous.formulas and same_objects(self.decals, previous.decals):
+        if self._same_decals(previous):
             paint = self._edited(previous.version, tile)
         same_light = self.options.lights == previous.options.lights
         return DirtyRegions((), paint, paint if same_light else whole)
+
+    def _same_decals(self, previous: TargetState) -> bool:
+        """Return True if the same formulas paint the same decals, but for edits."""
+        return self.formulas == previous.formulas and same_objects(self.decals, previous.decals)
 
     def _edited(self, since: int, tile: Tile) -> Regions:
         """Return the rectangles that edits after a version reach."""
@@ -266,9 +278,11 @@ class Targets:
         self.light_pass = LightPass(context, size)
         self.resolve = ResolvePass(context, size)
 
-    def rest_for(self, drawables: Sequence[Drawable]) -> RestBuffer | None:
-        """Return the rest buffer if some drawables are posed, else None."""
-        if not any(isinstance(drawable, PosedMeshDrawable) for drawable in drawables):
+    def rest_for(self, uploaded: UploadedScene) -> RestBuffer | None:
+        """Return the rest buffer if some objects are posed, or moved by heights, else None."""
+        if not any(isinstance(drawable, PosedMeshDrawable) for drawable in uploaded.drawables) and not any(
+            map(uploaded.moves, uploaded.drawables)
+        ):
             return None
         if self._rest is None:
             self._rest = RestBuffer(self._context, self.gbuffer)
@@ -396,22 +410,15 @@ def plan_frame(
     """
     state = TargetState.of(scene, uploaded.bounds, tile, options, depth=depth)
     dirty = state.dirty(previous, tile)
-    steps = _surface_steps(uploaded, tile, targets, depth=depth) if dirty.surface else []
+    source = None
+    if uploaded.decals is not None:
+        modes = options.mapping, options.contact, options.stiffness
+        maps = uploaded.masks, uploaded.materials, uploaded.relief
+        source = DecalSource(uploaded.decals, *modes, *maps, options.lights, uploaded.walks)
+    steps = _surface_steps(uploaded, tile, targets, source, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
-    modes = options.mapping, options.contact, options.stiffness, options.filtered
-    rest = targets.rest_for(uploaded.drawables)
-    decal_arguments = (
-        gbuffer,
-        uploaded.decals,
-        uploaded.images,
-        *modes,
-        rest,
-        uploaded.masks,
-        uploaded.materials,
-        uploaded.relief,
-        options.lights,
-        uploaded.walks,
-    )
+    rest = targets.rest_for(uploaded)
+    decal_arguments = gbuffer, source, uploaded.images, options.filtered, rest
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     materials = None if uploaded.materials is None else targets.decal_pass.material_targets
@@ -421,19 +428,25 @@ def plan_frame(
     return FramePlan(state, steps, dirty.work(tile))
 
 
-def _surface_steps(uploaded: UploadedScene, tile: Tile, targets: Targets, *, depth: bool) -> list[Step]:
-    """Return the steps that draw all objects into the G-buffer."""
-    gbuffer = targets.gbuffer
+def _surface_steps(
+    uploaded: UploadedScene, tile: Tile, targets: Targets, source: DecalSource | None, *, depth: bool
+) -> list[Step]:
+    """Return the steps that draw all objects into the G-buffer; heights of decals move trees."""
+    gbuffer, rest = targets.gbuffer, targets.rest_for(uploaded)
     objects = sorted(enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised)
-    steps: list[Step] = [
-        partial(gbuffer.clear, tile.width, tile.height),
-        *(partial(drawable.draw, number, tile, gbuffer) for number, drawable in objects),
-    ]
-    if depth and not all(drawable.rasterised for drawable in uploaded.drawables):
-        steps.append(partial(gbuffer.complete_depth, tile.width, tile.height))
-    rest = targets.rest_for(uploaded.drawables)
+    steps: list[Step] = [partial(gbuffer.clear, tile.width, tile.height)]
     if rest is not None:
         steps.append(partial(rest.clear, tile.width, tile.height))
+    for number, drawable in objects:
+        if isinstance(drawable, OffsetTreeDrawable) and uploaded.moves(drawable):
+            assert rest is not None
+            assert source is not None
+            steps.append(partial(drawable.draw_offset, number, tile, gbuffer, rest, source))
+        else:
+            steps.append(partial(drawable.draw, number, tile, gbuffer))
+    if depth and not all(drawable.rasterised for drawable in uploaded.drawables):
+        steps.append(partial(gbuffer.complete_depth, tile.width, tile.height))
+    if rest is not None:
         steps += [
             partial(drawable.draw_rest, number, tile, rest)
             for number, drawable in objects

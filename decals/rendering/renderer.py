@@ -24,6 +24,7 @@ from decals.rendering.gbuffer import depth_program
 from decals.rendering.light_pass import light_file, light_program, resolve_program
 from decals.rendering.materials import has_materials, has_relief
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
+from decals.rendering.offset_tree import OffsetTreeDrawable
 from decals.rendering.options import (
     RenderOptions,
     SceneLike,
@@ -45,7 +46,7 @@ from decals.rendering.progressive import (
     TargetState,
     plan_frame,
 )
-from decals.rendering.tree import TreeDrawable, TreeHolder
+from decals.rendering.tree import TreeHolder
 from decals.rendering.uploads import DecalData, ImageArray, UploadedScene, Uploads, register, warmup_of
 from decals.rendering.viewpoint import (
     MAX_TILE,
@@ -64,7 +65,7 @@ DEFAULT_OPTIONS = RenderOptions()
 
 register(PosedColoredMesh, PosedMeshDrawable, PosedMeshDrawable.warmup)
 register(ColoredMesh, MeshDrawable, MeshDrawable.warmup)
-register(TreeHolder, TreeDrawable, TreeDrawable.warmup)
+register(TreeHolder, OffsetTreeDrawable, OffsetTreeDrawable.warmup)
 
 
 class Renderer:

@@ -1,4 +1,4 @@
-"""The rest pose behind every pixel of posed meshes, beside the G-buffer."""
+"""The rest pose behind every pixel of posed meshes and of trees moved by heights, beside the G-buffer."""
 
 import moderngl
 
@@ -27,16 +27,32 @@ class RestBuffer:
         self.textures = {name: context.texture(gbuffer.size, "f4") for name in names}
         for texture in self.textures.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._framebuffer = context.gl.framebuffer(list(self.textures.values()), gbuffer.depth)
+        rest = list(self.textures.values())
+        self._framebuffer = context.gl.framebuffer(rest, gbuffer.depth)
+        surface = [gbuffer.position, gbuffer.normal, gbuffer.color]
+        self._with_surface = context.gl.framebuffer([*surface, *rest], gbuffer.depth)
         self._gl = context.gl
 
     def use(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Restrict the next draws to these rows of the lower left part of this size."""
-        self._framebuffer.viewport = (0, 0, width, height)
-        self._framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
-        self._framebuffer.use()
-        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._use(self._framebuffer, width, height, part)
         self._gl.depth_func = "<="
+
+    def use_with_surface(self, width: int, height: int, part: Part = WHOLE) -> None:
+        """Do the same for draws into the G-buffer and this buffer at once; see ``shaders/offset.frag``."""
+        self._use(self._with_surface, width, height, part)
+        self._gl.depth_func = "<"
+
+    def _use(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
+        framebuffer.viewport = (0, 0, width, height)
+        framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
+        framebuffer.use()
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+
+    def bind_images(self, first_unit: int) -> None:
+        """Bind the textures to image units, for compute shaders that write them."""
+        for unit, texture in enumerate(self.textures.values(), first_unit):
+            texture.bind_to_image(unit, read=False, write=True)
 
     def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Clear these rows of the lower left part of this size; the depth stays."""
@@ -48,5 +64,6 @@ class RestBuffer:
     def release(self) -> None:
         """Release the memory."""
         self._framebuffer.release()
+        self._with_surface.release()
         for texture in self.textures.values():
             texture.release()

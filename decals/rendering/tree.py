@@ -136,20 +136,25 @@ class Kinds:
 @lru_cache(maxsize=256)
 def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) -> Source:
     """``trace.frag`` or ``trace.comp`` with the cases of `kinds`."""
+    slots = tracing_slots(kinds)
+    if backend is PassBackend.COMPUTE:
+        return compose("trace.comp", slots=slots, defines={"GROUP": GROUP}, version="430 core")
+    return compose("trace.frag", slots=slots)
+
+
+def tracing_slots(kinds: Kinds, functions: Iterable[Any] = ()) -> dict[str, str | Source]:
+    """Return the fillings of ``trace.glsl``; the library has these typed functions too."""
     evaluators = [
         _interpreter(name, evaluator, glsl_type, kinds)
         for name, (evaluator, glsl_type) in _evaluators(kinds).items()
     ]
     if kinds.directed:
         evaluators += [_interpreter_along(kinds), compose("directed.glsl", version=None)]
-    slots: dict[str, str | Source] = {
-        "library": _library(kinds),
+    return {
+        "library": _library(kinds, functions),
         "dispatch": _dispatch(kinds),
         "evaluators": _joined(evaluators),
     }
-    if backend is PassBackend.COMPUTE:
-        return compose("trace.comp", slots=slots, defines={"GROUP": GROUP}, version="430 core")
-    return compose("trace.frag", slots=slots)
 
 
 def _evaluators(kinds: Kinds) -> dict[str, tuple[Evaluator, str]]:
@@ -161,7 +166,7 @@ def _evaluators(kinds: Kinds) -> dict[str, tuple[Evaluator, str]]:
     return {"directed_bound": (DIRECTED_BOUND, "mat2x4"), "directed_color": (DIRECTED_COLOR, "mat2x4")}
 
 
-def _library(kinds: Kinds) -> str:
+def _library(kinds: Kinds, others: Iterable[Any]) -> str:
     """Every typed function that the shader calls, from the sources that Warp runs."""
     evaluators = [evaluator for evaluator, _ in _evaluators(kinds).values()]
     skeletons = [kinds.instruction_set.skeletons[code] for code in kinds.skeletons]
@@ -180,6 +185,7 @@ def _library(kinds: Kinds) -> str:
         to_local,
         direction_to_local,
         trace_ray,
+        *others,
     ]
     provided = [*_choices(kinds), *_flags(kinds), falloff_numbers, field_bound, field_gradient]
     return translate_library(functions, provided=provided)
@@ -582,11 +588,12 @@ class TreeDrawable:
     def __init__(self, context: Context, item: TreeHolder) -> None:
         tree = item.tree
         cells = tracing_cells(tree)
+        self._tree, self._context, self.kinds = tree, context, Kinds.of(tree.tape)
         self._bounds = tree.support
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         self._gl = context.gl
-        self._program = tracing_program(context, Kinds.of(tree.tape))
+        self._program = tracing_program(context, self.kinds)
         self._box: moderngl.VertexArray | None = None
         if isinstance(self._program, moderngl.Program):
             self._box = context.gl.vertex_array(self._program, [])
@@ -620,31 +627,21 @@ class TreeDrawable:
             set_uniform(self._program, name, value)
         if self._box is not None:
             gbuffer.use(tile.width, tile.height, part)
-            self._draw_box(self._box)
+            draw_box(self._gl, self._program, self._box, self._bounds)
         else:
-            self._trace_rows(covered_rectangle(self._bounds, tile).rows(part), gbuffer)
+            self.trace_rows(self._program, covered_rectangle(self._bounds, tile).rows(part), gbuffer)
 
-    def _draw_box(self, box: moderngl.VertexArray) -> None:
-        """Trace a ray for every pixel that the back of the box covers, in a fragment shader."""
-        for name, corner in zip(("box_lower", "box_upper"), self._bounds, strict=True):
-            set_uniform(self._program, name, tuple(np.asarray(corner).tolist()))
-        self._gl.enable(moderngl.CULL_FACE)
-        self._gl.cull_face = "front"
-        box.render(vertices=BOX_VERTICES)
-        self._gl.cull_face = "back"
-        self._gl.disable(moderngl.CULL_FACE)
-
-    def _trace_rows(self, rows: Rectangle, gbuffer: GBuffer) -> None:
+    def trace_rows(self, program: Program, rows: Rectangle, gbuffer: GBuffer) -> None:
         """Trace a ray for every pixel of a rectangle, in a compute shader."""
         if rows.area == 0:
             return
-        assert isinstance(self._program, moderngl.ComputeShader)
-        set_uniform(self._program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
+        assert isinstance(program, moderngl.ComputeShader)
+        set_uniform(program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
         gbuffer.position.bind_to_image(POSITION_UNIT, read=True, write=True)
         gbuffer.normal.bind_to_image(NORMAL_UNIT, read=False, write=True)
         gbuffer.color.bind_to_image(COLOR_UNIT, read=False, write=True)
         self._gl.memory_barrier()
-        self._program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
+        program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
         self._gl.memory_barrier()
 
     def release(self) -> None:
@@ -653,6 +650,17 @@ class TreeDrawable:
             texture.release()
         if self._box is not None:
             self._box.release()
+
+
+def draw_box(gl: moderngl.Context, program: Program, box: moderngl.VertexArray, bounds: Bounds) -> None:
+    """Trace a ray for every pixel that the back of a box covers, in a fragment shader."""
+    for name, corner in zip(("box_lower", "box_upper"), bounds, strict=True):
+        set_uniform(program, name, tuple(np.asarray(corner).tolist()))
+    gl.enable(moderngl.CULL_FACE)
+    gl.cull_face = "front"
+    box.render(vertices=BOX_VERTICES)
+    gl.cull_face = "back"
+    gl.disable(moderngl.CULL_FACE)
 
 
 def tracing_program(context: Context, kinds: Kinds) -> Program:

@@ -541,8 +541,17 @@ class UploadedScene:
         """Box around all objects; a point for a scene without objects."""
         if not self.drawables:
             return np.zeros(3), np.zeros(3)
-        lower, upper = zip(*(drawable.bounds for drawable in self.drawables), strict=True)
-        return np.min(lower, axis=0), np.max(upper, axis=0)
+        boxes = []
+        for drawable in self.drawables:
+            lower, upper = (np.asarray(corner) for corner in drawable.bounds)
+            growth = self.relief.reach if self.relief is not None and self.moves(drawable) else 0.0
+            boxes.append((lower - growth, upper + growth))
+        lowest, highest = zip(*boxes, strict=True)
+        return np.min(lowest, axis=0), np.max(highest, axis=0)
+
+    def moves(self, drawable: Drawable) -> bool:
+        """Return True if heights of decals move the surface of an object."""
+        return self.relief is not None and hasattr(drawable, "draw_offset")
 
 
 class Uploads:

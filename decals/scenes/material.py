@@ -66,7 +66,7 @@ class DecalMaterial(DecalImage):
         Heights, stored as float32[h, w]. By default None.
     relief : float
         Height above the surface where the map is 1, in visible radii of each decal; negative values press the
-        map in. Pictures show it by parallax, `decals.displace` moves the surface by it. By default 0.
+        map in. Pictures show it, on meshes by parallax; `decals.displace` moves the surface. By default 0.
 
     Raises
     ------

@@ -1,0 +1,173 @@
+"""BlobTrees whose surface heights of decals move: traced as offset surfaces, with silhouettes and depth.
+
+A point p has a foot, the closest point q of the surface, at the signed distance d. It is outside if d exceeds
+the height at q. Rays skip space by a shell of cells around the surface, and inside it follow the foot from
+step to step by Newton's method (``shaders/offset.glsl``). No step is longer than the gap d − height over the
+greatest rate at which the gap can shrink: the distance shrinks at most by the ray's own fall, and the height
+rises at most by the slope of a cone over the image that contains all its heights (cone step mapping, Dummer
+2006).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import moderngl
+import numpy as np
+
+from blobtree import Node, polygonize
+from blobtree._typing import Float32Array, Float64Array
+from decals.field.law import ContactLaw
+from decals.rendering.context import Context
+from decals.rendering.decal_pass import DecalSource, decal_functions
+from decals.rendering.gbuffer import GBuffer
+from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, set_uniform
+from decals.rendering.rest_buffer import RestBuffer
+from decals.rendering.tree import Kinds, TreeDrawable, covered_rectangle, draw_box, tracing_slots
+from decals.rendering.uploads import DataTexture
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
+from decals.shaders import Source, compose
+
+SHELL_CELLS = 48
+"""Cells of a shell along its longest side."""
+
+SHELL_RESOLUTION = 64
+"""Cells of the mesh whose vertices are the points of a shell, along the longest side of the support."""
+
+REACH_MARGIN = 1.25
+"""Reach of a new shell over the heights at hand, so that edits seldom take another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """Cells around a surface, each with a point of it.
+
+    Attributes
+    ----------
+    texels
+        float32[nx ny nz, 4]: for each cell a point of the surface near its middle, and a distance to the
+        middle that no point of the surface is below.
+    lower, cell, counts
+        Lowest corner (3,), side of the cells, number of cells along each axis.
+    reach
+        Distance from the surface up to which the cells reach.
+    """
+
+    texels: Float32Array
+    lower: Float64Array
+    cell: float
+    counts: tuple[int, int, int]
+    reach: float
+
+    @classmethod
+    def of(cls, tree: Node, reach: float) -> "Shell":
+        """Return the shell of a tree's surface; without a surface, one far from everything."""
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+        mesh = polygonize(tree, resolution=SHELL_RESOLUTION)
+        points = mesh.vertices.astype(np.float64)
+        if not len(points):
+            return cls(np.full((1, 4), 1e30, np.float32), np.zeros(3), 1.0, (1, 1, 1), reach)
+        corners = points[mesh.faces]
+        gap = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+        lower, upper = points.min(axis=0), points.max(axis=0)
+        size = upper - lower + 2.0 * (reach + gap)
+        cell = float(size.max()) * (1.0 + 1e-6) / SHELL_CELLS
+        counts = np.ceil(size / cell).astype(int)
+        lower = 0.5 * (lower + upper) - 0.5 * cell * counts
+        middles = lower + (np.indices(counts).reshape(3, -1).T + 0.5) * cell
+        distances, nearest = cKDTree(points).query(middles)
+        texels = np.column_stack([points[nearest], distances - gap]).astype(np.float32)
+        x, y, z = counts.tolist()
+        return cls(texels, lower, cell, (x, y, z), reach)
+
+    @property
+    def bounds(self) -> Bounds:
+        """Box of all cells."""
+        return self.lower, self.lower + self.cell * np.array(self.counts)
+
+
+class OffsetTreeDrawable(TreeDrawable):
+    """A tree's tracing cells on the GPU, and for scenes with relief its shell."""
+
+    _shell: tuple[Shell, DataTexture] | None = None
+    _box_of: tuple[Program, moderngl.VertexArray] | None = None
+
+    def draw_offset(
+        self,
+        object_id: int,
+        tile: Tile,
+        gbuffer: GBuffer,
+        rest: RestBuffer,
+        source: DecalSource,
+        part: Part = WHOLE,
+    ) -> None:
+        """Trace the rays to the surface that heights move, or those of a part of the rows."""
+        assert source.relief is not None
+        shell, texels = self._shell_for(source.relief.reach)
+        program = offset_program(self._context, self.kinds, source)
+        textures = *self._textures, texels
+        for unit, texture in enumerate(textures):
+            texture.use(unit)
+        uniforms = {
+            **self._uniforms,
+            "object_id": object_id,
+            "shell": 2,
+            "shell_lower": tuple(shell.lower.tolist()),
+            "shell_cell": shell.cell,
+            "shell_counts": shell.counts,
+        }
+        for name, value in uniforms.items():
+            set_uniform(program, name, value)
+        unit = source.use(program, len(textures))
+        source.relief.slopes.use(unit)
+        set_uniform(program, "relief_slopes", unit)
+        if isinstance(program, moderngl.Program):
+            rest.use_with_surface(tile.width, tile.height, part)
+            draw_box(self._gl, program, self._vertices(program), shell.bounds)
+            return
+        rows = covered_rectangle(shell.bounds, tile).rows(part)
+        rest.bind_images(first_unit=3)
+        self.trace_rows(program, rows, gbuffer)
+
+    def _shell_for(self, reach: float) -> tuple[Shell, DataTexture]:
+        if self._shell is None or not reach <= self._shell[0].reach <= 4.0 * max(reach, 1e-30):
+            if self._shell is not None:
+                self._shell[1].release()
+            shell = Shell.of(self._tree, REACH_MARGIN * reach)
+            self._shell = shell, DataTexture(self._context, shell.texels)
+        return self._shell
+
+    def _vertices(self, program: moderngl.Program) -> moderngl.VertexArray:
+        if self._box_of is None or self._box_of[0] is not program:
+            if self._box_of is not None:
+                self._box_of[1].release()
+            self._box_of = program, self._gl.vertex_array(program, [])
+        return self._box_of[1]
+
+    def release(self) -> None:
+        """Release the memory."""
+        super().release()
+        if self._shell is not None:
+            self._shell[1].release()
+        if self._box_of is not None:
+            self._box_of[1].release()
+
+
+def offset_program(context: Context, kinds: Kinds, source: DecalSource) -> Program:
+    """Return the program that traces moved trees of these kinds, for the context's backend."""
+    text = offset_shader(kinds, source.constants(), source.law, source.limited, context.backend)
+    if context.backend is PassBackend.COMPUTE:
+        return attach_camera(context.compute_program(text))
+    return attach_camera(context.program(compose("box.vert"), text))
+
+
+@lru_cache(maxsize=64)
+def offset_shader(
+    kinds: Kinds, constants: str, law: ContactLaw | None, limited: bool, backend: PassBackend
+) -> Source:
+    """``offset.frag`` or ``offset.comp`` with the cases of `kinds` and the formulas of decals."""
+    slots = tracing_slots(kinds, decal_functions(law)) | {"constants": constants, "functions": ""}
+    defines = {"OFFSET": True, "RELIEF": True, "LIMITED": limited}
+    if backend is PassBackend.COMPUTE:
+        return compose("offset.comp", slots=slots, defines=defines | {"GROUP": GROUP}, version="430 core")
+    return compose("offset.frag", slots=slots, defines=defines)
