@@ -2,13 +2,14 @@
 
 It is for edges, corners and large decals. `decals.field.walks` walks from the centre of a decal along
 straightest geodesics and leaves a grid of *relays*: surface points whose image coordinates are known, with
-the gradients of these coordinates. A pixel walks from relay to relay towards its own point (`walk_from`), and
-takes the mean of the places that the four relays around it see (`between_relays`). From each relay the
-corrected mapping leads on, so a relay is exact on its own face, and of third order on curved surface. Relays
-across an edge, with another normal, do not count where others do.
+the gradients of these coordinates and the normal. A table of cells of space lists relays for each cell, one
+for each face and each way around a corner. A pixel looks up its cell, finds with these relays about where it
+lies in the image, and takes the mean of the places that the four relays there see (`between_relays`). A relay
+is exact on its own face, and of third order on curved surface. Relays across an edge, with another normal, do
+not count where others do.
 
-Behind a corner two walks lead to one point. Relays know the image coordinates of the other walk, and the
-shorter one is drawn. All lengths are in visible radii.
+Behind a corner two walks lead to one point, and the shorter one is drawn. Relays at the ends of longer walks
+are dropped, but for those close to the cut, where both are equally long. All lengths are in visible radii.
 """
 
 # mypy: ignore-errors
@@ -16,7 +17,6 @@ shorter one is drawn. All lengths are in visible radii.
 
 import warp as wp
 
-from decals.field.mapping import unroll
 from decals.index.lookup import IndexedDecals
 from decals.record import xyz
 
@@ -29,43 +29,36 @@ SIDE = 2 * RELAYS_PER_RADIUS + 1
 SPACING = 1.1 / 10.0
 """Distance of neighbouring relays in the image."""
 RELAY = 3
-"""Texels of a relay: (point, x of the other walk), (gradient of x, y of the other walk), (gradient of y,
-state)."""
+"""Texels of a relay: (point, x of the normal), (gradient of x, y of the normal), (gradient of y, z of the
+normal)."""
 RELAYS = RELAY * SIDE * SIDE
 """Texels of the relays of a grid."""
-BLOCK = 3
-"""Relays along a side of a block."""
-BLOCKS_ALONG = SIDE // BLOCK
-BLOCKS = BLOCKS_ALONG * BLOCKS_ALONG
-"""Blocks of a grid. A texel behind the relays holds the ball around those of a block: middle and radius."""
-GRID = RELAYS + BLOCKS
-"""Texels of a grid."""
-LOST, SINGLE, DOUBLE = 0.0, 1.0, 2.0
-"""States of a relay: its walk ended at a border; no other walk leads to its point; another one does."""
-STEPS = 4
-"""Steps from relay to relay, at most."""
-FROM_GUESS, FROM_NEAREST, FROM_OTHER = 0, 1, 2
-"""Where walks of a pixel begin: in the corrected mapping, at a near relay, where another walk leads."""
+CELLS_ALONG = 8
+"""Cells of the table along each side of the cube around the decal."""
+CELLS = CELLS_ALONG * CELLS_ALONG * CELLS_ALONG
+GRID = RELAYS + CELLS + 1
+"""Texels of a grid: the relays, the cells, and the place in the image from which walks are compared."""
+LISTED = 8
+"""Relays in the list of a cell, at most; two in each number, a + 512 b, plus TWO_WAYS in the first one."""
+NONE = 511
+"""Number after the last relay of a list."""
+TWO_WAYS = 512 * 512
+"""Marks the first number of cells to which two walks lead."""
+NOWHERE = 1.0e6
+"""Coordinates of relays that are not there: their walks ended at a border, or were longer than others."""
 TURN = 0.005
 """Smallest difference of normals, 1 − cosine, that counts against a relay."""
-DOUBT = 0.15
+DOUBT = 0.02
 """Squared distance in the image, in spacings, from which a relay counts less than the one that led there."""
 MIN_SHARE = 1.0e-4
-OTHER_FACE = 0.3
-"""Mean 1 − cosine of normals from which relays lie on another face than the point."""
-AGREEMENT = 0.1
-"""Squared distance that counts as much as a right angle between normals, in `nearest_relay`."""
+LISTED_SHARE = 0.002
+"""Share of the listed relay beside the four around a point."""
+AGREEMENT = 1.0
+"""Squared distance that counts as much as a right angle between normals."""
 FAR = 3.0
 """Mean distance of a point from its relays, in spacings, from which only the corrected mapping is drawn."""
-
-
-@wp.func
-def relay_number(at: wp.vec2) -> wp.vec2i:
-    """Return column and row of the relay nearest to a place in the image."""
-    middle = float(RELAYS_PER_RADIUS)
-    column = wp.clamp(wp.floor(at[0] / SPACING + 0.5), -middle, middle)
-    row = wp.clamp(wp.floor(at[1] / SPACING + 0.5), -middle, middle)
-    return wp.vec2i(int(column) + RELAYS_PER_RADIUS, int(row) + RELAYS_PER_RADIUS)
+OTHER_WAY = 0.15
+"""Distance in the image, in spacings, from which two places of a point are those of different walks."""
 
 
 @wp.func
@@ -75,47 +68,43 @@ def relay_place(column: wp.int32, row: wp.int32) -> wp.vec2:
 
 
 @wp.func
+def cell_of(w: wp.vec3) -> wp.int32:
+    """Return the number of the cell of the table in which a point at w lies, or of the nearest one."""
+    last = float(CELLS_ALONG) - 1.0
+    x = wp.clamp(wp.floor(0.5 * float(CELLS_ALONG) * (w[0] + 1.0)), 0.0, last)
+    y = wp.clamp(wp.floor(0.5 * float(CELLS_ALONG) * (w[1] + 1.0)), 0.0, last)
+    z = wp.clamp(wp.floor(0.5 * float(CELLS_ALONG) * (w[2] + 1.0)), 0.0, last)
+    return int(x) + CELLS_ALONG * (int(y) + CELLS_ALONG * int(z))
+
+
+@wp.func
 def from_relay(
     column: wp.int32, row: wp.int32, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals
 ) -> wp.vec4:
     """Return the place (x, y) of a point at w as a relay sees it, its distance, and the turn of the normal.
 
-    The turn is 1 − cosine, and −1 for a relay that is lost.
+    The turn is 1 − cosine. The distance of a relay that is not there is about NOWHERE.
     """
     texel = first + RELAY * (SIDE * row + column)
-    along_x = xyz(index.walks[texel + 1])
-    last = index.walks[texel + 2]
-    along_y = xyz(last)
-    if last[3] == LOST:
-        return wp.vec4(0.0, 0.0, 0.0, -1.0)
-    offset = w - xyz(index.walks[texel])
-    normal = wp.normalize(wp.cross(along_x, along_y))
-    arc = xyz(unroll(offset, normal, n_q))
-    place = relay_place(column, row) + wp.vec2(wp.dot(along_x, arc), wp.dot(along_y, arc))
-    return wp.vec4(place[0], place[1], wp.length(offset), wp.max(1.0 - wp.dot(normal, n_q), 0.0))
+    point = index.walks[texel]
+    along_x = index.walks[texel + 1]
+    along_y = index.walks[texel + 2]
+    offset = w - xyz(point)
+    place = relay_place(column, row) + wp.vec2(wp.dot(xyz(along_x), offset), wp.dot(xyz(along_y), offset))
+    cosine = wp.dot(wp.vec3(point[3], along_x[3], along_y[3]), n_q)
+    return wp.vec4(place[0], place[1], wp.length(offset), wp.max(1.0 - cosine, 0.0))
 
 
 @wp.func
-def walk_from(start: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
-    """Return where a walk from relay to relay ends, for a point at w from the centre."""
-    at = start
-    last = wp.int32(-1)
-    for _step in range(STEPS):
-        relay = relay_number(at)
-        number = SIDE * relay[1] + relay[0]
-        if number == last:
-            break
-        last = number
-        seen = from_relay(relay[0], relay[1], first, w, n_q, index)
-        if seen[3] < 0.0:
-            break
-        at = wp.vec2(seen[0], seen[1])
-    return at
+def between_relays(
+    listed: wp.vec4, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals
+) -> wp.vec4:
+    """Return the place of a point as the four relays around it see it, their mean distance and turn.
 
-
-@wp.func
-def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec4:
-    """Return the place of a point as the four relays around `at` see it, their mean distance and turn."""
+    `listed` is what a relay of the cell sees, from which this begins. It counts where the others lie on other
+    faces.
+    """
+    at = wp.vec2(listed[0], listed[1])
     limit = float(RELAYS_PER_RADIUS) - 1.0
     cell = wp.vec2(
         wp.clamp(wp.floor(at[0] / SPACING), -limit - 1.0, limit),
@@ -127,8 +116,9 @@ def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index
     )
     column = int(cell[0]) + RELAYS_PER_RADIUS
     row = int(cell[1]) + RELAYS_PER_RADIUS
-    weighted = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    total = wp.float32(0.0)
+    doubt = DOUBT * (TURN + listed[3])
+    total = LISTED_SHARE / (doubt * doubt)
+    weighted = total * listed
     for corner in range(4):
         right = corner & 1
         up = corner >> 1
@@ -136,96 +126,75 @@ def between_relays(at: wp.vec2, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index
         aside = wp.vec2(seen[0] - at[0], seen[1] - at[1]) / SPACING
         doubt = (DOUBT + wp.dot(aside, aside)) * (TURN + seen[3])
         weight = wp.abs(float(1 - right) - share[0]) * wp.abs(float(1 - up) - share[1]) / (doubt * doubt)
-        if seen[3] >= 0.0:
+        if seen[2] < 0.5 * NOWHERE:
             weighted += weight * seen
             total += weight
-    if total <= 0.0:
-        return wp.vec4(at[0], at[1], FAR * SPACING, 1.0)
     return weighted / total
 
 
 @wp.func
-def nearest_relay(first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec2:
-    """Return the place of the relay nearest to a point at w, among those whose normal agrees best.
+def detour(seen: wp.vec4, origin: wp.vec2) -> wp.float32:
+    """Return the length of a walk from the origin; relays that are far or of another face make it longer.
 
-    Blocks whose balls are farther than the best relay are left out. The block in the nearest ball is first.
+    Such relays draw the walk too short, by their distance times the turn at most.
     """
-    begin = wp.int32(0)
-    least = wp.float32(1.0e30)
-    for block in range(BLOCKS):
-        ball = index.walks[first + RELAYS + block]
-        farthest = wp.length(w - xyz(ball)) + ball[3]
-        if farthest < least:
-            least = farthest
-            begin = block
-    found = wp.vec2(0.0, 0.0)
-    least = wp.float32(1.0e30)
-    for turn in range(BLOCKS):
-        block = (begin + turn) % BLOCKS
-        ball = index.walks[first + RELAYS + block]
-        gap = wp.max(wp.length(w - xyz(ball)) - ball[3], 0.0)
-        if gap * gap < least:
-            row = BLOCK * int((float(block) + 0.5) / float(BLOCKS_ALONG))
-            column = BLOCK * (block % BLOCKS_ALONG)
-            for k in range(BLOCK * BLOCK):
-                up = int((float(k) + 0.5) / float(BLOCK))
-                right = k - BLOCK * up
-                texel = first + RELAY * (SIDE * (row + up) + column + right)
-                offset = w - xyz(index.walks[texel])
-                distance = wp.dot(offset, offset)
-                if distance < least:
-                    last = index.walks[texel + 2]
-                    normal = wp.normalize(wp.cross(xyz(index.walks[texel + 1]), xyz(last)))
-                    distance += AGREEMENT * (1.0 - wp.dot(normal, n_q))
-                    if distance < least and last[3] != LOST:
-                        least = distance
-                        found = relay_place(column + right, row + up)
-    return found
-
-
-@wp.func
-def nearness(distance: wp.float32) -> wp.float32:
-    """Return the share of the walked mapping at a mean distance from relays: 1 among them, 0 from FAR on."""
-    return wp.clamp(FAR - distance / SPACING, 0.0, 1.0)
+    excess = wp.max(seen[2] - (FAR - 1.0) * SPACING, 0.0)
+    return wp.length(wp.vec2(seen[0], seen[1]) - origin) + seen[2] * seen[3] + excess
 
 
 @wp.func
 def walked_place(owner: wp.int32, w: wp.vec3, n_q: wp.vec3, guess: wp.vec2, index: IndexedDecals) -> wp.vec3:
     """Return the place (x, y) of a point at w in the image of its owner, and how far it counts, 0 to 1.
 
-    `guess` is its place in the corrected mapping. It also counts alone for decals without relays, which are
-    those that the corrected mapping draws correctly.
+    `guess` is its place in the corrected mapping. It counts alone far from all relays, and for decals without
+    any, which are those that the corrected mapping draws correctly.
     """
     head = index.walks[owner]
     if head[0] < 0.0:
         return wp.vec3(guess[0], guess[1], 0.0)
     first = int(head[1]) + GRID * int(head[0])
-    start = guess
-    at = guess
-    found = wp.vec4(guess[0], guess[1], FAR * SPACING, 1.0)
-    begun = wp.int32(FROM_GUESS)
-    for _walk in range(3):  # one loop: calls are inlined, and three of them would take many registers
-        end = walk_from(start, first, w, n_q, index)
-        seen = between_relays(end, first, w, n_q, index)
-        better = begun == FROM_GUESS
-        if begun == FROM_NEAREST:
-            better = seen[2] + SPACING * seen[3] < found[2] + SPACING * found[3]
-        if begun == FROM_OTHER:
-            shorter = wp.length(wp.vec2(seen[0], seen[1])) < wp.length(wp.vec2(found[0], found[1]))
-            better = shorter and nearness(seen[2]) == 1.0 and seen[3] < found[3] + TURN
-        if better:
-            at = end
-            found = seen
-        if begun == FROM_OTHER:
+    listed = index.walks[first + RELAYS + cell_of(w)]
+    pair = int(listed[0])
+    ways = 1 + (pair >> 18)
+    at = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    other = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    least = wp.float32(NOWHERE)
+    second = wp.float32(NOWHERE)
+    for k in range(LISTED):
+        number = pair & NONE
+        if number == NONE:
             break
-        if begun == FROM_GUESS and (nearness(found[2]) < 1.0 or found[3] > OTHER_FACE):
-            begun = FROM_NEAREST
-            start = nearest_relay(first, w, n_q, index)
+        row = int((float(number) + 0.5) / float(SIDE))
+        seen = from_relay(number - SIDE * row, row, first, w, n_q, index)
+        cost = seen[2] * seen[2] + AGREEMENT * seen[3]
+        apart = wp.length(wp.vec2(seen[0] - at[0], seen[1] - at[1])) > OTHER_WAY * SPACING
+        if cost < least:
+            if apart:
+                other = at
+                second = least
+            at = seen
+            least = cost
         else:
-            relay = relay_number(at)
-            texel = first + RELAY * (SIDE * relay[1] + relay[0])
-            if index.walks[texel + 2][3] != DOUBLE:
-                break
-            begun = FROM_OTHER
-            start = wp.vec2(index.walks[texel][3], index.walks[texel + 1][3])
-    return wp.vec3(found[0], found[1], nearness(found[2]))
+            if apart and cost < second:
+                other = seen
+                second = cost
+        pair = pair >> 9
+        if (k & 1) == 1:
+            listed = wp.vec4(listed[1], listed[2], listed[3], float(TWO_WAYS - 1))
+            pair = int(listed[0])
+    if least == NOWHERE:
+        return wp.vec3(guess[0], guess[1], 0.0)
+    if second == NOWHERE:
+        ways = 1
+    last = index.walks[first + GRID - 1]
+    origin = wp.vec2(last[0], last[1])
+    found = at
+    shortest = wp.float32(NOWHERE)
+    for _way in range(ways):
+        seen = between_relays(at, first, w, n_q, index)
+        length = detour(seen, origin)
+        if length < shortest:
+            shortest = length
+            found = seen
+        at = other
+    return wp.vec3(found[0], found[1], wp.clamp(FAR - found[2] / SPACING, 0.0, 1.0))

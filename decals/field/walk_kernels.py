@@ -12,7 +12,17 @@ digits of float32.
 import warp as wp
 
 from decals.field.mapping import tangent_coordinates, unroll
-from decals.field.walk import DOUBLE, LOST, RELAY, RELAYS, SIDE, SINGLE, SPACING, relay_place
+from decals.field.walk import (
+    CELLS,
+    CELLS_ALONG,
+    LISTED,
+    NOWHERE,
+    OTHER_WAY,
+    RELAY,
+    SIDE,
+    SPACING,
+    relay_place,
+)
 from decals.record import xyz
 
 wp.set_module_options({"enable_backward": False})
@@ -25,10 +35,25 @@ LARGEST_TURN = 0.3
 """Angle between a walk and its neighbours, at most, from which its stretch is measured."""
 SAME_FACE = 0.9
 """Cosine between the normals of two walks' ends from which they count as ends on one smooth surface."""
-ONE_PLACE = 2.5
+SAME_WAY = 0.95
+"""Cosine between the direction of a walk and that expected by its neighbour, on one side of corners."""
+ONE_STEP = 0.3
+"""Difference of a relay's place from that expected by its neighbour, over the step, at most."""
+ONE_PLACE = 1.5
 """Distance, in spacings, to which another walk leads to the same place."""
 OTHER_WALK = 0.7
 """Distance in the image, in spacings, from which two walks are different."""
+BEYOND_CUT = 1.3
+"""Distance from the cut, in spacings, from which relays of longer walks are dropped."""
+ONE_FACE = 0.8
+"""Cosine between the normals of relays from which a cell lists one of them."""
+NEAR, REACH = 0.35, 0.55
+"""Distances from the middle of a cell to which relays are listed: half a diagonal, and 1 or FAR spacings.
+
+Those beyond NEAR are listed where there are no others.
+"""
+BEND = 0.3
+"""Error of a place that a relay sees, over its distance, at most."""
 LEAST_STRETCH, MOST_STRETCH = 0.2, 5.0
 
 
@@ -44,7 +69,10 @@ class WalkedMesh:
 
 @wp.struct
 class WalkStart:
-    """Centre and radius of a decal, the point of a face where its walks begin, and two axes in the face."""
+    """Centre and radius of a decal, the point of a face where its walks begin, and two axes in the face.
+
+    `place` is that of the point in the image. Walks are compared from the place `origin`.
+    """
 
     centre: wp.vec3
     radius: wp.float32
@@ -52,6 +80,8 @@ class WalkStart:
     face: wp.int32
     u: wp.vec3
     v: wp.vec3
+    place: wp.vec2
+    origin: wp.vec2
 
 
 @wp.func
@@ -101,8 +131,9 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
     i = wp.tid()
     start = starts[i // (SIDE * SIDE)]
     number = i % (SIDE * SIDE)
-    place = relay_place(number % SIDE, number // SIDE)
+    place = relay_place(number % SIDE, number // SIDE) - start.place
     length = wp.length(place)
+    texels[RELAY * i] = wp.vec4(NOWHERE, NOWHERE, NOWHERE, 0.0)
     if length > OUTER or start.face < 0:
         return
     angle = wp.float32(0.0)
@@ -120,9 +151,10 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
         turn = wp.min(0.5 * SPACING / length, LARGEST_TURN)
         for side in range(2):
             sign = float(1 - 2 * side)
-            beside, _ahead, other = walk(start, angle + sign * turn, length * start.radius, mesh)
+            beside, turned, other = walk(start, angle + sign * turn, length * start.radius, mesh)
             if other >= 0:
-                if wp.dot(mesh.normals[other], normal) > SAME_FACE:
+                expected = wp.cos(turn) * ahead + sign * wp.sin(turn) * across
+                if wp.dot(mesh.normals[other], normal) > SAME_FACE and wp.dot(turned, expected) > SAME_WAY:
                     seen = sign * wp.dot(beside - end, across) / (length * start.radius * wp.sin(turn))
                     if seen > LEAST_STRETCH and seen < MOST_STRETCH:
                         total += seen
@@ -134,9 +166,30 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
     along_x = cosine * ahead - sine / stretch * across
     along_y = sine * ahead + cosine / stretch * across
     end = end / start.radius
-    texels[RELAY * i] = wp.vec4(end[0], end[1], end[2], 0.0)
-    texels[RELAY * i + 1] = wp.vec4(along_x[0], along_x[1], along_x[2], 0.0)
-    texels[RELAY * i + 2] = wp.vec4(along_y[0], along_y[1], along_y[2], SINGLE)
+    texels[RELAY * i] = wp.vec4(end[0], end[1], end[2], normal[0])
+    texels[RELAY * i + 1] = wp.vec4(along_x[0], along_x[1], along_x[2], normal[1])
+    texels[RELAY * i + 2] = wp.vec4(along_y[0], along_y[1], along_y[2], normal[2])
+
+
+@wp.func
+def is_lost(i: wp.int32, texels: wp.array(dtype=wp.vec4)) -> wp.bool:
+    """Return True for a relay that is not there."""
+    return texels[RELAY * i][0] == NOWHERE
+
+
+@wp.func
+def relay_normal(i: wp.int32, texels: wp.array(dtype=wp.vec4)) -> wp.vec3:
+    """Return the normal at a relay."""
+    return wp.vec3(texels[RELAY * i][3], texels[RELAY * i + 1][3], texels[RELAY * i + 2][3])
+
+
+@wp.func
+def seen_from(i: wp.int32, point: wp.vec3, texels: wp.array(dtype=wp.vec4)) -> wp.vec2:
+    """Return the place of a point in the image, as a relay sees it."""
+    number = i % (SIDE * SIDE)
+    offset = point - xyz(texels[RELAY * i])
+    seen = wp.vec2(wp.dot(xyz(texels[RELAY * i + 1]), offset), wp.dot(xyz(texels[RELAY * i + 2]), offset))
+    return relay_place(number % SIDE, number // SIDE) + seen
 
 
 @wp.func
@@ -152,17 +205,12 @@ def relay_step(i: wp.int32, side: wp.int32, step: wp.vec3, normal: wp.vec3, texe
     ends = wp.vec3(0.0, 0.0, 0.0)
     for k in range(2):
         sign = 1 - 2 * k
-        texel = RELAY * (i + sign * side)
-        beyond = texels[texel + 2]
-        offset = float(sign) * (xyz(texels[texel]) - xyz(texels[RELAY * i]))
-        turned = wp.cross(xyz(texels[texel + 1]), xyz(beyond))
-        apart = wp.length(offset) / (SPACING * wp.length(step))
-        if (
-            beyond[3] == LOST
-            or apart < 0.5
-            or apart > 2.0
-            or wp.dot(turned, normal) < SAME_FACE * wp.length(turned)
-        ):
+        beyond = i + sign * side
+        offset = float(sign) * (xyz(texels[RELAY * beyond]) - xyz(texels[RELAY * i]))
+        expected = SPACING * step
+        if wp.length(offset - expected) > ONE_STEP * wp.length(expected):
+            return step
+        if wp.dot(relay_normal(beyond, texels), normal) < SAME_FACE:
             return step
         ends += offset
     ends = ends / (2.0 * SPACING)
@@ -175,11 +223,9 @@ def smooth_relays(texels: wp.array(dtype=wp.vec4), smoothed: wp.array(dtype=wp.v
     i = wp.tid()
     along_x = xyz(texels[RELAY * i + 1])
     along_y = xyz(texels[RELAY * i + 2])
-    state = texels[RELAY * i + 2][3]
-    if state != LOST:
-        cross = wp.cross(along_x, along_y)
-        size = wp.length(cross)
-        normal = cross / size
+    normal = relay_normal(i, texels)
+    if not is_lost(i, texels):
+        size = wp.dot(wp.cross(along_x, along_y), normal)
         x = relay_step(i, 1, wp.cross(along_y, normal) / size, normal, texels)
         y = relay_step(i, SIDE, wp.cross(normal, along_x) / size, normal, texels)
         area = wp.dot(wp.cross(x, y), normal)
@@ -187,8 +233,8 @@ def smooth_relays(texels: wp.array(dtype=wp.vec4), smoothed: wp.array(dtype=wp.v
             along_x = wp.cross(y, normal) / area
             along_y = wp.cross(normal, x) / area
     smoothed[RELAY * i] = texels[RELAY * i]
-    smoothed[RELAY * i + 1] = wp.vec4(along_x[0], along_x[1], along_x[2], 0.0)
-    smoothed[RELAY * i + 2] = wp.vec4(along_y[0], along_y[1], along_y[2], state)
+    smoothed[RELAY * i + 1] = wp.vec4(along_x[0], along_x[1], along_x[2], normal[1])
+    smoothed[RELAY * i + 2] = wp.vec4(along_y[0], along_y[1], along_y[2], normal[2])
 
 
 @wp.kernel
@@ -204,40 +250,101 @@ def compare_relays(
     number = i % (SIDE * SIDE)
     place = relay_place(number % SIDE, number // SIDE)
     errors[i] = -1.0
-    if texels[RELAY * i + 2][3] != LOST and wp.length(place) <= 1.0:
-        n_q = wp.normalize(wp.cross(xyz(texels[RELAY * i + 1]), xyz(texels[RELAY * i + 2])))
+    if not is_lost(i, texels) and wp.length(place) <= 1.0:
+        n_q = relay_normal(i, texels)
         arc = unroll(xyz(texels[RELAY * i]), normals[grid], n_q)
         drawn = tangent_coordinates(xyz(arc), normals[grid], tangents[grid])
         drawn = arc[3] / wp.max(wp.length(drawn), 1.0e-12) * drawn
         errors[i] = wp.length(drawn - place)
 
 
+@wp.func
+def arrival(i: wp.int32, ahead: wp.vec2, texels: wp.array(dtype=wp.vec4)) -> wp.vec3:
+    """Return the direction on the surface at a relay of a direction in the image, times a stretch."""
+    return ahead[0] * xyz(texels[RELAY * i + 1]) + ahead[1] * xyz(texels[RELAY * i + 2])
+
+
 @wp.kernel
-def join_relays(texels: wp.array(dtype=wp.vec4)):
-    """Write the image coordinates of other walks to the same place, for relays where there are any."""
+def find_longer(
+    starts: wp.array(dtype=WalkStart), texels: wp.array(dtype=wp.vec4), longer: wp.array(dtype=wp.int32)
+):
+    """Write 1 for relays to which another walk is shorter, unless they are close to the cut.
+
+    The difference of both lengths grows with the distance from the cut, by the difference of the directions
+    in which the walks arrive.
+    """
     i = wp.tid()
-    last = texels[RELAY * i + 2]
-    if last[3] == LOST:
+    if is_lost(i, texels):
         return
-    grid = RELAYS * (i // (SIDE * SIDE))
+    grid = SIDE * SIDE * (i // (SIDE * SIDE))
+    origin = starts[i // (SIDE * SIDE)].origin
     number = i % (SIDE * SIDE)
-    own = relay_place(number % SIDE, number // SIDE)
+    own = relay_place(number % SIDE, number // SIDE) - origin
     end = xyz(texels[RELAY * i])
-    normal = wp.normalize(wp.cross(xyz(texels[RELAY * i + 1]), xyz(last)))
-    least = wp.float32(ONE_PLACE * SPACING)
-    for other in range(SIDE * SIDE):
-        texel = grid + RELAY * other
-        offset = end - xyz(texels[texel])
-        distance = wp.length(offset)
-        if distance < least and texels[texel + 2][3] != LOST:
-            along_x = xyz(texels[texel + 1])
-            along_y = xyz(texels[texel + 2])
-            if wp.dot(wp.normalize(wp.cross(along_x, along_y)), normal) > SAME_FACE:
-                seen = relay_place(other % SIDE, other // SIDE)
-                seen += wp.vec2(wp.dot(along_x, offset), wp.dot(along_y, offset))
+    for j in range(grid, grid + SIDE * SIDE):
+        if wp.length(end - xyz(texels[RELAY * j])) < ONE_PLACE * SPACING:
+            if wp.dot(relay_normal(i, texels), relay_normal(j, texels)) > SAME_FACE:
+                seen = seen_from(j, end, texels) - origin
                 if wp.length(seen - own) > OTHER_WALK * SPACING:
+                    ahead = arrival(i, wp.normalize(own), texels)
+                    turned = wp.length(ahead - arrival(j, wp.normalize(seen), texels))
+                    if wp.length(own) - wp.length(seen) > BEYOND_CUT * SPACING * turned:
+                        longer[i] = 1
+                        return
+
+
+@wp.func
+def is_listed(
+    j: wp.int32,
+    i: wp.int32,
+    count: wp.int32,
+    lists: wp.array2d(dtype=wp.int32),
+    texels: wp.array(dtype=wp.vec4),
+):
+    """Return True if a relay listed for cell i sees relay j in its place; True if one sees it elsewhere."""
+    elsewhere = wp.bool(False)
+    number = j % (SIDE * SIDE)
+    for m in range(count):
+        other = j - number + lists[i, m]
+        if wp.dot(relay_normal(j, texels), relay_normal(other, texels)) > ONE_FACE:
+            end = xyz(texels[RELAY * j])
+            error = wp.length(seen_from(other, end, texels) - relay_place(number % SIDE, number // SIDE))
+            if error < OTHER_WAY * SPACING + BEND * wp.length(end - xyz(texels[RELAY * other])):
+                return True, False
+            elsewhere = True
+    return False, elsewhere
+
+
+@wp.kernel
+def list_relays(
+    texels: wp.array(dtype=wp.vec4),
+    lists: wp.array2d(dtype=wp.int32),
+    two_ways: wp.array(dtype=wp.int32),
+):
+    """Write the relays of each cell: the nearest on each face by each way. Two ways are marked with 1."""
+    i = wp.tid()
+    grid = SIDE * SIDE * (i // CELLS)
+    cell = i % CELLS
+    x = float(cell % CELLS_ALONG) + 0.5
+    y = float(cell // CELLS_ALONG % CELLS_ALONG) + 0.5
+    z = float(cell // (CELLS_ALONG * CELLS_ALONG)) + 0.5
+    middle = 2.0 / float(CELLS_ALONG) * wp.vec3(x, y, z) - wp.vec3(1.0, 1.0, 1.0)
+    reach = wp.float32(REACH)
+    for k in range(LISTED):
+        found = wp.int32(-1)
+        least = wp.float32(reach)
+        for j in range(grid, grid + SIDE * SIDE):
+            distance = wp.length(middle - xyz(texels[RELAY * j]))
+            if distance < least:
+                listed, _elsewhere = is_listed(j, i, k, lists, texels)
+                if not listed:
                     least = distance
-                    texels[RELAY * i] = wp.vec4(end[0], end[1], end[2], seen[0])
-                    first = xyz(texels[RELAY * i + 1])
-                    texels[RELAY * i + 1] = wp.vec4(first[0], first[1], first[2], seen[1])
-                    texels[RELAY * i + 2] = wp.vec4(last[0], last[1], last[2], DOUBLE)
+                    found = j
+        if found < 0:
+            break
+        _listed, elsewhere = is_listed(found, i, k, lists, texels)
+        if elsewhere:
+            two_ways[i] = 1
+        lists[i, k] = found - grid
+        if least < NEAR:
+            reach = NEAR

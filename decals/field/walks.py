@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree._typing import BoolArray, Float32Array, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from blobtree.kernels import loaded
 from decals.field.mapping import ImageMapping
-from decals.field.walk import BLOCK, BLOCKS, BLOCKS_ALONG, GRID, LOST, RELAY, RELAYS, SIDE
+from decals.field.walk import CELLS, GRID, LISTED, NONE, NOWHERE, RELAY, RELAYS, SIDE, TWO_WAYS
 from decals.field.walk_kernels import (
     WalkedMesh,
     WalkStart,
     compare_relays,
-    join_relays,
+    find_longer,
+    list_relays,
     place_relays,
     smooth_relays,
 )
@@ -32,8 +33,17 @@ TOLERANCE = 0.004
 FARTHEST = 0.5
 """Distance of a centre from its surface, in visible radii, from which a decal gets no relays."""
 
-INSIDE = 1e-5
-"""Least weight of a corner of the face in which walks begin: they do not begin on edges."""
+ASIDE = 1e-4
+"""Distance from the centre, in visible radii along the second axis of the image, at which walks begin.
+
+From a centre on a corner, walks begin on its face above, and the cut lies below.
+"""
+
+CORNER = 0.1
+"""Difference of the sum of angles at a vertex from a full turn, in radians, from which there is a corner."""
+
+BESIDE = 0.3
+"""Least distance from a corner, in visible radii, from which walks are compared."""
 
 CELLS_PER_RADIUS = 8
 """Cells of the mesh of a BlobTree along the visible radius of the smallest decal."""
@@ -153,18 +163,14 @@ def _walk(rows: Float32Array, meshes: Sequence[MeshSurface]) -> tuple[Int32Array
     return np.concatenate(numbers).astype(np.int32), np.concatenate(grids)
 
 
-NOWHERE = 1e6
-"""Coordinate of balls without relays, in visible radii."""
-ROUNDING = 1e-5
-"""Excess of the radius of balls, for rounding."""
-
 AT_ONCE = 256
-"""Decals whose grids are made at once; 441 relays of each take 22 KB."""
+"""Decals whose grids are made at once; the 441 relays and 512 cells of each take 29 KB."""
 
 
 def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Array]:
     """Return True for the decals that need relays, and the grids of these."""
-    starts: Any = wp.array(_starts(rows, mesh), dtype=WalkStart, device="cpu")
+    begun = _starts(rows, mesh)
+    starts: Any = wp.array(begun, dtype=WalkStart, device="cpu")
     relays = len(rows) * SIDE * SIDE
     placed: Any = wp.zeros(len(rows) * RELAYS, dtype=wp.vec4, device="cpu")
     texels: Any = wp.zeros_like(placed)
@@ -177,25 +183,25 @@ def _grids(rows: Float32Array, mesh: MeshSurface) -> tuple[BoolArray, Float32Arr
     wp.launch(loaded(compare_relays, "cpu"), relays, [*frames, texels], [errors], device="cpu")
     needed = errors.numpy().reshape(len(rows), -1).max(axis=1) > TOLERANCE
     grids = texels.numpy().reshape(len(rows), RELAYS, 4)[needed]
-    joined: Any = wp.array(grids.reshape(-1, 4), dtype=wp.vec4, device="cpu")
-    wp.launch(loaded(join_relays, "cpu"), len(grids) * SIDE * SIDE, [joined], device="cpu")
-    grids = joined.numpy().reshape(-1, RELAYS, 4)
-    return needed, np.concatenate([grids, _balls(grids)], axis=1)
+    origins = np.pad(begun["origin"][needed], ((0, 0), (0, 2)))[:, None]
+    return needed, np.concatenate([grids, _cells(begun[needed], grids), origins], axis=1)
 
 
-def _balls(grids: Float32Array) -> Float32Array:
-    """Return the balls around the blocks of relays, ``float32[g, BLOCKS, 4]``; empty ones are far away."""
-    along = BLOCKS_ALONG, BLOCK
-    blocks = grids.reshape(-1, *along, *along, RELAY, 4).transpose(0, 1, 3, 2, 4, 5, 6)
-    blocks = blocks.reshape(-1, BLOCKS, BLOCK * BLOCK, RELAY, 4)
-    lost = blocks[..., 2, 3:] == LOST
-    points = blocks[..., 0, :3]
-    low, high = np.where(lost, np.inf, points).min(axis=2), np.where(lost, -np.inf, points).max(axis=2)
-    middle = np.where(low <= high, 0.5 * low + 0.5 * high, NOWHERE)
-    reach = np.linalg.norm(np.where(lost, middle[:, :, None], points) - middle[:, :, None], axis=3).max(
-        axis=2
-    )
-    return np.concatenate([middle, (1.0 + ROUNDING) * reach[..., None]], axis=2).astype(np.float32)
+def _cells(begun: Any, grids: Float32Array) -> Float32Array:
+    """Drop the longer one of two walks to a place from grids, and return the texels of their cells."""
+    starts: Any = wp.array(begun, dtype=WalkStart, device="cpu")
+    texels: Any = wp.array(grids.reshape(-1, 4), dtype=wp.vec4, device="cpu", copy=False)
+    longer: Any = wp.zeros(len(grids) * SIDE * SIDE, dtype=wp.int32, device="cpu")
+    wp.launch(loaded(find_longer, "cpu"), len(longer), [starts, texels], [longer], device="cpu")
+    grids.reshape(-1, RELAY, 4)[longer.numpy() > 0] = [NOWHERE, NOWHERE, NOWHERE, 0.0]
+    lists: Any = wp.full((len(grids) * CELLS, LISTED), NONE, dtype=wp.int32, device="cpu")
+    two_ways: Any = wp.zeros(len(lists), dtype=wp.int32, device="cpu")
+    wp.launch(loaded(list_relays, "cpu"), len(lists), [texels], [lists, two_ways], device="cpu")
+    pairs = lists.numpy().reshape(-1, CELLS, LISTED // 2, 2)
+    packed = pairs[..., 0] + (NONE + 1) * pairs[..., 1]
+    packed[..., 0] += TWO_WAYS * two_ways.numpy().reshape(-1, CELLS)
+    cells: Float32Array = packed.astype(np.float32)
+    return cells
 
 
 def _walked(mesh: MeshSurface) -> Any:
@@ -212,10 +218,11 @@ def _walked(mesh: MeshSurface) -> Any:
 def _starts(rows: Float32Array, mesh: MeshSurface) -> Any:
     """Return where the walks of decals begin; their axes turn with the normal, from the decal to its face."""
     centers, normals, tangents = (rows[:, 4 * k : 4 * k + 3].astype(np.float64) for k in range(3))
+    radii = RIM_RADIUS * rows[:, 3]
     corners, face_normals, _ = mesh.triangles
-    faces, weights = mesh.locate(rows[:, :3])
+    faces, weights = mesh.locate(centers + ASIDE * radii[:, None] * np.cross(normals, tangents))
     sound = np.searchsorted(mesh.sound, faces)
-    weights = np.maximum(weights, INSIDE)
+    weights = np.maximum(weights, 0.0)
     weights /= weights.sum(axis=1, keepdims=True)
     points = np.einsum("nk,nki->ni", weights, mesh.vertices[corners[sound]] - centers[:, None])
     up = face_normals[sound].astype(np.float64)
@@ -225,7 +232,30 @@ def _starts(rows: Float32Array, mesh: MeshSurface) -> Any:
     u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-30)
     kind: Any = WalkStart
     starts: Any = np.zeros(len(rows), kind.numpy_dtype())
-    starts["centre"], starts["radius"] = centers, RIM_RADIUS * rows[:, 3]
+    starts["centre"], starts["radius"] = centers, radii
     starts["point"], starts["u"], starts["v"] = points, u, np.cross(up, u)
+    starts["place"] = np.clip(_along_axes(starts, points) / radii[:, None], -ASIDE, ASIDE)
+    starts["origin"] = _origins(starts, mesh, corners[sound])
     starts["face"] = np.where(facing > LEAST_COSINE, sound, -1)
     return starts
+
+
+def _along_axes(starts: Any, offsets: Float64Array) -> Float64Array:
+    """Return offsets ``float64[n, 3]`` along the axes of decals, ``float64[n, 2]``."""
+    return np.stack([np.einsum("ni,ni->n", offsets, starts[axis]) for axis in ("u", "v")], axis=1)
+
+
+def _origins(starts: Any, mesh: MeshSurface, faces: Int32Array) -> Float64Array:
+    """Return from which places in the image walks that begin in these faces are compared, ``float64[n, 2]``.
+
+    From a centre close to a corner, all walks around it are about equally long. They are compared from a
+    place farther from the corner, beyond the centre. Around one corner that gives the same cut.
+    """
+    offsets = mesh.vertices[faces] - (starts["centre"] + starts["point"])[:, None]
+    distances = np.linalg.norm(offsets, axis=2) / starts["radius"][:, None]
+    distances[mesh.angle_defects[faces] < CORNER] = np.inf
+    nearest = np.arange(len(faces)), distances.argmin(axis=1)
+    away = -_along_axes(starts, offsets[nearest])
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-30)
+    origins: Float64Array = np.maximum(BESIDE - distances[nearest], 0.0)[:, None] * away
+    return origins

@@ -164,6 +164,19 @@ class MeshSurface(Immutable):
         return self._corners, self._normals, edge_twins(self._welded[self._corners])
 
     @Lazy
+    def angle_defects(self) -> Float64Array:
+        """Return how far the sum of the angles at each vertex is from a full turn, ``float64[n]``."""
+        points = self.vertices[self._corners].astype(np.float64)
+        sides = np.roll(points, -1, axis=1) - points
+        sides /= np.linalg.norm(sides, axis=2, keepdims=True)
+        cosines = -np.einsum("nki,nki->nk", sides, np.roll(sides, 1, axis=1))
+        angles = np.arccos(np.clip(cosines, -1.0, 1.0))
+        numbers = self._welded[self._corners]
+        sums = np.bincount(numbers.ravel(), angles.ravel(), minlength=len(self.vertices))
+        defects: Float64Array = np.abs(2.0 * np.pi - sums)[self._welded]
+        return defects
+
+    @Lazy
     def _winding(self) -> int:
         """1 if the mesh is closed and winds counter-clockwise seen from outside, -1 if clockwise, else 0."""
         if not self.closed:

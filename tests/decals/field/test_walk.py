@@ -10,7 +10,7 @@ from blobtree import HalfSpace, Intersection, Point
 from decals.errors import InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
-from decals.field.walk import GRID, LOST, RELAY, RELAYS, SIDE
+from decals.field.walk import CELLS, GRID, NONE, NOWHERE, RELAY, RELAYS
 from decals.field.walks import Walks
 from decals.index.editor import DecalEditor
 from decals.model import Decals
@@ -39,6 +39,24 @@ def test_images_run_on_round_the_corner_of_a_cube(place: tuple[float, float]) ->
     print(f"{rms(errors):.5f}, largest {errors.max():.4f} of the radius")
     assert rms(errors) <= 0.003
     assert np.quantile(errors, 0.995) <= 0.01
+
+
+CUBE = np.arccos(np.sqrt(1 / 3))
+"""Angle between the edges of a cube and its diagonal."""
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.003, 0.05, 0.3])
+@pytest.mark.parametrize(
+    ("sides", "slope", "worst"),
+    [(3, CUBE, 0.005), (4, 0.9, 0.007), (64, 0.54, 0.006), (64, 1.2, 0.025)],
+)
+def test_images_around_a_tip_break_at_the_cut_alone(
+    sides: int, slope: float, worst: float, distance: float
+) -> None:
+    """The corner of a cube, a pyramid and two cones, seen from the tip itself and from beside it."""
+    errors = unfolding.tip(sides, slope, distance).errors(1.0)
+    print(f"{rms(errors):.5f}, largest {errors.max():.4f} of the radius")
+    assert errors.max() <= worst
 
 
 @pytest.mark.parametrize(("depth", "radius"), [(0.5, 0.8), (0.2, 0.5)])
@@ -180,10 +198,12 @@ def test_walks_on_hostile_meshes() -> None:
     walks = Walks.over(decals, [surface])
     assert np.isfinite(walks.texels).all()
     grids = walks.texels[len(walks) :].reshape(-1, GRID, 4)
-    for row, column in np.ndindex(SIDE, SIDE):  # the ball of a block holds its relays
-        first, ball = RELAY * (SIDE * row + column), grids[:, RELAYS + 7 * (row // 3) + column // 3]
-        away = np.linalg.norm(grids[:, first, :3] - ball[:, :3], axis=1)
-        assert ((away <= ball[:, 3]) | (grids[:, first + 2, 3] == LOST)).all()
+    there = grids[:, :RELAYS:RELAY, 0] != NOWHERE
+    numbers = grids[:, RELAYS : RELAYS + CELLS].astype(np.int64)
+    assert (numbers & NONE != NONE).any()
+    for listed in (numbers & NONE, numbers >> 9 & NONE):  # cells list relays that are there
+        grid, _cell, _part = np.nonzero(listed != NONE)
+        assert there[grid, listed[listed != NONE]].all()
     points, normals = surface.project(rng.uniform(-1, 1, (2000, 3)))
     seen = evaluate(decals, points, normals, mapping="walked", walks=walks, device="cpu")
     assert np.isfinite(seen.uv).all()

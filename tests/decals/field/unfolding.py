@@ -123,6 +123,40 @@ def corner(x: float, y: float, count: int = 4000) -> Patch:
     )
 
 
+def tip(sides: int, slope: float, distance: float, count: int = 4000) -> Patch:
+    """The tip of a pyramid, whose edges make an angle with its axis, seen from a distance below it.
+
+    The centre lies in the middle of a face. Points on the far side within 0.02 of the cut, which is straight,
+    are left out.
+    """
+    rng = np.random.default_rng(4)
+    turn = np.pi / 2 + 2 * np.pi * (np.arange(sides + 1) - 0.5) / sides
+    edges = np.stack([np.sin(slope) * np.cos(turn), np.sin(slope) * np.sin(turn)], axis=1)
+    edges = np.column_stack([edges, np.full(sides + 1, -np.cos(slope))])
+    angle = np.arccos(edges[0] @ edges[1])
+    normals = log_maps.unit(np.cross(edges[:-1], edges[1:]))
+    half = 0.5 * sides * angle
+    away, length = rng.uniform(-half, half, count), rng.uniform(0.0, 1.2, count)
+    kept = length * np.sin(half - np.abs(away)) > 0.02
+    away, length = away[kept], length[kept]
+    face = np.floor((away / angle + 0.5) % sides).astype(int) % sides
+    within = (away + 0.5 * angle) % angle
+    across = np.cross(normals, edges[:-1])
+    ways = np.cos(within)[:, None] * edges[face] + np.sin(within)[:, None] * across[face]
+    down = log_maps.unit(edges[0] + edges[1])
+    i = np.arange(1, sides + 1)
+    return Patch(
+        np.vstack([np.zeros(3), 3.0 * edges[:-1]]),
+        np.stack([0 * i, i, i % sides + 1], axis=1),
+        distance * down,
+        np.array([0.0, 0.0, 1.0]) if distance == 0.0 else normals[0],
+        np.array([1.0, 0.0, 0.0]),
+        length[:, None] * ways,
+        normals[face],
+        np.stack([-length * np.sin(away), length * np.cos(away) - distance], axis=1),
+    )
+
+
 def cylinder_rim(depth: float, count: int = 3000, sides: int = 128) -> Patch:
     """The side of a cylinder of radius 1, and its flat end at z = 0, seen from a depth below it.
 
