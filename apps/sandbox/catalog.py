@@ -175,6 +175,8 @@ def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float,
             return (NATURAL["height"],) if parameter.name == "height" else ()
         case Quantity.NAMES:
             return _letters(operands)
+        case Quantity.CHOICE:
+            return parameter.choices[0]
         case Quantity.NAME_PAIRS:
             letters = _letters(operands)
             return tuple(itertools.pairwise(letters))
