@@ -182,12 +182,12 @@ class Display:
         """Show what the options ask for, once the scene rests; return True if the view changed."""
         try:
             complete = self._worker.poll()
-        except ImplicitDecalsError as error:
+            if complete is not None:
+                complete()
+                return True
+        except ImplicitDecalsError as error:  # such as a mapping that the mode does not have
             self.message = str(error)
             return False
-        if complete is not None:
-            complete()
-            return True
         window = self._window
         if self._worker.busy or window.tools.dragging or window.background.following:
             return False
