@@ -1,5 +1,6 @@
 """State that the actions of one window share: selection, messages, strokes and background jobs."""
 
+import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -26,6 +27,10 @@ from decals.validation import instance
 
 Cursor = Callable[[], SurfacePick | None]
 """Returns the surface point under the cursor, or None."""
+
+
+SLOW_STEP = 0.08
+"""Processor time in seconds from which on a step of a drag counts as slow."""
 
 
 class DrawModes(Protocol):
@@ -104,6 +109,7 @@ class ActionState:
         self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
         self._series: tuple[str, object] | None = None
         self._stroke = object()
+        self._slow_steps = 0
         self._unsubscribe = session.subscribe(self._drop_deleted)
 
     def close(self) -> None:
@@ -161,7 +167,7 @@ class ActionState:
     def begin_stroke(self, label: str) -> None:
         """End the open stroke, and collect all following edits in one undo entry until `end_stroke`."""
         self.end_stroke()
-        self._stroke = object()
+        self._stroke, self._slow_steps = object(), 0
         self.session.begin_stroke(label)
 
     def end_stroke(self) -> None:
@@ -187,7 +193,7 @@ class ActionState:
         """
         if series == self._series:
             return
-        self._stroke = object()
+        self._stroke, self._slow_steps = object(), 0
         self.session.end_stroke()
         if series is not None:
             self.session.begin_stroke(label)
@@ -217,9 +223,15 @@ class ActionState:
         self.run_latest_step(command.label, step_of(command), long=takes_long(command))
 
     def run_latest_step(self, label: str, step: Step, *, long: bool) -> None:
-        """Carry out a step of a drag, in the background if it is long; errors become the message."""
+        """Carry out a step of a drag, in the background if it is long; errors become the message.
+
+        Two slow steps in a row count as long for the rest of the stroke.
+        """
         try:
-            if long or not self._done_now(step):
+            began = time.thread_time()
+            if long or self._slow_steps > 1 or not self._done_now(step):
                 self.background.edit_latest(label, step)
+            else:
+                self._slow_steps = self._slow_steps + 1 if time.thread_time() - began > SLOW_STEP else 0
         except ImplicitDecalsError as error:
             self.message = str(error)

@@ -1,6 +1,7 @@
 """The sandbox without a browser: its values follow the session, and its events edit the scene."""
 
 import json
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -14,9 +15,11 @@ import decals
 from blobtree import Point, Torus, Twist, Union
 from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
+from decals.editing.action_state import SLOW_STEP
 from decals.editing.actions import KEYS
 from decals.editing.commands import ReplaceScene
 from decals.editing.document import Document
+from decals.editing.tree_commands import SetParameter
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
@@ -253,6 +256,30 @@ def test_the_ends_of_a_slider_stay_while_it_moves(window: EditWindow) -> None:
     sandbox.set_value("radius", 1.4, False)
     after = sandbox.values()["panel"]["controls"][1]
     assert (after["value"], after["low"], after["high"]) == (1.4, before["low"], before["high"])
+
+
+def test_after_two_slow_steps_a_slider_blocks_the_page_no_longer(
+    window: EditWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sandbox, compute, threads = Sandbox(window), SetParameter.compute, []
+
+    def slow(command: SetParameter, document: Document) -> Any:
+        threads.append(threading.current_thread() is threading.main_thread())
+        began = time.thread_time()
+        while time.thread_time() - began < 1.2 * SLOW_STEP:
+            pass
+        return compute(command, document)
+
+    monkeypatch.setattr(SetParameter, "compute", slow)
+    sandbox.select("0/1")
+    for radius in (0.65, 0.7, 0.75, 0.8):
+        sandbox.set_value("radius", radius, False)
+    sandbox.set_value("radius", 0.85, True)
+    finish(window)
+    assert threads[:2] == [True, True]
+    assert not any(threads[2:])
+    tree: Any = tree_of(window.document)
+    assert (tree.children[1].radius, window.session.labels) == (0.85, ("set radius",))
 
 
 def test_a_slider_that_rests_ends_its_edit(window: EditWindow, monkeypatch: pytest.MonkeyPatch) -> None:
