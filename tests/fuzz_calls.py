@@ -519,6 +519,7 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "DuplicateDecals": {"numbers": [0]},
         "DuplicatePrimitive": {**node, "offset": (1.0, 0.0, 0.0)},
         "JoinPrimitive": {**node, "join": "union"},
+        "DragSurface": {**node, "start": (1.0, 0.0, 0.0), "end": (1.1, 0.0, 0.0), "quick": False},
         "TransformPrimitive": {**node, "matrix": np.eye(4), "quick": False},
         "MirrorPrimitive": {**node, "axis": 0},
         "FlagNodes": {"hidden": {0: ((1,),)}, "locked": {}, "label": "hide"},

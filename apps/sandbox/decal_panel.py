@@ -149,14 +149,12 @@ def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> N
 
 def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
     """Return the brush and its controls; the sizes of brushes need the surface, which selecting does not."""
-    if brush.brush is Brush.SELECT:
+    if brush.brush in (Brush.SELECT, Brush.BOX, Brush.LASSO, Brush.PULL):
         return {"brush": str(brush.brush), "controls": []}
     has_objects = bool(document.objects)
     radius = brush.radius or (default_radius(document) if has_objects else 1.0)
     size = brush.decal_radius or (default_decal_radius(document) if has_objects else 0.1)
     usual = default_radius(document) if has_objects else 1.0
-    if brush.brush in (Brush.SELECT, Brush.BOX, Brush.LASSO):
-        return {"brush": str(brush.brush), "controls": []}
     reach = max(4.0 * usual, radius)
     controls = [_slider("radius", radius, reach / STEPS, reach, "radius of the brush, in model units")]
     if brush.brush is Brush.SCATTER:

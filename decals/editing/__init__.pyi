@@ -24,6 +24,7 @@ from .scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecal
 from .session import EditSession, UndoEntry
 from .tree_commands import (
     AddPrimitive,
+    DragSurface,
     DuplicatePrimitive,
     GroupOperands,
     JoinPrimitive,
@@ -50,6 +51,7 @@ __all__ = [
     "BrushDecals",
     "DeleteDecals",
     "Document",
+    "DragSurface",
     "DuplicateDecals",
     "DuplicatePrimitive",
     "EditSession",

@@ -35,11 +35,13 @@ class Brush(StrEnum):
     """What a drag with the left button does to decals.
 
     SELECT selects and moves single ones, BOX and LASSO select those in a box, or in a line around them.
+    PULL drags the surface below them.
     """
 
     SELECT = "select"
     BOX = "box"
     LASSO = "lasso"
+    PULL = "pull"
     SCATTER = "scatter"
     PUSH = "push"
     ERASE = "erase"

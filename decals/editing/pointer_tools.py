@@ -4,12 +4,12 @@ from collections.abc import Callable
 from enum import Enum, auto
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array
 from decals.editing.actions import KEYS, Actions
 from decals.editing.brushes import Brush, BrushStroke
 from decals.editing.commands import MoveDecals
+from decals.editing.gizmo import Ray, on_plane
 from decals.editing.queries import (
     SurfacePick,
     facing_decals,
@@ -21,9 +21,6 @@ from decals.editing.queries import (
 )
 from decals.errors import InvalidEdit
 from decals.validation import describe, finite_number, instance
-
-Ray = tuple[ArrayLike, ArrayLike]
-"""Origin and direction in scene coordinates."""
 
 Occluded = Callable[[float, float, Float32Array], bool]
 """Returns True if another object in the window hides a surface point, at a pixel."""
@@ -89,7 +86,7 @@ class PointerTools:
         self._ray, self._occluded, self._pixels = ray, occluded, pixels
         self.selection_line: list[tuple[float, float]] = []
         self._press, self._press_position = Press.UP, (0.0, 0.0)
-        self._drag: DecalDrag | None = None
+        self._drag: DecalDrag | SurfaceDrag | None = None
         self._brush: BrushStroke | None = None
 
     @property
@@ -139,6 +136,11 @@ class PointerTools:
         if self.actions.state.brush.brush in (Brush.BOX, Brush.LASSO) and not shift:
             self.selection_line = [(x, y)]
             return True
+        if self.actions.state.brush.brush is Brush.PULL and not shift:
+            surface_pick, ray = self.at(x, y), self._ray(x, y)
+            if surface_pick is not None and ray is not None:
+                self._drag = SurfaceDrag(self.actions, surface_pick, ray)
+            return surface_pick is not None
         if self.actions.state.brush.brush is not Brush.SELECT and not shift:
             return self._begin_brush(x, y)
         selection = self.actions.state.selection
@@ -203,7 +205,7 @@ class PointerTools:
         if press is Press.DOWN:
             self._perform("Click", x, y, ctrl=ctrl, shift=shift)
         elif drag is not None:
-            self.actions.state.end_stroke()
+            drag.end()
         return drag is not None or ctrl
 
     def _select_inside(self, line: list[tuple[float, float]]) -> None:
@@ -238,7 +240,7 @@ class PointerTools:
 
     def _continue_drag(self) -> None:
         """Continue a drag after an action as another undo entry, unless its decals were deleted."""
-        if self._drag is not None and not self._drag.decals_exist:
+        if self._drag is not None and not self._drag.possible:
             self._drag = None
         if self._drag is not None and self._press is Press.DRAG:
             self._drag.begin()
@@ -270,7 +272,7 @@ class DecalDrag:
         self._offset: Float32Array = center - start.position
 
     @property
-    def decals_exist(self) -> bool:
+    def possible(self) -> bool:
         """True unless one of the decals was deleted."""
         return bool(self._actions.state.session.document.decals.has(self._numbers).all())
 
@@ -287,3 +289,39 @@ class DecalDrag:
         offset = shortest_rotations(self._normal[None], hit.normals)[0] @ self._offset
         target = nearest_points(document.shown_objects, hit.positions + offset)
         self._actions.state.run_latest(MoveDecals(self._numbers, target.positions[0], target.normals[0]))
+
+    def end(self) -> None:
+        """End the undo entry."""
+        self._actions.state.end_stroke()
+
+
+class SurfaceDrag:
+    """A drag of a point of the surface, in the plane through it that faces the viewer.
+
+    Parameters
+    ----------
+    actions
+        The actions.
+    start
+        The pressed point.
+    ray
+        The ray through it.
+    """
+
+    def __init__(self, actions: Actions, start: SurfacePick, ray: Ray) -> None:
+        self._trees, self._start, self._toward = actions.trees, start, ray[1]
+        self.possible = True
+
+    def begin(self) -> None:
+        """Begin an undo entry."""
+        self._trees.begin_surface_drag(self._start)
+
+    def move(self, ray: Ray, _occluded: Callable[[Float32Array], bool]) -> None:
+        """Drag the point to a ray."""
+        end = on_plane(self._start.position, self._toward, ray)
+        if end is not None:
+            self._trees.drag_surface(self._start.position, end)
+
+    def end(self) -> None:
+        """End the undo entry; if the object has no visible surface left, the drag is reverted."""
+        self._trees.end_drag()

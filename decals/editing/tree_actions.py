@@ -23,6 +23,7 @@ from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
 from decals.editing.tree_commands import (
     AddPrimitive,
+    DragSurface,
     DuplicatePrimitive,
     GroupOperands,
     JoinPrimitive,
@@ -210,7 +211,18 @@ class TreeActions:
         if command is not None:
             self._drag_to(command)
 
-    def _drag_to(self, command: MovePrimitive | TransformPrimitive | SetParameter) -> None:
+    def begin_surface_drag(self, start: SurfacePick) -> None:
+        """Begin to drag the surface by the selected node, else by the primitive at the point."""
+        if self._state.primitive is None or self._state.primitive[0] != start.object:
+            self._state.select_primitive(*self._primitive_under(start), np.zeros(3, np.float32))
+        self._state.begin_stroke(DragSurface.label)
+
+    def drag_surface(self, start: ArrayLike, end: ArrayLike) -> None:
+        """Drag a point of the surface, shape (3,), to another one; see `DragSurface`."""
+        if self._state.primitive is not None and self._state.session.stroke_open:
+            self._drag_to(DragSurface(*self._state.primitive, start, end, quick=True))
+
+    def _drag_to(self, command: MovePrimitive | TransformPrimitive | SetParameter | DragSurface) -> None:
         """Replace the edit of the open stroke by that of a command."""
 
         def step(session: EditSession) -> str:

@@ -1,5 +1,7 @@
 """Commands for primitives of BlobTrees: move, resize, paint, add, remove, duplicate and join."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -7,7 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import ISO, Node
+from blobtree._typing import Float64Array
 from blobtree.nodes import surgery
+from blobtree.nodes.numeric_parameters import (
+    NumericParameter,
+    numeric_parameters,
+    numeric_values,
+    with_numeric_values,
+)
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import (
     Path,
@@ -29,6 +38,23 @@ from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject, check_names, with_tree
 from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
+
+DRAGGED = (
+    Quantity.POINT,
+    Quantity.POINTS,
+    Quantity.RADIUS,
+    Quantity.RADII,
+    Quantity.LENGTH,
+    Quantity.EXTENTS,
+    Quantity.SEMI_AXES,
+)
+"""Parameters that `DragSurface` changes."""
+
+DRAG_STEP, DRAG_STEPS = 0.01, 40
+"""Steps of `DragSurface`: their length in sizes of the node's box, and how many there are at most."""
+
+NEWTON_STEPS, DRAG_TOLERANCE = 6, 1e-5
+"""Newton steps at each of its points, and the error of the field there that is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +200,77 @@ class TransformPrimitive(PrimitiveCommand):
         matrix = square_matrix(affine_matrix(self.matrix))
         node = mapped(node_at(tree, self.path), Place(tree, self.path).mapped(matrix))
         return self.compute_exchange(document, node, matrix, quick=self.quick)
+
+
+@dataclass(frozen=True, eq=False)
+class DragSurface(PrimitiveCommand):
+    """Drag a point of the surface: lengths of a primitive, or a branch, follow; decals stay on the surface.
+
+    The point goes to its end in short steps. In each of them, the least change of points, radii and lengths,
+    as a sum of squares, puts the surface there: a step of least squares on the gradient of the field by these
+    parameters.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    start, end
+        A point of the surface, and where it is dragged, shape (3,) each.
+    quick
+        If True, the tree is not checked for a visible surface: for the steps of a drag. Check it at the end.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import DragSurface, EditSession
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(DragSurface(0, (), (1, 0, 0), (1.5, 0, 0)))
+    >>> ball = session.document.objects[0].tree
+    >>> [round(value, 1) for value in (*ball.center, ball.radius)]
+    [0.2, 0.0, 0.0, 1.3]
+    """
+
+    start: ArrayLike
+    end: ArrayLike
+    quick: bool = False
+    label: ClassVar[str] = "drag the surface"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        tree, path = self.tree(document), tuple(self.path)
+        start, end = (finite_vector(name, getattr(self, name), InvalidEdit) for name in ("start", "end"))
+        low, high = node_at(tree, path).support
+        parameters = [
+            parameter
+            for parameter in numeric_parameters(tree)
+            if parameter.path[: len(path)] == path and parameter.declaration.quantity in DRAGGED
+        ]
+        if not parameters:
+            raise InvalidEdit(
+                f"a {type(node_at(tree, path)).__name__} has no point, radius or length to drag"
+            )
+        longest = max(DRAG_STEP * float((high - low).max()), float(np.linalg.norm(end - start)) / DRAG_STEPS)
+        count = max(1, math.ceil(float(np.linalg.norm(end - start)) / longest))
+        for target in np.linspace(start, end, count + 1)[1:]:
+            tree = _through(tree, parameters, target, longest)
+        return self.compute_exchange(document, node_at(tree, path), quick=self.quick)
+
+
+def _through(tree: Node, parameters: Sequence[NumericParameter], point: Float64Array, longest: float) -> Node:
+    """Return a tree whose surface passes through a point near it, by the least change of parameters."""
+    for _ in range(NEWTON_STEPS):
+        miss = ISO - float(tree(point[None])[0])
+        slopes = tree.parameter_gradient(point[None], parameters).values[0].astype(np.float64)
+        squared = float(slopes @ slopes)
+        if abs(miss) <= DRAG_TOLERANCE or squared == 0.0:
+            break
+        change = miss * slopes / squared
+        change *= min(1.0, 2.0 * longest / float(np.linalg.norm(change)))
+        tree = with_numeric_values(tree, parameters, np.asarray(numeric_values(tree, parameters)) + change)
+    return tree
 
 
 @dataclass(frozen=True, eq=False)

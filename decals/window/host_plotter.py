@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from blobtree.graphics import require_screen, vtk_warnings_hidden
 from decals.editing.document import Document
-from decals.editing.pointer_tools import Ray
+from decals.editing.gizmo import Ray
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Background
 from decals.scenes.camera import Camera

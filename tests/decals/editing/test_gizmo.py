@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 import decals
 from blobtree import Point, Polyline, Segment, Transform, Twist
 from blobtree.nodes.paths import mapped, node_at, node_in_world
-from decals.editing import Actions, EditSession, MirrorPrimitive, TransformPrimitive
+from decals.editing import (
+    Actions,
+    DragSurface,
+    EditSession,
+    MirrorPrimitive,
+    PointerTools,
+    TransformPrimitive,
+)
+from decals.editing.brushes import Brush
 from decals.editing.gizmo import (
     HandleDrag,
     along_line,
@@ -24,6 +32,7 @@ from decals.editing.gizmo import (
     snap_distance,
     turn_about,
 )
+from decals.errors import InvalidEdit
 from decals.scenes.objects import TreeObject
 from tests.decals.editing.scenes import digest, tree_of
 
@@ -163,3 +172,68 @@ def test_a_drag_of_a_parallel_ray_does_nothing() -> None:
     assert HandleDrag(handles, "move z", ray, 1.0).offset(ray, 0.0) is None
     level = (np.array((9.0, 0.0, 0.0)), np.array((-1.0, 0.0, 0.0)))
     assert HandleDrag(handles, "turn z", level, 1.0).matrix(level, snap=False) is None
+
+
+@pytest.mark.parametrize(
+    ("tree", "path", "start", "end"),
+    [
+        (TREE, (1,), (2.25, 1.2, 0), (2.4, 1.5, 0.2)),
+        (TREE, (), (-1, 0, 0), (-1.6, 0.2, 0)),
+        (TREE.twist(30.0), (0, 0), (0, 0, 1), (0.1, 0.1, 0.6)),
+        (
+            Point((0, 0, 0), radius=1.0) - Segment((0, 0, 1), (1, 0, 1), radius=0.3),
+            (1,),
+            (0, 0, 0.7),
+            (0, 0, 0.5),
+        ),
+    ],
+)
+def test_a_dragged_point_of_the_surface_ends_where_it_is_dragged(
+    tree: Any, path: Any, start: Any, end: Any
+) -> None:
+    session = EditSession(decals.cover(tree, count=12, images=["eye"]))
+    before = digest(session.document)
+    place = session.document.objects[0].surface.project([start])[0][0]
+    session.do(DragSurface(0, path, place, end))
+    changed: Any = tree_of(session.document)
+    np.testing.assert_allclose(changed([end]), 0.5, atol=1e-4)
+    positions = session.document.decals.decals.positions
+    np.testing.assert_allclose(changed(positions), 0.5, atol=1e-4)
+    others = [node_at(changed, (i,)) == node_at(tree, (i,)) for i in range(2)] if len(path) == 1 else []
+    assert others[:1] == [True] * len(others[:1])
+    session.undo()
+    assert digest(session.document) == before
+
+
+def test_the_least_change_moves_and_grows_a_ball_alike_and_nothing_else_is_dragged() -> None:
+    ball: Any = Point((0, 0, 0), radius=1.0)
+    session = EditSession(decals.cover(ball, count=3, images=["eye"]))
+    session.do(DragSurface(0, (), (0, 1, 0), (0, 1.5, 0)))
+    after: Any = tree_of(session.document)
+    np.testing.assert_allclose((*after.center, after.radius), (0, 0.25, 0, 1.25), atol=0.01)
+    with pytest.raises(InvalidEdit, match="start"):
+        session.do(DragSurface(0, (), (0, 1), (0, 2, 0)))
+
+
+def test_the_pull_brush_drags_the_surface_under_the_pointer_as_one_entry() -> None:
+    scene = decals.cover(TREE, count=12, images=["eye"])
+    rays = scene.camera.rays(100, 100)
+    session = EditSession(scene)
+    actions, state = Actions(session), digest(session.document)
+    tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
+    actions.state.brush.brush = Brush.PULL
+    assert not tools.press(0, 0)
+    tools.release(0, 0)
+    start = next((x, y) for x in range(99, 0, -1) for y in range(0, 100, 3) if tools.at(x, y))
+    for way in (4, 9):
+        tools.press(*start)
+        for x in (4, way):
+            tools.move(start[0] + x, start[1])
+        assert tools.dragging
+        tools.release(start[0] + way, start[1])
+    assert set(session.labels) == {"drag the surface"}
+    assert tools.at(start[0] + 6, start[1]) is not None
+    tools.actions.trees.drag_surface((0, 0, 1), (0, 0, 2))  # the drag has ended
+    while session.labels:
+        session.undo()
+    assert digest(session.document) == state
