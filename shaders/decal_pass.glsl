@@ -88,6 +88,7 @@ Pixel pixel_at(ivec2 texel) {
         DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
         vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
+#endif
 #ifdef MATERIALS
         float part = material_normals.w;
         if (part > 0.0) {
@@ -98,7 +99,6 @@ Pixel pixel_at(ivec2 texel) {
             pixel.material.w += 2.0 * round(RELIEF_LEVELS * lit);
 #endif
         }
-#endif
 #endif
         pixel.color.rgb = pixel.color.rgb * (1.0 - color.a) + color.rgb;
     }

@@ -72,12 +72,8 @@ DecalHit decal_at(vec3 q, vec3 n) {
 }
 
 #ifdef MATERIALS
-// Add the maps of a decal's image at a place with derivatives: part of the pixel, normal there, frame of the decal.
-void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3 n, vec3 n_p, vec3 u) {
-    vec4 maps = textureGrad(decal_materials, vec3(place.xy, 2.0 * place.z), dx, dy);
-    if (maps.z <= 0.0 || alpha <= 0.0) {
-        return;  // no material
-    }
+// Add the maps of a decal's image, averaged with alpha: part of the pixel, normal there, frame of the decal.
+void add_maps(vec4 maps, vec4 glow, float alpha, float part, vec3 n, vec3 n_p, vec3 u) {
     vec2 tilt = maps.xy / alpha;
     // The axis u, turned as the normal is on the way to the point; the inverse of `unroll_step`.
     vec3 axis = normalize(u - dot(u, n) / max(1.0 + dot(n_p, n), 1e-4) * (n_p + n));
@@ -92,10 +88,25 @@ void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3
     }
 #endif
     vec3 normal = tilt.x * axis + tilt.y * cross(n, axis) + sqrt(max(1.0 - dot(tilt, tilt), 1e-4)) * n;
-    float part = material_left * opacity;
     material_normals += part * alpha * vec4(normalize(normal), 1.0);
     material_values += part * maps.zw;
-    material_glow += part * textureGrad(decal_materials, vec3(place.xy, 2.0 * place.z + 1.0), dx, dy);
+    material_glow += part * glow;
+}
+
+// The same at a place with derivatives.
+void add_material(vec3 place, vec2 dx, vec2 dy, float alpha, float opacity, vec3 n, vec3 n_p, vec3 u) {
+    vec4 maps = textureGrad(decal_materials, vec3(place.xy, 2.0 * place.z), dx, dy);
+    if (maps.z <= 0.0 || alpha <= 0.0) {
+        return;  // no material
+    }
+    vec4 glow = textureGrad(decal_materials, vec3(place.xy, 2.0 * place.z + 1.0), dx, dy);
+    add_maps(maps, glow, alpha, material_left * opacity, n, n_p, u);
+}
+
+void clear_materials() {
+    material_normals = vec4(0.0);
+    material_values = vec2(0.0);
+    material_glow = vec4(0.0);
 }
 #endif
 
@@ -136,9 +147,7 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
 vec4 decal_color(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
 #ifdef MATERIALS
     material_left = 1.0;
-    material_normals = vec4(0.0);
-    material_values = vec2(0.0);
-    material_glow = vec4(0.0);
+    clear_materials();
 #endif
     vec4 color = vec4(0.0);
     if (!decal_layered) {

@@ -107,9 +107,29 @@ void part_image(inout Place place, Bumps bumps, vec3 n, int decal) {
     place.uv = uv;
 }
 
-// Premultiplied linear colour of a decal around a place. Where the image has more than one texel a pixel, several
+#ifdef MATERIALS
+// Sums of decals.glsl, and how to lay another decal over what was added to them.
+struct Maps {
+    vec4 normals;
+    vec2 values;
+    vec4 glow;
+};
+
+Maps material_sums() {
+    return Maps(material_normals, material_values, material_glow);
+}
+
+void cover_materials(Maps before, Maps under, float alpha) {
+    material_normals -= alpha * (under.normals - before.normals);
+    material_values -= alpha * (under.values - before.values);
+    material_glow -= alpha * (under.glow - before.glow);
+}
+#endif
+
+// Premultiplied linear colour of a decal around a place, of which a part of the pixel is seen. Where the image has more than one texel a pixel, several
 // look-ups along each side, more along the longer one, form a box.
-vec4 image_average(int decal, Place place, vec3 q, vec3 n) {
+vec4 image_average(int decal, Place place, vec3 q, vec3 n, float part) {
+    float fade = decal_limited ? fade_at(q, n, decal) : 1.0;
     vec4 u = decal_texel(4 * decal + 2);
     vec4 tint = decal_texel(4 * decal + 3);
     vec4 color = vec4(1.0);
@@ -124,15 +144,37 @@ vec4 image_average(int decal, Place place, vec3 q, vec3 n) {
         vec2 uv = place.uv - 0.5 * ((taps.x - 1.0) * right + (taps.y - 1.0) * up);
         color = vec4(0.0);
         float column = 0.0;
+#ifdef MATERIALS
+        vec4 maps = vec4(0.0), glow = vec4(0.0);
+        float squares = 0.0;  // of tilts
+#endif
         for (float left = taps.x * taps.y; left > 0.0; left -= 1.0) {
-            color += textureLod(decal_images, vec3(uv, u.w), level);
+            vec4 tap = textureLod(decal_images, vec3(uv, u.w), level);
+            color += tap;
+#ifdef MATERIALS
+            vec4 map_tap = textureLod(decal_materials, vec3(uv, 2.0 * u.w), level);
+            maps += map_tap;
+            glow += textureLod(decal_materials, vec3(uv, 2.0 * u.w + 1.0), level);
+            squares += dot(map_tap.xy, map_tap.xy) / max(tap.a, 1e-4);
+#endif
             column += 1.0;
             uv += column == taps.x ? up - (taps.x - 1.0) * right : right;
             column = column == taps.x ? 0.0 : column;
         }
         color /= taps.x * taps.y;
+#ifdef MATERIALS
+        maps /= taps.x * taps.y;
+        if (maps.z > 0.0 && color.a > 0.0) {
+            // Normals that differ within a pixel spread highlights as roughness does: alpha^2 grows by their variance.
+            vec2 tilt = maps.xy / color.a;
+            float variance = max(squares / (color.a * taps.x * taps.y) - dot(tilt, tilt), 0.0);
+            float rough = maps.z / color.a;
+            maps.z = color.a * min(pow(rough * rough * rough * rough + variance, 0.25), 1.0);
+            add_maps(maps, glow / (taps.x * taps.y), color.a, material_left * part * fade * tint.w, n,
+                decal_texel(4 * decal + 1).xyz, u.xyz);
+        }
+#endif
     }
-    float fade = decal_limited ? fade_at(q, n, decal) : 1.0;
     return fade * tint.w * color * vec4(tint.rgb, 1.0);
 }
 
@@ -223,6 +265,9 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     // The owner, those beside it or the one below, and the one above in turn; in one loop, because some drivers run
     // code once even where no pixel needs it.
     vec3 owner_part = vec3(1.0, 0.0, 0.0);
+#ifdef MATERIALS
+    Maps before = material_sums();
+#endif
     vec4 color = vec4(0.0);
     ivec2 others = beside;
     for (int decal = owner; decal >= 0;) {
@@ -270,8 +315,14 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         } else if (decal != above && !across) {
             part.x = min(part.x, 1.0 - owner_part.x);
         }
-        vec4 own_color = part.x * image_average(decal, place, at, n);
+#ifdef MATERIALS
+        Maps under = material_sums();
+#endif
+        vec4 own_color = part.x * image_average(decal, place, at, n, part.x);
         if (decal == above) {
+#ifdef MATERIALS
+            cover_materials(before, under, own_color.a);
+#endif
             color = own_color + (1.0 - own_color.a) * color;
             break;
         }
@@ -308,6 +359,9 @@ int nearest_rim(vec3 q, vec3 n, vec3 right, vec3 up) {
 vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
     vec4 sum = vec4(0.0);
     ivec2 parts = ivec2(1);
+#ifdef MATERIALS
+    clear_materials();
+#endif
     for (int i = 0; i < parts.x * parts.y; i++) {
         vec2 at = (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
         vec3 point = q + at.x * right + at.y * up;
@@ -330,6 +384,9 @@ vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         int most = 0;
         while (owner >= 0 && color.a < OPAQUE) {
             int boundaries;
+#ifdef MATERIALS
+            material_left = (1.0 - color.a) / float(parts.x * parts.y);
+#endif
             color += (1.0 - color.a) * layer_average(owner, point, n, part_right, part_up, boundaries);
             most = most > 0 && boundaries > 0 ? MANY : most + boundaries;  // of layers over each other
             if (!decal_layered) {
@@ -341,6 +398,9 @@ vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         if (whole && most > MAX_BOUNDARIES) {
             parts = ivec2(SIDE_PARTS);
             i = -1;
+#ifdef MATERIALS
+            clear_materials();
+#endif
             continue;
         }
         sum += color;

@@ -166,12 +166,13 @@ class DecalPass:
         """
         shining = source is not None and source.materials is not None
         walked = source is not None and source.walks is not None
-        filtered = filtered and not shining and not walked  # these are not averaged over pixels
+        raised = source is not None and source.relief is not None
+        filtered = filtered and not raised and not walked  # these are not averaged over pixels
         variant = {
             "limited": source is not None and source.limited,
             "filtered": filtered,
             "materials": shining,
-            "relief": shining and source is not None and source.relief is not None,
+            "relief": shining and raised,
         }
         library = "" if source is None else source.library(filtered=filtered)
         painting = self._pass(library, posed=rest is not None, **variant)

@@ -444,8 +444,8 @@ def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
 
 
 def _is_filtered(scene: SceneLike, options: RenderOptions) -> bool:
-    """Return True if decals are averaged over pixels; maps of materials and walked images are not."""
-    return options.filtered and not has_materials(scene) and options.mapping is not ImageMapping.WALKED
+    """Return True if decals are averaged over pixels; relief and walked images are not."""
+    return options.filtered and not has_relief(scene) and options.mapping is not ImageMapping.WALKED
 
 
 def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
