@@ -1,5 +1,6 @@
 """`displace`: the surface of a scene, moved by the heights of its decals."""
 
+import math
 import os
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -27,10 +28,11 @@ from decals.scenes.cover import as_scene
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.pose import PosedMesh, PosedScene
 from decals.scenes.scene import Scene
+from decals.surfaces import subdivide
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.subdivide import means, subdivided
-from decals.surfaces.surface import unit_rows
+from decals.surfaces.surface import Surface, unit_rows
 from decals.surfaces.topology import welded
 from decals.validation import checked_path, real_number
 
@@ -39,6 +41,9 @@ if TYPE_CHECKING:
 
 EDGES_PER_RADIUS = 16
 """Edges along the radius of a decal, by default."""
+
+ESTIMATE_SAMPLES = 2000
+"""Points on each object by which the number of triangles is estimated."""
 
 BLOCK = 1 << 18
 """Points that are evaluated at once."""
@@ -177,6 +182,9 @@ def displace(
             "expected a decal whose image has relief, got none; give a DecalMaterial height= and relief="
         )
     need = _Edges(rows, edge_length)
+    fewest = sum(need.fewest_triangles(item.surface) for item in known.objects)
+    if fewest > subdivide.MAX_FACES:
+        raise subdivide.too_many(f"about {fewest:.2g}")
     objects: list[SceneObject | PosedMesh] = []
     index = DecalIndex.of(known.decals)
     walks = walks_for(modes.mapping, known.decals, known.objects)
@@ -238,6 +246,17 @@ class _Edges:
         self._centers, self._radii = decals.positions.astype(np.float64), decals.radii.astype(np.float64)
         limits = self._radii / EDGES_PER_RADIUS if length is None else np.full(len(decals), length)
         self._limits = limits
+
+    def fewest_triangles(self, surface: Surface) -> float:
+        """Return the number of triangles below the decals if each is as large as allowed, by samples."""
+        from scipy.spatial import cKDTree
+
+        points = surface.sample(ESTIMATE_SAMPLES, seed=0)[0]
+        limits = np.full(len(points), np.inf)
+        for decal, near in enumerate(cKDTree(points).query_ball_point(self._centers, self._radii)):
+            limits[near] = np.minimum(limits[near], self._limits[decal])
+        with np.errstate(over="ignore", divide="ignore"):  # an infinite number is refused too
+            return float(surface.area * np.mean(4.0 / math.sqrt(3.0) / limits**2))
 
     def are_long(self, starts: Float64Array, ends: Float64Array) -> BoolArray:
         """Return True for edges of which a part may lie in a decal, and that are longer than its limit."""

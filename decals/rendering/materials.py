@@ -10,7 +10,7 @@ from decals.images.texels import resized_texels, unit_levels
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.lights import Lighting
-from decals.rendering.options import ImageLike, SceneLike
+from decals.rendering.options import ImageLike, SceneLike, relief_ranges, relief_texels
 from decals.rendering.pixel_pass import Program, set_uniform
 
 
@@ -110,12 +110,12 @@ class ReliefArray:
         self.texture = context.gl.texture_array((shape[1], shape[0], len(images)), 2, dtype="f4")
         side = SLOPE_CELLS
         self.slopes = context.gl.texture_array((side, side, len(images)), 1, dtype="f4")
-        self.steepest = 0.0
+        self.steepest, self.ranges = 0.0, relief_ranges(images)
         known: dict[int, Float64Array] = {}
         for layer, image in enumerate(images):
             texels = np.zeros((*image.pixels.shape[:2], 2), np.float32)
             texels[..., 1] = unit_levels(image.pixels[..., 3])
-            heights = _relief_texels(image)
+            heights = relief_texels(image)
             bounds: Float64Array = np.zeros((side, side))
             if heights is not None:
                 texels[..., 0] = heights
@@ -152,14 +152,7 @@ class Relief:
     def __init__(self, array: ReliefArray, scene: SceneLike) -> None:
         self.texture, self.slopes, self._steepest = array.texture, array.slopes, array.steepest
         rows = scene.decals.decals if isinstance(scene.decals, DecalEditor) else scene.decals
-        ranges: Float64Array = np.zeros(
-            (len(scene.images) + 1, 2)
-        )  # the last row is for decals without image
-        for number, image in enumerate(scene.images):
-            heights = _relief_texels(image)
-            if heights is not None:
-                ranges[number] = min(float(heights.min()), 0.0), max(float(heights.max()), 0.0)
-        heights_of = ranges[rows.images] * rows.radii[:, None]
+        heights_of = array.ranges[rows.images] * rows.radii[:, None]
         raised = heights_of.any(axis=1)
         self._range = (
             (float(heights_of[:, 0].min()), float(heights_of[:, 1].max())) if raised.any() else (0, 0)
@@ -188,12 +181,6 @@ def _first_light(lights: Lighting | None) -> tuple[float, ...]:
     if first.position is None:
         return (*(-inverse[:3, :3] @ first.direction).tolist(), 1.0)
     return (*(inverse[:3, :3] @ first.position + inverse[:3, 3]).tolist(), 2.0)
-
-
-def _relief_texels(image: ImageLike) -> Float32Array | None:
-    """Return the heights of an image in radii, times alpha; None without relief."""
-    texels: Float32Array | None = image.relief_texels() if hasattr(image, "relief_texels") else None
-    return texels
 
 
 def has_relief(scene: SceneLike) -> bool:

@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
+import numpy as np
+
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact, contact_mode
@@ -222,6 +225,25 @@ class ImageLike(Protocol):
 
     @property
     def pixels(self) -> Pixels: ...  # noqa: D102
+
+
+def relief_texels(image: ImageLike) -> Float32Array | None:
+    """Return the heights of an image in radii, times alpha; None without relief."""
+    texels: Float32Array | None = image.relief_texels() if hasattr(image, "relief_texels") else None
+    return texels
+
+
+def relief_ranges(images: Sequence[ImageLike]) -> Float64Array:
+    """Return the least and the greatest height of each image in radii, 0 included.
+
+    The last row of float64[n + 1, 2] is that of decals without image, which have number -1.
+    """
+    ranges = np.zeros((len(images) + 1, 2))
+    for number, image in enumerate(images):
+        heights = relief_texels(image)
+        if heights is not None:
+            ranges[number] = min(float(heights.min()), 0.0), max(float(heights.max()), 0.0)
+    return ranges
 
 
 class SceneLike(Protocol):

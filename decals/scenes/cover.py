@@ -11,7 +11,7 @@ from blobtree._typing import Float32Array
 from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScattering, InvalidScene
 from decals.images.load import DEFAULT_IMAGE, AnyImage
-from decals.rendering.options import SceneLike, is_scene_like
+from decals.rendering.options import SceneLike, is_scene_like, relief_ranges
 from decals.scattering.orientation import Direction
 from decals.scattering.scatter import scatter
 from decals.scattering.sizing import Sizing
@@ -124,7 +124,9 @@ def cover(
             images=len(pictures),
             progress=report,
         )
-        camera = fitting_camera(objects, direction=toward, up=upward)
+        heights = relief_ranges(pictures)[decals.images, 1] * decals.radii
+        raised = float(heights.max(initial=0.0))
+        camera = fitting_camera(objects, direction=toward, up=upward, raised=raised)
     recipe = Recipe.of(
         "decals.cover",
         seed=seed,
@@ -146,11 +148,14 @@ def fitting_camera(
     direction: Vector = THREE_QUARTER,
     up: Vector = UPWARD["y"][0],
     aspect: float = 4 / 3,
+    raised: float = 0.0,
 ) -> Camera:
-    """Return a camera that looks from a direction and whose picture the objects fill."""
-    points: Float32Array = np.concatenate(
-        [item.surface.sample(FRAMING_SAMPLES, seed=0)[0] for item in objects]
-    )
+    """Return a camera that looks from a direction and whose picture the objects fill.
+
+    Heights of decals raise the surface by at most ``raised``.
+    """
+    samples = [item.surface.sample(FRAMING_SAMPLES, seed=0) for item in objects]
+    points: Float32Array = np.concatenate([places + raised * normals for places, normals in samples])
     return Camera.fitting(points, direction=direction, up=up, aspect=aspect, margin=FRAMING_MARGIN)
 
 

@@ -31,6 +31,13 @@ def means(rows: Float64Array, ends: Int64Array) -> Float64Array:
     return 0.5 * (rows[ends[:, 0]] + rows[ends[:, 1]])
 
 
+def too_many(count: str) -> InvalidMesh:
+    """Return the error of a mesh that takes more than MAX_FACES triangles."""
+    return InvalidMesh(
+        f"expected at most {MAX_FACES:,} triangles, edges so short need {count}; give a longer edge_length"
+    )
+
+
 def subdivided(
     rows: Float64Array,
     faces: Int64Array,
@@ -77,10 +84,7 @@ def subdivided(
         middles = numbers[edge_of.reshape(-1, 3)]
         kinds = (middles >= 0) @ [1, 2, 4]
         if (1 + np.bitwise_count(kinds)).sum() > MAX_FACES:  # each middle adds a triangle
-            raise InvalidMesh(
-                f"expected at most {MAX_FACES:,} triangles, edges so short need more; "
-                "give a longer edge_length"
-            )
+            raise too_many("more")
         rows = np.concatenate([rows, midpoints(rows, edges[halved])])
         corners = np.concatenate([faces, middles], axis=1)
         faces = np.concatenate(

@@ -150,6 +150,13 @@ def test_too_many_triangles_are_refused(monkeypatch: pytest.MonkeyPatch, hilly: 
     monkeypatch.setattr(subdivide, "MAX_FACES", 5000)
     with pytest.raises(InvalidMesh, match="expected at most 5,000 triangles"):
         decals.displace(hilly, edge_length=0.01)
+    corners = np.eye(3)
+    with pytest.raises(InvalidMesh, match="edges so short need more"):
+        subdivided(corners, np.array([[0, 1, 2]]), lambda starts, _: np.ones(len(starts), np.bool_))
+    monkeypatch.setattr("decals.baking.displace.subdivided", lambda *_: pytest.fail("triangles were divided"))
+    for length in (0.01, 1e-6, 1e-300):
+        with pytest.raises(InvalidMesh, match="edges so short need about"):
+            decals.displace(hilly, edge_length=length)
 
 
 @pytest.mark.parametrize(

@@ -46,3 +46,16 @@ def test_the_whole_model_is_in_the_picture() -> None:
 def test_what_is_no_model_is_refused(models: tuple[object, ...]) -> None:
     with pytest.raises(InvalidInput, match="expected"):
         decals.cover(*models)  # type: ignore[arg-type]
+
+
+def test_the_picture_shows_raised_decals_whole() -> None:
+    dome = np.hypot(*np.mgrid[-1:1:32j, -1:1:32j]) < 0.7
+    stud = decals.DecalMaterial("stud", np.ones((32, 32, 3)), height=1.0 * dome, relief=0.9)
+    scene = decals.cover(BALL, count=12, images=stud)
+    moved = decals.displace(scene, edge_length=0.1, resolution=16)
+    points = np.asarray(moved.to_polydata().points, float)
+    matrix = scene.camera.clip_matrix((400, 300), BALL.bounds)
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    assert np.abs(clip[:, :2] / clip[:, 3:]).max() < 1.0
+    flat = decals.cover(BALL, count=12)
+    assert np.linalg.norm(flat.camera.position) < np.linalg.norm(scene.camera.position)
