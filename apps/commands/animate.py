@@ -13,7 +13,9 @@ from decals import MeshObject, Scene, pose, turntable
 from decals import animate as write_animation
 from decals.apps.commands.options import (
     MAX_SAMPLES,
+    ContactName,
     Definitions,
+    MappingName,
     OptionalWhole,
     Trust,
     check_count,
@@ -59,6 +61,8 @@ def animate(
     up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     size: str = "800x600",
     samples: OptionalWhole = None,
+    contact: ContactName = None,
+    mapping: MappingName = None,
     seed: OptionalWhole = None,
     define: Definitions = None,
     trust: Trust = False,
@@ -98,6 +102,10 @@ def animate(
         Width and height of the pictures in pixels.
     samples
         Samples per pixel along each axis. Default: that of a saved scene, or 2.
+    contact
+        Contact mode, as for render.
+    mapping
+        Image mapping, as for render.
     seed
         Seed of the random numbers of decals.
     define
@@ -136,7 +144,9 @@ def animate(
         whole = turns if turns is not None else float(function is None)
         cameras = turntable(scene, count, turns=whole)
         posed = cameras if function is None else _posed(cameras, function, rigid=rigid)
-        write_animation(posed, output, size=pixels, rate=rate, samples=samples, count=count)
+        options = {"contact": contact, "mapping": mapping}
+        drawn = (replace(item, drawing=item.drawing.overridden(**options)) for item in posed)
+        write_animation(drawn, output, size=pixels, rate=rate, samples=samples, count=count)
     print_path(output)
 
 

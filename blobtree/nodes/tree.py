@@ -9,6 +9,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, dataclass, field, replace
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
@@ -51,7 +52,7 @@ from blobtree.tape.attributes import (
     rest_tape,
 )
 from blobtree.tape.model import ImplicitModel
-from blobtree.tape.poses import maps_to_rest
+from blobtree.tape.poses import has_warps, invert_map, maps_to_rest
 from blobtree.tape.program import Placement
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import Hits, raycast
@@ -75,6 +76,9 @@ if TYPE_CHECKING:
 
 LARGEST_EXPONENT = 100.0
 """Beyond it a Ricci blend differs from a union by less than float32 can tell at the surface."""
+
+REST_RESOLUTION = 48
+"""Cells along the longest side of the mesh of a tree at rest, from which its warps are inverted."""
 
 COORDINATE_MARGIN = 2.0**-21
 """Margin around a box of `Node.interval`, over its largest coordinate, for the rounding of its centre."""
@@ -734,7 +738,8 @@ class Node(ImplicitModel):
             Points in the world, or one point, in model units.
         rest : Node, optional
             The same tree in another pose: where the points lie in its world instead. It has the same leaves,
-            from left to right, and no warps. A skeleton that moved takes its surroundings along.
+            from left to right. A skeleton that moved takes its surroundings along. Warps of this tree are
+            inverted near its surface, by Newton's method.
 
         Returns
         -------
@@ -746,7 +751,7 @@ class Node(ImplicitModel):
         InvalidPoints
             The points are not n rows of three finite numbers.
         InvalidNode
-            `rest` has other leaves, or warps.
+            `rest` has other leaves.
 
         Examples
         --------
@@ -765,6 +770,10 @@ class Node(ImplicitModel):
                 raise InvalidNode(f"rest: expected a BlobTree, got {shown(rest)}; leave it out")
             tape = rest_tape(self.tape, self._program, maps_to_rest(self, self._program, rest))
         rows = rest_coordinates_at(tape, array)
+        if rest is not None and has_warps(rest):
+            unwarped = rest_tape(rest.tape, rest._program, maps_to_rest(rest, rest._program, rest))
+            starts = polygonize(rest, resolution=REST_RESOLUTION).vertices
+            rows = invert_map(partial(rest_coordinates_at, unwarped), rows, starts)
         return rows[0] if single else rows
 
     def interval(self, lower: ArrayLike, upper: ArrayLike) -> tuple[float, float]:

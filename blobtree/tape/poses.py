@@ -1,12 +1,13 @@
 """Maps from the leaves of a posed tree to the world of the same tree at rest."""
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 
-from blobtree._typing import Float64Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.tape.program import (
     WORLD,
@@ -19,33 +20,39 @@ from blobtree.tape.program import (
     Run,
 )
 
+STEP = 1e-3
+"""Step of the differences in `invert_map`, in lengths of the model."""
+
+NEWTON_STEPS = 8
+"""Steps of Newton's method in `invert_map`."""
+
 
 @dataclass(frozen=True)
 class _PlacedLeaf:
-    """A leaf of a tree, its placement behind the innermost warp above it, and whether there is one."""
+    """A leaf of a tree, its placement behind the innermost warp above it, and the one without any warp."""
 
     leaf: ProgramLeaf
     placement: Placement
-    warped: bool
+    unwarped: Placement
 
 
 def maps_to_rest(posed: ProgramNode, program: list[Instruction], rest: ProgramNode) -> Float64Array:
     """Return matrices (n, 4, 4) from each leaf of a program, in its own space, to the rest tree's world.
 
     Leaves correspond from left to right. A leaf whose skeleton differs is moved, turned and scaled onto the
-    one at rest.
+    one at rest. The matrices lead to the world of the rest tree without its warps; see `invert_map`.
 
     Parameters
     ----------
     posed, program
         The posed tree and its program.
     rest
-        The tree at rest, with the same leaves and without warps.
+        The tree at rest, with the same leaves.
 
     Raises
     ------
     InvalidNode
-        The trees have other leaves, or the one at rest has warps.
+        The trees have other leaves.
     """
     places, own = _placed_leaves(posed), _placed_leaves(rest)
     names = [[type(place.leaf).__name__ for place in leaves] for leaves in (places, own)]
@@ -53,8 +60,6 @@ def maps_to_rest(posed: ProgramNode, program: list[Instruction], rest: ProgramNo
         raise InvalidNode(
             f"rest: expected the leaves of the posed tree ({_summary(names[0])}), got {_summary(names[1])}"
         )
-    if any(place.warped for place in own):
-        raise InvalidNode("rest: expected a tree without warps, which poses add; take the tree below them")
     numbers: defaultdict[tuple[int, bytes], list[int]] = defaultdict(list)
     for number, place in enumerate(places):
         numbers[_key(place.leaf, place.placement)].append(number)
@@ -67,7 +72,7 @@ def maps_to_rest(posed: ProgramNode, program: list[Instruction], rest: ProgramNo
                     "posed tree: expected leaves of positive weight under other operators than sums"
                 )
             number = found.pop(0)
-            maps.append(own[number].placement.matrix @ _between(places[number].leaf, own[number].leaf))
+            maps.append(own[number].unwarped.matrix @ _between(places[number].leaf, own[number].leaf))
     return np.array(maps)
 
 
@@ -83,19 +88,68 @@ def _key(leaf: ProgramLeaf, placement: Placement) -> tuple[int, bytes]:
 def _placed_leaves(root: ProgramNode) -> list[_PlacedLeaf]:
     """Return the leaves of a tree from left to right."""
     leaves: list[_PlacedLeaf] = []
-    pending: list[tuple[ProgramNode, Placement, bool]] = [(root, WORLD, False)]
+    pending = [(root, WORLD, WORLD)]
     while pending:
-        node, placement, warped = pending.pop()
+        node, placement, unwarped = pending.pop()
         if isinstance(node, ProgramLeaf):
-            leaves.append(_PlacedLeaf(node, placement, warped))
+            leaves.append(_PlacedLeaf(node, placement, unwarped))
             continue
         children = node.program_children
         if node.warp is not None:
-            placement, warped = Placement(np.eye(4), placement.growth), True
+            placement = Placement(np.eye(4), placement.growth)
         elif len(children) == 1:
-            placement = node.child_placement(placement)
-        pending.extend((child, placement, warped) for child in reversed(children))
+            placement, unwarped = node.child_placement(placement), node.child_placement(unwarped)
+        pending.extend((child, placement, unwarped) for child in reversed(children))
     return leaves
+
+
+def has_warps(root: ProgramNode) -> bool:
+    """Return True if a tree bends space anywhere."""
+    pending = [root]
+    while pending:
+        node = pending.pop()
+        if not isinstance(node, ProgramLeaf):
+            if node.warp is not None:
+                return True
+            pending.extend(node.program_children)
+    return False
+
+
+def invert_map(
+    function: Callable[[Float64Array], Float32Array], targets: Float32Array, starts: Float32Array
+) -> Float32Array:
+    """Return points that a smooth map takes to targets, float32[n, 3], by Newton's method.
+
+    Parameters
+    ----------
+    function
+        The map, of points float64[n, 3]; NaN where it is not defined.
+    targets
+        Where the points should go, float32[n, 3].
+    starts
+        Points near all the results, float32[m, 3]. Each search begins at that whose image is nearest.
+    """
+    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+    images = function(starts.astype(np.float64))
+    defined = np.isfinite(images).all(axis=1)
+    known = np.isfinite(targets).all(axis=1)
+    goals = targets[known].astype(np.float64)
+    points = starts[defined].astype(np.float64)[cKDTree(images[defined]).query(goals)[1]]
+    step = STEP * float(np.ptp(starts, axis=0).max())
+    errors, length = goals - function(points), np.ones(len(goals))
+    for _ in range(NEWTON_STEPS):
+        sides = [function(points + step * axis) - function(points - step * axis) for axis in np.eye(3)]
+        jacobians = np.nan_to_num(np.stack(sides, axis=2) / (2.0 * step))
+        moves = np.einsum("nij,nj->ni", np.linalg.pinv(jacobians), errors)
+        trials = points + length[:, None] * moves
+        found = goals - function(trials)
+        better = np.linalg.norm(found, axis=1) < np.linalg.norm(errors, axis=1)
+        points[better], errors[better] = trials[better], found[better]
+        length = np.where(better, 1.0, 0.5 * length)
+    result = np.full(targets.shape, np.nan, np.float32)
+    result[known] = points
+    return result
 
 
 def _between(posed: ProgramLeaf, rest: ProgramLeaf) -> Float64Array:

@@ -8,10 +8,12 @@ This removes the limitation that section 3.5 of the paper states.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+import decals
 from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.errors import InvalidNode
@@ -19,13 +21,14 @@ from blobtree.validation import real, truth
 from decals.errors import InvalidScene
 from decals.model import Decals
 from decals.rendering.options import Drawing
+from decals.rendering.picture import Picture
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, Color, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, instance, whole_number
 
-TREE_RESOLUTION = 96
+TREE_RESOLUTION = 128
 """Cells along the longest side of the mesh of a posed tree."""
 
 WEIGHT_ERROR = 1e-3
@@ -115,6 +118,10 @@ class PosedScene:
     camera: Camera
     drawing: Drawing
 
+    def render(self, **options: Any) -> Picture:
+        """Draw the scene as its `drawing` says; options and errors are those of `decals.render`."""
+        return decals.render(self, **options)
+
 
 def pose(
     scene: Scene,
@@ -136,7 +143,7 @@ def pose(
     poses : mapping from str to float[n, 3] or Node
         For some objects, by name: new positions of all vertices of a mesh; or the posed tree, with the same
         leaves as the tree at rest, from left to right. Warps bend and twist it, and skeletons may move; see
-        `blobtree.Node.rest_coordinates`. The tree at rest has no warps.
+        `blobtree.Node.rest_coordinates`. The tree at rest may have other warps.
     rigid : bool
         True for decals that keep their shape: each moves and turns with the nearest triangle of a posed mesh,
         and meets its neighbours in the new pose.

@@ -163,7 +163,13 @@ def test_the_command_turns_and_poses(vtk_display: None, folder: Path, capsys: Ca
         f"import numpy\nrest = numpy.array({vertices.tolist()})\n"
         "def pose(t):\n    return {'body': rest + [t, 0, 0]}\n"
     )
-    assert run(["animate", "scene.json", *SMALL, "--frames", "4", "--poses", "walk.py", "-o", "walk"]) == 0
+    drawn = {"contact": "product", "mapping": "chord"}
+    options = [text for name, value in drawn.items() for text in (f"--{name}", value)]
+    command = ["animate", "scene.json", *SMALL, "--frames", "4", "--poses", "walk.py", "-o", "walk"]
+    assert run([*command, *options]) == 0
+    moved = decals.pose(one, {"body": np.add(vertices, (0.5, 0, 0))}).render(size=SIZE, **drawn)
+    np.testing.assert_array_equal(picture(folder / "walk/frame_0003.png"), np.asarray(moved))
+    assert run(command) == 0
     moved = decals.render(decals.pose(one, {"body": np.add(vertices, (0.5, 0, 0))}), size=SIZE)
     np.testing.assert_array_equal(picture(folder / "walk/frame_0003.png"), np.asarray(moved))
 

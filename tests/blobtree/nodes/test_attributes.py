@@ -210,9 +210,29 @@ def test_places_on_a_tree_at_rest() -> None:
     ball = Superquadric((1, 0, 0), (1, 1, 2))
     grown = Superquadric((0, 0, 0), (2, 2, 2))
     np.testing.assert_allclose(grown.rest_coordinates([1.0, 1.0, 1.0], rest=ball), [1.5, 0.5, 1.0], atol=1e-6)
-    for wrong in (arm + arm, A, arm.twist(3.0), 3):
+    for wrong in (arm + arm, A, 3):
         with pytest.raises(InvalidNode, match="rest: expected"):
             arm.rest_coordinates(points, rest=wrong)  # type: ignore[arg-type]
+
+
+def test_places_on_a_tree_at_rest_that_has_warps() -> None:
+    """A point and its place at rest lie at the same point of the leaves, before the warps of either tree."""
+    arm = Segment((0, 0, 0), (0, 0, 2), radius=0.5) + Segment((0, 0, 2), (0.8, 0, 3), radius=0.4)
+    for at_rest, posed in (
+        (arm.twist(60.0), arm),
+        (arm.bend(25, (0.3, 1.5)), arm.twist(50.0).bend(-20, (0.2, 1.8))),
+        (arm.twist(60.0).translate((1, 2, 3)), arm.twist(60.0)),
+    ):
+        points = blobtree.polygonize(posed, resolution=16).vertices
+        found = posed.rest_coordinates(points, rest=at_rest)
+        before, after = (
+            rest(tree, at.astype(np.float64))[1] for tree, at in ((posed, points), (at_rest, found))
+        )
+        if isinstance(at_rest, Transform):
+            np.testing.assert_allclose(found, points + np.array([1, 2, 3]), atol=1e-5)
+        np.testing.assert_allclose(after, before, atol=1e-5)
+    outside = posed.rest_coordinates([50.0, 0.0, 0.0], rest=at_rest)
+    assert np.isnan(outside).all()
 
 
 def test_rest_coordinates_of_a_primitive_with_a_width_are_not_its_color() -> None:
