@@ -149,13 +149,14 @@ class Appearance:
 
         A surface without particles is not sampled.
         """
-        points = self._with_mean_normals(domain, centers, spacings)
         if self.sizing is Sizing.TOUCHING:
+            points = self._with_mean_normals(domain, centers, spacings)
             return points, touching_radii(points)
-        counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
-        samples_per_decal = max(SAMPLES_PER_DECAL, MIN_SAMPLES // max(len(points), 1))
+        counts = np.bincount(centers.surface_ids, minlength=len(domain.surfaces))
+        samples_per_decal = max(SAMPLES_PER_DECAL, MIN_SAMPLES // max(len(centers), 1))
         samples = domain.sample(counts * samples_per_decal, stream=_SAMPLE_STREAM)
         if self.sizing is Sizing.DELAUNAY:
+            points = self._with_mean_normals(domain, centers, spacings)
             return points, delaunay_radii(points, samples)
 
         def project(trials: OrientedPoints) -> OrientedPoints:
@@ -170,10 +171,10 @@ class Appearance:
             return OrientedPoints(centers.positions, normals, centers.surface_ids)
 
         even = bool(spacings.max() <= EVEN * spacings.min())
-        if even:
-            centers = center_outsized(domain, centers, movable, spacings, samples, aim)
-        decals = aim(centers)
-        return decals, covering_radii(decals, samples, project, _stream(seed, _TRIAL_STREAM), even=even)
+        decals = center_outsized(domain, centers, movable, spacings, samples, aim) if even else aim(centers)
+        trials = _stream(seed, _TRIAL_STREAM)
+        radii = covering_radii(decals, samples, project, trials, shade=domain.shaded, even=even)
+        return decals, radii
 
     def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
         if self.choice is ImageChoice.SIZE:

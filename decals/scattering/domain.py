@@ -43,6 +43,10 @@ Mask: TypeAlias = Callable[[Float32Array], ArrayLike]
 """Where particles may lie: a function of ``points[n, 3]`` to ``bool[n]``."""
 
 
+SAME_NORMAL = 0.998
+"""Cosine of the angle between two normals that count as the same."""
+
+
 @dataclass(frozen=True)
 class OrientedPoints:
     """Points with unit normals, each on one of several surfaces."""
@@ -199,6 +203,16 @@ class Domain:
                 parts.append((found[np.flatnonzero(allowed)], rows[allowed]))
         joined = OrientedPoints.joined([found for found, _ in parts])
         return joined.positions, joined.normals, np.concatenate([rows for _, rows in parts])
+
+    def shaded(self, points: OrientedPoints) -> OrientedPoints:
+        """Return the points of meshes whose smooth normals in pictures are not their own, with these."""
+        normals = points.normals.copy()
+        for index, surface in enumerate(self.surfaces):
+            if isinstance(surface, MeshSurface):
+                rows = np.flatnonzero(points.surface_ids == index)
+                normals[rows] = surface.smooth_normals(points.positions[rows])
+        rows = np.flatnonzero(np.einsum("ni,ni->n", normals, points.normals) < SAME_NORMAL)
+        return OrientedPoints(points.positions[rows], normals[rows], points.surface_ids[rows])
 
     def one_sided(self, points: OrientedPoints) -> BoolArray:
         """Return True for points on parts of meshes that have one side only; decals there should spill."""

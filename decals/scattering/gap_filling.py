@@ -103,7 +103,7 @@ def center_outsized(
     samples: OrientedPoints,
     aim: Aim,
 ) -> OrientedPoints:
-    """Return centres of decals, those of outsized decals moved toward the middle of their cells.
+    """Return the decals at centres, those of outsized decals moved toward the middle of their cells.
 
     The decals' normals decide which of them face a point, so that beside lips and thin walls some cells are
     larger than those of the particles. A decal stays where its move would make one of its neighbours larger,
@@ -127,7 +127,8 @@ def center_outsized(
     from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
 
     movable = movable.copy()
-    radii, owners = _cells(aim(centers), samples)
+    decals = aim(centers)
+    radii, owners = _cells(decals, samples)
     for _ in range(CENTERING_ROUNDS):
         rows = np.flatnonzero(movable & (radii > OUTSIZED * np.median(radii)))
         if len(rows) == 0:
@@ -143,15 +144,17 @@ def center_outsized(
         trial = OrientedPoints(positions, normals, centers.surface_ids)
         count = min(NEIGHBORS, len(centers))
         around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
-        after = _cells(aim(trial), samples)
+        turned = aim(trial)
+        after = _cells(turned, samples)
         worse = after[0][around].max(axis=1) >= radii[around].max(axis=1)
         if worse.any():
             back = rows[worse]
             movable[back] = False
             positions[back], normals[back] = centers.positions[back], centers.normals[back]
-            after = _cells(aim(trial), samples)
-        centers, (radii, owners) = trial, after
-    return centers
+            turned = aim(trial)
+            after = _cells(turned, samples)
+        centers, decals, (radii, owners) = trial, turned, after
+    return decals
 
 
 def _cells(decals: OrientedPoints, samples: OrientedPoints) -> tuple[Float64Array, Int64Array]:

@@ -179,6 +179,18 @@ class FacingTree:
             open_rows = open_rows[~np.isfinite(distances[open_rows, -1])]
         return distances, indices
 
+    def around(self, count: int) -> tuple[Float64Array, Int64Array]:
+        """Return distances and indices of the `count` points nearest to each point, itself first.
+
+        They may face away; there are fewer columns if the tree has fewer points.
+        """
+        total = int(self._tree.n)
+        columns = np.arange(1, min(count, total) + 1)
+        if total == 0:
+            return np.zeros((0, 0)), np.zeros((0, 0), np.int64)
+        distances, indices = self._tree.query(self._tree.data, k=columns, workers=_workers(total))
+        return distances, indices
+
     def _widths(self, least: int) -> list[int]:
         """Return growing numbers of neighbours, at most the number of points."""
         total = int(self._tree.n)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
@@ -60,6 +61,10 @@ MAX_TURN = 20.0
 CORNER_TOLERANCE = 1.02
 """Ratio of the distances from two decals up to which a point is a corner of both Voronoi cells."""
 
+THIN_NEIGHBORS, THIN_COSINE = 9, 0.3
+"""Number of decals nearest to a decal, itself among them, and cosine between their normals below which the
+surface there is thin, or bent so much that smooth normals decide which decals face a point."""
+
 CANDIDATES = 6
 """Nearest decals that face a point and may own it, whatever their radii."""
 
@@ -69,14 +74,7 @@ ARC_REACH = 2.0
 SPARE = 0.015
 """Share of its radius by which a decal grows beyond a bare point."""
 
-SEARCHES = (
-    (0.5, 0.86, 4),
-    (0.3, 0.92, 4),
-    (0.3, 0.95, 8),
-    (0.2, 0.96, 16),
-    (0.1, 0.97, 16),
-    (0.05, 0.98, 16),
-)
+SEARCHES = ((0.5, 0.86, 4), (0.3, 0.92, 4), (0.2, 0.96, 8), (0.1, 0.97, 8))
 """Rounds that look for bare points: spread of random points in mean distances of the samples, distance of the
 points around which they lie from their owners, in the owners' radii, and number of random points around each.
 The last round is repeated."""
@@ -84,8 +82,15 @@ The last round is repeated."""
 CUBE = 1.0
 """Side of the cubes of which one point each is searched around, in mean distances of the samples."""
 
-MAX_SEARCHES, CLEAN_SEARCHES = 24, 3
-"""Largest number of rounds, and rounds without a bare point after which they end."""
+TIE = 0.004
+"""Difference of two powers at a point, in squared radii of its owner, up to which either decal may own it."""
+
+MAX_CORNER = 0.5
+"""Largest distance of a corner of a cell from the point by which it is found, in radii."""
+
+MAX_SEARCHES, CLEAN_SEARCHES, MAX_REPEATS = 12, 2, 4
+"""Largest number of rounds, number of those without a bare point after which they end, and largest number of
+repeats of all rounds around decals that grew."""
 
 EVEN_RADIUS_RATIO = 1.495
 """Ratio of a radius to the median at even density, beyond which other decals grow first."""
@@ -127,6 +132,9 @@ class Sizing(Enum):
 
 Project: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 """Project points onto their own surfaces, and drop those that are hidden there."""
+
+Shade: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
+"""Return points on surfaces with the smooth normals of the picture; drop those whose normals are the same."""
 
 
 def turned_normals(
@@ -206,6 +214,7 @@ def covering_radii(
     project: Project,
     seed: int,
     *,
+    shade: Shade | None = None,
     even: bool = False,
 ) -> Float64Array:
     """Return the least radii, up to a small margin, at which decals cover the surfaces they lie on.
@@ -235,6 +244,9 @@ def covering_radii(
         Projects trial points onto their surfaces.
     seed
         Seed of the trials.
+    shade
+        Returns points with the smooth normals of the picture, which decide there which decals face a point.
+        Points in thin places are covered with both normals.
     even
         True if the decals should be of about equal size: before one becomes outsized, others grow.
 
@@ -242,12 +254,12 @@ def covering_radii(
     -------
     float64[n], above zero.
     """
-    tree = FacingTree(decals.positions, decals.normals)
+    centers = _Centers.of(decals)
 
     def find(trials: OrientedPoints) -> _OwnedPoints:
-        return _find_owners(tree, project(trials), decals)
+        return _find_owners(centers, project(trials))
 
-    owned = _find_owners(tree, samples, decals)
+    owned = _find_owners(centers, samples)
     limits = _max_radii(owned, len(decals))
     radii = np.zeros(len(decals))
     _grow(radii, owned, limits)
@@ -266,20 +278,26 @@ def covering_radii(
             owned = owned.joined(find(trials))
             _grow(radii, owned, limits)
 
+        def with_shading(found: _OwnedPoints) -> _OwnedPoints:
+            thin = np.flatnonzero(centers.thin[found.decals[:, 0]] & (found.decals[:, 0] >= 0))
+            if shade is None or len(thin) == 0:
+                return found
+            return found.joined(_find_owners(centers, shade(found.points[thin])))
+
         def search(trials: OrientedPoints) -> _OwnedPoints:
             report("measuring radii", (len(TRIAL_SPREADS) + 2) / (len(TRIAL_SPREADS) + 3))
-            return find(trials)
+            return with_shading(find(trials))
 
         stages = [(limits, -CLEARANCE)]
         if even:
             largest = EVEN_RADIUS_RATIO * float(np.median(radii))
-            radii, stages = (
-                np.minimum(radii, largest),
-                [(np.minimum(limits, largest), -CLEARANCE), (limits, SPECK)],
-            )
-        radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, tree, decals)
-        owned = owned.joined(first)
+            radii = np.minimum(radii, largest)
+            stages = [(np.full(len(radii), largest), -CLEARANCE), (limits, SPECK)]
+        radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, centers.tree, decals)
+        owned = owned.joined(with_shading(first))
         for limits, speck in stages:
+            if speck > 0.0 and not (owned.shares(radii) > 1.0 + speck).any():
+                break
             owned = _close_gaps(
                 radii, owned, (1.0 + RADIUS_MARGIN) * limits, speck, search, sample_distance, rng
             )
@@ -299,7 +317,7 @@ def delaunay_radii(decals: OrientedPoints, samples: OrientedPoints) -> Float64Ar
     Two decals are neighbours in the surface's own Delaunay triangulation if their Voronoi cells meet: if a
     sample is nearest to the one and next nearest to the other.
     """
-    owned = _find_owners(FacingTree(decals.positions, decals.normals), samples, decals)
+    owned = _find_owners(_Centers.of(decals), samples)
     pairs = owned.decals[(owned.decals[:, :2] >= 0).all(axis=1), :2]
     starts, ends = decals.positions[pairs[:, 0]], decals.positions[pairs[:, 1]]
     lengths = np.linalg.norm(starts.astype(np.float64) - ends, axis=1)
@@ -316,18 +334,41 @@ def _with_median(radii: Float64Array) -> Float64Array:
 
 
 @dataclass(frozen=True)
+class _Centers:
+    """All decals, in a search tree.
+
+    `gaps` are the distances to the nearest other decals, `thin` is True for decals in thin places; both are
+    ``[n]``.
+    """
+
+    points: OrientedPoints
+    tree: FacingTree
+    gaps: Float64Array
+    thin: BoolArray
+
+    @staticmethod
+    def of(decals: OrientedPoints) -> "_Centers":
+        """Return decals with their search tree."""
+        tree = FacingTree(decals.positions, decals.normals)
+        distances, around = tree.around(THIN_NEIGHBORS)
+        gaps = distances[:, 1] if distances.shape[1] > 1 else np.full(len(decals), np.inf)
+        cosines = np.einsum("nki,ni->nk", decals.normals[around], decals.normals)
+        return _Centers(decals, tree, gaps, cosines.min(axis=1, initial=1.0) < THIN_COSINE)
+
+
+@dataclass(frozen=True)
 class _OwnedPoints:
     """Points, and the nearest `CANDIDATES` decals that face each: distances and indices, -1 for none.
 
     `lengths` are the distances along the surface, at which images end; straight ones for decals beyond
-    `ARC_REACH`. All three are ``[n, k]``. `centers` are all decals.
+    `ARC_REACH`. All three are ``[n, k]``.
     """
 
     points: OrientedPoints
     lengths: Float64Array
     distances: Float64Array
     decals: Int64Array
-    centers: OrientedPoints
+    centers: _Centers
 
     def __getitem__(self, rows: Int64Array) -> "_OwnedPoints":
         return replace(
@@ -350,11 +391,17 @@ class _OwnedPoints:
         powers = self.powers(radii)
         columns: Int64Array = powers.argmin(axis=1)
         lowest = np.take_along_axis(self.decals, columns[:, None], axis=1)
-        smaller = (powers <= 0.0) & (radii[self.decals] < radii[lowest])
+        own, larger = radii[self.decals], radii[lowest]
+        smaller = (powers <= 0.0) & (own < larger)
+        least = MIN_KEPT_RADIUS * larger
+        apart = least + np.sqrt(
+            least**2 + larger**2 - np.where(smaller, own, larger) ** 2
+        )  # or less if nested
+        smaller &= self.centers.gaps[self.decals] <= apart
         rows = np.flatnonzero(smaller.any(axis=1))
         rows = rows[(smaller[rows] & self._nested(self.decals[rows], lowest[rows], radii)).any(axis=1)]
         decals, own = self.decals[rows], powers[rows]
-        facing = np.einsum("nki,ni->nk", self.centers.normals[decals], self.points.normals[rows])
+        facing = np.einsum("nki,ni->nk", self.centers.points.normals[decals], self.points.normals[rows])
         above = (
             smaller[rows] & self._nested(decals, lowest[rows], radii) & (facing > FACING_LIMIT + TOP_MARGIN)
         )
@@ -368,7 +415,8 @@ class _OwnedPoints:
 
     def _nested(self, decals: Int64Array, others: Int64Array, radii: Float64Array) -> BoolArray:
         """Return True for pairs of decals that are nested: `decals.record.balls_nested`."""
-        offsets = self.centers.positions[decals].astype(np.float64) - self.centers.positions[others]
+        positions = self.centers.points.positions
+        offsets = positions[decals].astype(np.float64) - positions[others]
         squared = np.einsum("...i,...i->...", offsets, offsets)
         smaller, larger = (choose(radii[decals], radii[others]) for choose in (np.minimum, np.maximum))
         difference = larger**2 - smaller**2
@@ -379,10 +427,22 @@ class _OwnedPoints:
         return nested
 
     def shares(self, radii: Float64Array) -> Float64Array:
-        """Return the distance from the owner in its radii, ``[n]``; above 1 the point is bare."""
+        """Return the distance from the owner in its radii, ``[n]``; above 1 the point is bare.
+
+        On lines of contact, where several decals are as good as owners, it is the largest of theirs.
+        """
         columns = self.owners(radii)[:, None]
-        lengths, owners = (np.take_along_axis(a, columns, 1)[:, 0] for a in (self.lengths, self.decals))
-        result: Float64Array = np.where(owners >= 0, lengths, 0.0) / radii[owners]
+        powers, shares = (
+            self.powers(radii),
+            np.where(self.decals >= 0, self.lengths, 0.0) / radii[self.decals],
+        )
+        own = (
+            np.take_along_axis(powers, columns, 1)
+            + TIE * radii[np.take_along_axis(self.decals, columns, 1)] ** 2
+        )
+        lowest = powers.min(axis=1, keepdims=True)
+        tied = (powers <= own) & (np.take_along_axis(powers, columns, 1) == lowest)
+        result: Float64Array = np.where(tied, shares, np.take_along_axis(shares, columns, 1)).max(axis=1)
         return result
 
     def risky(self, radii: Float64Array, share: float, apart: float) -> "_OwnedPoints":
@@ -429,15 +489,16 @@ def _firsts(rows: Int64Array) -> BoolArray:
     return first
 
 
-def _find_owners(tree: FacingTree, points: OrientedPoints, decals: OrientedPoints) -> _OwnedPoints:
-    distances, indices = tree.nearest(points.positions, points.normals, count=CANDIDATES)
+def _find_owners(centers: _Centers, points: OrientedPoints) -> _OwnedPoints:
+    decals = centers.points
+    distances, indices = centers.tree.nearest(points.positions, points.normals, count=CANDIDATES)
     close = np.isfinite(distances) & (distances <= ARC_REACH * distances[:, :1])
     rows, owners = np.nonzero(close)[0], indices[close]
     offsets = points.positions[rows].astype(np.float64) - decals.positions[owners]
     n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
     lengths = distances.copy()
     lengths[close] = _arc_lengths(offsets, n_p, n_q)
-    return _OwnedPoints(points, lengths, distances, indices, decals)
+    return _OwnedPoints(points, lengths, distances, indices, centers)
 
 
 def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
@@ -508,21 +569,50 @@ def _close_gaps(
     sample_distance: float,
     rng: np.random.Generator,
 ) -> _OwnedPoints:
-    """Grow radii, up to limits, until searches find no bare point; return the points nearest to bare."""
+    """Grow radii, up to limits, until searches find no bare point; return the points nearest to bare.
+
+    Growth moves the cells of other decals, so all points near decals that grew are searched around again.
+    """
+    every, grown = owned, np.ones(len(radii), np.bool_)
+    for _ in range(MAX_REPEATS):
+        before = radii.copy()
+        near = every[np.flatnonzero(grown[every.decals].any(axis=1))]
+        owned = _search_gaps(radii, near, limits, speck, find, sample_distance, rng)
+        grown = radii > before
+        every = every.joined(owned)
+        if not grown.any():
+            break
+    return every
+
+
+def _search_gaps(
+    radii: Float64Array,
+    owned: _OwnedPoints,
+    limits: Float64Array,
+    speck: float,
+    find: Callable[[OrientedPoints], _OwnedPoints],
+    sample_distance: float,
+    rng: np.random.Generator,
+) -> _OwnedPoints:
+    """Grow radii, up to limits, until rounds of searches around points find no bare one; return the last."""
     clean = 0
     for turn in range(MAX_SEARCHES):
         spread, share, count = SEARCHES[min(turn, len(SEARCHES) - 1)]
         owned = owned.risky(radii, share, CUBE * sample_distance)
         trials = _random_points_around(owned.points, count, spread * sample_distance, rng)
-        owned = owned.joined(find(trials))
+        owned = owned.joined(find(OrientedPoints.joined([trials, _power_corners(owned, radii)])))
         clean = 0 if _cover(radii, owned, limits, speck) else clean + 1
-        if turn >= len(SEARCHES) and clean >= CLEAN_SEARCHES:
+        if turn >= len(SEARCHES) - 1 and clean >= CLEAN_SEARCHES:
             break
     return owned
 
 
 def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck: float) -> bool:
-    """Grow, for every bare point, the decal that must grow least to own and reach it; return True for any."""
+    """Grow, for every bare point, the decal that must grow least to own and reach it; return True for any.
+
+    Growth counts more where the length along the surface exceeds the distance: a decal that bends over an
+    edge gains more such points with every growth.
+    """
     bare = owned[np.flatnonzero(owned.shares(radii) > 1.0 + speck)]
     powers = bare.powers(radii)
     lowest = np.sort(powers, axis=1)
@@ -533,11 +623,50 @@ def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck
     needed = np.where(on_top, bare.lengths, needed)
     possible = (bare.decals >= 0) & (needed <= limits[bare.decals]) & (~on_top | (columns == owners))
     needed = np.minimum((1.0 + SPARE) * needed, limits[bare.decals])
-    factors = np.where(possible, needed / radii[bare.decals], np.inf)
+    factors = np.full(needed.shape, np.inf)
+    bends = bare.lengths[possible] / np.maximum(bare.distances[possible], 1e-30)
+    factors[possible] = bends * (needed / radii[bare.decals])[possible]
     best = factors.argmin(axis=1)
     rows = np.flatnonzero(possible.any(axis=1))
+    before = radii.copy()
     np.maximum.at(radii, bare.decals[rows, best[rows]], needed[rows, best[rows]])
-    return len(rows) > 0
+    return bool((radii > before).any())
+
+
+def _power_corners(owned: _OwnedPoints, radii: Float64Array) -> OrientedPoints:
+    """Return the corners of cells near points: where three of the four least powers are equal.
+
+    With the offsets w of the centres and the powers c at a point q, the powers at q + a are c − 2 a·w + |a|².
+    So the corners in the tangent plane at q solve two linear equations. On a flat face without bends, the
+    point of a cell that is farthest from its decal is one of its corners, or lies on an edge of the surface.
+    """
+    powers = owned.powers(radii)
+    columns = np.argsort(powers, axis=1)[:, :4]
+    powers = np.take_along_axis(powers, columns, axis=1)
+    decals = np.take_along_axis(owned.decals, columns, axis=1)
+    places = owned.points.positions.astype(np.float64)
+    normals = owned.points.normals.astype(np.float64)
+    offsets = owned.centers.points.positions[decals] - places[:, None]
+    offsets -= np.einsum("nki,ni->nk", offsets, normals)[..., None] * normals[:, None]
+    reach = MAX_CORNER * radii[decals[:, 0]]
+    found: list[OrientedPoints] = []
+    for triple in combinations(range(columns.shape[1]), 3):
+        ids = np.sort(decals[:, triple], axis=1)
+        order = np.lexsort((powers[:, 0], *ids.T))
+        first = order[_firsts(ids[order])]
+        rows = first[decals[first][:, triple].min(axis=1) >= 0]
+        w, c = offsets[rows][:, triple], powers[rows][:, triple]
+        a, b = w[:, 1] - w[:, 0], w[:, 2] - w[:, 0]
+        rises = 0.5 * (c[:, 1:] - c[:, :1])
+        cross = np.cross(a, b)
+        squared = np.einsum("ni,ni->n", cross, cross)
+        step = rises[:, :1] * np.cross(b, cross) + rises[:, 1:] * np.cross(cross, a)
+        step /= np.where(squared > 0.0, squared, 1.0)[:, None]
+        near = (squared > 0.0) & (np.einsum("ni,ni->n", step, step) < reach[rows] ** 2)
+        rows = rows[near]
+        corners = (places[rows] + step[near]).astype(np.float32)
+        found.append(OrientedPoints(corners, owned.points.normals[rows], owned.points.surface_ids[rows]))
+    return OrientedPoints.joined(found)
 
 
 def _random_points_around(

@@ -17,6 +17,7 @@ from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.model import MAX_COORDINATE
 from decals.surfaces.mesh_kernels import closest_faces, closest_points, first_hits, mark_inside
+from decals.surfaces.normals import SplitMesh, split_at_creases
 from decals.surfaces.surface import (
     Scalars,
     Vectors,
@@ -24,6 +25,7 @@ from decals.surfaces.surface import (
     contains_host,
     make_read_only,
     project_host,
+    unit_rows,
     vectors,
 )
 from decals.surfaces.topology import (
@@ -253,6 +255,19 @@ class MeshSurface(Immutable):
     def normal(self, points: ArrayLike) -> Float32Array:
         """Return the normals of the faces closest to the points."""
         return self.project(points)[1]
+
+    def smooth_normals(self, points: ArrayLike) -> Float32Array:
+        """Return the unit normals of the picture at the points closest to some points.
+
+        They are interpolated in each face, and smooth up to the default crease angle.
+        """
+        faces, weights = self.locate(points)
+        corners = self._split.normals[self._split.faces[faces]].astype(np.float64)
+        return unit_rows(np.einsum("nc,nca->na", weights, corners))
+
+    @Lazy
+    def _split(self) -> SplitMesh:
+        return split_at_creases(self.vertices, self.faces)
 
     def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
         """Return the distance to the first face that each ray hits, from either side."""

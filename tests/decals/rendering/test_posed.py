@@ -234,9 +234,9 @@ def check_pose(renderer: Renderer, scene: Scene, at_rest: Node, posed: Node) -> 
     """Check that a posed tree shows, at each pixel, what its own point at rest shows."""
     seen = buffers(renderer, decals.pose(scene, {"limb": posed}))
     shown = seen.object_id >= 0
-    rest = posed.rest_coordinates(seen.position[shown], rest=at_rest)
-    rest = scene.objects[0].surface.project(rest)[0].astype(np.float64)
-    check_rest(scene, seen, rest, np.negative(at_rest.gradient(rest), dtype=np.float64))
+    places = posed.rest_coordinates(seen.position[shown], rest=at_rest)
+    rest = scene.objects[0].surface.project(places)[0].astype(np.float64)
+    check_rest(scene, seen, rest, -at_rest.gradient(rest).astype(np.float64))
     return seen
 
 
