@@ -1,7 +1,8 @@
 """Queries of a document's surfaces: nearest points, ray hits, picks, and outlines of decals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,9 +11,10 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, 
 from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
-from decals.field.evaluate import evaluate
+from decals.field.evaluate import Samples, evaluate
 from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
+from decals.field.walks import Walks, walks_for
 from decals.model import Decals
 from decals.record import DEFAULT_CONTACT
 from decals.scattering.mean_normals import mean_normals
@@ -319,6 +321,12 @@ RIM_STEPS = 4
 SEPARATION = 16.0
 """Distance between decals that are evaluated as if each were alone, in radii."""
 
+TESTED = 0.98, 0.75, 0.5, 0.25
+"""Distances from the centre at which directions are tested, in radii."""
+
+OTHER_PLACE = 0.2
+"""Distance in the image, in radii, from which a point is that of another walk."""
+
 INSIDE_TOLERANCE = 1.003
 """Distance from an image's centre, in its radii, up to which a point counts as inside."""
 
@@ -386,26 +394,85 @@ def outlines(
     numbers
         Numbers of decals.
     contact, mapping
-        As for `outline`. The outline of a walked image is drawn as that of a corrected one.
+        As for `outline`.
     angles
         Directions in which each outline is sampled.
     """
     mapping = member("mapping", mapping, ImageMapping, InvalidEdit)
-    if mapping is ImageMapping.WALKED:
-        mapping = ImageMapping.CORRECTED
-    modes = contact_mode(contact, InvalidEdit), mapping
     numbers = np.asarray(numbers, np.int64)
     decals = document.decals.take(numbers)
     if not len(decals):
         return np.zeros((0, angles + 1, 3), np.float32)
-    centers = decals.positions[:, None].astype(np.float64)
-    spokes = _rim_points(document, decals, angles, mapping) - centers
-    fractions = np.broadcast_to(np.arange(RINGS + 1) / RINGS, (*spokes.shape[:2], RINGS + 1))
-    visible = _visible_fractions(document, numbers, centers, spokes, fractions, modes)
-    finer = np.minimum(visible[..., None] + np.arange(RINGS + 1) / RINGS**2, 1.0)
-    finer = _visible_fractions(document, numbers, centers, spokes, finer, modes)
+    walks = walks_for(mapping, document.decals, document.objects, only=numbers)
+    own_walks = None if walks is None else walks.take(numbers)
+    alone = {"mapping": mapping, "walks": own_walks}
+    rims = _rim_points(document, decals, angles, alone)
+    spokes = _spokes(document, decals, angles, alone)
+    modes = {"contact": contact_mode(contact, InvalidEdit), "mapping": mapping, "walks": walks}
+
+    def shown(fractions: Float64Array) -> Float64Array:
+        points = _along_spokes(decals, rims, spokes, own_walks, fractions)
+        return _visible_fractions(document, numbers, points, fractions, modes)
+
+    visible = shown(np.broadcast_to(np.arange(RINGS + 1) / RINGS, (*rims.shape[:2], RINGS + 1)))
+    finer = shown(np.minimum(visible[..., None] + np.arange(RINGS + 1) / RINGS**2, 1.0))
     lengths = np.where(visible.max(axis=1, keepdims=True) > 0.0, finer, 1.0)[..., None]
-    return _lifted(document, centers + lengths * spokes, decals.radii)
+    return _lifted(document, _along_spokes(decals, rims, spokes, own_walks, lengths)[:, :, 0], decals.radii)
+
+
+def _along_spokes(
+    decals: Decals,
+    rims: Float64Array,
+    spokes: Float64Array,
+    walks: Walks | None,
+    fractions: Float64Array,
+) -> Float64Array:
+    """Return points at fractions (n, angles, k) of the ways from centres to rims (n, angles, 3).
+
+    They lie on the surface where walks lead along spokes (n, angles, 2), otherwise on straight lines.
+    """
+    centers = decals.positions[:, None, None].astype(np.float64)
+    points: Float64Array = centers + fractions[..., None] * (rims[:, :, None] - centers)
+    if walks is not None:
+        places = fractions[..., None] * spokes[:, :, None]
+        led = walks.points(places.reshape(len(decals), -1, 2)).reshape(points.shape)
+        points = np.where(np.isnan(led), points, centers + decals.radii[:, None, None, None] * led)
+    return points
+
+
+def _spokes(document: Document, decals: Decals, angles: int, alone: Mapping[str, Any]) -> Float64Array:
+    """Return directions in the images of decals, float64, shape (n, angles, 2).
+
+    Where another walk is shorter than the one that leads there, it is the last direction before. Only the
+    last place of a direction to which a walk leads is tested.
+    """
+    directions = np.broadcast_to(_directions(angles), (len(decals), angles, 2))
+    walks = alone["walks"]
+    if walks is None:
+        return directions
+    places = np.asarray(TESTED)[:, None] * directions[:, :, None]
+    led = walks.points(places.reshape(len(decals), -1, 2)).reshape(*places.shape[:3], 3)
+    there = ~np.isnan(led[..., 0])
+    last = np.arange(len(decals))[:, None], np.arange(angles), there.argmax(axis=2)
+    there, led, places = there.any(axis=2), np.nan_to_num(led[last]), places[last]
+    radii = decals.radii[:, None, None].astype(np.float64)
+    centers = decals.positions[:, None].astype(np.float64)
+    nearest = nearest_points(document.objects, (centers + radii * led).reshape(-1, 3))
+    offsets = (nearest.positions.reshape(led.shape) - centers) / radii
+    samples, _ = _alone(decals, offsets.reshape(-1, 3), nearest.normals.astype(np.float64), alone)
+    apart = np.linalg.norm(2.0 * samples.uv.reshape(places.shape) - 1.0 - places, axis=2)
+    reached = (there & (apart < OTHER_PLACE)) | ~there.any(axis=1, keepdims=True)
+    turns = np.arange(2 * angles)
+    before = np.maximum.accumulate(np.where(np.tile(reached, 2), turns, -1), axis=1)[:, angles:]
+    chosen = np.where(before >= 0, before, turns[:angles]) % angles
+    result: Float64Array = np.take_along_axis(directions, chosen[..., None], axis=1)
+    return result
+
+
+def _directions(angles: int) -> Float64Array:
+    """Return unit vectors in so many directions of an image, float64, shape (angles, 2)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, angles, endpoint=False)
+    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
 
 
 def _lifted(document: Document, points: Float64Array, radii: Float32Array) -> Float32Array:
@@ -417,11 +484,10 @@ def _lifted(document: Document, points: Float64Array, radii: Float32Array) -> Fl
     return closed
 
 
-def _rim_points(document: Document, decals: Decals, angles: int, mapping: ImageMapping) -> Float64Array:
+def _rim_points(document: Document, decals: Decals, angles: int, alone: Mapping[str, Any]) -> Float64Array:
     """Return points on the rims of decals without neighbours, float64, shape (n, angles, 3)."""
-    turn = np.linspace(0.0, 2.0 * np.pi, angles, endpoint=False)
-    along, across = decals.tangents[:, None].astype(np.float64), decals.bitangents[:, None]
-    directions = (np.cos(turn)[:, None] * along + np.sin(turn)[:, None] * across).reshape(-1, 3)
+    axes = np.stack([decals.tangents, decals.bitangents], axis=1).astype(np.float64)
+    directions = (_directions(angles) @ axes).reshape(-1, 3)
     centers = np.repeat(decals.positions.astype(np.float64), angles, axis=0)
     radii = np.repeat(decals.radii.astype(np.float64), angles)[:, None]
     points, remaining = centers, np.ones((len(centers), 1))
@@ -431,43 +497,50 @@ def _rim_points(document: Document, decals: Decals, angles: int, mapping: ImageM
         offsets = (points - centers) / radii
         directions = offsets - np.einsum("ni,ni->n", offsets, normals)[:, None] * normals
         directions = unit_rows(directions).astype(np.float64)
-        remaining = 1.0 - _image_distances(decals, offsets, normals, mapping)[:, None]
+        remaining = 1.0 - _image_distances(decals, offsets, normals, alone)[:, None]
     return points.reshape(len(decals), angles, 3)
 
 
 def _image_distances(
-    decals: Decals, offsets: Float64Array, normals: Float64Array, mapping: ImageMapping
+    decals: Decals, offsets: Float64Array, normals: Float64Array, alone: Mapping[str, Any]
 ) -> Float64Array:
     """Return distances from the image centres, in image radii, at offsets from decals without neighbours.
 
-    Offsets (n · k, 3) from the centres are in radii, k for each decal. The result is at least 1 outside.
+    The result is at least 1 outside.
     """
-    centers = np.zeros((len(decals), 3))
-    centers[:, 0] = SEPARATION * np.arange(len(decals))
-    separate = decals.replace(positions=centers, radii=np.ones(len(decals)), receivers=None)
-    rows = np.repeat(np.arange(len(decals)), len(offsets) // len(decals))
-    samples = evaluate(separate, centers[rows] + offsets, normals, mapping=mapping)
+    samples, rows = _alone(decals, offsets, normals, alone)
     lengths = 2.0 * np.linalg.norm(samples.uv - 0.5, axis=1)
     outside = np.maximum(np.linalg.norm(offsets, axis=1), 1.0)
     result: Float64Array = np.where(samples.owner == rows, lengths, outside)
     return result
 
 
+def _alone(
+    decals: Decals, offsets: Float64Array, normals: Float64Array, alone: Mapping[str, Any]
+) -> tuple[Samples, Int64Array]:
+    """Return samples of decals without neighbours, and the row of the decal of each sample.
+
+    Offsets (n · k, 3) from the centres are in radii, k for each decal.
+    """
+    centers = np.zeros((len(decals), 3))
+    centers[:, 0] = SEPARATION * np.arange(len(decals))
+    separate = decals.replace(positions=centers, radii=np.ones(len(decals)), receivers=None)
+    rows = np.repeat(np.arange(len(decals)), len(offsets) // len(decals))
+    return evaluate(separate, centers[rows] + offsets, normals, **alone), rows
+
+
 def _visible_fractions(
     document: Document,
     numbers: Int64Array,
-    centers: Float64Array,
-    spokes: Float64Array,
+    points: Float64Array,
     fractions: Float64Array,
-    modes: tuple[AnyContact, ImageMapping],
+    modes: Mapping[str, Any],
 ) -> Float64Array:
     """Return per spoke the largest fraction up to which its decal shows without a gap, else the first one.
 
-    Centres have the shape (n, 1, 3), spokes (n, angles, 3), fractions (n, angles, k).
+    Points have the shape (n, angles, k, 3), fractions (n, angles, k).
     """
-    points = centers[:, :, None] + fractions[..., None] * spokes[:, :, None]
     nearest = nearest_points(document.objects, points.reshape(-1, 3))
-    contact, mapping = modes
     owners = np.full(len(nearest.objects), -1, np.int32)
     for number in np.unique(nearest.objects):
         rows = np.flatnonzero(nearest.objects == number)
@@ -475,9 +548,8 @@ def _visible_fractions(
             document.decals,
             nearest.positions[rows],
             nearest.normals[rows],
-            contact=contact,
-            mapping=mapping,
             on=document.objects[int(number)],
+            **modes,
         )
         inside = np.linalg.norm(samples.uv - 0.5, axis=1) <= 0.5 * INSIDE_TOLERANCE
         owners[rows] = np.where(inside, samples.owner, -1)

@@ -6,11 +6,24 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
-from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.kernels import loaded
 from decals.field.mapping import ImageMapping
-from decals.field.walk import CELLS, GRID, LISTED, NONE, NOWHERE, RELAY, RELAYS, SIDE, TWO_WAYS
+from decals.field.walk import (
+    CELLS,
+    GRID,
+    LISTED,
+    NONE,
+    NOWHERE,
+    RELAY,
+    RELAYS,
+    RELAYS_PER_RADIUS,
+    SIDE,
+    SPACING,
+    TWO_WAYS,
+)
 from decals.field.walk_kernels import (
     WalkedMesh,
     WalkStart,
@@ -73,7 +86,12 @@ class Walks:
 
     @classmethod
     def over(
-        cls, decals: Decals | DecalEditor, models: Iterable[Any], *, previous: "Walks | None" = None
+        cls,
+        decals: Decals | DecalEditor,
+        models: Iterable[Any],
+        *,
+        previous: "Walks | None" = None,
+        only: ArrayLike | None = None,
     ) -> "Walks":
         """Walk from the centres of decals over surfaces.
 
@@ -88,6 +106,8 @@ class Walks:
             Objects of a scene, meshes, BlobTrees or surfaces.
         previous : Walks, optional
             Earlier walks, of which those of decals and surfaces that have not changed are kept.
+        only : int[k], optional
+            Numbers of the decals that walk. The others are drawn in the corrected mapping. Default: all.
 
         Examples
         --------
@@ -114,6 +134,8 @@ class Walks:
             used = ~changed[:shared] & (before >= 0)
             slots[:shared][used] = np.arange(used.sum())
             kept = previous.texels[len(previous._rows) :].reshape(-1, GRID, 4)[before[used]]
+        if only is not None:
+            changed &= np.isin(np.arange(len(rows)), only)
         chosen = np.flatnonzero(changed & (radii > 0.0) & np.isfinite(rows).all(axis=1))
         numbers, grids = _walk(rows[chosen], meshes)
         slots[chosen[numbers]] = len(kept) + np.arange(len(numbers))
@@ -122,12 +144,45 @@ class Walks:
         texels = np.concatenate([heads, kept.reshape(-1, 4), grids.reshape(-1, 4)])
         return cls(texels, rows, meshes)
 
+    def take(self, numbers: Int64Array) -> "Walks":
+        """Return the walks of some of the decals."""
+        heads = self.texels[numbers]
+        heads[:, 1] = len(numbers)
+        texels = np.concatenate([heads, self.texels[len(self) :]])
+        return Walks(texels, self._rows[numbers], self._meshes)
 
-def walks_for(mapping: ImageMapping, decals: Decals | DecalEditor, objects: Iterable[Any]) -> Walks | None:
+    def points(self, places: Float64Array) -> Float64Array:
+        """Return surface points at places in the images, ``float64[n, k, 2]``, one row for each decal.
+
+        They are relative to the centres, in visible radii, ``float64[n, k, 3]``; NaN where no walk leads.
+        """
+        result = np.full((*places.shape[:2], 3), np.nan)
+        rows = np.flatnonzero(self.texels[: len(self), 0] >= 0)
+        grids = self.texels[len(self) :].reshape(-1, GRID, 4)[self.texels[rows, 0].astype(np.int64)]
+        numbers = np.clip(np.rint(places[rows] / SPACING).astype(np.int64) + RELAYS_PER_RADIUS, 0, SIDE - 1)
+        relays = grids[:, :RELAYS].reshape(len(rows), SIDE, SIDE, RELAY, 4).astype(np.float64)
+        near = relays[np.arange(len(rows))[:, None], numbers[..., 1], numbers[..., 0]]
+        aside = places[rows] - SPACING * (numbers - RELAYS_PER_RADIUS)
+        along_x, along_y, normals = near[..., 1, :3], near[..., 2, :3], near[..., 3]
+        steps = np.cross(along_y * aside[..., :1] - along_x * aside[..., 1:], normals)
+        there = near[..., 0, 0] != NOWHERE
+        area = np.einsum("...i,...i->...", np.cross(along_x, along_y), normals)
+        led = near[..., 0, :3] + steps / np.where(there, area, 1.0)[..., None]
+        result[rows] = np.where(there[..., None], led, np.nan)
+        return result
+
+
+def walks_for(
+    mapping: ImageMapping,
+    decals: Decals | DecalEditor,
+    objects: Iterable[Any],
+    *,
+    only: ArrayLike | None = None,
+) -> Walks | None:
     """Return the walks of decals over the objects with a surface; None in mappings that need none."""
     if mapping is not ImageMapping.WALKED:
         return None
-    return Walks.over(decals, [item for item in objects if hasattr(item, "surface")])
+    return Walks.over(decals, [item for item in objects if hasattr(item, "surface")], only=only)
 
 
 def _meshes(models: Iterable[Any], radii: Float32Array) -> Iterable[MeshSurface]:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 
 from blobtree import Point, Segment
 from decals.editing.document import Document
@@ -15,7 +16,7 @@ from decals.record import Contact
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
-from decals.scenes.objects import TreeObject
+from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
 from tests.decals.editing.scenes import one
 
@@ -58,7 +59,8 @@ def edge_of(shown: Any) -> Any:
 def gaps(points: Any, line: Any) -> Any:
     """Distance of each point from a closed line."""
     steps = np.diff(line, axis=0)
-    along = np.einsum("nki,ki->nk", points[:, None] - line[None, :-1], steps) / (steps**2).sum(axis=1)
+    squared = np.maximum((steps**2).sum(axis=1), 1e-30)
+    along = np.einsum("nki,ki->nk", points[:, None] - line[None, :-1], steps) / squared
     feet = line[None, :-1] + np.clip(along, 0, 1)[:, :, None] * steps
     return np.linalg.norm(points[:, None] - feet, axis=2).min(axis=1)
 
@@ -82,6 +84,26 @@ def test_an_outline_is_the_edge_of_what_the_picture_shows(
     assert there.max() < 3.5  # at corners, between two of the line's directions
     assert np.median(back) < 0.9
     assert back.max() < 3.5
+
+
+def test_an_outline_follows_a_walked_image_over_edges(renderer: Renderer) -> None:
+    """Of a decal near the corner of a cube, beside another one."""
+    box = pv.Cube().triangulate()
+    scene = Scene(
+        objects=(MeshObject("cube", box.points, box.regular_faces),),
+        decals=Decals([[0.3, 0.25, 0.5], [-0.2, 0.0, 0.5]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [0.45, 0.4]),
+        images=(DecalImage.load("scale"),),
+        camera=Camera((4.5, 3.5, 5), fov=16),
+    )
+    document = Document.from_scene(scene)
+    found = renderer.buffers(document, RenderOptions(size=SIZE, mapping=ImageMapping.WALKED))
+    image = np.hypot(found.uv[..., 0] - 0.5, found.uv[..., 1] - 0.5) <= 0.5
+    edge = edge_of((found.owner == 0) & image)
+    line = pixels_of(document, outline(document, 0, mapping=ImageMapping.WALKED))
+    there = gaps(edge, line)
+    assert len(edge) > 300
+    assert np.median(there) < 1.0
+    assert there.max() < 5.0
 
 
 @pytest.mark.parametrize("radius", [0.2, 0.9, 1.4])
