@@ -117,6 +117,7 @@ def write_polygons(
     first: wp.int32,
     patch_of_edge: wp.array(dtype=wp.int8),
     leaves: LeafArrays,
+    listed: wp.array(dtype=wp.int32),
     write: wp.bool,
     polygon_starts: wp.array(dtype=wp.int32),
     counts: wp.array(dtype=wp.int32),
@@ -125,14 +126,14 @@ def write_polygons(
     pierced: wp.array(dtype=wp.uint8),
     polygons: wp.array(dtype=wp.vec4i),
 ) -> None:
-    """Write, or count, the polygons around each leaf's crossed edges, counter-clockwise from outside.
+    """Write, or count, the polygons around crossed edges of listed leaves, counter-clockwise from outside.
 
     An edge along which a smaller leaf lies is left to that leaf; of equal leaves the first one around it
     takes it. A polygon joins the three or four leaves around the edge; of three, the last corner is −1.
     Leaves with a smaller one along a crossed edge are flagged as irregular, and as pierced, by their cells of
     blocks, if they are empty. Counting, `owned` receives the edges of each leaf's polygons, as bits.
     """
-    i = first + wp.tid()
+    i = listed[first + wp.tid()]
     size = leaves.sizes[i]
     code = int(leaves.codes[i])
     near = base_block(leaves.lowest[i], leaves.depth, leaves.keys)

@@ -165,19 +165,23 @@ class AdaptiveCells:
             blocks = np.flatnonzero(reached & (tree.levels == level))
             self.divided[blocks] |= ~octant_ok[blocks]
             below, links = child[blocks], self.links.reshape(-1, CHILDREN)
-            active = (below >= 0) & ~block_ok[np.maximum(below, 0)] & self.divided[blocks][:, OCTANT_OF_CELL]
+            active = (below >= 0) & ~block_ok[np.maximum(below, 0)] & of_cells(self.divided[blocks])
             links[blocks] = np.where(active, below, links[blocks])
             used = links[blocks]
-            reached[used[(used >= 0) & self.divided[blocks][:, OCTANT_OF_CELL]]] = True
+            reached[used[(used >= 0) & of_cells(self.divided[blocks])]] = True
+
+    @property
+    def open_cells(self) -> BoolArray:
+        """By cell, True if its octant is not merged (n, 64)."""
+        return of_cells(self.divided)
 
     def leaves(self) -> Leaves:
         """Return the leaves that the surface crosses, by block and cell."""
         tree = self.tree
         links = self.links.reshape(-1, CHILDREN)
-        open_cells = self.divided[:, OCTANT_OF_CELL]
         reached = self._reached()
         crossed = (self._codes > 0) & (self._codes < 255)
-        blocks, cells = np.nonzero(crossed & open_cells & (links < 0) & reached[:, None])
+        blocks, cells = np.nonzero(crossed & self.open_cells & (links < 0) & reached[:, None])
         crossed = (self._octant_codes > 0) & (self._octant_codes < 255)
         octant_blocks, octants = np.nonzero(crossed & ~self.divided & reached[:, None])
         scale = 4 ** (tree.depth - tree.levels)
@@ -199,7 +203,7 @@ class AdaptiveCells:
         for level in range(self.tree.depth):
             blocks = np.flatnonzero(reached & (self.tree.levels == level))
             used = links[blocks]
-            reached[used[(used >= 0) & self.divided[blocks][:, OCTANT_OF_CELL]]] = True
+            reached[used[(used >= 0) & of_cells(self.divided[blocks])]] = True
         return reached
 
     def corner_values(self, leaves: Leaves, chosen: IndexArray) -> Float32Array:
@@ -239,6 +243,11 @@ class AdaptiveCells:
         merged = ~self.divided[blocks, octants]
         slots = np.where(merged, CHILDREN + octants, slots)
         return self.divide(blocks, slots, np.zeros(len(blocks), bool))
+
+
+def of_cells(octants: BoolArray) -> BoolArray:
+    """Return for each cell of blocks (n, 64) the value of its octant (n, 8)."""
+    return octants.take(OCTANT_OF_CELL, axis=1)
 
 
 def _octant_samples(samples: Float32Array, octant: Int32Array) -> Float32Array:

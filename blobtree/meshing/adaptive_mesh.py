@@ -25,11 +25,12 @@ from blobtree.cells.grid import CHILDREN, KEY_DIGITS
 from blobtree.cells.scan import exclusive_scan
 from blobtree.device import launch
 from blobtree.errors import InvalidResolution
-from blobtree.meshing.adaptive_cell_kernels import LeafArrays, choose_leaf_rows, write_polygons
-from blobtree.meshing.adaptive_cells import OCTANT_OF_CELL, OCTANTS, SIMPLE, AdaptiveCells, Leaves
+from blobtree.meshing.adaptive_cell_kernels import EMPTY, LeafArrays, choose_leaf_rows, write_polygons
+from blobtree.meshing.adaptive_cells import CELLS_OF_OCTANT, OCTANTS, SIMPLE, AdaptiveCells, Leaves
 from blobtree.meshing.adaptive_kernels import PatchArrays, measure_distances, place_on_surface
 from blobtree.meshing.block_tree import on_device
 from blobtree.meshing.crease_kernels import find_choices, move_onto_creases, turn_diagonals
+from blobtree.meshing.leaf_changes import BESIDE, FAR, LeafChanges
 from blobtree.meshing.mesh import Mesh, cell_patches, patch_tables, vertex_arrays
 from blobtree.meshing.patches import EDGES, FLIPPED, MAX_PATCHES, PATCH_COUNT, PATCH_OF_EDGE
 from blobtree.progress import Progress
@@ -91,6 +92,22 @@ class AdaptiveMesh:
         return Mesh(vertices.positions, self.faces, vertices.normals, vertices.colors, counts)
 
 
+@dataclass
+class LeafEdges:
+    """What is known of the crossed edges of leaves."""
+
+    numbers: Int32Array
+    """By cell of a block, the number of its leaf, or EMPTY."""
+    counts: Int32Array
+    """Polygons of each leaf."""
+    owned: NDArray[np.int16]
+    """Edges of each leaf's polygons, as bits."""
+    irregular: BoolArray
+    """Leaves with smaller ones along a crossed edge."""
+    pierced: IndexArray
+    """Cells of empty leaves with smaller ones along a crossed edge, ascending."""
+
+
 class AdaptiveMesher:
     """Meshes of cells whose leaves are divided more and more; vertices are placed once."""
 
@@ -101,6 +118,8 @@ class AdaptiveMesher:
         self._kernel = self._base.tape.instruction_set.kernel_for
         self._creases = creases
         self._known = Vertices.none()
+        self._changes = LeafChanges(cells)
+        self._known_edges: LeafEdges
 
     def mesh(self, report: Progress) -> AdaptiveMesh:
         """Return the mesh of the leaves; divide those at which it would not be a manifold.
@@ -122,7 +141,9 @@ class AdaptiveMesher:
             owners = np.repeat(np.arange(len(leaves)), counts)
             vertices = self._vertices(leaves, rows, owners, counts, report)
             faces, quads = _triangles(polygons, vertices.positions)
-            torn = _torn_vertices(faces, len(owners))
+            torn = _torn_vertices(faces, irregular[owners])
+            if not len(torn) and not _is_closed(faces, len(owners)):
+                torn = _torn_vertices(faces, np.ones(len(owners), bool))
             if not len(torn):
                 report("connecting vertices", 1.0)
                 mesh = AdaptiveMesh(leaves, vertices, owners, faces, quads)
@@ -150,12 +171,8 @@ class AdaptiveMesher:
         """
         device, count = self._device, len(leaves)
         arrays: Any = LeafArrays()
-        merged = ~self._cells.divided[:, OCTANT_OF_CELL].ravel()
-        by_slot = np.full((len(self._tree), SLOTS), -1, np.int32)
-        by_slot[leaves.blocks, leaves.slots] = np.arange(count)
-        numbers = np.where(
-            merged, by_slot[:, CHILDREN:][:, OCTANT_OF_CELL].ravel(), by_slot[:, :CHILDREN].ravel()
-        )
+        merged = ~self._cells.open_cells.ravel()
+        numbers = self._numbers(leaves)
         arrays.keys, arrays.depth = self._base.leaves.keys, self._tree.depth
         arrays.links = on_device(np.where(merged, -1, self._cells.links), wp.int32, device)
         arrays.merged = on_device(merged, wp.uint8, device)
@@ -170,22 +187,53 @@ class AdaptiveMesher:
         arrays.rows = rows
         starts = np.cumsum(PATCH_COUNT[rows.numpy()], dtype=np.int64)
         arrays.starts = on_device(np.append(0, starts)[:-1], wp.int32, device)
-        counts = wp.zeros(count + 1, dtype=wp.int32, device=device)
-        owned = wp.empty(count, dtype=wp.int16, device=device)
+        inputs = [tables.patch_of_edge, arrays]
+        self._known_edges = known = self._edges(leaves, numbers, inputs)
+        if len(known.pierced) or (known.irregular & ~SIMPLE[leaves.codes]).any():
+            return rows.numpy(), None, known.irregular, known.pierced
+        polygon_starts, total = exclusive_scan(
+            on_device(np.append(known.counts, 0), wp.int32, device), "polygons"
+        )
+        polygons = wp.empty(total, dtype=wp.vec4i, device=device)
+        inputs += [on_device(np.arange(count), wp.int32, device), True, polygon_starts]
+        flags = [wp.empty(length, dtype=wp.uint8, device=device) for length in (count, len(numbers))]
+        outputs = [polygon_starts, on_device(known.owned, wp.int16, device), *flags, polygons]
+        launch(write_polygons, count, inputs, outputs, device)
+        return rows.numpy(), polygons.numpy().reshape(-1, 4), known.irregular, known.pierced
+
+    def _numbers(self, leaves: Leaves) -> Int32Array:
+        """Return by cell of a block the number of its leaf, or EMPTY."""
+        numbers = np.full(len(self._tree) * CHILDREN, EMPTY, np.int32)
+        merged = leaves.slots >= CHILDREN
+        numbers[first_cells(leaves)[~merged]] = np.flatnonzero(~merged)
+        cells = CELLS_OF_OCTANT[leaves.slots[merged] - CHILDREN]
+        numbers[leaves.blocks[merged][:, None] * CHILDREN + cells] = np.flatnonzero(merged)[:, None]
+        return numbers
+
+    def _edges(self, leaves: Leaves, numbers: Int32Array, inputs: list[Any]) -> "LeafEdges":
+        """Return what `write_polygons` counts, anew beside leaves that changed since the last round."""
+        device, count = self._device, len(leaves)
+        self._changes.update()
+        nearness = self._changes.of_leaves(leaves)
+        listed, kept = np.flatnonzero(nearness != FAR), np.flatnonzero(nearness != BESIDE)
+        counts = wp.zeros(count, dtype=wp.int32, device=device)
+        owned = wp.zeros(count, dtype=wp.int16, device=device)
         irregular = wp.zeros(count, dtype=wp.uint8, device=device)
         pierced = wp.zeros(len(numbers), dtype=wp.uint8, device=device)
-        none = wp.empty(0, dtype=wp.vec4i, device=device)
-        inputs = [tables.patch_of_edge, arrays]
-        outputs = [counts, owned, irregular, pierced]
-        launch(write_polygons, count, [*inputs, False, counts], [*outputs, none], device)
-        flags, holes = irregular.numpy().astype(bool), np.flatnonzero(pierced.numpy())
-        if len(holes) or (flags & ~SIMPLE[leaves.codes]).any():
-            return rows.numpy(), None, flags, holes
-        polygon_starts, total = exclusive_scan(counts, "polygons")
-        polygons = wp.empty(total, dtype=wp.vec4i, device=device)
-        inputs += [True, polygon_starts]
-        launch(write_polygons, count, inputs, [*outputs, polygons], device)
-        return rows.numpy(), polygons.numpy().reshape(-1, 4), flags, holes
+        inputs = [*inputs, on_device(listed, wp.int32, device), False, counts]
+        outputs = [counts, owned, irregular, pierced, wp.empty(0, dtype=wp.vec4i, device=device)]
+        launch(write_polygons, len(listed), inputs, outputs, device)
+        flags, cells = irregular.numpy().astype(bool), np.flatnonzero(pierced.numpy())
+        result = LeafEdges(numbers, counts.numpy(), owned.numpy(), flags, cells)
+        if len(kept):
+            before = self._known_edges
+            old = before.numbers[first_cells(leaves)[kept]]
+            result.counts[kept], result.owned[kept] = before.counts[old], before.owned[old]
+            result.irregular[kept] = before.irregular[old]
+            new = cells[self._changes.of_cells(cells) == BESIDE]
+            rest = before.pierced[self._changes.of_cells(before.pierced) != BESIDE]
+            result.pierced = np.union1d(new, rest)
+        return result
 
     # -- vertices -----------------------------------------------------------------------------------
 
@@ -353,6 +401,12 @@ class AdaptiveMesher:
         return arrays, rank[blocks.ravel()], offset[:, 0] * 16 + offset[:, 1] * 4 + offset[:, 2]
 
 
+def first_cells(leaves: Leaves) -> IndexArray:
+    """Return the lowest cell of a block that each leaf holds."""
+    slots = np.append(np.arange(CHILDREN), CELLS_OF_OCTANT[:, 0])[leaves.slots]
+    return leaves.blocks * CHILDREN + slots
+
+
 def _block_keys(blocks: Int32Array) -> Int64Array:
     """Return the keys of blocks (n, 3), see `block_kernels.block_key`."""
     keys = np.zeros(len(blocks), np.int64)
@@ -373,8 +427,23 @@ def _triangles(polygons: Int32Array, positions: Float32Array) -> tuple[Int32Arra
     )
 
 
-def _torn_vertices(faces: Int32Array, vertices: int) -> IndexArray:
-    """Return the vertices around which the triangles do not form one closed fan."""
+def _is_closed(faces: Int32Array, vertices: int) -> bool:
+    """Return True if each edge has two triangles, on which it runs in opposite directions.
+
+    The vertex of a leaf that is not irregular then has one fan, as its patch has one loop.
+    """
+    start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    rising = start < end
+    first = np.sort(start[rising] * vertices + end[rising])
+    other = np.sort(end[~rising] * vertices + start[~rising])
+    return np.array_equal(first, other) and bool((np.diff(first) > 0).all())
+
+
+def _torn_vertices(faces: Int32Array, chosen: BoolArray) -> IndexArray:
+    """Return the chosen ones of all vertices (n,) around which the triangles do not form one closed fan."""
+    vertices = len(chosen)
+    if not chosen.all():
+        faces = faces[chosen[faces[:, 0]] | chosen[faces[:, 1]] | chosen[faces[:, 2]]]
     start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
     keys = np.minimum(start, end) * vertices + np.maximum(start, end)
     order = np.argsort(keys)
@@ -385,17 +454,18 @@ def _torn_vertices(faces: Int32Array, vertices: int) -> IndexArray:
     opposite = start[one] == end[other]
     twin = np.full(len(keys), -1, np.int64)
     twin[one[opposite]], twin[other[opposite]] = other[opposite], one[opposite]
-    wrong = twin < 0
-    if wrong.any():
-        return np.unique(np.concatenate([start[wrong], end[wrong]]))
+    alone = twin < 0
+    wrong: IndexArray = np.unique(np.concatenate([start[alone], end[alone]]))
+    if chosen[wrong].any():
+        return wrong[chosen[wrong]]
     degrees = np.bincount(start, minlength=vertices)
     firsts = np.full(vertices, -1, np.int64)
     firsts[start] = np.arange(len(start))
-    walking = np.flatnonzero(degrees)
+    walking = np.flatnonzero(chosen & (degrees > 0))
     at, steps = firsts[walking], np.zeros(vertices, np.int64)
     while len(walking):  # to the next edge from the same vertex, until the first one comes again
         at = twin[at - at % 3 + (at + 2) % 3]
         steps[walking] += 1
         going = at != firsts[walking]
         walking, at = walking[going], at[going]
-    return np.flatnonzero((steps != degrees) | (degrees == 0))
+    return np.flatnonzero(chosen & ((steps != degrees) | (degrees == 0)))

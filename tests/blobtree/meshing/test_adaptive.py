@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from blobtree import Difference, Mesh, Node, Point, Segment, Sum, Union, polygonize
 from blobtree._typing import BoolArray, Int32Array
-from blobtree.meshing.adaptive_cells import SIMPLE
-from blobtree.meshing.adaptive_mesh import _torn_vertices
+from blobtree.meshing import leaf_changes
+from blobtree.meshing.adaptive_cells import SIMPLE, Leaves
+from blobtree.meshing.adaptive_mesh import _is_closed, _torn_vertices
 from blobtree.meshing.crumbs import _pieces, without_crumbs
 from blobtree.meshing.patches import PATCH_COUNT
 from tests.blobtree.meshing.test_chord import BALL, CUT, points_on
@@ -116,6 +118,50 @@ def test_the_topology_of_smooth_trees_is_that_of_fine_equal_cells(seed: int) -> 
     assert volume(mesh) == pytest.approx(volume(fine), rel=0.02)
 
 
+def _meshes_both_ways(tree: Node, error: float, creases: bool, monkeypatch: pytest.MonkeyPatch) -> list[Mesh]:
+    """Return the meshes whose polygons are counted anew beside changes alone, and everywhere."""
+    meshes = []
+    for limit in (leaf_changes.MAX_CHANGES, -1):
+        monkeypatch.setattr(leaf_changes, "MAX_CHANGES", limit)
+        meshes.append(polygonize(tree, chord_error=error, creases=creases))
+    return meshes
+
+
+def _blobs(seed: int, count: int) -> Node:
+    rng = np.random.default_rng(seed)
+    return Sum(
+        tuple(Point(tuple(rng.uniform(-1, 1, 3)), radius=float(rng.uniform(0.03, 0.2))) for _ in range(count))
+    )
+
+
+def test_a_local_rebuild_gives_the_mesh_of_a_full_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = 0
+    of_leaves = leaf_changes.LeafChanges.of_leaves
+
+    def counted(changes: leaf_changes.LeafChanges, leaves: Leaves) -> NDArray[np.uint8]:
+        nonlocal kept
+        nearness = of_leaves(changes, leaves)
+        kept += int((nearness == leaf_changes.FAR).sum())
+        return nearness
+
+    monkeypatch.setattr(leaf_changes.LeafChanges, "of_leaves", counted)
+    local, full = _meshes_both_ways(_blobs(1, 40), 4e-3, False, monkeypatch)
+    assert kept > len(local.vertices)
+    np.testing.assert_array_equal(local.vertices, full.vertices)
+    np.testing.assert_array_equal(local.faces, full.faces)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("creases", [False, True])
+def test_a_local_rebuild_of_random_trees(creases: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    trees = [*random_trees(seed=7, count=4, depth=3), _blobs(2, 100)]
+    for tree in trees:
+        error = float((tree.support[1] - tree.support[0]).max()) / 500
+        local, full = _meshes_both_ways(tree, error, creases, monkeypatch)
+        np.testing.assert_array_equal(local.vertices, full.vertices)
+        np.testing.assert_array_equal(local.faces, full.faces)
+
+
 # -- the choice of leaves, and the test for manifolds --------------------------------------------------
 
 
@@ -134,7 +180,10 @@ TETRAHEDRON = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], np.int32)
 
 def _flags(faces: Int32Array, count: int) -> BoolArray:
     flags = np.zeros(count, bool)
-    flags[_torn_vertices(faces, count)] = True
+    flags[_torn_vertices(faces, np.ones(count, bool))] = True
+    assert _is_closed(faces, count) >= (not flags.any())
+    for vertex in range(count):
+        assert (len(_torn_vertices(faces, np.arange(count) == vertex)) > 0) >= flags[vertex]
     return flags
 
 
@@ -145,6 +194,7 @@ def test_torn_vertices_are_found() -> None:
     pinched = np.where(two == 4, 0, two)
     assert np.flatnonzero(_flags(pinched, 8)).tolist() == [0, 4]  # 4 is no longer used
     assert _flags(TETRAHEDRON[:3], 4)[1:].all()  # open
+    assert not _is_closed(TETRAHEDRON[:3], 4)
     assert _flags(np.concatenate([TETRAHEDRON, TETRAHEDRON[:, ::-1]]), 4).all()  # edges of four triangles
 
 
