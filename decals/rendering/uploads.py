@@ -617,7 +617,8 @@ class Uploads:
         """Return the relief of a scene's decals; None without any."""
         if images is None or not has_relief(scene):
             return None
-        shape = images.height, images.width
+        heights, widths = zip(*(image.pixels.shape[:2] for image in scene.images), strict=True)
+        shape = min(max(heights), images.height), min(max(widths), images.width)  # no texel is averaged
         array = self._reliefs.get(
             lambda: ReliefArray(self.context, scene.images, shape), images, *scene.images
         )
