@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
 from decals.baking.atlas import Unwrapped, unwrap
 from decals.baking.glb import Node, glb_bytes
+from decals.baking.materials import CHANNELS, material_bytes, split_maps, surface_values, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.texture import BLOCK_SAMPLES, bake_texture
 from decals.errors import InvalidScene
@@ -19,11 +21,11 @@ from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.field.walks import walks_for
-from decals.images.texels import Pixels, decode_srgb
+from decals.images.texels import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.rendering.options import Drawing, SceneLike, drawing_of
+from decals.rendering.options import Drawing, ImageLike, SceneLike, drawing_of
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
@@ -58,8 +60,9 @@ def bake(
     """Write a scene as a GLB file for other programs, with the decals in a texture or in vertex colours.
 
     The file has a node for each object, with normals. All nodes share one texture and one material, whose
-    base colour is that of decals and objects without light. Coordinates are those of the scene. No OpenGL is
-    needed.
+    base colour is that of decals and objects without light. Scenes with a `DecalMaterial` get textures of
+    normals, roughness, metalness, occlusion and emission too. Coordinates are those of the scene. No OpenGL
+    is needed.
 
     Parameters
     ----------
@@ -130,15 +133,21 @@ def bake(
         meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
         shown = drawing.contact, drawing.mapping, drawing.stiffness
         colors = SurfaceColors(meshes, objects, decals, images, *shown)
-        texture = None
+        maps = None
         if vertex_colors:
             nodes = _colored_nodes(meshes, colors, report)
         else:
             unwrapped = unwrap(meshes, size, report)
-            texture = bake_texture(meshes, unwrapped, size, samples, colors.at, report)
-            nodes = [_textured_node(mesh, part, size) for mesh, part in zip(meshes, unwrapped, strict=True)]
+            parts = list(zip(meshes, unwrapped, strict=True))
+            options: dict[str, Any] = {}
+            if colors.has_materials:  # maps are of the rest pose
+                resting = [vertex_tangents(mesh.places, mesh.facings, part) for mesh, part in parts]
+                options = {"channels": CHANNELS, "encode": material_bytes, "tangents": resting}
+            texels = bake_texture(meshes, unwrapped, size, samples, colors.at, report, **options)
+            maps = split_maps(texels)
+            nodes = [_textured_node(mesh, part, size, colors.has_materials) for mesh, part in parts]
         report("writing the file", 0.0)
-        content = glb_bytes(nodes, texture, getattr(objects[0], "origin", WORLD))
+        content = glb_bytes(nodes, maps, getattr(objects[0], "origin", WORLD))
         report("writing the file", 0.5)
         try:
             write_atomically(path, content)
@@ -161,7 +170,7 @@ class SurfaceColors:
         The same as the scene has them, which decides which decals lie on them.
     decals : Decals or DecalEditor
         The decals on them.
-    images : sequence of Pixels
+    images : sequence of images
         Images of the decals.
     contact, mapping, stiffness
         See `bake`.
@@ -172,21 +181,28 @@ class SurfaceColors:
         meshes: Sequence[BakeMesh],
         objects: Sequence[object],
         decals: Decals | DecalEditor,
-        images: Sequence[Pixels],
+        images: Sequence[ImageLike],
         contact: AnyContact,
         mapping: ImageMapping,
         stiffness: float,
     ) -> None:
         self._meshes, self._objects, self._decals = meshes, objects, decals
-        self._images = [DecalImage(f"image {i}", pixels) for i, pixels in enumerate(images)]
+        self.has_materials = any(hasattr(image, "surface_texels") for image in images)
+        self._materials = list(images)
+        self._images = [DecalImage(f"image {i}", image.pixels) for i, image in enumerate(images)]
         self._contact, self._mapping, self._stiffness = contact, mapping, stiffness
         self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
         self._walks = walks_for(mapping, decals, objects)
 
-    def at(self, number: int, points: Float32Array, normals: Float32Array) -> Float64Array:
-        """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals."""
+    def at(
+        self, number: int, points: Float32Array, normals: Float32Array, tangents: Float32Array | None = None
+    ) -> Float64Array:
+        """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals.
+
+        With tangents, they are the values of all maps, see `decals.baking.materials.surface_values`.
+        """
         base = decode_srgb(np.asarray(self._meshes[number].base_colors(points), np.float64))
-        over = evaluate(
+        samples = evaluate(
             self._decals,
             points,
             normals,
@@ -194,19 +210,25 @@ class SurfaceColors:
             contact=self._contact,
             stiffness=self._stiffness,
             index=self._index,
-            images=self._images,
+            images=self._images if tangents is None else self._materials,
+            materials=tangents is not None,
             on=self._objects[number],
             walks=self._walks,
-        ).color
+        )
+        over = samples.color
         assert over is not None  # there are images, if only an empty list of them
         colors: Float64Array = base * (1.0 - over[:, 3:]) + over[:, :3]
-        return colors
+        if tangents is None or samples.materials is None:
+            return colors
+        return surface_values(colors, samples.materials, normals, tangents)
 
 
-def _textured_node(mesh: BakeMesh, part: Unwrapped, size: int) -> Node:
+def _textured_node(mesh: BakeMesh, part: Unwrapped, size: int, tangents: bool) -> Node:
     uv = part.places / np.float32(size)
     uv[:, 1] = 1.0 - uv[:, 1]
-    return Node(mesh.name, mesh.vertices[part.rows], part.faces, mesh.normals[part.rows], uv=uv)
+    vertices, normals = mesh.vertices[part.rows], mesh.normals[part.rows]
+    along = vertex_tangents(mesh.vertices, mesh.normals, part) if tangents else None
+    return Node(mesh.name, vertices, part.faces, normals, uv=uv, tangents=along)
 
 
 def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Progress) -> list[Node]:
@@ -222,10 +244,9 @@ def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Pr
     return nodes
 
 
-def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[Pixels], Drawing]:
+def _parts(scene: object) -> tuple[Sequence[object], Decals | DecalEditor, list[ImageLike], Drawing]:
     """Return objects, decals, images and drawing of a scene, of models or of the file of either."""
     known = scene_or_objects(scene)
     if isinstance(known, list):
         return known, Decals.empty(), [], Drawing()
-    pixels = [image.pixels for image in known.images]
-    return known.objects, known.decals, pixels, drawing_of(known)
+    return known.objects, known.decals, list(known.images), drawing_of(known)

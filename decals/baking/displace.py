@@ -58,8 +58,7 @@ class DisplacedScene(PosedScene):
         with reporting() as report:
             meshes = [bake_mesh(item, resolution=None, creases=False, report=report) for item in self.objects]
         modes = self.drawing.contact, self.drawing.mapping, self.drawing.stiffness
-        pixels = [image.pixels for image in self.images]
-        colors = SurfaceColors(meshes, self.objects, self.decals, pixels, *modes)
+        colors = SurfaceColors(meshes, self.objects, self.decals, self.images, *modes)
         first, *others = (
             to_polydata(
                 Mesh(

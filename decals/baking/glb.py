@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree._typing import Float32Array, Int32Array
+from decals.baking.materials import ROUGHNESS, Maps
 from decals.validation import optional_package
 
-ROUGHNESS = 0.7
-"""Roughness of the material, about that of the studio light's highlight."""
-
-COLOR_ATTRIBUTE = "_COLOR_0"
-"""Name under which trimesh writes linear float colours; its own colours are bytes."""
+PREFIX = "_"
+"""Begin of names under which trimesh writes attributes of its own: linear float colours, and tangents."""
 
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
 
@@ -34,6 +32,8 @@ class Node:
         Texture coordinates, v upward.
     colors : float32[n, 3], optional
         Linear colours.
+    tangents : float32[n, 4], optional
+        Tangents along u, and the signs of the bitangents.
     """
 
     name: str
@@ -42,19 +42,18 @@ class Node:
     normals: Float32Array
     uv: Float32Array | None = None
     colors: Float32Array | None = None
+    tangents: Float32Array | None = None
 
 
-def glb_bytes(
-    nodes: Sequence[Node], texture: UInt8Array | None = None, origin: ArrayLike = (0.0, 0.0, 0.0)
-) -> bytes:
+def glb_bytes(nodes: Sequence[Node], maps: Maps | None = None, origin: ArrayLike = (0.0, 0.0, 0.0)) -> bytes:
     """Return a GLB file of nodes that share one material.
 
     Parameters
     ----------
     nodes : sequence of Node
-        All with ``uv`` and a texture, or all with ``colors`` and without one.
-    texture : uint8[h, w, 3], optional
-        sRGB base colour, first row at the top.
+        All with ``uv`` and textures, or all with ``colors`` and without any.
+    maps : Maps, optional
+        Textures, first row at the top.
     origin : (x, y, z), optional
         Point that all vertices are relative to, in float64; it becomes the translation of the nodes.
 
@@ -66,10 +65,8 @@ def glb_bytes(
     trimesh = optional_package("trimesh", "bake")
     material = trimesh.visual.material.PBRMaterial(
         name="baked",
-        baseColorTexture=None if texture is None else Image.fromarray(texture),
-        metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS,
         doubleSided=True,
+        **_textures(maps),
     )
     base = "scene"
     while any(node.name == base for node in nodes):
@@ -85,8 +82,9 @@ def glb_bytes(
             visual=trimesh.visual.TextureVisuals(uv=node.uv, material=material),
             process=False,
         )
-        if node.colors is not None:
-            mesh.vertex_attributes[COLOR_ATTRIBUTE] = node.colors
+        for name, values in (("COLOR_0", node.colors), ("TANGENT", node.tangents)):
+            if values is not None:
+                mesh.vertex_attributes[PREFIX + name] = values
         scene.add_geometry(mesh, node_name=node.name, geom_name=node.name, transform=transform)
     content: bytes = trimesh.exchange.gltf.export_glb(
         scene, include_normals=True, tree_postprocessor=_finish_tree
@@ -94,13 +92,28 @@ def glb_bytes(
     return content
 
 
+def _textures(maps: Maps | None) -> dict[str, Any]:
+    """Return the textures and factors of a material of trimesh."""
+    given = {} if maps is None else {"baseColorTexture": maps.color}
+    if maps is None or maps.surface is None:
+        factors: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": ROUGHNESS}
+    else:
+        factors = {"metallicFactor": 1.0, "roughnessFactor": 1.0}
+        given |= {"metallicRoughnessTexture": maps.surface, "occlusionTexture": maps.surface}
+        given |= {} if maps.normal is None else {"normalTexture": maps.normal}
+        if maps.emission is not None:
+            given["emissiveTexture"], factors["emissiveFactor"] = maps.emission, [1.0, 1.0, 1.0]
+    return factors | {name: Image.fromarray(texels) for name, texels in given.items()}
+
+
 def _finish_tree(tree: dict[str, Any]) -> None:
-    """Name the colours as glTF does, and let viewers filter the texture without wrapping it."""
+    """Name attributes as glTF does, and let viewers filter textures without wrapping them."""
     for mesh in tree["meshes"]:
         for primitive in mesh["primitives"]:
             attributes = primitive["attributes"]
-            if COLOR_ATTRIBUTE in attributes:
-                attributes["COLOR_0"] = attributes.pop(COLOR_ATTRIBUTE)
+            for name in ("COLOR_0", "TANGENT"):
+                if PREFIX + name in attributes:
+                    attributes[name] = attributes.pop(PREFIX + name)
     if textures := tree.get("textures"):
         wrap = {"wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE}
         tree["samplers"] = [{"magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR, **wrap}]

@@ -21,8 +21,15 @@ GUTTER_SHARE = 1 / 256
 ROUNDING = 1e-2
 """Distance in texels below which a texel counts as inside a chart."""
 
-ColorFunction = Callable[[int, Float32Array, Float32Array], Float64Array]
-"""Linear colours ``float64[n, 3]`` of the surface of the mesh with a number, at points with unit normals."""
+ColorFunction = Callable[[int, Float32Array, Float32Array, Float32Array | None], Float64Array]
+"""Linear colours ``float64[n, 3]`` of the surface of the mesh with a number, at points with unit normals; or
+other values, of as many channels, which need the tangents there."""
+
+
+def color_bytes(colors: Float64Array) -> UInt8Array:
+    """Return linear colours as sRGB bytes."""
+    levels: UInt8Array = np.rint(255.0 * encode_srgb(colors)).astype(np.uint8)
+    return levels
 
 
 def bake_texture(
@@ -32,18 +39,22 @@ def bake_texture(
     samples: int,
     color_at: ColorFunction,
     report: Progress,
+    *,
+    channels: int = 3,
+    encode: Callable[[Float64Array], UInt8Array] = color_bytes,
+    tangents: Sequence[Float32Array] | None = None,
 ) -> UInt8Array:
-    """Return the texture ``uint8[size, size, 3]``, sRGB, first row at the top.
+    """Return the texture ``uint8[size, size, channels]``, by default sRGB, first row at the top.
 
     A texel is the mean colour of ``samples`` × ``samples`` points on it. Texels outside all charts take the
     colours of the closest points of charts within the gutter, and the mean colour of the charts beyond it, so
     that smaller mip levels mix in no foreign colour.
     """
-    sheet = _Sheet(meshes, unwrapped)
+    sheet = _Sheet(meshes, unwrapped, tangents)
     gutter = max(MIN_GUTTER, GUTTER_SHARE * size)
-    image = np.zeros((size, size, 3), np.uint8)
+    image = np.zeros((size, size, channels), np.uint8)
     empty = np.ones((size, size), np.bool_)
-    total, count = np.zeros(3), 0
+    total, count = np.zeros(channels), 0
     steps = (np.arange(samples) + 0.5) / samples - 0.5
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     height = max(1, BLOCK_SAMPLES // (size * samples**2))
@@ -56,20 +67,25 @@ def bake_texture(
         if not near.any():
             continue
         points = (centers[near, None] + offsets).reshape(-1, 2)
-        colors = sheet.colors(points, color_at).reshape(-1, len(offsets), 3).mean(axis=1)
-        image[rows[near], columns[near]] = np.rint(255.0 * encode_srgb(colors))
+        colors = sheet.colors(points, color_at).reshape(-1, len(offsets), channels).mean(axis=1)
+        image[rows[near], columns[near]] = encode(colors)
         empty[rows[near], columns[near]] = False
         inside = distances[near] < ROUNDING
         total, count = total + colors[inside].sum(axis=0), count + int(inside.sum())
     if count:
-        image[empty] = np.rint(255.0 * encode_srgb(total / count))
+        image[empty] = encode(total[None] / count)[0]
     return image
 
 
 class _Sheet:
     """All unwrapped meshes as one flat mesh on the texture."""
 
-    def __init__(self, meshes: Sequence[BakeMesh], unwrapped: Sequence[Unwrapped]) -> None:
+    def __init__(
+        self,
+        meshes: Sequence[BakeMesh],
+        unwrapped: Sequence[Unwrapped],
+        tangents: Sequence[Float32Array] | None,
+    ) -> None:
         counts = [len(part.rows) for part in unwrapped]
         starts = np.cumsum([0, *counts[:-1]])
         places = np.concatenate([part.places for part in unwrapped])
@@ -78,6 +94,7 @@ class _Sheet:
         pairs = list(zip(meshes, unwrapped, strict=True))
         self._vertices = np.concatenate([mesh.places[part.rows] for mesh, part in pairs])
         self._normals = np.concatenate([mesh.facings[part.rows] for mesh, part in pairs])
+        self._tangents = None if tangents is None else np.concatenate(tangents)
         self._mesh_of_face = np.repeat(np.arange(len(meshes)), [len(part.faces) for part in unwrapped])
 
     def distances(self, points: Float64Array) -> Float64Array:
@@ -88,17 +105,22 @@ class _Sheet:
         return distances
 
     def colors(self, points: Float64Array, color_at: ColorFunction) -> Float64Array:
-        """Return linear colours of the surface at points of the texture, ``float64[n, 3]``."""
+        """Return colours of the surface at points of the texture."""
         faces, weights = self._locate(points)
         positions = self._mixed(self._vertices, faces, weights).astype(np.float32)
         normals = self._mixed(self._normals, faces, weights)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         units = (normals / np.maximum(lengths, 1e-30)).astype(np.float32)
         meshes = self._mesh_of_face[faces]
-        colors = np.empty((len(points), 3))
-        for number in np.unique(meshes):
-            rows = meshes == number
-            colors[rows] = color_at(int(number), positions[rows], units[rows])
+        tangents = None
+        if self._tangents is not None:
+            tangents = self._mixed(self._tangents, faces, weights).astype(np.float32)
+        parts = []
+        order = [np.nonzero(meshes == number)[0] for number in np.unique(meshes)]
+        for rows in order:
+            along = None if tangents is None else tangents[rows]
+            parts.append(color_at(int(meshes[rows[0]]), positions[rows], units[rows], along))
+        colors: Float64Array = np.concatenate(parts)[np.argsort(np.concatenate(order))]
         return colors
 
     def _locate(self, points: Float64Array) -> tuple[Int64Array, Float64Array]:

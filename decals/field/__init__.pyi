@@ -1,7 +1,8 @@
-from .evaluate import Neighbors, Samples
+from .evaluate import MaterialSamples, Neighbors, Samples
 from .walks import Walks
 
 __all__ = [
+    "MaterialSamples",
     "Neighbors",
     "Samples",
     "Walks",

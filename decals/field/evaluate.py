@@ -54,6 +54,31 @@ class Neighbors:
 
 
 @dataclass(frozen=True, eq=False)
+class MaterialSamples:
+    """Maps of materials at m points, mixed by the part that is seen of each decal.
+
+    Attributes
+    ----------
+    part : float32[m]
+        Part of the surface that materials cover. The other values are sums over it: 0 without materials.
+    normal : float32[m, 3]
+        Sum of unit normals. Where decals with several normals lie over each other, their maps are turned as
+        that of the topmost one.
+    roughness, metallic, occlusion : float32[m]
+        Sums of the maps.
+    emission : float32[m, 3]
+        Light that the surface sheds itself, in linear light.
+    """
+
+    part: Float32Array
+    normal: Float32Array
+    roughness: Float32Array
+    metallic: Float32Array
+    occlusion: Float32Array
+    emission: Float32Array
+
+
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Decals at m points, as `evaluate` returns them.
 
@@ -76,6 +101,8 @@ class Samples:
         NaN without an owner. None if it was not asked for.
     neighbors : Neighbors or None
         All decals that act at each point, and their pushes. None if they were not asked for.
+    materials : MaterialSamples or None
+        Maps of materials. None if they were not asked for, or without a `DecalMaterial`.
     """
 
     owner: Int32Array
@@ -85,6 +112,7 @@ class Samples:
     jacobian: Float64Array | None = None
     neighbors: Neighbors | None = None
     height: Float32Array | None = None
+    materials: MaterialSamples | None = None
 
 
 def evaluate(
@@ -100,6 +128,7 @@ def evaluate(
     jacobian: bool = False,
     normal_derivatives: ArrayLike | None = None,
     neighbors: bool = False,
+    materials: bool = False,
     on: object | str | Iterable[str] | None = None,
     walks: Walks | None = None,
     device: Any = None,
@@ -131,6 +160,8 @@ def evaluate(
         Derivatives of the normals by the point, for the derivative on curved surface. By default it is flat.
     neighbors : bool, optional
         True also returns the fields and pushes of all decals, `Samples.neighbors`.
+    materials : bool, optional
+        True also returns the maps of the images that are a `DecalMaterial`, `Samples.materials`.
     on : object of a scene, str or sequence of str, optional
         The object that the points lie on, or its labels, so that only decals act that lie on it. By default
         all decals act.
@@ -180,7 +211,7 @@ def evaluate(
     mapping = member("mapping", mapping, ImageMapping, InvalidScene)
     contact = contact_mode(contact, InvalidScene)
     stiffness = stiffness_number(stiffness, InvalidScene)
-    for name, value in (("jacobian", jacobian), ("neighbors", neighbors)):
+    for name, value in (("jacobian", jacobian), ("neighbors", neighbors), ("materials", materials)):
         truth(name, value, InvalidScene)
     device = known_device(device)
     positions, facings = _as_rows("points", points), _as_rows("normals", normals)
@@ -212,7 +243,7 @@ def evaluate(
     wp.launch(
         loaded(_with_law(sample_points, contact), device), count, inputs, [owner, uv, field], device=device
     )
-    color = height = None
+    color = height = maps = None
     if images is not None:
         listed = each_image(images)
         pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(listed)]
@@ -221,12 +252,14 @@ def evaluate(
         reliefs = [image.relief_texels() if hasattr(image, "relief_texels") else None for image in listed]
         if any(relief is not None for relief in reliefs):
             height = _heights(decals, reliefs, pixels, given, contact, device)
+        if materials and any(hasattr(image, "surface_texels") for image in listed):
+            maps = _materials(decals, listed, pixels, facings, given, contact, device)
     derivative = None
     if jacobian:
         center = owner.numpy(), uv.numpy()
         derivative = _jacobians(positions, facings, inputs[2:], center, turns, contact, device)
     near = _neighbors(decals, inputs, owner, contact, device) if neighbors else None
-    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near, height)
+    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near, height, maps)
 
 
 def _jacobians(
@@ -334,17 +367,68 @@ def _heights(
         if relief is not None:
             layer[..., 0] = relief
         layers.append(layer)
+    radii = RIM_RADIUS * inputs[-2].records.numpy()[::RECORD, 3:]
+    return _map_sums(decals, layers, np.repeat(radii, 3, axis=1), inputs, contact, device)[:, 0]
+
+
+def _materials(
+    decals: Decals | DecalEditor,
+    images: Sequence[Any],
+    pixels: Sequence[Pixels],
+    normals: Float32Array,
+    inputs: list[Any],
+    contact: AnyContact,
+    device: Any,
+) -> MaterialSamples:
+    """Return the maps of materials, each mixed as a colour is, with the axes of each decal as its tint."""
+    given = []  # x, y, z of normals; roughness, metalness, 1; emission; occlusion
+    for image, pixel in zip(images, pixels, strict=True):
+        maps = np.zeros((*pixel.shape[:2], 12), np.float32)
+        if hasattr(image, "surface_texels"):
+            first, second = image.surface_texels()
+            maps[..., :2], maps[..., 3:5] = first[..., :2], first[..., 2:]
+            maps[..., 2] = np.sqrt(np.maximum(1.0 - (first[..., :2] ** 2).sum(axis=-1), 0.0))
+            maps[..., 5], maps[..., 6:10] = 1.0, second
+        alpha = unit_levels(pixel[..., 3:])
+        given.append(np.concatenate([maps * alpha, alpha], axis=-1))
+
+    def sums(columns: list[int], tints: Float32Array | float) -> Float32Array:
+        layers = [np.ascontiguousarray(maps[..., [*columns, -1]]) for maps in given]
+        return _map_sums(decals, layers, tints, inputs, contact, device)[:, :3]
+
+    records = inputs[-2].records.numpy()
+    facing, axis = records[1::RECORD, :3], records[2::RECORD, :3]
+    tilt = sums([0, 0, 0], axis) + sums([1, 1, 1], np.cross(facing, axis))
+    upright, roughness, metallic = sums([2, 3, 4], 1.0).T
+    emission = sums([6, 7, 8], 1.0)
+    part, occlusion, _ = sums([5, 9, 10], 1.0).T
+    unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.float32(1e-30))
+    owner_facing = facing[np.maximum(inputs[-1].numpy(), 0)] if len(facing) else unit
+    # turned as the normal is on the way to the point; the inverse of `unroll_step`
+    cosine = np.maximum(1.0 + (owner_facing * unit).sum(axis=1, keepdims=True), 1e-4)
+    turned = tilt - (tilt * unit).sum(axis=1, keepdims=True) / cosine * (owner_facing + unit)
+    normal = (turned + upright[:, None] * unit).astype(np.float32)
+    return MaterialSamples(part, normal, roughness, metallic, occlusion, emission)
+
+
+def _map_sums(
+    decals: Decals | DecalEditor,
+    layers: Sequence[Float32Array],
+    tints: Float32Array | float,
+    inputs: list[Any],
+    contact: AnyContact,
+    device: Any,
+) -> Float32Array:
+    """Return layers ``[h, w, 4]`` mixed as colours are, with other tints; without image, decals add 0."""
     indexed = inputs[-2]
     records = indexed.records
-    scaled = records.numpy().copy()
-    shown = scaled[2::RECORD, 3:] >= 0.0
-    scaled[3::RECORD, :3] = np.where(shown, RIM_RADIUS * scaled[::RECORD, 3:], 0.0)
-    indexed.records = wp.array(scaled, dtype=wp.vec4, device=device)
+    tinted = records.numpy().copy()
+    tinted[3::RECORD, :3] = np.where(tinted[2::RECORD, 3:] >= 0.0, tints, 0.0)
+    indexed.records = wp.array(tinted, dtype=wp.vec4, device=device)
     try:
-        heights: Float32Array = _colors(decals, _laid_out(layers), inputs, contact, device)[:, 0]
+        return _colors(decals, _laid_out(layers), inputs, contact, device)
     finally:
         indexed.records = records
-    return heights
 
 
 def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any) -> Any:

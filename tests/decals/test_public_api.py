@@ -20,7 +20,7 @@ NAMES = [
     "load_scene", "measure", "pose", "render", "save_scene", "scatter", "show", "skin", "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
-    "field": ["Neighbors", "Samples", "Walks"],
+    "field": ["MaterialSamples", "Neighbors", "Samples", "Walks"],
     "index": ["DecalEditor", "DecalIndex"],
     "rendering": [
         "Background", "Buffers", "Context", "Drawable", "Drawing", "Light", "Lighting", "Picture",

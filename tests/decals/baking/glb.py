@@ -2,6 +2,7 @@
 
 import json
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -114,6 +115,7 @@ class ReadMesh:
     normals: Array
     uv: Array | None
     texture: Array | None
+    maps: dict[str, Array]
 
     def on_surface(self, count: int, seed: int = 0) -> tuple[Array, Array, Array]:
         """Random points on the triangles, their unit normals and texture coordinates."""
@@ -127,8 +129,8 @@ class ReadMesh:
         return points, normals / np.linalg.norm(normals, axis=1, keepdims=True), uv
 
 
-def read_glb(path: Path) -> dict[str, ReadMesh]:
-    """Nodes of a file by name, as trimesh reads them."""
+def read_glb(path: Path, maps: Sequence[str] = ()) -> dict[str, ReadMesh]:
+    """Nodes of a file by name, as trimesh reads them, with textures by their names."""
     import trimesh
 
     scene: Any = trimesh.load(path)
@@ -144,6 +146,7 @@ def read_glb(path: Path) -> dict[str, ReadMesh]:
             np.asarray(mesh.vertex_normals, float),
             None if uv is None else np.asarray(uv, float),
             None if image is None else np.asarray(image.convert("RGB")),
+            {key: np.asarray(getattr(mesh.visual.material, key).convert("RGB")) for key in maps},
         )
     return nodes
 

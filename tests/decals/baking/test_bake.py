@@ -34,6 +34,7 @@ from tests.decals.baking.glb import (
     read_glb,
     read_json,
 )
+from tests.oracles.materials import tilted
 
 SIZE = 256
 
@@ -299,7 +300,7 @@ def textured(size: int, samples: int = 1) -> Array:
         meshes,
         scene.objects,
         scene.decals,
-        [image.pixels for image in scene.images],
+        scene.images,
         decals.Contact.PRODUCT,
         decals.ImageMapping.CORRECTED,
         2.0,
@@ -346,3 +347,86 @@ def test_stages_are_reported_in_order(tmp_path: Path, monkeypatch: pytest.Monkey
     assert seen.count(("unwrapping the surface", 0.0)) > 3
     assert seen[-1] == ("writing the file", 1.0)
     assert all(0.0 <= fraction <= 1.0 for _, fraction in seen)
+
+
+def bumpy_scene() -> decals.Scene:
+    """A ball and a cube under two layers of materials with tilted normals."""
+    scene = ball_and_cube()
+    maps = {"normal": (170, 90, 240), "emission": (0, 90, 30)}
+    wide: dict[str, Any] = {name: np.full((8, 8, 3), value, np.uint8) for name, value in maps.items()}
+    gold = decals.DecalMaterial(
+        "gold",
+        np.full((8, 8, 3), (250, 200, 90), np.uint8),
+        roughness=0.35,
+        metallic=0.9,
+        occlusion=0.8,
+        **wide,
+    )
+    images = [gold, *scene.images[1:]]
+    return scene.replace(images=images, decals=scene.decals.replace(images=0, opacities=1.0))
+
+
+def test_materials_at_points_are_the_reference_shaders() -> None:
+    scene = bumpy_scene()
+    decal = scene.decals
+    rng = np.random.default_rng(4)
+    owners = rng.integers(0, len(decal), 60)
+    normals = decal.normals[owners] + rng.normal(0, 0.2, (60, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = decal.positions[owners] + 0.2 * decal.radii[owners, None] * decal.tangents[owners]
+    samples = decals.evaluate(decal, points, normals, images=scene.images, materials=True)
+    assert samples.materials is not None
+    assert samples.color is not None
+    assert (samples.owner >= 0).all()
+    maps = samples.materials
+    tilt = (np.array([170.0, 90.0]) - 128) / 127
+    single = samples.color[:, 3] == 1.0
+    assert single.sum() > 30
+    for row in np.nonzero(single)[0]:
+        number = samples.owner[row]
+        expected = tilted(normals[row : row + 1], decal.normals[number], decal.tangents[number], tilt)
+        np.testing.assert_allclose(maps.normal[row], expected[0], atol=2e-3)
+    for name, value in (("part", 255), ("roughness", 89), ("metallic", 230), ("occlusion", 204)):
+        np.testing.assert_allclose(getattr(maps, name)[single], value / 255, atol=1e-4)
+    np.testing.assert_allclose(maps.emission[single, 1], ((90 / 255 + 0.055) / 1.055) ** 2.4, atol=1e-4)
+
+
+def test_materials_are_textures_of_a_file(tmp_path: Path) -> None:
+    need("trimesh", "xatlas")
+    scene, size, path = bumpy_scene(), 128, tmp_path / "a.glb"
+    decals.bake(scene, path, size=size, samples=1)
+    names = "metallicRoughnessTexture", "occlusionTexture", "normalTexture", "emissiveTexture"
+    numbers = {mesh["name"]: number for number, mesh in enumerate(read_json(path)["meshes"])}
+    for name, node in read_glb(path, names).items():
+        assert node.uv is not None
+        tangents = read_attribute(path, numbers[name], "TANGENT")
+        np.testing.assert_allclose(np.linalg.norm(tangents[:, :3], axis=1), 1.0, atol=1e-5)
+        corners = node.faces
+        sides, turns = (np.diff(values[corners], axis=1) for values in (node.vertices, node.uv))
+        over_u, over_v = np.swapaxes(np.linalg.solve(turns, sides), 0, 1)
+        across = tangents[:, 3:] * np.cross(node.normals, tangents[:, :3])
+        assert ((over_u * tangents[corners[:, 0], :3]).sum(axis=1) > 0).all()
+        assert ((over_v * across[corners[:, 0]]).sum(axis=1) > 0).all()
+        uv, points, normals, along = (
+            values[corners].mean(axis=1) for values in (node.uv, node.vertices, node.normals, tangents)
+        )
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        item = next(item for item in scene.objects if item.name == name)
+        samples = decals.evaluate(scene.decals, points, normals, images=scene.images, materials=True, on=item)
+        maps = samples.materials
+        assert maps is not None
+        inside = (np.hypot(*(samples.uv - 0.5).T) < 0.35) & (maps.part > 0.99)
+        assert inside.sum() > 3
+        row, column = ((1 - uv[:, 1]) * size).astype(int), (uv[:, 0] * size).astype(int)
+        surface, occlusion, local, emission = (node.maps[key][row, column] for key in names)
+        np.testing.assert_array_equal(surface, occlusion)
+        expected = np.stack([maps.occlusion, maps.roughness, maps.metallic], axis=1)
+        assert np.median(np.abs(surface / 255 - expected)[inside]) < 0.004
+        assert np.median(np.abs(linear(emission / 255) - maps.emission)[inside]) < 0.004
+        local = (local.astype(float) - 128) / 127
+        up = along[:, 3:] * np.cross(normals, along[:, :3])
+        bent = local[:, :1] * along[:, :3] + local[:, 1:2] * up + local[:, 2:] * normals
+        assert np.median(np.linalg.norm(bent - maps.normal, axis=1)[inside]) < 0.03
+    material = read_json(path)["materials"][0]
+    assert material["emissiveFactor"] == [1, 1, 1]
+    assert material["pbrMetallicRoughness"].get("metallicFactor", 1) == 1
