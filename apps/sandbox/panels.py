@@ -49,7 +49,8 @@ def named(expression: str) -> list[str]:
 
 def icon_button(icon: str, text: str, click: Any, **options: Any) -> None:
     """Build a button with an icon and a tooltip."""
-    vuetify3.VBtn(icon=icon, title=text, raw_attrs=named(f"'{text}'"), size="small", click=click, **options)
+    options = {"size": "small", "density": "comfortable", **options}
+    vuetify3.VBtn(icon=icon, title=text, raw_attrs=named(f"'{text}'"), click=click, **options)
 
 
 def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "c.name") -> None:

@@ -59,8 +59,14 @@ FIRST_OBJECT_RADIUS = 0.2
 FIRST_LIMB_RADIUS = 0.06
 """Radius of a limb that is the first object, likewise."""
 
-NEW_NODE_SIZE = 0.4
-"""Size of a new node of a panel, in sizes of the selected node or the scene."""
+NEW_NODE_SIZE, NEW_OBJECT_SIZE = 1.2, 0.4
+"""Size of a new node of a panel, in sizes of the selected node, and of a new object, in sizes of the scene.
+
+A ball has a quarter of it as its radius: each is 0.6 times as large as the one that it grows from.
+"""
+
+NEW_NODE_LIFT = 0.2
+"""Height of a new node's centre above the selected node, in its sizes: blended balls keep a neck."""
 
 MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
@@ -573,7 +579,8 @@ def _place_on(node: Node) -> tuple[Float64Array, float]:
     """Return centre (3,) and size for a new node on top of another one."""
     low, high = node.bounds
     size = float((high - low).max()) * NEW_NODE_SIZE
-    return _rounded(np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2], np.float64), size)
+    top = float(high[1]) + NEW_NODE_LIFT * size
+    return _rounded(np.array([(low[0] + high[0]) / 2, top, (low[2] + high[2]) / 2], np.float64), size)
 
 
 def _place_of_object(
@@ -582,7 +589,7 @@ def _place_of_object(
     """Return centre (3,) and size for a new object: beside the others, or at the camera's target."""
     if objects:
         low, high = bounds_of(objects)
-        size = float((high - low).max()) * NEW_NODE_SIZE
+        size = float((high - low).max()) * NEW_OBJECT_SIZE
         return _rounded(np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size)
     center = np.asarray(target, np.float64)
     distance = float(np.linalg.norm(np.asarray(eye, np.float64) - center))

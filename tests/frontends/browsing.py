@@ -35,6 +35,7 @@ async def opened(url: str, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Pag
             executable_path=browser_path(), args=["--no-sandbox", "--disable-gpu"]
         )
         page = await browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.set_default_timeout(1000 * PATIENCE)
         await page.goto(url)
         await page.wait_for_selector(PICTURE)
         yield page

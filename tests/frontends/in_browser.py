@@ -410,6 +410,8 @@ async def lab(picture: str | None = None) -> None:
                 await browser.get_by_role("button", name="Check the answer").click()
                 kind = "success" if attempt.right else "warning"
                 await browser.locator(f".v-alert.text-{kind}").get_by_text(attempt.words).wait_for()
+            if number == 0:
+                await accessible(browser)
             if picture is not None and number == 1:
                 await shows(browser, plotter)
                 image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
