@@ -2,17 +2,22 @@
 
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any
 
 from blobtree import Node
 from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
+from blobtree.transpile.python import plain_python
 from decals.errors import InvalidEdit
 from decals.validation import finite_number, one_of
 
 SLIDER_REACH = 4.0
 """Largest value of a slider for a number without unit and range, over the present value or 1."""
+
+CURVE_STEPS = 24
+"""Pieces of the curve of a falloff."""
 
 STEPS = 200
 """Steps of a slider from end to end."""
@@ -48,6 +53,8 @@ class Control:
         Texts of a choice.
     optional
         An empty field gives None.
+    curve
+        Points of the curve of a choice, in a square of the size 1, as SVG writes them; "" for none.
     """
 
     name: str
@@ -60,6 +67,7 @@ class Control:
     step: float = 0.0
     choices: tuple[str, ...] = ()
     optional: bool = False
+    curve: str = ""
 
 
 def controls_of(node: Node, size: float) -> list[dict[str, Any]]:
@@ -82,7 +90,8 @@ def _control(parameter: Parameter, value: Any, size: float) -> Control:
     if quantity is Quantity.COLOR:
         return Control(parameter.name, "color", hex_color(value), doc)
     if quantity is Quantity.FALLOFF:
-        return Control(parameter.name, "choice", _falloff_name(value), doc, choices=tuple(FALLOFF_NAMES))
+        names, curve = tuple(FALLOFF_NAMES), _curve(value)
+        return Control(parameter.name, "choice", _falloff_name(value), doc, choices=names, curve=curve)
     if quantity is Quantity.CHOICE:
         return Control(parameter.name, "choice", value, doc, choices=parameter.choices)
     if quantity in NUMBERS and not isinstance(value, tuple):
@@ -118,6 +127,14 @@ def hex_color(rgb: tuple[float, float, float]) -> str:
 
 def _falloff_name(falloff: Falloff) -> str:
     return next((name for name, other in FALLOFF_NAMES.items() if other == falloff), falloff.name)
+
+
+@cache
+def _curve(falloff: Falloff) -> str:
+    """Return the field over the distance, from the top left to the bottom right."""
+    plain: Any = plain_python(falloff.value.func)  # type: ignore[arg-type]  # a Python function
+    values = [float(plain(step / CURVE_STEPS)) for step in range(CURVE_STEPS + 1)]
+    return " ".join(f"{step / CURVE_STEPS:.3f},{1.0 - value:.3f}" for step, value in enumerate(values))
 
 
 def _shortened(value: Any) -> str:

@@ -1,14 +1,22 @@
 """The outline of a scene: objects, the nodes of their trees, layers and images, as rows of a list."""
 
+from base64 import b64encode
 from dataclasses import asdict, dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
+from PIL import Image
 
 from blobtree.nodes.paths import Path as TreePath
 from decals.editing.document import Document
 from decals.scenes.objects import TreeObject
+from decals.scenes.scene import DecalImage
+
+PICTURE_SIZE = 32
+"""Width and height of pictures of images, in pixels."""
 
 MAX_ROWS = 2000
 """Most rows of one object: a page with more is slow."""
@@ -30,6 +38,8 @@ class Row:
         Indentation.
     hidden, locked
         True if the user hid or locked it.
+    picture
+        URL of a small picture of an image; "" for other rows.
     """
 
     key: str
@@ -38,6 +48,7 @@ class Row:
     depth: int
     hidden: bool = False
     locked: bool = False
+    picture: str = ""
 
 
 def key_of(number: int, path: TreePath) -> str:
@@ -63,9 +74,24 @@ def outline(document: Document) -> list[dict[str, Any]]:
     for layer in np.unique(np.concatenate([document.decals.column("layers"), hidden])).tolist():
         flags = layer in hidden, layer in document.locked_layers
         rows.append(Row(f"layer {layer}", f"layer {layer}", "layer", 0, *flags))
-    images = (Path(image.source).name for image in document.images)
-    rows += [Row(f"image {number}", name, "image", 0) for number, name in enumerate(images)]
+    for number, image in enumerate(document.images):
+        name, picture = Path(image.source).name, _picture(image)
+        rows.append(Row(f"image {number}", name, "image", 0, picture=picture))
     return [asdict(row) for row in rows]
+
+
+_pictures: WeakKeyDictionary[DecalImage, str] = WeakKeyDictionary()
+
+
+def _picture(image: DecalImage) -> str:
+    """Return a small picture as a URL with its data; "" for images that are no bytes."""
+    if image.pixels.dtype != np.uint8:
+        return ""
+    if image not in _pictures:
+        file = BytesIO()
+        Image.fromarray(image.pixels).resize((PICTURE_SIZE, PICTURE_SIZE)).save(file, "PNG")
+        _pictures[image] = f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+    return _pictures[image]
 
 
 def _nodes(number: int, item: TreeObject) -> list[Row]:
@@ -78,7 +104,7 @@ def _nodes(number: int, item: TreeObject) -> list[Row]:
             break
         count = len(node.children)
         kind = "primitive" if count == 0 else "modifier" if count == 1 else "combination"
-        flags = (bool(path) and path in paths for paths in (item.hidden, item.locked))
-        rows.append(Row(key_of(number, path), type(node).__name__, kind, 1 + len(path), *flags))
+        hidden, locked = (bool(path) and path in paths for paths in (item.hidden, item.locked))
+        rows.append(Row(key_of(number, path), type(node).__name__, kind, 1 + len(path), hidden, locked))
         pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
     return rows

@@ -313,7 +313,8 @@ class Page:
             vuetify3.VListItem(
                 title=("row.label",),
                 raw_attrs=['role="button"'],
-                prepend_icon=(ROW_ICONS,),
+                prepend_icon=(f"row.picture ? '' : {ROW_ICONS}",),
+                prepend_avatar=("row.picture",),
                 active=("row.key === selected || marked.includes(row.key)",),
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
                 classes="flex-grow-1",

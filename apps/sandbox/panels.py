@@ -38,6 +38,11 @@ BRUSH_TEXTS = {
 WORDS = "c.name.replaceAll('_', ' ')"
 """Name of the control ``c`` in words."""
 
+CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
+  style="width: 100%; height: 48px"><polyline :points="c.curve" fill="none" stroke="currentColor"
+  stroke-width="2" vector-effect="non-scaling-stroke"/></svg>"""
+"""The curve of the control ``c``."""
+
 DROP = "dropped = Array.from($event.{}.files)"
 """Send files to the state of the page, which turns them into names and bytes."""
 
@@ -116,6 +121,7 @@ def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "
             update_modelValue=(event, f"[{who}, $event, true]"),
             **FIELD,
         )
+        html.Div(CURVE, v_if="c.curve")
         vuetify3.VSwitch(
             v_if="c.kind === 'switch'",
             model_value=("c.value",),

@@ -1,10 +1,13 @@
 """Controls of the sandbox: every parameter has one, and what a page sends back is the parameter's value."""
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from blobtree import Node, Point, Polygon, Twist
+from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import parameters_of
 from decals.apps.sandbox import catalog
 from decals.apps.sandbox.controls import controls_of, hex_color, parsed
@@ -56,6 +59,16 @@ def test_controls_of_a_ball() -> None:
     assert (center["kind"], center["value"], center["unit"]) == ("vector", [1.0, 2.0, 3.0], "model units")
     assert (radius["kind"], radius["value"], radius["high"]) == ("number", 0.5, 2.0)
     assert (color["kind"], color["value"]) == ("color", "#ff8000")
+
+
+def test_the_curve_of_a_falloff_falls_from_one_to_zero() -> None:
+    for name, falloff in FALLOFF_NAMES.items():
+        node: Any = replace(BALL, falloff=name)
+        text = next(control["curve"] for control in controls_of(node, 2.0) if control["name"] == "falloff")
+        x, y = np.array([point.split(",") for point in text.split()], np.float64).T
+        np.testing.assert_allclose((x[0], y[0], x[-1], y[-1]), (0, 0, 1, 1), atol=1e-3)
+        assert (np.diff(y) >= 0).all()
+        assert np.interp(falloff.rim, x, y) == pytest.approx(0.5, abs=0.02)
 
 
 def test_what_a_page_sends_is_parsed() -> None:

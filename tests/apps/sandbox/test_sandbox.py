@@ -143,6 +143,9 @@ def test_values_of_a_page_are_plain_and_follow_the_session(window: EditWindow) -
     assert json.loads(json.dumps(values, default=list)) is not None
     assert [row["key"] for row in values["outline"]] == ["object 0", "0", "0/0", "0/1", "layer 0", "image 0"]
     assert (values["selected"], values["panel"]["controls"], values["done"]) == ("", [], [])
+    assert [row["key"] for row in values["outline"] if row["picture"].startswith("data:image/png")] == [
+        "image 0"
+    ]
     sandbox.select("0/1")
     values = sandbox.values()
     assert (values["selected"], values["panel"]["kind"]) == ("0/1", "Point")
