@@ -240,9 +240,10 @@ class DragSurface(PrimitiveCommand):
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        tree, path = self.tree(document), tuple(self.path)
+        tree = self.tree(document)
+        low, high = node_at(tree, self.path).support
+        path = tuple(self.path)
         start, end = (finite_vector(name, getattr(self, name), InvalidEdit) for name in ("start", "end"))
-        low, high = node_at(tree, path).support
         parameters = [
             parameter
             for parameter in numeric_parameters(tree)
