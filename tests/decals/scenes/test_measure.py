@@ -11,7 +11,10 @@ import decals
 from blobtree import Point
 from decals.errors import InvalidScene
 from decals.scenes.measure import measure
-from tests.decals.meshes import icosphere
+from decals.surfaces import MeshSurface
+from tests.decals.distortion import random_points
+from tests.decals.fault_models import FAULT_MODELS
+from tests.decals.meshes import box, icosphere, plane, sphere
 
 SQUARE = [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]
 DISTANCE = 1.2
@@ -107,3 +110,42 @@ def test_numbers_are_reproducible_and_become_json() -> None:
 def test_refuses(wrong: dict[str, Any], says: str) -> None:
     with pytest.raises(InvalidScene, match=says):
         measure(**{"scene": flat_scene([[0, 0, 0]], 1.0)} | wrong)
+
+
+def item(name: str, surface: MeshSurface) -> decals.MeshObject:
+    return decals.MeshObject(name, surface.vertices, surface.faces)
+
+
+@pytest.mark.parametrize(
+    "objects",
+    [
+        (item("floor", plane(4.0)), item("box", box((1.4, 1.0, 1.0), (0.0, 0.0, 0.5)))),
+        (item("wall", box((3.0, 3.0, 0.4))), item("ball", sphere(0.8, (0.1, 0.2, 0.35), 3))),
+        (item("ball", sphere(0.8, level=3)), item("other", sphere(0.8, (0.9, 0.0, 0.2), 3))),
+    ],
+    ids=["box on a floor", "ball in a wall", "two balls"],
+)
+def test_no_decal_is_a_sliver_where_objects_meet(
+    objects: tuple[decals.MeshObject, decals.MeshObject],
+) -> None:
+    layout = decals.scatter(objects, count=80, seed=1)
+    camera = decals.Camera.fitting(objects[0].vertices)
+    scene = decals.Scene(objects=objects, camera=camera, decals=layout, images=["tile"])
+    measures = measure(scene, samples=20_000)
+    shares = measures.decals.visible_area / (np.pi * layout.radii.astype(np.float64) ** 2)
+    assert shares.min() > 0.15
+    assert measures.coverage > 0.9999
+
+
+def test_ragged_borders_are_covered() -> None:
+    """A bowl that has lost random triangles near its rim."""
+    for seed in (1, 2):
+        vertices, faces = FAULT_MODELS["bowl"]()
+        near_rim = vertices[faces].mean(axis=1)[:, 2] > 0.05
+        lost = near_rim & (np.random.default_rng(seed).random(len(faces)) < 0.4)
+        mesh = vertices, faces[~lost]
+        layout = decals.scatter(MeshSurface(*mesh), count=100, seed=seed)
+        points, normals = random_points(mesh, 50_000, seed)
+        found = decals.evaluate(layout, points, normals)
+        assert ((found.owner >= 0) & (((found.uv - 0.5) ** 2).sum(axis=1) <= 0.2501)).all()
+        assert layout.radii.max() < 1.6 * np.median(layout.radii)
