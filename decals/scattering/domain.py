@@ -43,7 +43,7 @@ Mask: TypeAlias = Callable[[Float32Array], ArrayLike]
 """Where particles may lie: a function of ``points[n, 3]`` to ``bool[n]``."""
 
 
-SAME_NORMAL = 0.998
+SAME_NORMAL = 0.9998
 """Cosine of the angle between two normals that count as the same."""
 
 
