@@ -10,6 +10,7 @@ from tests.apps.commands.pictures import picture
 Capture = pytest.CaptureFixture[str]
 
 
+@pytest.mark.slow
 def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr("decals.apps.commands.demo.COUNT", 120)
     assert run(["demo", "--size", "80x60", "--samples", "1"]) == 0

@@ -83,6 +83,7 @@ def test_all_models_except_the_horse_stand_along_y() -> None:
     assert axes_of("horse").up == (0.0, 0.0, 1.0)
 
 
+@pytest.mark.slow
 def test_decals_run_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("decals.apps.commands.demo.COUNT", 300)
     scene = nest_scene(progress=lambda _stage, _fraction: None)

@@ -43,12 +43,12 @@ def sandbox(shared: EditWindow) -> Iterator[Sandbox]:
 
 
 def settle(sandbox: Sandbox, window: EditWindow) -> None:
-    """Wait until the view shows what it should."""
+    """Wait until the view shows what it should: one call installs what was made, the next begins new work."""
     finish(window)
-    sandbox.settle()
-    while sandbox.values()["display"]["busy"]:
+    idle = 0
+    while idle < 3:
         sandbox.settle()
-    sandbox.settle()
+        idle = 0 if sandbox.values()["display"]["busy"] else idle + 1
 
 
 def picture(window: EditWindow) -> np.ndarray:

@@ -88,8 +88,17 @@ PLACEMENTS = {
 }
 
 
+FURTHER = ("moved", "turned and scaled", "shrunk and scaled")
+
+
 @EACH
-@pytest.mark.parametrize("place", PLACEMENTS.values(), ids=PLACEMENTS)
+@pytest.mark.parametrize(
+    "place",
+    [
+        pytest.param(place, id=name, marks=pytest.mark.slow if name in FURTHER else ())
+        for name, place in PLACEMENTS.items()
+    ],
+)
 def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:
     placed = place(node)
     points = points_around(np.random.default_rng(2), placed, 300)

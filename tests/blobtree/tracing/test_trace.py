@@ -91,6 +91,7 @@ def test_a_capsule() -> None:
 RAYS, STEPS = 40, 1500
 
 
+@pytest.mark.slow_cases("0")
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
 def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     """Against dense marching in float64: never later than the first sample inside, and on the surface."""

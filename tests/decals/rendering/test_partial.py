@@ -81,16 +81,10 @@ def parallel(scene: Edited) -> Projection:
 
 
 CASES = [(PLAIN_KINDS, Contact.PRODUCT), *((KINDS, contact) for contact in Contact)]
-ORDINARY = {
-    ("fragment", CASES[0]),
-    ("fragment", (KINDS, Contact.RADIAL)),
-    ("fragment", (KINDS, Contact.ELASTIC)),
-    ("compute", (KINDS, Contact.MIN)),
-}
-"""Each contact once. What an edit can reach is found in the same way for both kinds of shaders."""
+ORDINARY = {("fragment", (KINDS, Contact.ELASTIC))}
+"""The default contact. What an edit can reach is found in the same way for both kinds of shaders."""
 
 
-@pytest.mark.slow_cases("fragment-kinds0-0", "fragment-kinds3-2")
 @pytest.mark.parametrize(
     ("drawer", "kinds", "contact"),
     [

@@ -95,7 +95,7 @@ RANDOM_SURFACES = given(
 )
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 @RANDOM_SURFACES
 def test_random_surfaces_keep_the_invariants(
     number: int, count: int, fixed: int, parts: int, flat: bool

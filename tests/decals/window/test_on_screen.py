@@ -70,6 +70,7 @@ def test_ctrl_c_in_the_terminal_closes_the_window(display: str, tmp_path: Path) 
     assert len(load_scene(tmp_path / "knot-decals.recovery.json", samples=sample_mesh).decals) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only X servers are missing silently")
 def test_a_display_that_does_not_answer_is_an_error(tmp_path: Path) -> None:
     command = "import sys; from decals.apps.cli import run; sys.exit(run(['edit', 'knot', '--decals', '2']))"

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from blobtree import Point
 from decals.editing.scatter_commands import decals_on
@@ -25,6 +26,7 @@ def place(driver: Any) -> Any:
     return next(at for number, at in driver.visible() if number in on_tree)
 
 
+@pytest.mark.slow
 def test_primitives_grow_join_and_go_and_undo_gives_the_first_picture(driver: Driver) -> None:
     first, state, at = fresh(driver), driver.state, place(driver)
     pictures = [first]
