@@ -92,6 +92,12 @@ class OffsetTreeDrawable(TreeDrawable):
     _shell: tuple[Shell, DataTexture] | None = None
     _box_of: tuple[Program, moderngl.VertexArray] | None = None
 
+    def prepare(self, source: DecalSource) -> None:
+        """Make everything that `draw_offset` needs at the first call."""
+        assert source.relief is not None
+        self._shell_for(source.relief.reach)
+        offset_program(self._context, self.kinds, source)
+
     def draw_offset(
         self,
         object_id: int,

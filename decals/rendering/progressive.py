@@ -410,11 +410,7 @@ def plan_frame(
     """
     state = TargetState.of(scene, uploaded.bounds, tile, options, depth=depth)
     dirty = state.dirty(previous, tile)
-    source = None
-    if uploaded.decals is not None:
-        modes = options.mapping, options.contact, options.stiffness
-        maps = uploaded.masks, uploaded.materials, uploaded.relief
-        source = DecalSource(uploaded.decals, *modes, *maps, options.lights, uploaded.walks)
+    source = decal_source(uploaded, options)
     steps = _surface_steps(uploaded, tile, targets, source, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
     rest = targets.rest_for(uploaded)
@@ -426,6 +422,15 @@ def plan_frame(
     light_arguments = gbuffer, paint, tile, radius, options.lights, materials, relief
     steps += [partial(targets.light_pass.draw, rectangle, *light_arguments) for rectangle in dirty.light]
     return FramePlan(state, steps, dirty.work(tile))
+
+
+def decal_source(uploaded: UploadedScene, options: RenderOptions) -> DecalSource | None:
+    """Return the decals of a scene and how options draw them; None without decals."""
+    if uploaded.decals is None:
+        return None
+    modes = options.mapping, options.contact, options.stiffness
+    maps = uploaded.masks, uploaded.materials, uploaded.relief
+    return DecalSource(uploaded.decals, *modes, *maps, options.lights, uploaded.walks)
 
 
 def _surface_steps(

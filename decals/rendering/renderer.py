@@ -44,6 +44,7 @@ from decals.rendering.progressive import (
     TargetPool,
     Targets,
     TargetState,
+    decal_source,
     plan_frame,
 )
 from decals.rendering.tree import TreeHolder
@@ -427,7 +428,18 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
         WarmupTask(SHADERS, partial(depth_program, context)),
         WarmupTask(SHADERS, partial(resolve_program, context)),
     ]
+    if relief:
+        tasks.append(WarmupTask(SHADERS, partial(_compile_offsets, uploads, scene, options)))
     return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light, materials, relief), tasks)
+
+
+def _compile_offsets(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> None:
+    """Compile the programs that trace the trees that heights of a scene move."""
+    uploaded = uploads.scene(scene, options.mapping)
+    source = decal_source(uploaded, options)
+    for drawable in uploaded.drawables:
+        if source is not None and isinstance(drawable, OffsetTreeDrawable):
+            drawable.prepare(source)
 
 
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
