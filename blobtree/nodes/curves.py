@@ -21,9 +21,9 @@ from blobtree.nodes.primitives import (
     JoinedPrimitive,
     Pieces,
     Primitive,
+    RoundPrimitive,
     Segment,
     beside,
-    octagons,
 )
 from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
@@ -42,7 +42,7 @@ STEEPEST_RADIUS = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Circle(Primitive):
+class Circle(RoundPrimitive):
     """A tube around a circle, the same shape as a `Torus`.
 
     Examples
@@ -61,11 +61,6 @@ class Circle(Primitive):
     _: KW_ONLY
     radius: Radius
     color: Color = DEFAULT_COLOR
-
-    @classmethod
-    def hull(cls, columns: Columns) -> Float64Array:
-        """Return the corners of an octagon around the circle."""
-        return octagons(columns["center"], columns["axis"], columns["circle_radius"])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

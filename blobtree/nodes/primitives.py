@@ -233,6 +233,15 @@ class Primitive(Profile, Leaf, ProgramPrimitive):
         return np.concatenate([head, influences[:, :1], tail], axis=1).reshape(count, -1, 4)
 
 
+class RoundPrimitive(Primitive):
+    """A primitive around a circle or a disc, which declares a centre, an axis and a radius in this order."""
+
+    @classmethod
+    def hull(cls, columns: Columns) -> Float64Array:
+        """Return the corners of an octagon around the circle."""
+        return octagons(*columns.values())
+
+
 class JoinedPrimitive(Primitive):
     """A primitive that may be a piece of a longer one, which goes on at its joints (`JOINT_YIELD`)."""
 
@@ -339,7 +348,7 @@ class Cone(Primitive):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Torus(Primitive):
+class Torus(RoundPrimitive):
     """A torus: a tube around a circle.
 
     Examples
@@ -360,14 +369,9 @@ class Torus(Primitive):
     radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the tube")]
     color: Color = DEFAULT_COLOR
 
-    @classmethod
-    def hull(cls, columns: Columns) -> Float64Array:
-        """Return the corners of an octagon around the circle."""
-        return octagons(columns["center"], columns["axis"], columns["ring_radius"])
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Disc(Primitive):
+class Disc(RoundPrimitive):
     """A flat disc with a rounded edge: everything within `radius` of the disc.
 
     Examples
@@ -387,11 +391,6 @@ class Disc(Primitive):
     _: KW_ONLY
     radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
     color: Color = DEFAULT_COLOR
-
-    @classmethod
-    def hull(cls, columns: Columns) -> Float64Array:
-        """Return the corners of an octagon around the disc."""
-        return octagons(columns["center"], columns["axis"], columns["disc_radius"])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
