@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from blobtree.transpile.python import plain_python, vector
@@ -58,6 +58,7 @@ def test_one_sample_a_pixel_is_near_the_mean(
 SLOPES = st.tuples(*[st.floats(-1, 1)] * 2).filter(lambda a: max(map(abs, a)) > 1e-3)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-1, 1), SLOPES), min_size=1, max_size=3))
 def test_parts_of_a_pixel_inside_lines_are_exact(lines: list[tuple[float, tuple[float, float]]]) -> None:
     directions = [np.array(along) / np.hypot(*along) for _, along in lines]
