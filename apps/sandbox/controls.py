@@ -131,8 +131,11 @@ def _falloff_name(falloff: Falloff) -> str:
 
 @cache
 def _curve(falloff: Falloff) -> str:
-    """Return the field over the distance, from the top left to the bottom right."""
-    plain: Any = plain_python(falloff.value.func)  # type: ignore[arg-type]  # a Python function
+    """Return the field over the distance, from the top left to the bottom right; "" if its source is gone."""
+    try:
+        plain: Any = plain_python(falloff.value.func)  # type: ignore[arg-type]  # a Python function
+    except OSError:
+        return ""
     values = [float(plain(step / CURVE_STEPS)) for step in range(CURVE_STEPS + 1)]
     return " ".join(f"{step / CURVE_STEPS:.3f},{1.0 - value:.3f}" for step, value in enumerate(values))
 

@@ -6,9 +6,10 @@ import pytest
 from tests.soundness import failures_of, random_tree
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
-def test_random_trees_of_all_nodes_are_sound(seed: int) -> None:
+@pytest.mark.ordinary_cases("8-4")
+@pytest.mark.parametrize(("seed", "count"), [(8, 4), *((seed, 10) for seed in range(8))])
+def test_random_trees_of_all_nodes_are_sound(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
-    trees = [random_tree(rng) for _ in range(10)]
+    trees = [random_tree(rng) for _ in range(count)]
     found = {repr(tree): failures_of(tree, rng) for tree in trees}
     assert {text: failures for text, failures in found.items() if failures} == {}

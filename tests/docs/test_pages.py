@@ -210,6 +210,7 @@ def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("small_pictures")
 @pytest.mark.slow_cases(
     "baking",
+    "character",
     "contact",
     "custom-nodes",
     "decals",
