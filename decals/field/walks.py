@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.kernels import loaded
+from blobtree.progress import reporting
 from decals.field.mapping import ImageMapping
 from decals.field.walk import (
     CELLS,
@@ -120,8 +121,18 @@ class Walks:
         >>> (0.6 * (seen.uv - 0.5)).round(3).tolist()
         [[0.2..., 0.1...]]
         """
-        records = decals.arrays[RECORDS] if isinstance(decals, DecalEditor) else decals.packed()
-        rows = records.reshape(-1, RECORD, 4)[:, :3].reshape(-1, 12).copy()
+        return cls.of_rows(walk_rows(decals), models, previous=previous, only=only)
+
+    @classmethod
+    def of_rows(
+        cls,
+        rows: Float32Array,
+        models: Iterable[Any],
+        *,
+        previous: "Walks | None" = None,
+        only: ArrayLike | None = None,
+    ) -> "Walks":
+        """Walk from the centres of decals as `over` does; the rows are those of `walk_rows`."""
         radii = (RIM_RADIUS * rows[:, 3]).astype(np.float32)
         meshes = tuple(_meshes(models, radii))
         slots = np.full(len(rows), -1, np.int64)
@@ -172,6 +183,12 @@ class Walks:
         return result
 
 
+def walk_rows(decals: Decals | DecalEditor) -> Float32Array:
+    """Return a copy of what decides the walks of decals: their centres, radii and axes, float32[n, 12]."""
+    records = decals.arrays[RECORDS] if isinstance(decals, DecalEditor) else decals.packed()
+    return records.reshape(-1, RECORD, 4)[:, :3].reshape(-1, 12).copy()
+
+
 def walks_for(
     mapping: ImageMapping,
     decals: Decals | DecalEditor,
@@ -182,7 +199,12 @@ def walks_for(
     """Return the walks of decals over the objects with a surface; None in mappings that need none."""
     if mapping is not ImageMapping.WALKED:
         return None
-    return Walks.over(decals, [item for item in objects if hasattr(item, "surface")], only=only)
+    return Walks.over(decals, with_surface(objects), only=only)
+
+
+def with_surface(objects: Iterable[Any]) -> list[Any]:
+    """Return the objects over which decals can walk."""
+    return [item for item in objects if hasattr(item, "surface")]
 
 
 def _meshes(models: Iterable[Any], radii: Float32Array) -> Iterable[MeshSurface]:
@@ -208,17 +230,19 @@ def _walk(rows: Float32Array, meshes: Sequence[MeshSurface]) -> tuple[Int32Array
         best = np.minimum(best, found)
     mesh_of[best > FARTHEST * RIM_RADIUS * rows[:, 3]] = -1
     numbers, grids = [np.zeros(0, np.int64)], [np.zeros((0, GRID, 4), np.float32)]
-    for number, mesh in enumerate(meshes):
-        own = np.flatnonzero(mesh_of == number)
-        for first in range(0, len(own), AT_ONCE):
-            part = own[first : first + AT_ONCE]
-            needed, made = _grids(rows[part], mesh)
-            numbers.append(part[needed])
-            grids.append(made)
+    with reporting() as report:
+        for number, mesh in enumerate(meshes):
+            own = np.flatnonzero(mesh_of == number)
+            for first in range(0, len(own), AT_ONCE):
+                report("walking over the surface", first / len(own))
+                part = own[first : first + AT_ONCE]
+                needed, made = _grids(rows[part], mesh)
+                numbers.append(part[needed])
+                grids.append(made)
     return np.concatenate(numbers).astype(np.int32), np.concatenate(grids)
 
 
-AT_ONCE = 256
+AT_ONCE = 64
 """Decals whose grids are made at once; the 441 relays and 512 cells of each take 29 KB."""
 
 

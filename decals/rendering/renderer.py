@@ -343,6 +343,13 @@ class Renderer:
         """
         return self._uploads.decals(scene), self._uploads.images(scene)
 
+    def walks_ready(self, scene: SceneLike) -> bool:
+        """Return True if pictures in the mapping WALKED need not wait for walks of the decals of a scene.
+
+        Otherwise the walks are being computed in a thread. A new state of the scene cancels the former one's.
+        """
+        return not len(scene.decals) or self._uploads.walk_cache.ready(scene)
+
     @property
     def backend(self) -> PassBackend:
         """Kind of shader, fragment or compute, that runs passes over all pixels."""

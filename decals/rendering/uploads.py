@@ -34,6 +34,7 @@ from decals.rendering.materials import (
 from decals.rendering.options import SceneLike, check_scene, drawn_objects, is_limited
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
+from decals.rendering.walk_cache import WalkCache
 from decals.rendering.warmup import WarmupPlan
 from decals.validation import require_rgba
 
@@ -558,6 +559,11 @@ class Uploads:
     """Objects, decals and images of scenes on the GPU; they stay until a `sweep` after which they are unused.
 
     The context must be current.
+
+    Attributes
+    ----------
+    walk_cache
+        The walks of the last scene in the mapping WALKED.
     """
 
     def __init__(self, context: Context) -> None:
@@ -568,7 +574,8 @@ class Uploads:
         self._materials: GpuCache[MaterialArray] = GpuCache()
         self._reliefs: GpuCache[ReliefArray] = GpuCache()
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
-        self._walks: tuple[tuple[int, ...], tuple[object, ...], Walks, DataTexture] | None = None
+        self.walk_cache = WalkCache()
+        self._walks: tuple[Walks, DataTexture] | None = None
 
     def scene(self, scene: SceneLike, mapping: ImageMapping = ImageMapping.CORRECTED) -> UploadedScene:
         """Return a whole scene, with walks for the mapping WALKED; errors are those of `check_scene`."""
@@ -582,26 +589,18 @@ class Uploads:
         return UploadedScene(drawables, self.decals(scene), images, masks, materials, relief, walks)
 
     def walks(self, scene: SceneLike, mapping: ImageMapping) -> DataTexture | None:
-        """Return the walks of a scene's decals over its objects; None in other mappings, or without decals.
-
-        After an edit, only decals that changed walk again.
-        """
+        """Return the walks of a scene's decals; None in other mappings, or without decals."""
         if mapping is not ImageMapping.WALKED or not len(scene.decals):
             return None
-        objects = [item for item in drawn_objects(scene) if hasattr(item, "surface")]
-        version = scene.decals.version if isinstance(scene.decals, DecalEditor) else 0
-        key = version, id(scene.decals), *map(id, objects)
-        if self._walks is None or self._walks[0] != key:
-            previous = None if self._walks is None else self._walks[2]
-            walks = Walks.over(scene.decals, objects, previous=previous)
+        walks = self.walk_cache.get(scene)
+        if self._walks is None or self._walks[0] is not walks:
             self._release_walks()
-            kept_alive = scene.decals, *objects
-            self._walks = key, kept_alive, walks, DataTexture(self.context, walks.texels)
-        return self._walks[3]
+            self._walks = walks, DataTexture(self.context, walks.texels)
+        return self._walks[1]
 
     def _release_walks(self) -> None:
         if self._walks is not None:
-            self._walks[3].release()
+            self._walks[1].release()
         self._walks = None
 
     def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArray | None:
@@ -687,3 +686,4 @@ class Uploads:
             cache.release()
         self._release_masks()
         self._release_walks()
+        self.walk_cache.release()

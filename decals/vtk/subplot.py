@@ -150,6 +150,8 @@ class SubplotRenderer(KnownAttributes):
         If True, frames end when the graphics card has finished, so that they can be timed.
     keep_previous_frame : bool
         If True, the previous frame stays while shaders compile; see `warm`.
+    walks_in_thread : bool
+        If True, the mapping WALKED is drawn as CORRECTED while the walks of decals are computed in a thread.
 
     Examples
     --------
@@ -168,6 +170,7 @@ class SubplotRenderer(KnownAttributes):
     vtk_renderer: pv.Renderer
     wait_for_gpu: bool
     keep_previous_frame: bool
+    walks_in_thread: bool
     status: FrameStatus
     applied: InjectedDecals
 
@@ -178,7 +181,8 @@ class SubplotRenderer(KnownAttributes):
         self._samples, self._draw_scale = 2, 1.0
         self._settings: dict[str, Any] = {}
         self._lights = Lights.SCENE
-        self.wait_for_gpu = self.keep_previous_frame = False
+        self.wait_for_gpu = self.keep_previous_frame = self.walks_in_thread = False
+        self._walking = False
         self.status = FrameStatus.EMPTY
         self._scene: SceneLike | None = None
         self._context = context
@@ -309,6 +313,29 @@ class SubplotRenderer(KnownAttributes):
         self._draw_with("mapping", mapping)
 
     @property
+    def shown_mapping(self) -> ImageMapping:
+        """Image mapping of a frame that is drawn now: CORRECTED while walks are computed in a thread."""
+        mapping, scene = self.mapping, self._scene
+        if mapping is not ImageMapping.WALKED or not self.walks_in_thread or scene is None:
+            return mapping
+        if self._frames is None or self._frames.renderer.walks_ready(scene):
+            return mapping
+        self._walking = True
+        return ImageMapping.CORRECTED
+
+    @property
+    def walking(self) -> bool:
+        """True while walks are computed in a thread, until `end_walking`."""
+        return self._walking
+
+    def end_walking(self) -> bool:
+        """Return True once after the end of walks that were computed in a thread: another frame is due."""
+        if not self._walking or self.shown_mapping is not self.mapping:
+            return False
+        self._walking = False
+        return True
+
+    @property
     def contact(self) -> AnyContact:
         """Contact mode; see `decals.Contact`."""
         return self.drawing.contact
@@ -386,7 +413,7 @@ class SubplotRenderer(KnownAttributes):
         inside = 0 <= column - left < width and 0 <= row - low < height
         if self.scene is None or not inside:
             return None
-        options = self.drawing.at((width, height))
+        options = self._shown_drawing.at((width, height))
         with self.current():
             buffers = self.renderer.buffers_at(
                 self.scene, column - left, row - low, options, viewpoint=self.viewpoint()
@@ -579,8 +606,12 @@ class SubplotRenderer(KnownAttributes):
         supersampled = size[0] > self.vtk_renderer.GetSize()[0]
         return FrameOptions(self._render_options(size, 1 if supersampled else samples))
 
+    @property
+    def _shown_drawing(self) -> Drawing:
+        return replace(self.drawing, mapping=self.shown_mapping)
+
     def _render_options(self, size: Size, samples: int) -> RenderOptions:
-        return replace(self.drawing, samples=samples, lights=self.lighting()).at(size)
+        return replace(self._shown_drawing, samples=samples, lights=self.lighting()).at(size)
 
     def prepare(self, samples: int, seconds: float) -> float | None:
         """Draw a slice of a later frame of the window's size, without showing it.

@@ -236,8 +236,8 @@ class FrameController:
         return self._drawn_version != self._version()
 
     def begin(self) -> None:
-        """Begin with a coarse frame, and keep it while shaders are compiled."""
-        self._subplot.keep_previous_frame = True
+        """Begin with a coarse frame, and keep it while shaders are compiled; walks run in a thread."""
+        self._subplot.keep_previous_frame = self._subplot.walks_in_thread = True
         self._subplot.draw_scale = FIRST_SCALE
         self._set_coarse()
         self._changed_at -= REFINE_DELAY
@@ -270,10 +270,13 @@ class FrameController:
         subplot.keep_previous_frame = keep
 
     def require_whole(self) -> None:
-        """Draw a whole frame now, unless the shown one is whole."""
+        """Draw a whole frame now, with all walks, unless the shown one is whole."""
         subplot = self._subplot
-        if subplot.warming_up or (subplot.draw_scale, subplot.samples) != (1.0, self.samples):
+        whole = (subplot.draw_scale, subplot.samples) == (1.0, self.samples)
+        if not whole or subplot.warming_up or subplot.walking:
+            aside, subplot.walks_in_thread = subplot.walks_in_thread, False
             self.draw_whole()
+            subplot.walks_in_thread = aside
 
     def refine_when_due(self) -> None:
         """Improve a coarse frame for one slice, once nothing has moved for `REFINE_DELAY`."""

@@ -152,6 +152,10 @@ def eye_and_target(subplot: SubplotRenderer) -> tuple[ArrayLike, ArrayLike]:
     return camera.position, camera.focal_point
 
 
+FRAME_SETTINGS = "draw_scale", "samples", "wait_for_gpu", "keep_previous_frame", "walks_in_thread"
+"""Settings of a subplot that say how it draws frames for a window."""
+
+
 class SubplotBackup:
     """Scene and settings of a subplot before a document is edited in it.
 
@@ -163,14 +167,13 @@ class SubplotBackup:
 
     def __init__(self, subplot: SubplotRenderer) -> None:
         self._subplot, self._scene = subplot, subplot.scene
-        self._scale, self._samples = subplot.draw_scale, subplot.samples
-        self._wait, self._keep = subplot.wait_for_gpu, subplot.keep_previous_frame
+        self._kept = {name: getattr(subplot, name) for name in FRAME_SETTINGS}
 
     def restore(self, document: Document) -> None:
         """Restore settings and scene; a scene that was edited is replaced by the result."""
         subplot = self._subplot
-        subplot.draw_scale, subplot.samples = self._scale, self._samples
-        subplot.wait_for_gpu, subplot.keep_previous_frame = self._wait, self._keep
+        for name, value in self._kept.items():
+            setattr(subplot, name, value)
         if subplot.scene is document:
             subplot.scene = document.scene if isinstance(self._scene, Scene) else self._scene
 

@@ -207,11 +207,12 @@ class EditWindow:
         """True while background work runs, or the frame is to be refined."""
         coarse = self.frames.state is FrameState.COARSE
         unsaved = self.actions.files.recovery.pending
-        return not self._closed and (self.background.busy or coarse or unsaved or self.subplot.warming_up)
+        drawing = coarse or self.subplot.warming_up or self.subplot.walking
+        return not self._closed and (self.background.busy or unsaved or drawing)
 
     def _content_version(self) -> tuple[object, ...]:
         subplot, document = self.subplot, self.document
-        modes = subplot.contact, subplot.mapping, subplot.stiffness
+        modes = subplot.contact, subplot.shown_mapping, subplot.stiffness
         return id(document.objects), id(document.images), document.decals.version, *modes
 
     # -- frames -----------------------------------------------------------------------------------------
@@ -260,7 +261,7 @@ class EditWindow:
         if not dragging:
             self.handle.update()
         outlined = () if dragging else self.actions.state.selection  # outlines take longer than the drag
-        self.overlay.outline(self.document, outlined, self.subplot.contact, self.subplot.mapping)
+        self.overlay.outline(self.document, outlined, self.subplot.contact, self.subplot.shown_mapping)
         self.actions.help_pages = self.overlay.show_help(self.actions.help_page)
         self.overlay.show_status(self._status())
         self._host.set_title(self.actions.files.title)
@@ -292,7 +293,7 @@ class EditWindow:
         dragging = self.tools.dragging or self.handle.dragging
         if self._closed or self.warmup.advance():
             return
-        if self.background.poll(dragging=dragging):
+        if self.background.poll(dragging=dragging) or self.subplot.end_walking():
             self.redraw(whole=not dragging)
         elif self.background.busy and self._status_limit.take():
             self._show_status()

@@ -2,6 +2,7 @@
 
 import asyncio
 import gc
+import threading
 import weakref
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 from decals.editing.scatter_commands import decals_on
+from decals.field.mapping import ImageMapping
+from decals.field.walks import Walks
 from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 from tests.decals.vtk.conftest import Factory, plotter
@@ -126,3 +129,44 @@ def test_a_window_of_our_own_without_a_screen_does_not_wait(looping: bool) -> No
     else:
         with pytest.raises(StopIteration):
             play().send(None)
+
+
+def test_input_is_answered_while_walks_are_computed(
+    plotter: Factory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ready, of_rows = threading.Event(), Walks.of_rows
+
+    def late(*given: Any, **options: Any) -> Walks:
+        assert ready.wait(60)
+        return of_rows(*given, **options)
+
+    monkeypatch.setattr(Walks, "of_rows", late)
+    pl = plotter()
+
+    async def play() -> None:
+        window = EditWindow(scene(), plotter=pl)
+        window.show()
+        await rested(window)
+        subplot, driver = window.subplot, Driver(window)
+        corrected = np.asarray(pl.screenshot(None, return_img=True))
+        subplot.mapping = ImageMapping.WALKED
+        window.redraw(whole=True)
+        number, at = next(driver.visible())
+        driver.click(at)
+        assert window.actions.state.selection == (number,)
+        assert (subplot.mapping.name, subplot.shown_mapping.name) == ("WALKED", "CORRECTED")
+        assert window.busy
+        ready.set()
+        await rested(window)
+        assert subplot.shown_mapping.name == "WALKED"
+        driver.key("Escape")
+        await rested(window)
+        pl.render()
+        seen = np.asarray(pl.image)
+        subplot.walks_in_thread = False
+        pl.render()
+        np.testing.assert_array_equal(np.asarray(pl.image), seen)
+        assert (seen != corrected).any()
+        window.close()
+
+    asyncio.run(play())
