@@ -22,6 +22,7 @@ const float LONGEST = 4.0;            // step, over the same
 const float STEPS_PER_GROWTH = 16.0;  // after which the shortest step is longer by itself
 const int SEED_STEPS = 12;            // of the search for a foot from a point of the shell
 const int FOOT_STEPS = 4;             // and from the foot before
+const float RELAXATION = 0.6;         // part of the slope of its cone that the surface is first assumed to rise by
 const float LEAST_SPREAD = 0.5;       // factor between steps over the surface and below it, in hollows
 
 struct Foot {
@@ -81,6 +82,7 @@ float offset_ray(vec3 origin, vec3 direction, inout Foot foot) {
     float t = range.x;
     vec2 outside = vec2(t, -1.0);  // the last place on the ray outside, and the gap there; -1: none
     vec2 inside = vec2(0.0);       // the first place inside
+    float known = t;               // up to here the ray is outside, as cones tell
     bool tracked = false;
     bool met = false;
     for (int i = 0; i < OFFSET_STEPS; i++) {
@@ -94,7 +96,11 @@ float offset_ray(vec3 origin, vec3 direction, inout Foot foot) {
         free -= max(relief_range.y, -relief_range.x);
         if (free > 0.25 * shell_cell) {
             tracked = false;
-            t += free;
+            if (t - free > known) {
+                t = known;  // the step before was too long
+            } else {
+                t = known = t + free;
+            }
             continue;
         }
         bool seeded = !tracked || distance(p, seed.xyz) < distance(p, foot.place);
@@ -103,20 +109,29 @@ float offset_ray(vec3 origin, vec3 direction, inout Foot foot) {
         }
         move_foot(foot, p, seeded ? SEED_STEPS : FOOT_STEPS, met ? exactness : 0.1 * shortest);
         tracked = true;
-        float rate = 1.0;
+        float nearing = 1.0;  // rates at which the distance to the surface shrinks at most, ahead and back
+        float leaving = 1.0;
+        float rise = 0.0;     // and the heights grow
         float gap = foot.height - relief_range.y;
         if (gap <= exactness) {
             gap = foot.height - relief_height(foot.place, foot.normal);
             float fall = -dot(direction, foot.normal);
             float across = sqrt(max(1.0 - fall * fall, 0.0));
-            float spread = max(1.0 + foot.bend * foot.height, LEAST_SPREAD);
-            rate = max(fall + 0.125 * across * across, 0.0) + across * relief_slope / spread;
+            nearing = max(0.125 * across * across + fall, 1e-6);
+            leaving = max(0.125 * across * across - fall, 1e-6);
+            rise = across * relief_slope / max(1.0 + foot.bend * foot.height, LEAST_SPREAD);
+        }
+        if (!met && t - max(gap, 0.0) / (leaving + rise) > known) {
+            t = known;  // the step before was too long
+            continue;
         }
         met = met || gap <= 0.0;
         float now = t;
         if (gap > 0.0) {
             outside = vec2(t, gap);
-            t += clamp(gap / max(rate, 1e-6), shortest * max(1.0, float(i) / STEPS_PER_GROWTH), longest);
+            float least = shortest * max(1.0, float(i) / STEPS_PER_GROWTH);
+            known = t + clamp(gap / (nearing + rise), least, longest);
+            t += clamp(gap / (nearing + RELAXATION * rise), least, longest);
         } else {
             inside = vec2(t, gap);
         }

@@ -112,8 +112,11 @@ float relief_light_at(vec3 q, float z, vec3 n) {
     vec3 slant = relief_slant(toward, n);
     float range = relief_range.y - relief_range.x;
     float hidden = 0.0;
-    for (int i = 1; i <= SHADOW_STEPS; i++) {
+    for (int i = 1; i < SHADOW_STEPS; i++) {
         float rise = (relief_range.y - z) * float(i) / float(SHADOW_STEPS);
+        if (hidden >= min(relief_range.y - z - rise, SHADOW_EDGE * range)) {
+            break;  // nothing hides more, or the shadow is full
+        }
         hidden = max(hidden, relief_height(q + rise * slant, n) - z - rise);
     }
     return 1.0 - clamp(hidden / (SHADOW_EDGE * range), 0.0, 1.0);

@@ -91,15 +91,18 @@ def slope_bounds(texels: Float32Array) -> Float64Array:
             )
         return values
 
-    near = np.pad(cells(steep, np.maximum), 1, mode="edge")
-    near = np.lib.stride_tricks.sliding_window_view(near, (3, 3)).max(axis=(2, 3))
     highest = cells(texels.astype(np.float64), np.maximum).reshape(-1)
     lowest = cells(texels.astype(np.float64), np.minimum).reshape(-1)
     places = np.indices((count, count)).reshape(2, -1)
-    between = np.maximum(np.abs(places[:, :, None] - places[:, None, :]) - 1, 0) * (2.0 / count)
-    gaps = np.hypot(*between)
-    far = np.where(gaps > 0.0, (highest - lowest[:, None]) / np.where(gaps > 0.0, gaps, 1.0), 0.0)
-    bounds: Float64Array = np.maximum(near, far.max(axis=1).reshape(count, count))
+    apart = np.abs(places[:, :, None] - places[:, None, :])
+    gaps = np.hypot(*np.maximum(apart - 1, 0) * (2.0 / count))
+    slopes = np.where(gaps > 0.0, (highest - lowest[:, None]) / np.where(gaps > 0.0, gaps, 1.0), np.inf)
+    between = [cells(steep, np.maximum)]  # steepest place up to so many cells away, so on the way there
+    for _ in range(count - 1):
+        wider = np.lib.stride_tricks.sliding_window_view(np.pad(between[-1], 1, mode="edge"), (3, 3))
+        between.append(wider.max(axis=(2, 3)))
+    limits = np.stack(between).reshape(count, -1)[apart.max(axis=0), np.arange(count**2)[:, None]]
+    bounds: Float64Array = np.minimum(slopes, limits).max(axis=1).reshape(count, count)
     return bounds
 
 

@@ -2,10 +2,11 @@
 
 A point p has a foot, the closest point q of the surface, at the signed distance d. It is outside if d exceeds
 the height at q. Rays skip space by a shell of cells around the surface, and inside it follow the foot from
-step to step by Newton's method (``shaders/offset.glsl``). No step is longer than the gap d − height over the
-greatest rate at which the gap can shrink: the distance shrinks at most by the ray's own fall, and the height
+step to step by Newton's method (``shaders/offset.glsl``). A safe step is at most the gap d − height over
+the greatest rate at which the gap can shrink: the distance shrinks at most by the fall of the ray, the height
 rises at most by the slope of a cone over the image that contains all its heights (cone step mapping, Dummer
-2006).
+2006). As most cones are far steeper than the heights, a longer step is tried first; where the cones at both
+of its ends do not cover it, the ray goes back to the end of the shorter one (Keinert et al. 2014).
 """
 
 from dataclasses import dataclass
