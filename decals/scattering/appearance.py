@@ -12,6 +12,7 @@ from decals.model import Decals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.gap_filling import EVEN, center_outsized
 from decals.scattering.mean_normals import mean_normals
+from decals.scattering.neighbors import NearestFacing
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii, turned_normals
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
@@ -164,10 +165,18 @@ class Appearance:
             return projected[np.flatnonzero(allowed)]
 
         expected = EXPECTED_RADIUS * spacings.astype(np.float64)
+        bent = self._with_mean_normals(domain, centers, spacings)
+        bent_at = centers.positions
+        nearest = NearestFacing(samples.positions, samples.normals)
 
         def aim(centers: OrientedPoints) -> OrientedPoints:
-            bent = self._with_mean_normals(domain, centers, spacings)
-            normals = turned_normals(bent, centers.normals, samples, expected)
+            nonlocal bent, bent_at
+            moved = np.flatnonzero((centers.positions != bent_at).any(axis=1))
+            normals = bent.normals.copy()
+            normals[moved] = self._with_mean_normals(domain, centers[moved], spacings[moved]).normals
+            bent = OrientedPoints(centers.positions, normals, centers.surface_ids)
+            bent_at = centers.positions
+            normals = turned_normals(bent, centers.normals, samples, nearest, expected)
             return OrientedPoints(centers.positions, normals, centers.surface_ids)
 
         even = bool(spacings.max() <= EVEN * spacings.min())

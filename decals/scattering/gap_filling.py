@@ -7,7 +7,7 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.neighbors import FacingTree
+from decals.scattering.neighbors import FacingTree, NearestFacing
 
 SAMPLES_PER_PARTICLE = 24
 """Samples for each particle among which gaps are looked for."""
@@ -128,7 +128,8 @@ def center_outsized(
 
     movable = movable.copy()
     decals = aim(centers)
-    radii, owners = _cells(decals, samples)
+    nearest = NearestFacing(samples.positions, samples.normals)
+    radii, owners = _cells(decals, nearest)
     for _ in range(CENTERING_ROUNDS):
         rows = np.flatnonzero(movable & (radii > OUTSIZED * np.median(radii)))
         if len(rows) == 0:
@@ -145,25 +146,24 @@ def center_outsized(
         count = min(NEIGHBORS, len(centers))
         around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
         turned = aim(trial)
-        after = _cells(turned, samples)
+        after = _cells(turned, nearest)
         worse = after[0][around].max(axis=1) >= radii[around].max(axis=1)
         if worse.any():
             back = rows[worse]
             movable[back] = False
             positions[back], normals[back] = centers.positions[back], centers.normals[back]
             turned = aim(trial)
-            after = _cells(turned, samples)
+            after = _cells(turned, nearest)
         centers, decals, (radii, owners) = trial, turned, after
     return decals
 
 
-def _cells(decals: OrientedPoints, samples: OrientedPoints) -> tuple[Float64Array, Int64Array]:
+def _cells(decals: OrientedPoints, nearest: NearestFacing) -> tuple[Float64Array, Int64Array]:
     """Return the distance of each decal's farthest sample, and the decal nearest to each sample."""
-    tree = FacingTree(decals.positions, decals.normals)
-    distances, indices = tree.nearest(samples.positions, samples.normals)
-    radii, owners = np.zeros(len(decals)), indices[:, 0]
+    distances, owners = nearest.of(decals.positions, decals.normals)
+    radii = np.zeros(len(decals))
     owned = owners >= 0
-    np.maximum.at(radii, owners[owned], distances[owned, 0])
+    np.maximum.at(radii, owners[owned], distances[owned])
     return radii, owners
 
 

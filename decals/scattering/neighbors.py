@@ -217,6 +217,49 @@ class FacingTree:
         return distances, indices
 
 
+class NearestFacing:
+    """Finds the nearest facing centre of each of many fixed points, again while some centres change.
+
+    Parameters
+    ----------
+    positions, normals
+        The fixed points, ``float32[m, 3]`` each.
+    """
+
+    def __init__(self, positions: Float32Array, normals: Float32Array) -> None:
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+        self._positions, self._normals = positions, normals
+        self._tree = cKDTree(positions)
+        self._centers = self._center_normals = np.zeros((0, 3), np.float32)
+        self._distances, self._indices = np.zeros(0), np.zeros(0, np.int64)
+
+    def of(self, centers: Float32Array, normals: Float32Array) -> tuple[Float64Array, Int64Array]:
+        """Return distance and index of the nearest facing centre of each point; infinity and -1 for none."""
+        rows = self._outdated(centers, normals)
+        tree = FacingTree(centers, normals)
+        found, which = tree.nearest(self._positions[rows], self._normals[rows])
+        self._distances[rows], self._indices[rows] = found[:, 0], which[:, 0]
+        self._centers, self._center_normals = centers, normals
+        return self._distances.copy(), self._indices.copy()
+
+    def _outdated(self, centers: Float32Array, normals: Float32Array) -> Int64Array:
+        """Return the points whose nearest centre changed, or is farther than a changed one may be."""
+        count = len(self._positions)
+        if len(centers) != len(self._centers):
+            self._distances, self._indices = np.full(count, np.inf), np.full(count, -1, np.int64)
+            return np.arange(count)
+        changed = ((centers != self._centers) | (normals != self._center_normals)).any(axis=1)
+        owned = self._indices >= 0
+        outdated = ~owned | (owned & changed[self._indices])
+        if changed.any():
+            reach = 2.0 * float(np.median(self._distances[owned])) if owned.any() else 0.0
+            outdated |= self._distances > reach
+            near = self._tree.query_ball_point(centers[changed], reach, workers=_workers(int(changed.sum())))
+            outdated[np.concatenate([np.asarray(rows, np.int64) for rows in near])] = True
+        return np.flatnonzero(outdated)
+
+
 def _workers(points: int) -> int:
     return -1 if points >= MIN_PARALLEL_QUERIES else 1
 

@@ -15,7 +15,7 @@ from decals.field.radial import TOP_MARGIN
 from decals.model import FACING_LIMIT
 from decals.record import MIN_KEPT_RADIUS
 from decals.scattering.domain import OrientedPoints
-from decals.scattering.neighbors import FacingTree
+from decals.scattering.neighbors import FacingTree, NearestFacing
 from decals.surfaces.surface import unit_rows
 
 RADIUS_MARGIN = 0.03
@@ -138,7 +138,11 @@ Shade: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 
 
 def turned_normals(
-    decals: OrientedPoints, own: Float32Array, samples: OrientedPoints, radii: Float64Array
+    decals: OrientedPoints,
+    own: Float32Array,
+    samples: OrientedPoints,
+    nearest: NearestFacing,
+    radii: Float64Array,
 ) -> Float32Array:
     """Return the normals of decals, turned toward lips and away from surface behind walls, ``float32[n, 3]``.
 
@@ -158,21 +162,21 @@ def turned_normals(
         Normals of the surfaces at the centres, ``float32[n, 3]``.
     samples
         Points spread evenly over the area to cover.
+    nearest
+        Finds the decals nearest to the samples.
     radii
         Expected radius of each decal, ``float64[n]``.
     """
     normals = decals.normals.astype(np.float64)
     changed = np.zeros(len(decals), np.bool_)
-    tree = FacingTree(decals.positions, decals.normals)
-    distances, indices = tree.nearest(samples.positions, samples.normals)
-    facing, owners = distances[:, 0], indices[:, 0]
+    facing, owners = nearest.of(decals.positions, decals.normals)
     owned = owners >= 0
     lips = np.flatnonzero(owned & (facing > LIP_RATIO * radii[owners]))
     if len(lips):
         from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
 
-        nearest, rows = cKDTree(decals.positions).query(samples.positions[lips])
-        close = nearest < LIP_NEARNESS * facing[lips]
+        distances, rows = cKDTree(decals.positions).query(samples.positions[lips])
+        close = distances < LIP_NEARNESS * facing[lips]
         lips, rows = lips[close], rows[close]
         toward = unit_rows(_sums(samples.normals[lips], rows, len(decals))).astype(np.float64)
         turned = unit_rows(toward + normals).astype(np.float64)
@@ -459,13 +463,14 @@ class _OwnedPoints:
         order = np.lexsort((-shares[rows], *places.T))
         return self[rows[order[_firsts(places[order])]]]
 
-    def joined(self, other: "_OwnedPoints") -> "_OwnedPoints":
-        """Return the points of both."""
+    def joined(self, *others: "_OwnedPoints") -> "_OwnedPoints":
+        """Return the points of all."""
+        parts = (self, *others)
         return _OwnedPoints(
-            OrientedPoints.joined([self.points, other.points]),
-            np.concatenate([self.lengths, other.lengths]),
-            np.concatenate([self.distances, other.distances]),
-            np.concatenate([self.decals, other.decals]),
+            OrientedPoints.joined([part.points for part in parts]),
+            np.concatenate([part.lengths for part in parts]),
+            np.concatenate([part.distances for part in parts]),
+            np.concatenate([part.decals for part in parts]),
             self.centers,
         )
 
@@ -574,6 +579,9 @@ def _close_gaps(
     Growth moves the cells of other decals, so all points near decals that grew are searched around again.
     """
     every, grown = owned, np.ones(len(radii), np.bool_)
+    if speck > 0.0:  # all other points were searched with less tolerance
+        grown[:] = False
+        grown[owned.decals[owned.shares(radii) > 1.0 + speck]] = True
     for _ in range(MAX_REPEATS):
         before = radii.copy()
         near = every[np.flatnonzero(grown[every.decals].any(axis=1))]
@@ -594,21 +602,32 @@ def _search_gaps(
     sample_distance: float,
     rng: np.random.Generator,
 ) -> _OwnedPoints:
-    """Grow radii, up to limits, until rounds of searches around points find no bare one; return the last."""
-    clean = 0
+    """Grow radii, up to limits, until searches around points find no bare one; return all points of the last.
+
+    Points whose nearest decals have not grown for `CLEAN_SEARCHES` of the last rounds are not searched again.
+    """
+    finest = len(SEARCHES) - 1
+    changed = np.full(len(radii), finest)  # first round after each decal's last growth
+    done: list[_OwnedPoints] = []
     for turn in range(MAX_SEARCHES):
-        spread, share, count = SEARCHES[min(turn, len(SEARCHES) - 1)]
+        spread, share, count = SEARCHES[min(turn, finest)]
         owned = owned.risky(radii, share, CUBE * sample_distance)
+        latest = np.where(owned.decals >= 0, changed[owned.decals], 0).max(axis=1, initial=0)
+        settled = turn - latest >= CLEAN_SEARCHES
+        done.append(owned[np.flatnonzero(settled)])
+        owned = owned[np.flatnonzero(~settled)]
+        if len(owned.points) == 0:
+            break
         trials = _random_points_around(owned.points, count, spread * sample_distance, rng)
         owned = owned.joined(find(OrientedPoints.joined([trials, _power_corners(owned, radii)])))
-        clean = 0 if _cover(radii, owned, limits, speck) else clean + 1
-        if turn >= len(SEARCHES) - 1 and clean >= CLEAN_SEARCHES:
-            break
-    return owned
+        before = radii.copy()
+        _cover(radii, owned, limits, speck)
+        changed[radii > before] = max(turn + 1, finest)
+    return owned.joined(*done)
 
 
-def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck: float) -> bool:
-    """Grow, for every bare point, the decal that must grow least to own and reach it; return True for any.
+def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck: float) -> None:
+    """Grow, for every bare point, the decal that must grow least to own and reach it.
 
     Growth counts more where the length along the surface exceeds the distance: a decal that bends over an
     edge gains more such points with every growth.
@@ -628,9 +647,7 @@ def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck
     factors[possible] = bends * (needed / radii[bare.decals])[possible]
     best = factors.argmin(axis=1)
     rows = np.flatnonzero(possible.any(axis=1))
-    before = radii.copy()
     np.maximum.at(radii, bare.decals[rows, best[rows]], needed[rows, best[rows]])
-    return bool((radii > before).any())
 
 
 def _power_corners(owned: _OwnedPoints, radii: Float64Array) -> OrientedPoints:

@@ -12,7 +12,7 @@ from blobtree._typing import Float32Array
 from blobtree.device import launch
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.neighbors import FacingTree, NeighborQuery, index_array
+from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery, index_array
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.polish import polish
 from decals.scattering.relaxation import Relaxation
@@ -21,6 +21,7 @@ from decals.scattering.repulsion import CORE, CUTOFF, Law
 from decals.scattering.repulsion_kernels import CLOSEST
 from decals.scattering.search_kernels import Candidates, ChoiceRule, move_to_best
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.surface import unit_rows
 from tests.decals.meshes import box, plane, sphere, star
 from tests.decals.scattering.evaluation import device_particles
 from tests.oracles.repulsion import rings, total_energy
@@ -218,3 +219,17 @@ def test_missing_neighbors_are_infinitely_far() -> None:
     assert indices.tolist() == [[0, -1, -1]]
     assert FacingTree(spot, up).nearest(spot, down)[1].tolist() == [[-1]]
     assert FacingTree(spot[:0], up[:0]).nearest(spot, up)[1].tolist() == [[-1]]
+
+
+def test_the_nearest_facing_centres_are_right_after_every_change() -> None:
+    rng = np.random.default_rng(3)
+    points, centers = (unit_rows(rng.normal(size=(count, 3))) for count in (2000, 150))
+    normals, nearest = centers, NearestFacing(points, points)
+    for _ in range(6):
+        expected = FacingTree(centers, normals).nearest(points, points)
+        for found, exact in zip(nearest.of(centers, normals), expected, strict=True):
+            np.testing.assert_array_equal(found, exact[:, 0])
+        rows = rng.integers(0, len(centers), 4)
+        centers, normals = centers.copy(), normals.copy()
+        centers[rows] = unit_rows(centers[rows] + rng.normal(0.0, 0.3, (4, 3)))
+        normals[rows[1:]] = unit_rows(normals[rows[1:]] + rng.normal(0.0, 0.5, (3, 3)))
